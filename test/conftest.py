@@ -213,7 +213,7 @@ def filter_failures() -> Iterator[list[str]]:
     from wheel_terra_estimator.estimation.output_guard import OutputGuard
 
     found: list[str] = []
-    repaired, keep_sound = OutputGuard.repaired, GatedFilter._keep_sound
+    repaired, enforce_bounds = OutputGuard.repaired, GatedFilter._enforce_bounds
 
     def watched_repaired(self: OutputGuard, stamp: int, outcome: Any) -> Any:
         result = repaired(self, stamp, outcome)
@@ -221,15 +221,15 @@ def filter_failures() -> Iterator[list[str]]:
             found.append(repr(outcome) if isinstance(outcome, Exception) else 'not a number')
         return result
 
-    def watched_keep_sound(self: GatedFilter) -> None:
+    def watched_enforce_bounds(self: GatedFilter) -> None:
         before = self.restarts
-        keep_sound(self)
+        enforce_bounds(self)
         if self.restarts > before:
             found.append('mean or covariance not a number')
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(OutputGuard, 'repaired', watched_repaired)
-        patch.setattr(GatedFilter, '_keep_sound', watched_keep_sound)
+        patch.setattr(GatedFilter, '_enforce_bounds', watched_enforce_bounds)
         yield found
 
 

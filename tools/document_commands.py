@@ -8,6 +8,8 @@ python tools/document_commands.py
 from __future__ import annotations
 
 import argparse
+import functools
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -35,7 +37,8 @@ Options: `wheel-terra COMMAND --help-all`.
 
 def page() -> str:
     """Return the page as Markdown."""
-    lines = [_INTRODUCTION]
+    lines = [_INTRODUCTION, '| in many commands (see `--help`) | meaning |', '|---|---|']
+    lines += [*_common().values(), '']
     others = []
     for name, parser in sub_parsers().items():
         if name in LABORATORY:
@@ -46,6 +49,19 @@ def page() -> str:
     return '\n'.join(lines).rstrip() + '\n'
 
 
+@functools.cache
+def _common() -> dict[str, str]:
+    """Return the rows that stand in three commands or more."""
+    rows = [
+        row
+        for name, parser in sub_parsers().items()
+        if name not in LABORATORY
+        for action in parser._actions
+        if action.dest != 'overwrite' and action.option_strings and (row := _row(action))
+    ]
+    return {row: row for row, count in Counter(rows).items() if count > 2}
+
+
 def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
     yield f'{"#" * depth} `{title}`\n'
     yield f'{_sentence(parser.description or "")}\n'
@@ -53,7 +69,7 @@ def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
         examples = [line.strip() for line in parser.epilog.splitlines()[1:]]
         yield '\n'.join(['```sh', *examples, '```\n'])
     for group, actions in parser.groups().items():
-        rows = [row for action in actions if (row := _row(action))]
+        rows = [row for action in actions if (row := _row(action)) and row not in _common()]
         if rows:
             yield '\n'.join([f'| {group} | meaning |', '|---|---|', *rows, ''])
     for action in parser._actions:
@@ -67,7 +83,7 @@ def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
 def _row(action: argparse.Action) -> str:
     if isinstance(action, argparse._SubParsersAction | argparse._HelpAction):
         return ''
-    if action.dest == 'debug' or action.help == argparse.SUPPRESS:
+    if action.dest in ('debug', 'help_all') or action.help == argparse.SUPPRESS:
         return ''
     value = ''
     if action.nargs != 0:

@@ -78,10 +78,8 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         '<!-- Written by `python tools/document_effects.py`; do not edit. -->',
         '',
         'Every physical or instrument effect that the models know. Each is off unless a model file '
-        'switches it on (`effects.<name>.enabled: true`); the same terms then run in the reference '
-        'quadrature, in the closed form and in the filter. Where an effect has several forms, '
-        '`effects.<name>.form` chooses one. A figure shows what the first parameter '
-        'does to a wheel of 157 mm radius with 10 mm lugs under 80 N in HIT-LSS1 sand.',
+        'has `effects.<name>.enabled: true`; `effects.<name>.form` chooses one of its forms. '
+        'Figures: first parameter, wheel of 157 mm radius with 10 mm lugs, 80 N, HIT-LSS1 sand.',
         '',
         '| effect | stands for | touches |',
         '|---|---|---|',
@@ -93,16 +91,17 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         lines += ['', f'## {effect.name}', '']
         for form in effect.forms:
             if several:
-                first = ' (the first one, without a key)' if form is effect.forms[0] else ''
+                first = ' (default)' if form is effect.forms[0] else ''
                 lines += [f'**`form: {form.form}`**{first}', '']
             lines += [f'{form.claim[0].upper()}{form.claim[1:]}.', '', f'    {form.symbol}', '']
             lines += _law_table() if form.sparse else _parameter_table(form)
-            lines.append(f'- Touches: {touched(form)}.')
+            if form.touches != effect.touches:
+                lines.append(f'- Touches: {touched(form)}.')
             if form.needs:
-                lines.append(f'- Needs to vary in a table: {", ".join(form.needs)}.')
+                lines.append(f'- Must vary in a table: {", ".join(form.needs)}.')
             lines += [f'- Valid: {form.validity}.', f'- Source: {form.source}.', '']
         for other, separates in effect.confounded_with.items():
-            lines.append(f'- Nearly the same as `{other}`; what separates them: {separates}.')
+            lines.append(f'- Confounded with `{other}`; separated by: {separates}.')
         if effect.incompatible_with:
             lines.append(f'- Not together with: {", ".join(sorted(effect.incompatible_with))}.')
         lines += [f'- {text[0].upper()}{text[1:]}.' for text in left_aside(effect)]
@@ -128,9 +127,12 @@ def _law_table() -> list[str]:
     lines += ['', '| feature | value | varies with |', '|---|---|---|']
     for name, feature in law.FEATURES.items():
         columns = ', '.join(feature.columns) or '-'
-        only = f' ({", ".join(f"`{t}`" for t in feature.targets)} only)' if feature.targets else ''
+        targets = ', '.join(f'`{t}`' for t in feature.targets)
+        only = ' \\*' if '_times_' in name else f' ({targets} only)' if targets else ''
         lines.append(f'| `{name}` | {feature.meaning.replace("|", "&#124;")}{only} | {columns} |')
-    return [*lines, '']
+    products = {f.targets for name, f in law.FEATURES.items() if '_times_' in name}
+    (targets,) = products  # all the same
+    return [*lines, '', f'\\* {", ".join(f"`{t}`" for t in targets)} only', '']
 
 
 def _parameter_table(form: Effect) -> list[str]:

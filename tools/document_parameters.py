@@ -17,21 +17,9 @@ _INTRODUCTION = """# Parameters
 
 Written by `python tools/document_parameters.py` from the declared table; do not edit.
 
-Every file is a ROS parameter file, the same for the node (`--params-file F`) and the commands
-(`--config F`, a path or the bare name of a shipped file, several times; later files win key by
-key; `-p NAME:=VALUE` wins over files):
-
-    /**:
-      ros__parameters:
-        wheels:
-          names: [left_wheel, right_wheel]
-          radius: [0.12, 0.12]
-        rover.mass: 20.0
-
-Keys may be nested or dotted. Only scalars and flat lists of one type; no null, no empty list. An
-integer will do where a number is wanted, though not inside a list of numbers (`[0.0, 0.5]`, not
-`[0, 0.5]`: ROS refuses mixed lists). Unknown keys are errors. A per-wheel list has one entry for
-each of `wheels.names`, in that order.
+Keys of [configuration files](configuration.md). A list per wheel has one entry for each of
+`wheels.names`, in that order. An integer will do where a number is wanted, though not inside a list
+(`[0.0, 0.5]`, not `[0, 0.5]`: ROS refuses mixed lists).
 """
 
 _SECTIONS = {
@@ -41,6 +29,13 @@ _SECTIONS = {
     'soil': 'Soil',
     'sensors': 'Sensors',
     'filter': 'Filter',
+}
+_SIGNS = {
+    'at least ': '≥ ',
+    ' and at most ': ', ≤ ',
+    'at most ': '≤ ',
+    'above ': '> ',
+    ' and below ': ', < ',
 }
 _EFFECTS = """## Effects
 
@@ -74,7 +69,16 @@ def _row(parameter: Parameter) -> str:
     if parameter.aliases:
         meaning += ' (also ' + ', '.join(f'`{alias}`' for alias in parameter.aliases) + ')'
     unit = parameter.unit if parameter.unit not in ('', '-') else ''
-    return f'| `{parameter.key}` | {default} | {unit} | {parameter.allowed} | {meaning} |'
+    return (
+        f'| `{parameter.key}` | {default} | {unit} | {_in_short(parameter.allowed)} | {meaning} |'
+    )
+
+
+def _in_short(allowed: str) -> str:
+    """Return what is allowed, with signs in place of words."""
+    for words, sign in _SIGNS.items():
+        allowed = allowed.replace(words, sign)
+    return allowed
 
 
 if __name__ == '__main__':

@@ -59,7 +59,7 @@ def report_head() -> None:
 
 
 def blind_trial() -> None:
-    """Hide, diagnose blind, open the seal, draw."""
+    """Hide, diagnose blind, compare, draw."""
     from matplotlib import pyplot
 
     folder = demo_recording('trial')

@@ -31,7 +31,7 @@ _OF_THE_MACHINE = frozenset(
 
 
 class UserError(Exception):
-    """Input that cannot be used: one line that names file, key or row, and the cure.
+    """Input that cannot be used: one line that names file, key or row, and the remedy.
 
     Commands print it on standard error and exit with status 2; the node logs it and ends.
     """

@@ -379,13 +379,13 @@ class CannotWriteError(UserError):
 def cannot_write(path: Path, error: OSError) -> CannotWriteError:
     """Return the one line for an error of the disk."""
     reason = error.strerror or str(error) or type(error).__name__
-    cure = {
+    remedy = {
         errno.ENOSPC: '; free some space',
         errno.EDQUOT: '; free some space',
         errno.EROFS: '; choose another place',
         errno.EACCES: '; choose another place',
     }.get(error.errno or 0, '')
-    return CannotWriteError(f'{path}: cannot be written ({reason}){cure}')
+    return CannotWriteError(f'{path}: cannot be written ({reason}){remedy}')
 
 
 def refuse_inputs(path: Path, inputs: Iterable[Path]) -> None:

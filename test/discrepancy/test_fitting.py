@@ -49,7 +49,7 @@ def test_a_cell_set_apart_is_the_evidence_of_its_wider_noise(rng):
     problem = SimpleNamespace(
         size=size, std=np.full(size, std), row=np.arange(size), quantity=np.zeros(size, int)
     )
-    score, cells = outliers._set_apart(problem, np.linalg.inv(covariance), target)
+    score, cells = outliers._rejected_cells(problem, np.linalg.inv(covariance), target)
     assert [cell[0] for cell in cells] == [4]
     wider = covariance.copy()
     wider[4, 4] = 0.3 + (outliers.OUTLIER_FACTOR * std) ** 2

@@ -38,7 +38,7 @@ from wheel_terra_estimator.discrepancy.report.words import _repeatability
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import confidence
 from wheel_terra_estimator.discrepancy.selection import significance as gap_test
-from wheel_terra_estimator.discrepancy.selection.verdict import _rivals
+from wheel_terra_estimator.discrepancy.selection.verdict import _competitors
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
@@ -242,7 +242,7 @@ def test_a_cell_that_the_model_takes_whole_is_no_outlier(setting):
     target = np.zeros(problem.size)
     target[3] = 9.0 * problem.std[3]
     with np.errstate(all='raise'):
-        _, found = outliers._set_apart(problem, inverse, target)
+        _, found = outliers._rejected_cells(problem, inverse, target)
     assert [cell[:2] for cell in found] == [(problem.row[3], problem.quantity[3])]
 
 
@@ -420,7 +420,7 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
 
 
 def test_a_rival_explains_more_than_an_empty_place():
-    """By a nat: evidence of nothing 0, so that 2 is a rival and 0 is none."""
+    """By a nat: evidence of nothing 0, so that 2 is a competitor and 0 is none."""
     names = ((), ('lug_support',), ('multipass',), ('cohesion',))
     evidence = (0.0, 5.0, 2.0, 0.0)
     selection = SimpleNamespace(
@@ -429,7 +429,7 @@ def test_a_rival_explains_more_than_an_empty_place():
         ]
     )
     total = np.full(4, 1.0)  # alike otherwise
-    assert set(_rivals(selection, total, ('lug_support',), 'lug_support')) == {'multipass'}
+    assert set(_competitors(selection, total, ('lug_support',), 'lug_support')) == {'multipass'}
 
 
 def test_an_error_that_a_good_model_may_have_is_smaller_than_one_that_asks_for_a_name():

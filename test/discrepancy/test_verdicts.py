@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""No agreement beside a misfit, no rival that is none, no effect passed over in silence."""
+"""No agreement beside a misfit, no competitor that is none, no effect passed over in silence."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ def test_thrust_of_grousers_at_its_usual_share_is_named_without_being_asked_for(
     table, values = with_effect('lugs48', 6, 'grouser_thrust')
     found = run(table, values)
     assert [effect.name for effect in found.effects] == ['grouser_thrust']
-    rivals = found.effects[0].confounded_with
+    competitors = found.effects[0].confounded_with
     by_name = {candidate.names: candidate for candidate in found.candidates}
-    for rival in rivals:
-        # What is no better than the soil alone is no rival.
-        assert by_name[(rival,)].log_evidence > 1.0
+    for competitor in competitors:
+        # What is no better than the soil alone is no competitor.
+        assert by_name[(competitor,)].log_evidence > 1.0
 
 
 def test_every_effect_is_named_tried_or_said_not_to_be():

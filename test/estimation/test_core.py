@@ -192,7 +192,7 @@ def test_a_step_that_fails_before_its_set_is_told_with_the_set():
         for i in range(21):
             sets += core.add(odometry(0.1 * i, rate=9.0 if i == 7 else 1.0))
             if settled:
-                core.settle()
+                core.process_pending()
         assert core.health()['filter_restarts'] == 1
         told.append(
             [(*found, sorted(s.faults)) for found, s in zip(essence(sets), sets, strict=True)]

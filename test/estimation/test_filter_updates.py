@@ -11,13 +11,13 @@ from wheel_terra_estimator.estimation.contacts.linearisation import Linearisatio
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
 from wheel_terra_estimator.estimation.contacts.steering import straight_headings
+from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import (
     ReferenceUpdate,
 )
-from wheel_terra_estimator.estimation.filter.repetition import repetitions
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate, SinkageUpdateTuning
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
@@ -68,7 +68,7 @@ def references(parts, ekf, speeds, held=None):
     update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
     opened = []
     for i, speed in enumerate(speeds):
-        ekf.widen(SPEED, 1e-8)
+        ekf.inflate(SPEED, 1e-8)
         if held is not None:
             ekf.set(SPEED, held, 1e-8)
         opened.append(
@@ -120,7 +120,7 @@ def test_models_are_doubted_while_the_references_keep_to_one_side(parts, ekf):
     for name, values in speeds.items():
         fresh = parts.filter()
         fresh.set(SPEED, 0.045, 1e-8)
-        doubt[name] = references(parts, fresh, values)[0].model_doubt
+        doubt[name] = references(parts, fresh, values)[0].model_variance_factor
     assert doubt['one side'] > 5.0
     assert doubt['white'] < 2.0
 
@@ -129,7 +129,7 @@ def test_models_are_doubted_where_a_small_lean_lasts(parts):
     """Half a deviation to one side: within what six references scatter, no chance over sixty."""
     noise = 0.003 * (-1.0) ** np.arange(60)
     lean, white = (
-        references(parts, parts.filter(), 0.045 + by + noise, held=0.045)[0].model_doubt
+        references(parts, parts.filter(), 0.045 + by + noise, held=0.045)[0].model_variance_factor
         for by in (0.0015, 0.0)
     )
     assert lean > 10.0 > 2.0 > white
@@ -518,9 +518,9 @@ def test_the_balance_of_forces_on_a_slope(parts, ekf):
 
 
 def test_cycles_that_see_the_same_ground_are_one_piece_of_information():
-    assert repetitions(FORWARD, 0.1) == pytest.approx(0.15 / 0.005)
-    assert repetitions((1.5, NAN), 0.2) == 1.0
-    assert repetitions((0.0,) * 4, 0.1) == 100.0
+    assert correlated_cycles(FORWARD, 0.1) == pytest.approx(0.15 / 0.005)
+    assert correlated_cycles((1.5, NAN), 0.2) == 1.0
+    assert correlated_cycles((0.0,) * 4, 0.1) == 100.0
 
 
 def test_what_is_not_seen_is_considered_and_not_learned(parts):

@@ -14,9 +14,9 @@ from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.smoothing.backward import smoothed_states
+from wheel_terra_estimator.estimation.smoothing.disk_buffer import DiskBuffer
+from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
-from wheel_terra_estimator.estimation.smoothing.spool import Spool
-from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
 from wheel_terra_estimator.estimation.smoothing.window import Moment, centred
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
@@ -36,8 +36,8 @@ def test_a_linear_drive_smoothed_is_its_least_squares_solution():
     F = np.array([[1.0, 0.1, 0.0], [0.0, 0.95, 0.05], [0.0, 0.0, 1.0]])
     Q = np.diag([0.01, 0.02, 0.005])
     ekf = GatedFilter(start, spread, -bound, bound)
-    ekf.tape = tape = Tape()
-    tape.mark(0, Gaussian(ekf.mean, ekf.covariance))
+    ekf.buffer = buffer = HistoryBuffer()
+    buffer.mark(0, Gaussian(ekf.mean, ekf.covariance))
     rows, values = [], []
 
     def add(step, matrix, value, before=None):
@@ -53,21 +53,21 @@ def test_a_linear_drive_smoothed_is_its_least_squares_solution():
         noise = Q.copy()
         ekf.predict(F @ ekf.mean, F, Q)
         if step == WIDENED_AT:
-            ekf.widen(1, WIDENING)
+            ekf.inflate(1, WIDENING)
             noise[1, 1] += WIDENING
         add(step, whitened(noise), np.zeros(SIZE), -whitened(noise) @ F)
         H, z = rng.normal(size=(1, SIZE)), rng.normal(size=1)
         if step % 3:
             ekf.update(z - H @ ekf.mean, H, np.array([NOISE]))
             add(step, H / np.sqrt(NOISE), z / np.sqrt(NOISE))
-        tape.mark(step, Gaussian(ekf.mean, ekf.covariance))
+        buffer.mark(step, Gaussian(ekf.mean, ekf.covariance))
     system = np.vstack(rows)
     covariance = np.linalg.inv(system.T @ system)
     solution = covariance @ system.T @ np.concatenate(values)
-    states = list(smoothed_states(tape, -bound, bound))[::-1]
-    assert len(states) == len(tape) + 1
-    for index in range(len(tape.marks)):
-        step, state = tape.marks[index].content, states[tape.marks[index].position]
+    states = list(smoothed_states(buffer, -bound, bound))[::-1]
+    assert len(states) == len(buffer) + 1
+    for index in range(len(buffer.marks)):
+        step, state = buffer.marks[index].content, states[buffer.marks[index].position]
         part = slice(SIZE * step, SIZE * (step + 1))
         np.testing.assert_allclose(state.mean, solution[part], atol=1e-10)
         np.testing.assert_allclose(state.covariance, covariance[part, part], atol=1e-10)
@@ -190,15 +190,21 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
 
 
 def test_a_spool_forgets_what_is_wound_back():
-    spool = Spool()
+    disk_buffer = DiskBuffer()
     for item in range(10):
-        spool.append((item, np.full(item, item)))
-    spool.truncate(4)
-    assert len(spool) == 4 and spool[3][0] == 3
-    spool.append('next')
-    assert [spool[i] if i > 3 else spool[i][0] for i in range(5)] == [0, 1, 2, 3, 'next']
+        disk_buffer.append((item, np.full(item, item)))
+    disk_buffer.truncate(4)
+    assert len(disk_buffer) == 4 and disk_buffer[3][0] == 3
+    disk_buffer.append('next')
+    assert [disk_buffer[i] if i > 3 else disk_buffer[i][0] for i in range(5)] == [
+        0,
+        1,
+        2,
+        3,
+        'next',
+    ]
     with pytest.raises(IndexError):
-        spool[5]
+        disk_buffer[5]
 
 
 def moment(time, value, rim=0.1):

@@ -159,11 +159,11 @@ def test_a_reversal_carries_the_slip_over_by_what_is_asked_less():
     """
     made, ekf = process([0.05] * 6, ratio=0.8), Parts(reader.load(SAND)).filter()
     ekf.set(SLIP_PER_DEMAND, 1.5, 0.5**2)
-    made.turn_back(ekf, before=0.1, now=-0.1)
+    made.reverse_direction(ekf, before=0.1, now=-0.1)
     assert made.state.ratio == pytest.approx(1.05)
     assert made.state.ratio_std == pytest.approx(np.hypot(0.1, 0.5 * 0.2))
     # Up again, on a steeper slope: as on the way up before, and slip for what is asked more.
-    made.turn_back(ekf, before=-0.1, now=0.14)
+    made.reverse_direction(ekf, before=-0.1, now=0.14)
     assert made.state.ratio == pytest.approx(1.0 - 0.5 * (0.2 + 1.5 * 0.04))
 
 
@@ -208,7 +208,9 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
     length = SpeedTuning().usual_length
 
     def after(travel):
-        return made.towards_usual_slip(free, travel / rim, rim, direction=1.0, slope_share=0.0)
+        return made.towards_equilibrium_slip(
+            free, travel / rim, rim, direction=1.0, slope_share=0.0
+        )
 
     assert after(length).speed_gain == pytest.approx(np.exp(-1.0))
     usual = after(1e3 * length).constant
@@ -228,12 +230,12 @@ def test_wheels_alone_say_nothing_of_the_accelerometers_zero(before):
     ('speed', 'kept'),
     [(0.0, False), (0.8 * 0.06 * 0.95, True), (0.8 * 0.06 * 1.05, True), (0.4, True)],
 )
-def test_a_jolt_at_a_start_is_undone_and_nothing_else(speed, kept):
-    """Far from what the wheels say, by less than the accelerometer's noise: that is a jolt."""
+def test_a_start_up_transient_is_removed_and_nothing_else(speed, kept):
+    """Far from the wheels, by less than the accelerometer's noise: a start-up transient."""
     made = process([0.06] * 6)
     ekf = Parts(reader.load(SAND)).filter()
     ekf.set(SPEED, speed, 1e-6)
-    made.undo_jolt(ekf, 0.06)
+    made.remove_start_transient(ekf, 0.06)
     expected = speed if kept else 0.8 * 0.06
     assert ekf.mean[SPEED] == pytest.approx(expected)
 

@@ -190,7 +190,7 @@ def test_steps_made_before_a_set_asks_for_them_change_no_number(data):
     for measurement in arriving(stream, delays):
         sets += core.add(measurement)
         if data.draw(st.booleans()):
-            core.settle()
+            core.process_pending()
     assert essence(sets + core.flush()) == expected
 
 
@@ -202,7 +202,7 @@ def test_a_late_input_that_was_settled_costs_the_next_set_one_step():
         core.add(sinkage(1.87))
         core.add(reference(1.95))
         if settled:
-            core.settle()
+            core.process_pending()
         before = fake.steps
         assert len(core.add(odometry(2.0))) == 1
         steps.append(fake.steps - before)

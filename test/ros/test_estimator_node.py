@@ -72,7 +72,7 @@ class TestOneNode:
         node, until = listener
         diagnostics = hear(node, DiagnosticArray, '/diagnostics')
         until(lambda: diagnostics)
-        until(lambda: 'never heard' in diagnostics[-1].status[0].message)
+        until(lambda: 'never received' in diagnostics[-1].status[0].message)
         statuses = diagnostics[-1].status
         assert len(statuses) == 5, 'one per wheel and one for the node'
         assert all(s.level == DiagnosticStatus.STALE for s in statuses)
@@ -175,7 +175,9 @@ def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, paramete
         return any(words in m.status[0].message for m in diagnostics)
 
     until(
-        lambda: said('wheel rates unknown') and said('/drive/joints: never heard (no publishers)')
+        lambda: (
+            said('wheel rates unknown') and said('/drive/joints: never received (no publishers)')
+        )
     )
     assert 'listening to /drive/joints, /imu/data' in process.stop(signal.SIGTERM)[1]
 

@@ -133,4 +133,4 @@ def test_a_node_without_inputs_waits_at_first_and_warns_then(drive):
     said, _ = process.communicate(60.0)
     waits, _, warns = said.partition('[WARN]')
     assert 'waiting for /joint_states, /imu/data' in waits
-    assert 'never heard' in warns
+    assert 'never received' in warns

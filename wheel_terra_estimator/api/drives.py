@@ -94,7 +94,7 @@ def estimate(
     Raises
     ------
     UserError
-        For input that cannot be used: file, column or key, and the cure.
+        For input that cannot be used: file, column or key, and the remedy.
 
     Examples
     --------

@@ -67,7 +67,7 @@ def diagnose(
     Raises
     ------
     UserError
-        For input that cannot be used, with row or column and the cure.
+        For input that cannot be used, with row or column and the remedy.
 
     Examples
     --------

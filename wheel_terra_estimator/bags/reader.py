@@ -160,12 +160,12 @@ class MeasurementReader:
             and not topic.name.startswith(NO_INPUTS)
             and topic.name not in others
         ]
-        cure = f'name the right one with --remap {name}:={fitting[0] if fitting else "/TOPIC"}'
+        remedy = f'name the right one with --remap {name}:={fitting[0] if fitting else "/TOPIC"}'
         if name == 'joint_states' and not fitting:
             odometry = [t.name for t in there if t.type == INPUT_TYPES['odom'] and t.message_count]
             if odometry:
-                cure = f'use -p wheel_odometry:=odom --remap odom:={odometry[0]}'
-        return f'there are: {listed}; {cure}'
+                remedy = f'use -p wheel_odometry:=odom --remap odom:={odometry[0]}'
+        return f'there are: {listed}; {remedy}'
 
     def _check_wheel_names(self) -> None:
         """Make sure that some joint message holds a wheel, before anything is written."""

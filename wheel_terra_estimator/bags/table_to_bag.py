@@ -112,7 +112,7 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
     Raises
     ------
     UserError
-        Map or table cannot be used; names file, row, column and cure.
+        Map or table cannot be used; names file, row, column and remedy.
     """
     with open_csv(table) as file:
         layout = _read_map(columns, file.header, table)

@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     text = as_file(calibration, configuration, name)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(text, encoding='utf-8')
-    print(f'{name}: {len(calibration.changes)} parameters told')
+    print(f'{name}: {len(calibration.changes)} parameters identified')
     print('\n'.join(summary(calibration)))
     for note in recording.notes:
         print(f'note: {note}')

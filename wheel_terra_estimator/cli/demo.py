@@ -5,7 +5,8 @@
 The entrapment of a simulated six-wheel rover, whose ground truth is known, and a piece of a real
 drive of the Pathfinder rover. The node hears them over DDS; where there is no rclpy the same drives
 go through ``wheel-terra replay``, which gives the same numbers. The trial is a table made
-by ``wheel-terra trial``, in which an effect is hidden: it is diagnosed blind, then the seal opened.
+by ``wheel-terra trial``, in which an effect is hidden: it is diagnosed blind, then compared with
+the withheld truth.
 """
 
 from __future__ import annotations
@@ -159,22 +160,22 @@ def _trial(folder: Path) -> Part:
     command = ['wheel_terra_estimator.cli.main', 'diagnose', '--overwrite']
     command += [str(shipped / 'blind.csv'), '--config', str(shipped / 'rig.yaml')]
     status, said = _run([*command, '-o', str(folder / 'diagnosis')], ONE_THREAD)
-    return Part(status, f'blind table, truth sealed (SHA-256 {SEAL_SHA256[:16]}...)\n{said}')
+    return Part(status, f'blind table, truth withheld (SHA-256 {SEAL_SHA256[:16]}...)\n{said}')
 
 
 def _named(folder: Path) -> str:
-    """Open the seal; return whether what was named is what was hidden."""
+    """Reveal the truth; return whether what was named is what was hidden."""
     from wheel_terra_estimator.configuration.shipped import demo_recording
 
     path = demo_recording('trial') / 'sealed.json'
     sealed = path.read_bytes()
     if hashlib.sha256(sealed).hexdigest() != SEAL_SHA256:
-        raise UserError(f'{path}: the seal is broken; install the package anew')
+        raise UserError(f'{path}: its checksum is wrong; install the package anew')
     report = json.loads((folder / 'diagnosis' / 'report.json').read_text(encoding='utf-8'))
     hidden = ' + '.join(json.loads(sealed)['hidden'])
     said = ' + '.join(effect['name'] for effect in report['effects']) or report['verdict']
     judged = 'right' if said == hidden else 'wrong'
-    return f'seal opened: {hidden} was hidden; said: {said}: {judged}'
+    return f'truth revealed: {hidden} was hidden; named: {said}: {judged}'
 
 
 def _drive(number: int, output: Path, live: bool) -> Part:

@@ -41,7 +41,7 @@ COMMANDS = {
     'replay': 'run the estimator over a rosbag2, without ROS',
     'predict': 'print or draw the curves of the wheel-soil model',
     'diagnose': 'find where model and measurement disagree and name the missing effect',
-    'trial': 'hide an effect in a drawn table, diagnose it blind, open the seal',
+    'trial': 'hide an effect in a drawn table, diagnose it blind, reveal the truth',
     'effects': 'list the physical and instrument effects that can be named',
     'soilbin': 'run the virtual soil bin (discrete elements)',
     'reproduce': 'every figure, table and number of three papers beside ours, with a verdict',

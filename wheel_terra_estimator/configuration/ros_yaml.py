@@ -267,8 +267,8 @@ def _checked(value: Any, source: str) -> Value:
             raise UserError(f'{source} is a nested list; only flat lists are allowed')
     kinds = {type(item) for item in value}
     if kinds == {int, float}:
-        cure = ', '.join(format_value(float(item)) for item in value)
-        raise UserError(f'{source} mixes integers and numbers, which ROS refuses; write [{cure}]')
+        remedy = ', '.join(format_value(float(item)) for item in value)
+        raise UserError(f'{source} mixes integers and numbers, which ROS refuses; write [{remedy}]')
     if len(kinds) > 1:
         raise UserError(f'{source} mixes types in one list: {value}')
     return value

@@ -25,7 +25,7 @@ from wheel_terra_estimator.discrepancy.fitting.reference import shared_error
 from wheel_terra_estimator.discrepancy.proposal.find import (
     closed_by,
     effects_said,
-    promise_on_top,
+    gain_on_top,
     propose,
 )
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
@@ -60,10 +60,10 @@ _BEATS_LAW = 4.0
 
 @dataclass(frozen=True)
 class Naming:
-    """One named effect: its key, its rivals, how sure it is and what that was computed from."""
+    """One named effect: its key, its competitors, its confidence and what that comes from."""
 
     key: str
-    rivals: tuple[str, ...]
+    competitors: tuple[str, ...]
     confidence: Confidence
     features: Mapping[str, float]
 
@@ -117,10 +117,10 @@ def decide(
         barred = everything if len(tried) >= _MOST_TRIED else frozenset(tried)
         verdict = choose(findings.selection, variance_of, off=off, excluded=barred)
         decision = _judged(table, both, findings, verdict, allowed_error)
-        if verdict.word == 'agrees' and not off and channels_off(decision.gap):
+        if verdict.status == 'agrees' and not off and channels_off(decision.gap):
             off = True
             continue
-        if verdict.word != 'named':
+        if verdict.status != 'named':
             decision = replace(decision, doubtful=doubtful)
             return _left_open(table, both, decision, allowed_error, laws)
         tried.append(verdict.index)
@@ -131,7 +131,7 @@ def decide(
 
 
 class _Laws:
-    """The best law beside each floor: the rival of doubtful names, proposed where none is given."""
+    """The best law beside each floor: it competes with doubtful names, or is proposed."""
 
     def __init__(self, table: SteadyTable) -> None:
         self._table = table
@@ -183,7 +183,7 @@ def _left_open(
     points that they do not have, the refit without one is nearer to the truth.
     """
     findings = decision.findings
-    if decision.verdict.word not in OPEN:
+    if decision.verdict.status not in OPEN:
         return decision
     law = laws.beside(decision, decision.left.only_far)
     # Estimated noise may be next to nothing beside a few smooth rows.
@@ -245,8 +245,8 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
     """Return the named effects with their confidence; first the one that alone explains more."""
     findings, fitted, known = decision.findings, decision.after, catalogue()
     shown = _what_rows_show(findings, fitted, decision.gap)
-    promise = promise_on_top(table, findings.setting, fitted)
-    shown['law'] = float(np.log1p(max(promise, 0.0)))
+    expected_gain = gain_on_top(table, findings.setting, fitted)
+    shown['law'] = float(np.log1p(max(expected_gain, 0.0)))
     found = []
     for place, key in enumerate(fitted.names):
         values = confidences.features(findings.selection, decision.verdict, place) | shown
@@ -254,9 +254,9 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
         alike = known_alike(key, findings, known)
         values['alike'] = float(len(alike))
         alone = float(np.logaddexp.reduce(findings.selection.joint_of((key,))))
-        rivals = decision.verdict.open_sets[place]
+        competitors = decision.verdict.ambiguity_groups[place]
         sure = confidences.confidence(values, len(alike))
-        found.append((alone, Naming(key, rivals, sure, values)))
+        found.append((alone, Naming(key, competitors, sure, values)))
     return tuple(naming for _, naming in sorted(found, key=lambda item: -item[0]))
 
 

@@ -68,7 +68,7 @@ def render(
     soil = _shifts(findings, after, variance, 'soil')
     moved = (*soil, *_shifts(findings, after, variance, *setting.forward.base_effects))
     return Diagnosis(
-        verdict=decision.verdict.word,
+        verdict=decision.verdict.status,
         sentence=words.sentence(
             decision.verdict,
             effects,
@@ -132,7 +132,7 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
             for e in selection.explanations
             if len(e.names) == 1 and effect_of(e.names[0]) == name
         }
-        rivals = tuple(map(effect_of, naming.rivals))
+        competitors = tuple(map(effect_of, naming.competitors))
         found.append(
             NamedEffect(
                 name,
@@ -143,14 +143,14 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
                 },
                 naming.confidence.of_name,
                 naming.confidence.of_set,
-                rivals,
+                competitors,
                 decision.left.noticeable,
                 known[key].claim,
                 known[key].source,
                 {
-                    rival: known[key].confounded_with.get(rival)
-                    or known[rival].confounded_with.get(name, '')
-                    for rival in rivals
+                    competitor: known[key].confounded_with.get(competitor)
+                    or known[competitor].confounded_with.get(name, '')
+                    for competitor in competitors
                 },
                 naming.features,
                 known[key].form if len(known[name].forms) > 1 else '',
@@ -268,25 +268,25 @@ def _smallest_visible(
 def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
     findings, verdict, after = decision.findings, decision.verdict, decision.after
     selection = findings.selection
-    rivals: list[Fit] = []
-    for place, names in enumerate(verdict.open_sets):
+    competitors: list[Fit] = []
+    for place, names in enumerate(verdict.ambiguity_groups):
         others = set(after.names) - {after.names[place]}
-        for rival in names:
+        for competitor in names:
             with suppress(KeyError):
-                rivals.append(selection.find((*others, rival)).fitted)
-    if not rivals:
+                competitors.append(selection.find((*others, competitor)).fitted)
+    if not competitors:
         by_effects: dict[frozenset[str], Fit] = {}
         for explanation in selection.explanations:  # each set of effects in its best forms
             effects = frozenset(map(effect_of, explanation.names))
             by_effects.setdefault(effects, explanation.fitted)
         best = list(by_effects.values())
-        if verdict.word in OPEN:  # the two names that come nearest, and nothing
-            after, *rivals = [f for f in best if f.names][:2] or [after]
-            rivals.append(decision.nothing)
+        if verdict.status in OPEN:  # the two names that come nearest, and nothing
+            after, *competitors = [f for f in best if f.names][:2] or [after]
+            competitors.append(decision.nothing)
         else:
-            named = verdict.word == 'named'
+            named = verdict.status == 'named'
             wanted = [f for f in best if f.names != after.names and (f.names or named)]
-            rivals = [f for f in wanted if not set(after.names) < set(f.names)][:1]
+            competitors = [f for f in wanted if not set(after.names) < set(f.names)][:1]
     noise = np.array(
         [
             float(np.nanmedian(findings.noise.std[:, q]))
@@ -295,7 +295,7 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
             for q in range(len(QUANTITIES))
         ]
     )
-    return next_measurement.propose(findings.setting, after, rivals, noise)
+    return next_measurement.propose(findings.setting, after, competitors, noise)
 
 
 def _shifts(

@@ -198,8 +198,8 @@ class NextMeasurement:
     """A measurement that would settle what stays open."""
 
     what: str  # for people
-    separates: tuple[str, ...]  # the two rivals (``nothing`` may be one)
-    # Distances between the rivals' best fits in noise standard deviations, before and with it
+    separates: tuple[str, ...]  # the two competitors (``nothing`` may be one)
+    # Distances between the competitors' best fits in noise standard deviations, before and with it
     distance_now: float
     distance_then: float
     # Column -> values of the proposed rows (SI); None for a zero check of an instrument
@@ -291,7 +291,7 @@ class Diagnosis:
     soil: tuple[SoilShift, ...]
     # The same with the parameters of effects that were on
     moved: tuple[SoilShift, ...] = field(metadata=_ASIDE)
-    # Row index, quantity, deviation in standard deviations of the cells that were set apart
+    # Row index, quantity, deviation in standard deviations of the cells that were rejected
     outliers: tuple[tuple[int, str, float], ...] = field(metadata=_ASIDE)
     gap_p_value: float  # of the test "the soil alone explains these rows"
     # Of what is left after the fit, and the smooth part in it as a share of the range

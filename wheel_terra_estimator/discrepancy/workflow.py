@@ -123,7 +123,7 @@ def diagnose(
 
     decision = decided(forward, nuisance, {})
     notes: tuple[str, ...] = ()
-    if decision.verdict.word in OPEN and reference is None:
+    if decision.verdict.status in OPEN and reference is None:
         for name, forms in _other_forms(forward, chosen).items():
             not_tried[name] += '; its other forms, in its place, were tried'
             rest = tuple(c for c in nuisance if effect_of(c.owner) != name)
@@ -132,7 +132,7 @@ def diagnose(
                 continue  # no other form fits better than its own, or than none
             again = decided(forward.without(name), rest, forms)
             new = [naming.key for naming in again.names if naming.key not in forward.base_effects]
-            # Its own form, free as well, is a rival: what both explain is no other form.
+            # Its own form, free as well, is a competitor: what both explain is no other form.
             if len(again.names) == 1 and new and effect_of(new[0]) == name:
                 notes = (f'{name} is on in another form; the form named here takes its place',)
                 decision = _measured_from(again, decision)

@@ -124,14 +124,14 @@ ReferenceVelocity
             return []
         return self._follow(self._watch.judge(channel, checked))
 
-    def settle(self) -> None:
+    def process_pending(self) -> None:
         """Make the steps that the next set would have to make, while nobody waits for it.
 
         Changes no number: a step that fails is made again, and told of, at the next set.
         """
         if self._timeline.released:
             with suppress(*_FAILURES), np.errstate(all='ignore'):
-                self._log.settle(self._timeline.released - 1)
+                self._log.process_pending(self._timeline.released - 1)
 
     def flush(self) -> list[EstimateSet]:
         """Return the sets that were held back for late inputs: no more will come."""

@@ -91,7 +91,7 @@ class Taught:
         if self.verdict == LEARNED:
             return f'learned, {self.bits:.1f} bits'
         if self.verdict == CONFOUNDED:
-            return f'not told apart from {self.confounded_with}'
+            return f'not distinguishable from {self.confounded_with}'
         return 'assumed, not learned'
 
     def cure_in_words(self) -> str:
@@ -100,7 +100,7 @@ class Taught:
             return ''
         if self.manoeuvre and self.promised_std is not None:
             return f'{self.manoeuvre} ({self.with_unit(self.promised_std)})'
-        bench = next((cure for key, cure in _ON_THE_BENCH.items() if key in self.name), '')
+        bench = next((remedy for key, remedy in _ON_THE_BENCH.items() if key in self.name), '')
         return f'nothing this rover can drive{bench}'
 
     def with_unit(self, std: float) -> str:

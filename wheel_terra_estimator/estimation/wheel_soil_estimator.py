@@ -36,6 +36,7 @@ from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_opp
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
 from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, FloatArray, Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
     ForceBalance,
@@ -53,7 +54,6 @@ from wheel_terra_estimator.estimation.filter.likelihood import Likelihood
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
-from wheel_terra_estimator.estimation.filter.repetition import repetitions
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
@@ -101,7 +101,7 @@ from wheel_terra_estimator.estimation.sideways import (
     SidewaysMotion,
     SidewaysRover,
 )
-from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
+from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 from wheel_terra_estimator.estimation.taught import Taught, Teaching, with_model_errors
 from wheel_terra_estimator.estimation.words import MissingInputs
 
@@ -154,7 +154,7 @@ class _Cycle(NamedTuple):
     dt: float
     window: InertialWindow
     rims: Floats  # [m/s], nan = unknown
-    unturned: RimSpeeds
+    yaw_compensated: RimSpeeds
     still: bool  # all wheels stand
     torque: Floats  # means since the last cycle [N m], nan = none came
     leaving_angles: Floats  # [rad], nan = unknown
@@ -172,7 +172,7 @@ class WheelSoilEstimator:
     ----------
     configuration : Configuration
         Rover, soil, sensors, tuning.
-    tape : Tape, optional
+    buffer : HistoryBuffer, optional
         Keeps what a smoother needs.
     likelihood : Likelihood, optional
         Sums up how likely the readings were.
@@ -181,7 +181,7 @@ class WheelSoilEstimator:
     def __init__(
         self,
         configuration: Configuration,
-        tape: Tape | None = None,
+        buffer: HistoryBuffer | None = None,
         likelihood: Likelihood | None = None,
     ) -> None:
         self._configuration = configuration
@@ -273,10 +273,10 @@ class WheelSoilEstimator:
             self._sideways,
             self._stuck,
         )
-        self._tape = tape
-        if tape is not None:
-            self._ekf.tape = tape
-            self._parts += (tape,)
+        self._buffer = buffer
+        if buffer is not None:
+            self._ekf.buffer = buffer
+            self._parts += (buffer,)
         if likelihood is not None:
             self._ekf.likelihood = likelihood
             self._parts += (likelihood,)
@@ -382,7 +382,9 @@ class WheelSoilEstimator:
 
         self._predict(cycle)
         if not cycle.reference_known and not self._contact_age.settled:
-            self._speed.undo_jolt(ekf, cycle.unturned.typical, cycle.window.stated)
+            self._speed.remove_start_transient(
+                ekf, cycle.yaw_compensated.typical, cycle.window.stated
+            )
 
         if reference is not None:
             self._fuse_reference(cycle, reference)
@@ -410,12 +412,12 @@ class WheelSoilEstimator:
             layout,
             reference_known=self._reference.known(time),
             settled=self._contact_age.settled,
-            opposes_rims=cycle.unturned.oppose(float(ekf.mean[SPEED])),
+            opposes_rims=cycle.yaw_compensated.oppose(float(ekf.mean[SPEED])),
             unread=self._sinkage.unread(time),
         )
         ekf.fuse(rows, considered)
 
-        self._speed.end_cycle(time, ekf, cycle.unturned, settled=self._contact_age.settled)
+        self._speed.end_cycle(time, ekf, cycle.yaw_compensated, settled=self._contact_age.settled)
         self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
         self._speed.keep_least_variance(ekf, cycle.rims)
         evidence = PullEvidence(
@@ -437,9 +439,9 @@ class WheelSoilEstimator:
         )
         tilt = rut_tilt(self._rover, layout, ekf.mean)
         self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)
-        if self._tape is not None:
+        if self._buffer is not None:
             present = Gaussian(ekf.mean, ekf.covariance)
-            self._tape.mark((evidence, ekf.mean.copy()), present)
+            self._buffer.mark((evidence, ekf.mean.copy()), present)
 
     def _begin_cycle(self, time: float) -> _Cycle:
         """Work out turning, loads and rim speeds; note what changes under the wheels."""
@@ -462,28 +464,28 @@ class WheelSoilEstimator:
         loads = self._loads.update(
             window, pulls.model_pull, pulls.torque, self._unloaded.state.unloaded, headings
         )
-        unturned = RimSpeeds.of(rims, turning.yaw_rate, headings)
+        yaw_compensated = RimSpeeds.of(rims, turning.yaw_rate, headings)
         reference_known = self._reference.known(time)
-        reverses = self._contact_age.update(unturned.typical)
+        reverses = self._contact_age.update(yaw_compensated.typical)
         demand = (
             self._contact_age.state.direction * loads.slope_share if window.tells_force else NAN
         )
         if reverses:
-            speed.turn_back(ekf, self._demand.state, demand)
-            if self._tape is not None:
+            speed.reverse_direction(ekf, self._demand.state, demand)
+            if self._buffer is not None:
                 # The soil that was learned downhill is not that of the climb before it.
-                self._tape.cut()
+                self._buffer.cut()
         demand_change = self._demand.update(demand, dt, settled=self._contact_age.settled)
-        self._note_climb(demand, unturned.typical, dt, told=reference_known)
-        speed.begin(ekf, unturned)
-        speed.follow_sides(unturned, dt)
+        self._note_climb(demand, yaw_compensated.typical, dt, told=reference_known)
+        speed.begin(ekf, yaw_compensated)
+        speed.follow_sides(yaw_compensated, dt)
         heard = known(rims)
         return _Cycle(
             time=time,
             dt=dt,
             window=window,
             rims=rims,
-            unturned=unturned,
+            yaw_compensated=yaw_compensated,
             still=bool(heard) and all(abs(rim) < rover.rest_speed for rim in heard),
             torque=self._wheels.take_torque(),
             leaving_angles=self._leaving_angles.angles(time),
@@ -506,15 +508,15 @@ class WheelSoilEstimator:
         prediction = Prediction.unchanged(x)
         step = self._speed.step(
             cycle.time,
-            cycle.unturned,
+            cycle.yaw_compensated,
             self._trusted(cycle.window, cycle.time),
             inflated=cycle.reference_known,
         )
         if not cycle.still and not cycle.reference_known:
-            step = self._speed.towards_usual_slip(
+            step = self._speed.towards_equilibrium_slip(
                 step,
                 cycle.dt,
-                cycle.unturned.typical,
+                cycle.yaw_compensated.typical,
                 direction=self._contact_age.state.direction,
                 slope_share=cycle.loads.slope_share,
             )
@@ -522,7 +524,7 @@ class WheelSoilEstimator:
             prediction,
             step,
             cycle.dt,
-            rim=cycle.unturned.typical,
+            rim=cycle.yaw_compensated.typical,
             demand_change=cycle.demand_change if cycle.reference_known else 0.0,
             stated=cycle.window.stated,
         )
@@ -620,7 +622,7 @@ class WheelSoilEstimator:
         stationary = self._stationary_pulls(cycle)
         start = self._contact_age.shear_variance
         model_variance = tuple([start if turns else 0.0 for turns in cycle.turns])
-        repeats = repetitions(cycle.rims, cycle.dt) * self._reference.model_doubt
+        repeats = correlated_cycles(cycle.rims, cycle.dt) * self._reference.model_variance_factor
         rows = self._torque.update(
             ekf,
             forces,
@@ -727,8 +729,8 @@ class WheelSoilEstimator:
             self._margin.update(time, self._wheel_states(loads), direction * loads.slope_share)
         self._learn_slopes(time, slips, rims, motion.lateral_motion)
         self._follow_sideways(time, body, rims)
-        if self._tape is not None:
-            self._tape.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
+        if self._buffer is not None:
+            self._buffer.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
 
     def _wheel_states(self, loads: LoadState) -> WheelStates:
         """Return the state of the wheels as the models take it, at no slip."""

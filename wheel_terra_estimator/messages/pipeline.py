@@ -16,7 +16,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.measurements import Measurement
-from wheel_terra_estimator.estimation.timing.input_checks import CURES
+from wheel_terra_estimator.estimation.timing.input_checks import REMEDIES
 from wheel_terra_estimator.estimation.timing.input_log import Estimator
 from wheel_terra_estimator.messages.convert import InputConverter, input_layout
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
@@ -78,9 +78,9 @@ class Pipeline:
         self._published += len(sets)
         return sets
 
-    def settle(self) -> None:
+    def process_pending(self) -> None:
         """Do beforehand what the next set would wait for; changes no number."""
-        self.core.settle()
+        self.core.process_pending()
 
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message of an input topic that could not even be unpacked."""
@@ -125,8 +125,8 @@ class Pipeline:
         rejected = self.converter.rejected + self.core.rejected
         for (topic, reason), count in rejected.items():
             if count != self._refused[topic, reason]:
-                cure = f' -> {CURES[reason]}' if reason in CURES else ''
-                words = f'{self.converter.in_words(topic, reason)} ({count} so far){cure}'
+                remedy = f' -> {REMEDIES[reason]}' if reason in REMEDIES else ''
+                words = f'{self.converter.in_words(topic, reason)} ({count} so far){remedy}'
                 self._reasons[topic] = words
                 found.append((topic, words))
         self._refused = rejected

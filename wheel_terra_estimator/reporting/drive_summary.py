@@ -281,7 +281,7 @@ def as_text(summary: DriveSummary) -> str:
         for row in summary.messages
     ]
     width = max((len(name) for name in heard), default=0)
-    lines += ['', f'  {"messages":{width}}{"heard":>8}   rejected']
+    lines += ['', f'  {"messages":{width}}{"received":>8}   rejected']
     for name, row in zip(heard, summary.messages, strict=True):
         lines.append(f'  {name:{width}}{row.count:8}   {row.rejected or "none"}')
     if summary.taught:

@@ -156,9 +156,10 @@ class EstimatorNode(LifecycleNode):
             transition = request.transition
             _, state = self._state_machine.current_state
             alone = self._given.get('autostart', True) is not False
-            cure = '; with a life cycle manager set autostart to false' if alone else ''
+            remedy = '; with a life cycle manager set autostart to false' if alone else ''
             self.get_logger().error(
-                f'life cycle: no transition {transition.label or transition.id} from {state}{cure}'
+                f'life cycle: no transition {transition.label or transition.id} '
+                f'from {state}{remedy}'
             )
             response.success = False
             return response
@@ -325,7 +326,7 @@ class EstimatorNode(LifecycleNode):
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)
         if topic not in FREQUENT:
-            pipeline.settle()
+            pipeline.process_pending()
 
     def _take(self, estimates: EstimateSet, now: float) -> None:
         assert self._pipeline is not None and self._publisher is not None
@@ -529,7 +530,7 @@ class EstimatorNode(LifecycleNode):
         faults += [(self.resolve_topic_name(t), words) for t, words in self._incompatible.items()]
         wheels = self._pipeline.converter.layout.wheel_odometry if self._pipeline else ''
         if wheels and self._watch_inputs.age(wheels, now) is None and self._latest is not None:
-            words = f'never heard ({self._publishers_in_words(wheels)})'
+            words = f'never received ({self._publishers_in_words(wheels)})'
             faults.append((self.resolve_topic_name(wheels), words))
         if self._same_name:
             words = f'another node is called /{self._full_name}: both publish estimates'
@@ -567,7 +568,7 @@ class EstimatorNode(LifecycleNode):
             name = self.resolve_topic_name(topic)
             age = self._watch_inputs.age(topic, now)
             if age is None:
-                words.append(f'{name}: never heard ({self._publishers_in_words(topic)})')
+                words.append(f'{name}: never received ({self._publishers_in_words(topic)})')
             elif age > SILENCE and not self._watch_inputs.is_silent(topic, now):  # told as a fault
                 words.append(f'{name}: silent for {age:.0f} s')
         for (topic, reason), count in self._pipeline.rejected.items():

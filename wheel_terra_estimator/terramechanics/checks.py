@@ -57,7 +57,7 @@ def check_range(
 
 
 def _other_unit(value: float, upper: float, unit: str) -> str:
-    """Return the cure of a number that may be in degrees or per cent."""
+    """Return the remedy of a number that may be in degrees or per cent."""
     if unit == 'rad' and abs(value) <= 180.0:
         return f'; from degrees: math.radians({value:g})'
     if unit == '-' and upper == 1.0 < abs(value) <= 100.0:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""``wheel-terra trial``: hide an effect, diagnose blind, open the seal."""
+"""``wheel-terra trial``: hide an effect, diagnose blind, reveal the truth."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--effect',
         metavar='NAME',
-        help="what is hidden: an effect, 'none' or 'stranger' (default: drawn by the seed)",
+        help="what is hidden: an effect, 'none' or 'stranger', one outside the catalogue "
+        '(default: drawn by the seed)',
     )
     parser.add_argument(
         '--many', type=int, metavar='N', help='N trials from the seed on, and their score'
@@ -71,11 +72,11 @@ def _one(folder: Path, seed: int, effect: str | None, *, pictures: bool) -> None
     campaign = trial.draw(seed, effect)
     digest = trial.hide(campaign, folder)
     rows = len(campaign.rows['slip'])
-    print(f'blind table of {rows} rows, truth sealed (SHA-256 {digest[:16]}...)')
+    print(f'blind table of {rows} rows, truth withheld (SHA-256 {digest[:16]}...)')
     diagnosis = trial.solve_blind(folder)
     print(f'diagnosis: {diagnosis.sentence}')
     outcome = trial.compare(folder, diagnosis)
-    print(f'seal opened: {outcome.words}')
+    print(f'truth revealed: {outcome.words}')
     _print_gap(outcome)
     if outcome.proposal:
         print(f'  proposed law: {outcome.proposal}')

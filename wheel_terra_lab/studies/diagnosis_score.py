@@ -86,7 +86,7 @@ def record(group: str, design: str, seed: int) -> Record:
         'verdict': found.verdict,
         'names': [effect.name for effect in found.effects],
         'confidence': [effect.confidence for effect in found.effects],
-        'rivals': [list(effect.confounded_with) for effect in found.effects],
+        'competitors': [list(effect.confounded_with) for effect in found.effects],
         'closed': None if proposal is None else _closed(found),
         'seconds': time.process_time() - started,
     }
@@ -113,7 +113,7 @@ def run(file: Path, first: int, rounds: int) -> None:
                 results.add({'key': key, **record(*key)})
 
 
-def nearest_rival(campaign: Campaign) -> tuple[float, str]:
+def nearest_competitor(campaign: Campaign) -> tuple[float, str]:
     """Return d' between a hidden effect and the nearest other one, refitted, and its name.
 
     By the campaigns' own model, soil under its stated deviations, no noise.
@@ -154,7 +154,7 @@ def beyond_the_others(campaign: Campaign) -> list[float]:
 def judge(file: Path) -> None:
     """Print what anybody could find in the same campaigns, who knows noise and soil deviations.
 
-    One effect: the likelihood of the truth exceeds that of a rival at a distance d' with the
+    One effect: the likelihood of the truth exceeds that of a competitor at a distance d' with the
     probability Phi(d'/2). Several: an effect that stands less than `_TELLABLE` beyond soil and the
     others does not pay the price of a further effect.
     """
@@ -162,10 +162,12 @@ def judge(file: Path) -> None:
     shares, misses, distances = [], [], []
     for r in everything:
         if r['group'] == 'one' and r['distances'][0] > 5.0:
-            distance, rival = nearest_rival(campaign_of(*r['key']))
+            distance, competitor = nearest_competitor(campaign_of(*r['key']))
             shares.append(float(ndtr(0.5 * distance)))
             if not set(r['names'][:1]) & set(r['hidden']):
-                misses.append(f'{r["hidden"][0]} as {r["names"][:1]}: {rival} at {distance:.1f}')
+                misses.append(
+                    f'{r["hidden"][0]} as {r["names"][:1]}: {competitor} at {distance:.1f}'
+                )
         elif r['group'] == 'several':
             distances += beyond_the_others(campaign_of(*r['key']))
     if shares:
@@ -245,7 +247,8 @@ def show(file: Path) -> None:
     opened = [r for r in of(LEFT_OUT, 'strangers') if r['verdict'] in OPEN]
     sure, right = _names(everything)
     covered = sum(
-        bool(r['names']) and bool({r['names'][0], *r['rivals'][0]} & set(r['hidden'])) for r in one
+        bool(r['names']) and bool({r['names'][0], *r['competitors'][0]} & set(r['hidden']))
+        for r in one
     )
     lines = {
         "one effect in any form, d' > 5: first": _of(

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How many faults `wheel-terra check` finds, and how often it names a wrong cure.
+"""How many faults `wheel-terra check` finds, and how often it names a wrong remedy.
 
 python -m wheel_terra_lab.studies.fault_study B:turns C:firm drive=my_rover.yaml --seeds 7001 7002
 
@@ -641,8 +641,8 @@ def print_table(table: dict[str, Counter[str]]) -> None:
     total = sum((table[fault.name] for fault in FAULTS), Counter[str]())
     shown = total['found'] + total['missed']
     print(
-        f'found {total["found"]} of {shown} that the recording can tell, told that it cannot '
-        f'{total["told"]}; with a wrong cure {total["wrong"]}'
+        f'found {total["found"]} of {shown} that the recording shows, reported as not visible '
+        f'{total["told"]}; with a wrong remedy {total["wrong"]}'
     )
 
 

@@ -209,12 +209,14 @@ class Soak:
 
     def report(self) -> str:
         """Return the table."""
-        lines = [f'{"fault":18} {"times":>6} {"told":>6} {"sets again, median; worst [s]":>31}']
+        lines = [
+            f'{"fault":18} {"times":>6} {"warned":>6} {"estimates again, median; worst [s]":>36}'
+        ]
         for fault in FAULTS:
             times = self.recoveries.get(fault)
             if times:
                 figures = f'{median(times):.2f}; {max(times):.2f}'
-                lines.append(f'{fault:18} {len(times):6} {self.told[fault]:6} {figures:>31}')
+                lines.append(f'{fault:18} {len(times):6} {self.told[fault]:6} {figures:>36}')
         latencies = self.rover.latencies
         half, most = 1e3 * quantile(latencies, 0.5), 1e3 * quantile(latencies, 0.99)
         lines.append(f'sets {self.rover.sets}; latency p50 {half:.1f} ms, p99 {most:.1f} ms')

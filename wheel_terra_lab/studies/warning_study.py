@@ -1,12 +1,12 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which faults are told while driving, and which raise the stuck warning before that.
+"""Which faults are reported while driving, and which raise the stuck warning before that.
 
 python -m wheel_terra_lab.studies.warning_study drive_a=generic_six_wheel drive_b=my_rover.yaml
 
 The faults are those of `fault_study.py`. Each recording is played message by message through what
 node and replay share, first as it is, then with each fault. A run ends where the fault is told, by
-any words with a cure; a fault that shows in no window of this part of the drive is not told.
+any words with a remedy; a fault that shows in no window of this part of the drive is not told.
 """
 
 from __future__ import annotations
@@ -163,9 +163,15 @@ def main() -> None:
                 early += late
                 by_check += before and not late
                 untold += not before
-                by = 'told while driving' if late else 'found by check' if before else 'not found'
+                by = (
+                    'reported while driving'
+                    if late
+                    else 'found by check'
+                    if before
+                    else 'not found'
+                )
                 print(f'{recording.name}: {fault.name}: {found}, {by}', flush=True)
-    print(f'\n{"fault":36}{"told":>7}{"runs":>7}{"first [s]":>12}{"last [s]":>12}')
+    print(f'\n{"fault":36}{"found":>7}{"runs":>7}{"first [s]":>12}{"last [s]":>12}')
     for name, told in times.items():
         known = [time for time in told if not math.isnan(time)] or [math.nan]
         count = sum(not math.isnan(time) for time in told)
@@ -173,12 +179,13 @@ def main() -> None:
     everything = [time for told in times.values() for time in told]
     heard = sum(not math.isnan(time) for time in everything)
     print(
-        f'\ntold while driving: {share(heard, len(everything))}; '
-        f'told without a fault: {share(false, len(arguments.cases))}'
+        f'\nreported while driving: {share(heard, len(everything))}; '
+        f'reported without a fault: {share(false, len(arguments.cases))}'
     )
     print(
-        f'{runs} runs; warned before the fault was told: {early}; warned, not told while driving '
-        f'but found by the checks that replay runs first: {by_check}; warned, not found: {untold}'
+        f'{runs} runs; warned before the fault was reported: {early}; warned, not reported while '
+        f'driving but found by the checks that replay runs first: {by_check}; warned, not found: '
+        f'{untold}'
     )
 
 

@@ -336,9 +336,9 @@ def _hide(
             wanted *= 1.5
         kind = catalogue[name]
         sign = float(rng.choice([-1.0, 1.0])) if kind.signed else 1.0
-        spice = float(rng.random())
+        secondary = float(rng.random())
         try:
-            size, effect, _ = size_for(kind, wanted, spice, sign, ruler)
+            size, effect, _ = size_for(kind, wanted, secondary, sign, ruler)
         except ValueError as error:
             raise _UnusableError from error
         sizes.append(size)

@@ -49,18 +49,18 @@ class Ruler:
         y = np.stack([out[key] for key in OUTPUTS], 1) / self._std
         return y[np.isfinite(self._std)]
 
-    def distance(self, hidden: tuple[Hidden, ...], rivals: tuple[Kind, ...] = ()) -> float:
-        """Distance of ``hidden`` beyond the best refit of the soil and of each rival's size."""
+    def distance(self, hidden: tuple[Hidden, ...], competitors: tuple[Kind, ...] = ()) -> float:
+        """Distance of ``hidden`` beyond the best refit of soil and of each competitor's size."""
         target = self.whitened(np.zeros(len(SOIL_SD)), hidden)
         if not np.all(np.isfinite(target)):
             return float('nan')
-        if not rivals:
+        if not competitors:
             return float(np.linalg.norm(self._refit(target, None, 0.5)))
         return min(
-            float(np.linalg.norm(self._refit(target, rival, spice)))
-            for rival in rivals
-            for spice in (
-                (0.1, 0.5, 0.9) if rival.largest in (20,) or rival.needs == () else (0.5,)
+            float(np.linalg.norm(self._refit(target, competitor, secondary)))
+            for competitor in competitors
+            for secondary in (
+                (0.1, 0.5, 0.9) if competitor.largest in (20,) or competitor.needs == () else (0.5,)
             )
         )
 
@@ -69,16 +69,16 @@ class Ruler:
         y = np.stack([outputs[key] for key in OUTPUTS], 1) / self._std
         return float(np.linalg.norm(self._refit(y[np.isfinite(self._std)], None, 0.5)))
 
-    def _refit(self, target: FloatArray, rival: Kind | None, spice: float) -> FloatArray:
-        """Damped Gauss-Newton over soil units and, with a rival, its size; returns the residual."""
+    def _refit(self, target: FloatArray, competitor: Kind | None, secondary: float) -> FloatArray:
+        """Damped Gauss-Newton over soil units and a competitor's size; returns the residual."""
         n = len(SOIL_SD)
-        x = np.zeros(n + (rival is not None))
-        typical = rival.typical(self.rows, self.soil) if rival else 0.0
+        x = np.zeros(n + (competitor is not None))
+        typical = competitor.typical(self.rows, self.soil) if competitor else 0.0
 
         def model(x: FloatArray) -> FloatArray:
-            if rival is None:
+            if competitor is None:
                 return self.whitened(x, ())
-            effect = rival.make(float(x[n]) * typical, spice, self.rows, self.soil)
+            effect = competitor.make(float(x[n]) * typical, secondary, self.rows, self.soil)
             return self.whitened(x[:n], (effect,))
 
         def cost(r: FloatArray, x: FloatArray) -> float:
@@ -88,9 +88,9 @@ class Ruler:
         prior[:, :n] = np.eye(n)
         residual = target - model(x)
         best = cost(residual, x)
-        for _ in range(6 if rival else 4):
+        for _ in range(6 if competitor else 4):
             jacobian = self._jacobian
-            if rival is not None:
+            if competitor is not None:
                 probe = x.copy()
                 probe[n] += 0.05
                 column = (model(probe) - (target - residual)) / 0.05
@@ -102,9 +102,9 @@ class Ruler:
             for damping in (1.0, 0.4, 0.15):
                 trial = x + damping * step
                 trial[:n] = np.clip(trial[:n], -4, 4)
-                if rival is not None:
-                    low = -rival.largest if rival.signed else 0.0
-                    trial[n] = np.clip(trial[n], low, rival.largest)
+                if competitor is not None:
+                    low = -competitor.largest if competitor.signed else 0.0
+                    trial[n] = np.clip(trial[n], low, competitor.largest)
                 new = target - model(trial)
                 if (value := cost(new, trial)) < best:
                     gain, x, residual, best = best - value, trial, new, value
@@ -135,19 +135,19 @@ def listed_kinds(rows: Rows, kinds: Mapping[str, Kind] = LISTED) -> dict[str, Ki
 
 
 def size_for(
-    kind: Kind, wanted: float, spice: float, sign: float, ruler: Ruler
+    kind: Kind, wanted: float, secondary: float, sign: float, ruler: Ruler
 ) -> tuple[float, Hidden, float]:
     """Return size, effect and d', with d' near ``wanted`` as far as the largest size allows."""
     typical = kind.typical(ruler.rows, ruler.soil) * sign
     factor = 1.0
     result = None
     for _ in range(4):
-        effect = kind.make(factor * typical, spice, ruler.rows, ruler.soil)
+        effect = kind.make(factor * typical, secondary, ruler.rows, ruler.soil)
         reached = ruler.distance((effect,))
         if np.isfinite(reached):
             result = (factor * typical, effect, reached)
             close = abs(np.log(max(reached, 1e-3) / wanted)) < 0.15
-            if close or (kind.all_or_nothing and spice < 0.5):
+            if close or (kind.all_or_nothing and secondary < 0.5):
                 break
             new = float(np.clip(factor * wanted / max(reached, 1e-3), 0.01, kind.largest))
             if new == factor:

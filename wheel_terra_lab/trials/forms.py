@@ -46,7 +46,7 @@ def _driving(rows: Rows) -> FloatArray:
     return np.clip(rows['slip'], 0.0, 1.0)
 
 
-def _lyasko(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _lyasko(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def prepare(setup: Setup, rows: Rows) -> None:
         s = np.abs(rows['slip'])
         deeper = 1 + size * ((1 + s) / (1 - s / 2) - 1)
@@ -55,15 +55,15 @@ def _lyasko(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change('slip_sinkage_exponent', prepare)
 
 
-def _exponent_by_load(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _exponent_by_load(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def prepare(setup: Setup, rows: Rows) -> None:
         setup.exponent = setup.exponent + size * np.log(_pressure(rows))
 
     return Change('slip_sinkage_exponent', prepare, n1=0.0)
 
 
-def _saturating(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    span = 0.1 + 0.4 * spice
+def _saturating(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
+    span = 0.1 + 0.4 * secondary
 
     def dug(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         return np.asarray(size * rows['lug_height'] * (1 - np.exp(-_driving(rows) / span)))
@@ -71,14 +71,14 @@ def _saturating(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden
     return _adding('lug_digging', 'sinkage', dug, range=span)
 
 
-def _by_height(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _by_height(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def saved(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         return np.asarray(-size * np.clip(rows['lug_height'] - FREE_HEIGHT, 0.0, None))
 
     return _adding('lug_support', 'sinkage', saved, free_height=FREE_HEIGHT)
 
 
-def _terzaghi(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _terzaghi(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """Terzaghi's bearing factors after Hettiaratchi and Reece, front plate at half of t1."""
 
     def drag(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
@@ -97,7 +97,7 @@ def _terzaghi(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return _adding('bulldozing', 'drawbar_pull', drag)
 
 
-def _rut(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _rut(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def depth(rows: Rows) -> FloatArray:
         return np.asarray(size * 2 * (1 - 0.5 ** (rows['pass_number'] - 1)))
 
@@ -110,8 +110,8 @@ def _rut(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change('multipass', prepare, finish)
 
 
-def _bearing_layer(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    depth = layer_depth(spice, rows, soil)
+def _bearing_layer(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
+    depth = layer_depth(secondary, rows, soil)
 
     def prepare(setup: Setup, rows: Rows) -> None:
         setup.extra_bearing.append(lambda equivalent: size * np.maximum(equivalent - depth, 0.0))
@@ -119,21 +119,21 @@ def _bearing_layer(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hid
     return Change('hard_layer', prepare, depth=depth)
 
 
-def _backward(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _backward(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def prepare(setup: Setup, rows: Rows) -> None:
         setup.peak_ratio = setup.peak_ratio - size * rows['slip']
 
     return Change('stress_peak_shift', prepare)
 
 
-def _proportional(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _proportional(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def lost(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         return np.asarray(size * np.abs(out['torque']) * np.sign(rows['angular_velocity']))
 
     return _adding('drivetrain_friction', 'torque', lost)
 
 
-def _viscous(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _viscous(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def lost(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         return np.asarray(size * rows['angular_velocity'])
 
@@ -141,7 +141,7 @@ def _viscous(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
 
 
 def _thrust(textbook: bool) -> Callable[[float, float, Rows, TrueSoil], Hidden]:
-    def make(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+    def make(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
         def finish(out: Rows, setup: Setup, rows: Rows) -> None:
             s, h = _driving(rows), rows['lug_height']
             span = out['entrance_angle'] * (1 - setup.leaving_ratio)
@@ -161,7 +161,7 @@ def _thrust(textbook: bool) -> Callable[[float, float, Rows, TrueSoil], Hidden]:
     return make
 
 
-def _smooth_rim(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _smooth_rim(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def prepare(setup: Setup, rows: Rows) -> None:
         bare = np.exp(-rows['lug_height'] / RING_HEIGHT)
         setup.tan_phi = setup.tan_phi * (1 - size * bare)
@@ -169,7 +169,7 @@ def _smooth_rim(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden
     return Change('rim_friction', prepare, ring_height=RING_HEIGHT)
 
 
-def _flexible(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _flexible(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def prepare(setup: Setup, rows: Rows) -> None:
         n = setup.exponent
         stiff = (3 - n) * setup.width * setup.stiffness * np.sqrt(2 * setup.radius)
@@ -185,7 +185,7 @@ def _flexible(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change('wheel_flexibility', prepare, finish)
 
 
-def _coat(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _coat(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def prepare(setup: Setup, rows: Rows) -> None:
         setup.radius = setup.radius + size
         setup.shear_radius = setup.shear_radius + size
@@ -196,14 +196,14 @@ def _coat(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change('soil_adhesion', prepare, finish)
 
 
-def _tension(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _tension(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def prepare(setup: Setup, rows: Rows) -> None:
         setup.extra_by_angle.append(lambda t, t2: -size * np.clip(t / t2, 0.0, None))
 
     return Change('soil_adhesion', prepare)
 
 
-def _carried(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _carried(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def finish(out: Rows, setup: Setup, rows: Rows) -> None:
         layer = size * rows['lug_height'] * _driving(rows)
         out['sinkage'] = out['sinkage'] + layer
@@ -213,7 +213,7 @@ def _carried(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change('soil_transport', None, finish)
 
 
-def _shear_by_pressure(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _shear_by_pressure(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def prepare(setup: Setup, rows: Rows) -> None:
         setup.shear_modulus = setup.shear_modulus * _pressure(rows) ** size
 

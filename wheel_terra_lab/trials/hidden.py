@@ -5,8 +5,8 @@
 ``LISTED[name]`` follows the equations of the catalogue's sources; ``OTHER[name]``
 stands for the same physical claim written with another formula (what a real soil would do to us);
 ``OUTSIDE[name]`` are effects that no catalogue entry describes. Each is a function
-``(size, spice, rows, soil) -> Hidden``: ``size`` is the main parameter in its own unit, ``spice``
-in 0..1 draws the second one (onset slip, layer depth).
+``(size, secondary, rows, soil) -> Hidden``: ``size`` is the main parameter in its own unit,
+``secondary`` in 0..1 draws the second one (onset slip, layer depth).
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Kind:
     needs: tuple[str, ...] = ()  # rows must vary in these columns, else nothing can be seen
     # One output that the effect cannot be seen without; empty = any will do.
     requires: str = ''
-    two_parameters: bool = False  # `spice` matters
+    two_parameters: bool = False  # `secondary` matters
     all_or_nothing: bool = False  # a claim with no amplitude: half of the cases keep size 1
 
 
@@ -132,9 +132,9 @@ def _mound(size: float, onset: float, law: str) -> Hidden:
     return Change('soil_mound', prepare, onset=onset)
 
 
-def _other_mound(size: float, spice: float) -> Hidden:
-    law = 'conveyance' if spice < 0.5 else 'hard ramp'
-    return _mound(0.5 * size, 0.35 + 0.5 * (spice - 0.5), law)
+def _other_mound(size: float, secondary: float) -> Hidden:
+    law = 'conveyance' if secondary < 0.5 else 'hard ramp'
+    return _mound(0.5 * size, 0.35 + 0.5 * (secondary - 0.5), law)
 
 
 def _slope_gravity(size: float, only_pull: bool) -> Hidden:
@@ -205,11 +205,11 @@ def _layer(size: float, depth: float, power: float) -> Hidden:
     return Change('hard_layer', prepare, depth=depth)
 
 
-def layer_depth(spice: float, rows: Rows, soil: TrueSoil) -> float:
+def layer_depth(secondary: float, rows: Rows, soil: TrueSoil) -> float:
     """Depth [m] of the layer: some rows reach it, others do not."""
     z = solve(rows, soil)['geometric_sinkage']
     low, high = np.nanquantile(z, 0.1), np.nanquantile(z, 0.95)
-    return float(low * 0.6 + (high * 0.9 - low * 0.6) * (0.2 + 0.6 * spice))
+    return float(low * 0.6 + (high * 0.9 - low * 0.6) * (0.2 + 0.6 * secondary))
 
 
 def _friction(size: float, with_load: float) -> Hidden:
@@ -259,7 +259,7 @@ def _reading(name: str, key: str, size: float, bent: float) -> Hidden:
 
 
 def _gain_kind(name: str, key: str, other: bool) -> Kind:
-    def make(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+    def make(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
         return _reading(name, key, size, 0.4 if other else 0.0)
 
     return Kind(make, lambda rows, soil: 0.08, 5, signed=True, requires=key)
@@ -431,8 +431,8 @@ LISTED = _kinds(other=False)
 OTHER = _kinds(other=True)
 
 
-def _hump(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    centre = 0.2 + 0.4 * spice
+def _hump(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
+    centre = 0.2 + 0.4 * secondary
     return Change(
         'hump',
         None,
@@ -444,13 +444,13 @@ def _hump(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     )
 
 
-def _crosstalk(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _crosstalk(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change(
         'crosstalk', None, _pull(lambda out, setup, rows: size * out['torque'] / setup.radius)
     )
 
 
-def _softening(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _softening(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """Friction angle falls from peak to residual as slip grows."""
 
     def prepare(setup: Setup, rows: Rows) -> None:
@@ -460,19 +460,19 @@ def _softening(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change('friction_softening', prepare)
 
 
-def _ripple(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _ripple(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change(
         'ripple',
         None,
         _pull(
             lambda out, setup, rows: (
-                size * rows['normal_load'] * np.sin(2 * np.pi * (rows['slip'] / 0.25 + spice))
+                size * rows['normal_load'] * np.sin(2 * np.pi * (rows['slip'] / 0.25 + secondary))
             )
         ),
     )
 
 
-def _saturation(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _saturation(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """The torque sensor flattens near the top of its range."""
 
     def finish(out: Rows, setup: Setup, rows: Rows) -> None:
@@ -483,7 +483,7 @@ def _saturation(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden
     return Change('torque_saturation', None, finish)
 
 
-def _side_drag(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _side_drag(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """Both side walls rub in the soil: a drag on pull and torque that grows with depth cubed."""
 
     def finish(out: Rows, setup: Setup, rows: Rows) -> None:

@@ -12,7 +12,7 @@ from wheel_terra_lab.trials.hidden import Change, Kind, mean_load
 from wheel_terra_lab.trials.truth import Hidden, Rows, Setup, TrueSoil
 
 
-def _carriage(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _carriage(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """The carriage that guides the wheel binds: the soil carries more where slip is high."""
 
     def prepare(setup: Setup, rows: Rows) -> None:
@@ -21,7 +21,7 @@ def _carriage(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change('binding_carriage', prepare)
 
 
-def _curved_envelope(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _curved_envelope(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """The strength of the soil grows with less than the pressure."""
 
     def prepare(setup: Setup, rows: Rows) -> None:
@@ -31,9 +31,9 @@ def _curved_envelope(size: float, spice: float, rows: Rows, soil: TrueSoil) -> H
     return Change('curved_envelope', prepare)
 
 
-def _collapse(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _collapse(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """Beyond a slip the bed under the wheel collapses: stiffness drops within a narrow band."""
-    edge = 0.3 + 0.3 * spice
+    edge = 0.3 + 0.3 * secondary
 
     def prepare(setup: Setup, rows: Rows) -> None:
         share = 0.5 * (1.0 + np.tanh((rows['slip'] - edge) / 0.04))
@@ -42,7 +42,7 @@ def _collapse(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change('collapse', prepare)
 
 
-def _sinkage_stop(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _sinkage_stop(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """The sinkage sensor flattens towards the end of its travel."""
 
     def finish(out: Rows, setup: Setup, rows: Rows) -> None:
@@ -53,17 +53,17 @@ def _sinkage_stop(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidd
     return Change('sinkage_stop', None, finish)
 
 
-def _hysteresis(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _hysteresis(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """The pull reading lags: what it shows depends on how fast pull grows with slip."""
 
     def finish(out: Rows, setup: Setup, rows: Rows) -> None:
-        lag = np.exp(-np.clip(rows['slip'], 0.0, 1.0) / (0.05 + 0.15 * spice))
+        lag = np.exp(-np.clip(rows['slip'], 0.0, 1.0) / (0.05 + 0.15 * secondary))
         out['drawbar_pull'] = out['drawbar_pull'] - size * mean_load(rows) * lag
 
     return Change('lagging_pull', None, finish)
 
 
-def _bulge(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+def _bulge(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     """Soil pressed out at the sides carries as well: the more so the deeper the rut."""
 
     def prepare(setup: Setup, rows: Rows) -> None:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""One blind trial: hide, seal, diagnose, open the seal, compare."""
+"""One blind trial: hide, withhold the truth, diagnose, compare."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def draw(seed: int, effect: str | None) -> Campaign:
 
 
 def hide(campaign: Campaign, folder: Path) -> str:
-    """Write blind table, rig file and sealed truth; return the seal's SHA-256."""
+    """Write blind table, rig file and withheld truth; return its SHA-256."""
     campaign.write_csv(folder / TABLE)
     configuration = reader.from_parameters(campaign.settings(), complete=False)
     configuration.write(folder / RIG, comment='the model that the engineer believes in')
@@ -123,7 +123,7 @@ def solve_blind(folder: Path) -> Diagnosis:
 
 
 def compare(folder: Path, diagnosis: Diagnosis) -> Outcome:
-    """Open the seal and compare."""
+    """Reveal the truth and compare."""
     truth = json.loads((folder / SEAL).read_text(encoding='utf-8'))
     hidden = tuple(truth['hidden'])
     said = tuple(effect.name for effect in diagnosis.effects)
@@ -137,7 +137,7 @@ def compare(folder: Path, diagnosis: Diagnosis) -> Outcome:
     else:
         # Owned up to: neither a name, however doubtful, nor an agreement.
         right = diagnosis.verdict in OPEN
-        wanted = f'a stranger was hidden ({hidden[0]})'
+        wanted = f'an effect outside the catalogue was hidden ({hidden[0]})'
     answer = f'{" + ".join(said)} ({sure:.2f})' if said else diagnosis.verdict
     return Outcome(
         truth['seed'],

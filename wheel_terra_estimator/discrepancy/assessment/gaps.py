@@ -23,7 +23,7 @@ TOO_FAR = 2.0  # times noise and allowed model error: a channel that is off
 def gaps(
     table: SteadyTable, findings: Findings, curves: Curves, floor: float, allowed_error: float
 ) -> dict[str, QuantityGap]:
-    """Return the held-out errors of each quantity; cells set apart as outliers do not count.
+    """Return the held-out errors of each quantity; cells rejected as outliers do not count.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ _SLIPS = np.array([0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7, 0.8])
 _KEPT = 3
 _WORTH = 2.0  # d' that a measurement must promise, and ...
 _MORE = 1.5  # ... times the distance at hand: else it is not worth the trouble
-_DEEPEST = 0.6  # of the radius: blocks in which a rival sinks deeper are not proposed
+_DEEPEST = 0.6  # of the radius: blocks in which a competitor sinks deeper are not proposed
 # A zero check costs minutes and settles an instrument's error for good.
 ZERO_CHECKS = {
     'sinkage_offset': 'read the sinkage sensor with the wheel on a hard, level floor (should be 0)',
@@ -36,34 +36,34 @@ ZERO_CHECKS = {
 
 
 def propose(
-    setting: Setting, chosen: Fit, rivals: Sequence[Fit], std: FloatArray
+    setting: Setting, chosen: Fit, competitors: Sequence[Fit], std: FloatArray
 ) -> tuple[NextMeasurement, ...]:
-    """Rank measurements by how far they would part the chosen explanation from its rivals.
+    """Rank measurements by how far they would part the chosen explanation from its competitors.
 
     Parameters
     ----------
-    chosen, rivals : Fit
+    chosen, competitors : Fit
         The best explanation, and those that the rows cannot exclude, most probable first.
     std : numpy.ndarray
         (4,) noise of a new row.
     """
     found: list[NextMeasurement] = []
-    rivals = rivals[:2]
-    menu = _menu(setting) if rivals else []
-    predicted = _predicted(setting, [chosen, *rivals], [points for _, points in menu])
-    for place, rival in enumerate(rivals, 1):
-        names = (_label(chosen), _label(rival))
+    competitors = competitors[:2]
+    menu = _menu(setting) if competitors else []
+    predicted = _predicted(setting, [chosen, *competitors], [points for _, points in menu])
+    for place, competitor in enumerate(competitors, 1):
+        names = (_label(chosen), _label(competitor))
         if names[0] == names[1]:  # two forms of the same
-            names = (' + '.join(chosen.names), ' + '.join(rival.names))
-        now = _distance(setting, chosen, rival, None, std)
-        ours, theirs = ([effect_of(key) for key in f.names] for f in (chosen, rival))
+            names = (' + '.join(chosen.names), ' + '.join(competitor.names))
+        now = _distance(setting, chosen, competitor, None, std)
+        ours, theirs = ([effect_of(key) for key in f.names] for f in (chosen, competitor))
         for name in dict.fromkeys((*ours, *theirs)):
             if name in ZERO_CHECKS and (name in ours) != (name in theirs):
                 found.append(NextMeasurement(ZERO_CHECKS[name], names, now, np.inf))
         blocks = []
         for (what, points), (values, sensitivity) in zip(menu, predicted, strict=True):
             outputs = values[[0, place]]
-            then = _with_rows(setting, chosen, rival, outputs, sensitivity[place], std)
+            then = _with_rows(setting, chosen, competitor, outputs, sensitivity[place], std)
             depth = outputs[..., 0].max()
             worth = np.isfinite(then) and then > max(_WORTH, _MORE * now)
             if worth and depth < _DEEPEST * np.min(points.wheel.radius):
@@ -170,34 +170,34 @@ def _joined(blocks: Sequence[OperatingPoints]) -> OperatingPoints:
 def _with_rows(
     setting: Setting,
     chosen: Fit,
-    rival: Fit,
+    competitor: Fit,
     outputs: FloatArray,
     sensitivity: FloatArray,
     std: FloatArray,
 ) -> float:
-    """Distance d' of chosen and rival with new rows: (2, n, 4) outputs, Jacobian of the rival."""
+    """Distance d' of chosen and competitor with new rows: (2, n, 4) outputs, its Jacobian."""
     difference = ((outputs[0] - outputs[1]) / std).reshape(-1)
     jacobian = (sensitivity / std[None, :, None]).reshape(len(difference), -1)
     keep = np.isfinite(difference)
-    return _distance(setting, chosen, rival, (difference[keep], jacobian[keep]), std)
+    return _distance(setting, chosen, competitor, (difference[keep], jacobian[keep]), std)
 
 
 def _distance(
     setting: Setting,
     chosen: Fit,
-    rival: Fit,
+    competitor: Fit,
     new: tuple[FloatArray, FloatArray] | None,
     std: FloatArray,
 ) -> float:
-    """Distance d' of the chosen prediction from the rival's best refit to it (linear)."""
+    """Distance d' of the chosen prediction from the competitor's best refit to it (linear)."""
     problem = setting.problem
-    scale = 1.0 / np.sqrt(rival.variance)
-    difference = problem.rotate(problem.flat(chosen.outputs - rival.outputs)) * scale
-    jacobian = rival.jacobian * scale[:, None]
+    scale = 1.0 / np.sqrt(competitor.variance)
+    difference = problem.rotate(problem.flat(chosen.outputs - competitor.outputs)) * scale
+    jacobian = competitor.jacobian * scale[:, None]
     if new is not None:
         difference = np.concatenate([difference, new[0]])
         jacobian = np.concatenate([jacobian, new[1]])
-    precision = jacobian.T @ jacobian + np.diag(rival.prior)
+    precision = jacobian.T @ jacobian + np.diag(competitor.prior)
     step = np.linalg.solve(precision, jacobian.T @ difference)
     return float(np.linalg.norm(difference - jacobian @ step))
 

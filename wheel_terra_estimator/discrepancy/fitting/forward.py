@@ -234,7 +234,7 @@ class Forward:
         known: FloatArray | None,
         groups: Sequence[Sequence[int]],
     ) -> State:
-        """Solve groups of hypotheses apart, so that none pays for the dear terms of others."""
+        """Solve groups of hypotheses apart, so that none pays for the expensive terms of others."""
         angle = np.empty((len(u), len(self.points)))
         outputs = np.empty((*angle.shape, len(QUANTITIES)))
         jacobians: list[FloatArray] = [np.empty(0)] * (len(u) if jacobian else 0)

@@ -33,13 +33,13 @@ def find_outliers(
     observed: FloatArray,
     narrow: FloatArray,
 ) -> list[tuple[int, int, float]]:
-    """Return (row, quantity, deviation) of the cells to be set apart, worst first.
+    """Return (row, quantity, deviation) of the cells to be rejected, worst first.
 
     Each cell is predicted from all others (soil, effects and a smooth error free); one at a time,
-    the cell that gains most from a twelve times larger noise is set apart. A hump or a ripple in
+    the cell that gains most from a twelve times larger noise is rejected. A hump or a ripple in
     slip that all loads share competes with outliers: the evidence says which of the two it is.
 
-    ``problem`` has no cell set apart, and (m,) ``observed`` cells; ``variances``, (m,) each, of the
+    ``problem`` has no cell rejected, and (m,) ``observed`` cells; ``variances``, (m,) each, of the
     rotated axes are for a structural error that is small and one that is large; ``narrow`` (N, N)
     comes from `slip_features`.
     """
@@ -48,7 +48,7 @@ def find_outliers(
     best, found, chosen = -np.inf, [], None
     for variance in variances:
         inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
-        score, cells = _set_apart(problem, inverse, target)
+        score, cells = _rejected_cells(problem, inverse, target)
         if score > best:
             best, found, chosen = score, cells, inverse
     counts = np.bincount([q for _, q, _ in found], minlength=3)
@@ -58,7 +58,7 @@ def find_outliers(
     plain = np.linalg.inv(chosen)
     for quantity, amplitude in itertools.product(np.flatnonzero(counts >= 2), NARROW):
         shared = _shared_features(problem, narrow, amplitude, int(quantity))
-        score, cells = _set_apart(
+        score, cells = _rejected_cells(
             problem, np.asarray(np.linalg.inv(plain + shared), dtype=float), target
         )
         if score > best:
@@ -95,7 +95,7 @@ def _scattered(
     return [cell for cell in found if cell in kept]
 
 
-def _set_apart(
+def _rejected_cells(
     problem: Problem, inverse: FloatArray, target: FloatArray
 ) -> tuple[float, list[tuple[int, int, float]]]:
     """Set cells apart greedily; return the log evidence of the result and the cells."""

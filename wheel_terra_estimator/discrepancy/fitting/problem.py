@@ -23,7 +23,7 @@ IndexArray = NDArray[np.intp]
 _LENGTHS = (0.35, 1.0)
 # A hump or a ripple in slip that all loads, slopes and wheels share is no outlier either.
 _SLIP_LENGTH, _OTHER_LENGTH = 0.08, 3.0
-# A cell set apart as an outlier is taken to have this many times its noise.
+# A cell rejected as an outlier is taken to have this many times its noise.
 OUTLIER_FACTOR = 12.0
 
 
@@ -157,7 +157,7 @@ def build_problem(
     scale : numpy.ndarray
         (4,) range of each quantity.
     outliers : sequence of (row, quantity)
-        Cells set apart.
+        Cells rejected.
     common : sequence of CommonError
         Errors of inputs (slip, leaving angle), common to the quantities of a row.
     """

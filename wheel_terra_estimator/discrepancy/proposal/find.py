@@ -50,7 +50,7 @@ IndexArray = NDArray[np.intp]
 
 MOST_TERMS = 4
 _BRANCHES = 3  # first terms that are gone on from, where laws do not predict what was left out
-_TRIED = 6  # terms of the greatest promise that are fitted in each step
+_TRIED = 6  # terms of the greatest expected gain that are fitted in each step
 _WORTH = 3.0  # nats by which a term must raise the evidence beyond those that say which it is
 _LEVELS = 6  # levels of an input that are left out one at a time, at most
 _CLOSED = 0.15  # share of the gap on what was left out that a law must close
@@ -198,7 +198,7 @@ def _widened(fitted: Fit, findings: Findings) -> Fit:
     )
 
 
-def promise_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
+def gain_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
     """Return the nats that the best term of an unlisted law promises on top of a fit.
 
     Near zero where the fit leaves noise alone; several nats where what is left has the shape of
@@ -210,7 +210,7 @@ def promise_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
     found = {name: term for name, term in _terms(table).items() if pair_of(name)[1] not in late}
     terms = replace(setting, effects=found)
     starts = linear_starts(terms, fitted, tuple(terms.effects))
-    return max((promise for promise, _, _ in starts), default=0.0)
+    return max((expected_gain for expected_gain, _, _ in starts), default=0.0)
 
 
 def _terms(table: SteadyTable) -> dict[str, Effect]:

@@ -185,8 +185,10 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
         'residuals': residuals,
         'where': keep('where', pictures.where_map(diagnosis)),
         'structural_error': keep('structural_error', pictures.structural_error(diagnosis)),
-        'rivals': keep('next_measurement', pictures.rivals(proposed)) if proposed else None,
-        'rivals_title': proposed.what if proposed else '',
+        'competitors': keep('next_measurement', pictures.competitors(proposed))
+        if proposed
+        else None,
+        'competitors_title': proposed.what if proposed else '',
     }
 
 

@@ -66,7 +66,7 @@ def measured_against_model(diagnosis: Diagnosis) -> Figure:
         figure, axes = _panels(1, table.quantities, height=2.7, legend=lines)
         for axis, q, scale in _each(axes, table.quantities, 'model [{}]', 'measured [{}]'):
             measured = scale * table.measured[:, q]
-            good = np.isfinite(measured) & ~_set_apart(diagnosis, q)
+            good = np.isfinite(measured) & ~_rejected_cells(diagnosis, q)
             after = scale * curves.after[:, q]
             axis.plot(
                 scale * curves.before[good, q],
@@ -105,7 +105,7 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
         legend = below + lines_of_groups
         figure, axes = _panels(1, table.quantities, height=3.0, legend=legend)
         for axis, q, scale in _each(axes, table.quantities):
-            kept = np.isfinite(table.measured[:, q]) & ~_set_apart(diagnosis, q)
+            kept = np.isfinite(table.measured[:, q]) & ~_rejected_cells(diagnosis, q)
             for (_, rows), colour, shape in zip(groups, _DISCRETE, _SHAPES, strict=False):
                 for values, style in ((curves.before, ':'), (curves.after, '-')):
                     axis.plot(slip[rows], scale * values[rows, q], style, color=colour, lw=1.2)
@@ -187,7 +187,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
         drawn = None
         for row, name in zip(axes, table.quantities, strict=True):
             q, (scale, quantity_unit) = QUANTITIES.index(name), SHOWN[name]
-            outside = _set_apart(diagnosis, q)
+            outside = _rejected_cells(diagnosis, q)
             error = [scale * (table.measured[:, q] - values[:, q]) for _, values in stages]
             reach = 1.12 * max(float(np.nanmax(np.abs(e[~outside]))) for e in error)
             for axis, (title, _), residual in zip(row, stages, error, strict=True):
@@ -272,7 +272,7 @@ def structural_error(diagnosis: Diagnosis) -> Figure | None:
         lines = _legend_lines(names, table.quantities)
         figure, axes = _panels(1, table.quantities, height=2.5, legend=lines)
         for axis, q, scale in _each(axes, table.quantities):
-            inside = ~_set_apart(diagnosis, q)
+            inside = ~_rejected_cells(diagnosis, q)
             dots = axis.plot(
                 slip[inside], scale * left.residual[inside, q], 'o', ms=3.5, color=GREY
             )
@@ -290,8 +290,8 @@ def structural_error(diagnosis: Diagnosis) -> Figure | None:
     return figure
 
 
-def rivals(item: NextMeasurement) -> Figure | None:
-    """Draw what the rivals predict on proposed rows, for the quantities in which they part."""
+def competitors(item: NextMeasurement) -> Figure | None:
+    """Draw what the competitors predict on proposed rows, for the quantities in which they part."""
     if item.rows is None or len(item.predictions) < 2:
         return None
     x_name = 'slip' if np.ptp(item.rows.get('slip', np.zeros(1))) > 0 else _widest(item.rows)
@@ -299,13 +299,13 @@ def rivals(item: NextMeasurement) -> Figure | None:
     x = factor * np.asarray(item.rows[x_name], dtype=float)
     order = np.argsort(x, kind='stable')
     with _style():
-        names = [words(rival) for rival in item.predictions]
+        names = [words(competitor) for competitor in item.predictions]
         aside = any(np.asarray(values)[:, -1].any() for values in item.predictions.values())
         shown = QUANTITIES if aside else QUANTITIES[:-1]
         lines = _legend_lines(names, shown)
         figure, axes = _panels(1, shown, height=2.2, legend=lines)
         for axis, q, scale in _each(axes, shown, label(x_name, unit), 'predicted [{}]'):
-            for (rival, values), colour, marker in zip(
+            for (competitor, values), colour, marker in zip(
                 item.predictions.items(), (BLUE, RED, GREEN, PURPLE), 'oDs^', strict=False
             ):
                 axis.plot(
@@ -315,7 +315,7 @@ def rivals(item: NextMeasurement) -> Figure | None:
                     ms=4.5,
                     color=colour,
                     mfc='none' if marker != 'o' else colour,
-                    label=words(rival),
+                    label=words(competitor),
                 )
         handles, labels = axes[0][0].get_legend_handles_labels()
         _legend(figure, handles, labels, lines=lines)
@@ -445,7 +445,7 @@ def _last(diagnosis: Diagnosis) -> str:
     return f'with {" and ".join(names)}' if names else 'soil refitted'
 
 
-def _set_apart(diagnosis: Diagnosis, q: int) -> NDArray[np.bool_]:
+def _rejected_cells(diagnosis: Diagnosis, q: int) -> NDArray[np.bool_]:
     mask = np.zeros(len(diagnosis.table), dtype=bool)
     for row, quantity, _ in diagnosis.outliers:
         mask[row] |= QUANTITIES.index(quantity) == q

@@ -63,8 +63,8 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
         left.append('Something is left that the named effect does not explain.')
     for effect in diagnosis.effects:
         if effect.confounded_with:
-            rivals = ', '.join(map(_plain, effect.confounded_with))
-            left.append(f'These rows cannot tell {_plain(effect.name)} from {rivals}.')
+            competitors = ', '.join(map(_plain, effect.confounded_with))
+            left.append(f'These rows cannot tell {_plain(effect.name)} from {competitors}.')
     if diagnosis.verdict in OPEN and not still_off:
         left.append('Why these rows need another soil, or more scatter, than was stated.')
     if not left:
@@ -112,11 +112,11 @@ def _to_settle(diagnosis: Diagnosis) -> list[str]:
 def worth(item: NextMeasurement) -> str:
     """Return a measurement with what it is worth."""
     names = ['no effect' if name == 'nothing' else _plain(name) for name in item.separates]
-    rivals = ' from '.join(names)
+    competitors = ' from '.join(names)
     if not np.isfinite(item.distance_then):
-        return f'{item.what} (tells {rivals})'
+        return f'{item.what} (separates {competitors})'
     now, then = number(item.distance_now, 2), number(item.distance_then, 2)
-    return f'{item.what} (tells {rivals}: {now} times the noise apart now, {then} with it)'
+    return f'{item.what} (separates {competitors}: {now} times the noise apart now, {then} with it)'
 
 
 def moved(shift: SoilShift) -> str:
@@ -170,12 +170,12 @@ def why_not(
         return f'another form of the same: {behind:.1f} nats behind'
     if not names:
         return f'leaves a gap: {behind:.1f} nats behind {_label(chosen)}'
-    open_names = {name for rivals in verdict.open_sets for name in rivals}
+    open_names = {name for competitors in verdict.ambiguity_groups for name in competitors}
     if len(names) == len(chosen) and set(names) - chosen <= open_names:
         return f'cannot be told apart on these rows ({behind:.1f} nats behind)'
-    if verdict.word == 'agrees':
+    if verdict.status == 'agrees':
         return f'no gap that needs it ({behind:.1f} nats behind nothing)'
-    if verdict.word == 'unexplained':
+    if verdict.status == 'unexplained':
         return 'leaves a smooth misfit that it does not explain'
     if chosen < set(names):
         extra = _label(set(names) - chosen)
@@ -194,7 +194,8 @@ def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
             f'{_plain(name)} is off by {amount(name, item.after)} {SHOWN[name][1]} on unseen rows '
             f'(noise and allowed model error permit {amount(name, item.limit)})'
         )
-    text = f'Not decided: {" and ".join(parts)}, but these rows favour neither nothing nor a name'
+    off = ' and '.join(parts)
+    text = f'Not decided: {off}, but these rows favour neither the refitted soil nor an effect'
     return f'{text}; nearest: {", ".join(nearest)}.' if nearest else f'{text}.'
 
 
@@ -222,7 +223,7 @@ def notes(
     found += _repeatability(findings.noise)
     if findings.outliers:
         count = len(findings.outliers)
-        found.append(f'{count} {"cell was" if count == 1 else "cells were"} set apart as outliers')
+        found.append(f'{count} {"cell was" if count == 1 else "cells were"} rejected as outliers')
     found += [f'{text}: look at it before any effect' for text in far(shifts)]
     for c, u in zip(after.coordinates, after.u, strict=True):
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
@@ -266,32 +267,32 @@ def sentence(
     nearest: tuple[str, ...] = (),
 ) -> str:
     """Return the verdict in words."""
-    if verdict.word == 'undecided':
+    if verdict.status == 'undecided':
         return _undecided(gap or {}, nearest)
     within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'
     if not floor:
         within = ' (model-error floor needed: none)'
-    if verdict.word == 'agrees' and floor > _COARSE:
+    if verdict.status == 'agrees' and floor > _COARSE:
         return (
             'These rows are too scattered to judge the model: it agrees with them, but only within '
             f'{100 * floor:.0f} % of the range (p = {number(gap_p_value, 2)}).'
         )
-    if verdict.word == 'agrees':
+    if verdict.status == 'agrees':
         agreed = 'Model and measurement agree once the soil is refitted'
         return f'{agreed}{within}.'
-    if verdict.word == 'unexplained' and stretch:
+    if verdict.status == 'unexplained' and stretch:
         return (
             'Model and measurement disagree; none of the known effects alone explains it, but '
             f'{stretch.text}.'
         )
-    if verdict.word == 'unexplained' and left.only_far:
+    if verdict.status == 'unexplained' and left.only_far:
         return (
             'Model and measurement agree only with numbers too far from the configured ones to be '
             f'believed (one by {left.pull:.1f} of its standard deviations, at most '
             f'{FARTHEST_PULL:g} are believed): they are wrong, or something is missing that acts '
             'like them and is none of the known effects.'
         )
-    if verdict.word == 'unexplained':
+    if verdict.status == 'unexplained':
         size = f'a misfit of about {100 * left.amplitude:.0f} % of the range'
         if left.amplitude < 0.005:
             size = 'nothing smooth, but more scatter than the noise allows,'
@@ -310,8 +311,8 @@ def sentence(
         form = f' in the form {_plain(effect.form)}' if effect.form else ''
         text = f'{effect.name}{form} ({values}; confidence {percent(effect.confidence)})'
         if effect.confounded_with:
-            rivals = ' or '.join(effect.confounded_with)
-            text += f' or {rivals} (one of them: {percent(effect.confidence_of_set)})'
+            competitors = ' or '.join(effect.confounded_with)
+            text += f' or {competitors} (one of them: {percent(effect.confidence_of_set)})'
         parts.append(text)
     result = 'Missing in the model: ' + ', and '.join(parts)
     if any(effect.remainder for effect in effects):

@@ -104,7 +104,7 @@ def linear_starts(
 ) -> list[tuple[float, tuple[str, ...], FloatArray]]:
     """Return (promised fall of the objective, names, start) for ``base`` plus each effect.
 
-    The promise comes from the signatures at the base fit. An effect's second parameter (an onset, a
+    It comes from the signatures at the base fit. An effect's second parameter (an onset, a
     depth) has no gradient while its strength is nil, so a few values of it compete.
     """
     trials: list[Trial] = []

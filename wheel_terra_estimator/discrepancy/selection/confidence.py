@@ -26,7 +26,7 @@ from wheel_terra_estimator.terramechanics.effects.base import effect_of
 FEATURES = (
     'one',
     'margin',  # log odds of the name against everything without it
-    'margin_of_set',  # the same of the name and its rivals
+    'margin_of_set',  # the same of the name and its competitors
     'gain',  # log evidence over nothing, compressed
     'remainder',  # something is left beyond the floor
     'floor',  # probability of a structural error
@@ -49,7 +49,7 @@ _TEMPERATURE = 1.5
 
 @dataclass(frozen=True)
 class Confidence:
-    """Probability that a name is right, and that it or one of its rivals is."""
+    """Probability that a name is right, and that it or one of its competitors is."""
 
     of_name: float
     of_set: float
@@ -61,7 +61,7 @@ def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, fl
     name = selection.explanations[verdict.index].names[place]
     effects = [{effect_of(key) for key in e.names} for e in selection.explanations]
     has = np.array([effect_of(name) in mine for mine in effects])
-    inside = {effect_of(key) for key in (name, *verdict.open_sets[place])}
+    inside = {effect_of(key) for key in (name, *verdict.ambiguity_groups[place])}
     covered = np.array([bool(inside & mine) for mine in effects])
 
     def margin(mine: np.ndarray) -> float:

@@ -33,7 +33,7 @@ SURE_OF_FLOOR = 0.95
 ODDS_AGAINST_NAMES = 2.0
 # Members of the open set: tempered weights are added up to this mass.
 SET_MASS = 0.97
-# Nats by which a rival must at least beat the same set without it.
+# Nats by which a competitor must at least beat the same set without it.
 BETTER_THAN_EMPTY = 1.0
 TEMPERATURE = 1.3
 
@@ -49,10 +49,10 @@ CLEAN_SHARE = 0.25
 class Verdict:
     """What was decided."""
 
-    word: str  # ``agrees``, ``named``, ``unexplained`` or ``undecided``
+    status: str  # ``agrees``, ``named``, ``unexplained`` or ``undecided``
     index: int  # explanation that is reported as the fit: of the named set, else of nothing
     # For each named effect, the others (in their best form) that the data cannot tell from it
-    open_sets: tuple[tuple[str, ...], ...]
+    ambiguity_groups: tuple[tuple[str, ...], ...]
     left: Remainder  # what that explanation leaves
 
 
@@ -89,8 +89,8 @@ def choose(
     odds = ODDS_OVER_FLOOR if floor_is_sure else ODDS_TO_SPEAK
     if np.logaddexp(effects, rest) - agrees < np.log(odds):
         agreement = 'undecided' if off else 'agrees'
-        word = agreement if left.accounted_for else 'unexplained'
-        return Verdict(word, nothing, (), left)
+        status = agreement if left.accounted_for else 'unexplained'
+        return Verdict(status, nothing, (), left)
     named = [h for h in named if h not in excluded]
     if not named or rest - effects > np.log(ODDS_AGAINST_NAMES):
         return Verdict('unexplained', nothing, (), left)
@@ -106,8 +106,8 @@ def choose(
     if after.significant and _explained(selection, nothing, best) < MOST:
         return Verdict('unexplained', nothing, (), left)
     names = selection.explanations[best].names
-    open_sets = tuple(_rivals(selection, total, names, name) for name in names)
-    return Verdict('named', best, open_sets, after)
+    ambiguity_groups = tuple(_competitors(selection, total, names, name) for name in names)
+    return Verdict('named', best, ambiguity_groups, after)
 
 
 def _best_set(selection: Selection, weight: FloatArray, named: list[int]) -> int:
@@ -130,7 +130,7 @@ def _explained(selection: Selection, nothing: int, best: int) -> float:
     return (float(before @ before) - float(after @ after)) / excess
 
 
-def _rivals(
+def _competitors(
     selection: Selection, total: FloatArray, names: tuple[str, ...], name: str
 ) -> tuple[str, ...]:
     """Return effects that could stand in the place of ``name``, most probable first."""
@@ -143,13 +143,13 @@ def _rivals(
         mine = set(explanation.names)
         if len(mine) == len(names) and others <= mine:
             (own,) = mine - others
-            # What is no better than leaving the place empty is no rival.
+            # What is no better than leaving the place empty is no competitor.
             if effect_of(own) == effect_of(name) and own != name:
                 continue  # another form of the same effect
             if own == name or explanation.log_evidence > without + BETTER_THAN_EMPTY:
                 places[own] = float(total[h])
     by_weight = sorted(places, key=lambda key: -places[key])
-    # Of a rival's forms the best one stands for all.
+    # Of a competitor's forms the best one stands for all.
     best_form = {effect_of(key): key for key in reversed(by_weight)}
     order = [key for key in by_weight if best_form[effect_of(key)] == key]
     logs = np.array([places[key] for key in order]) / TEMPERATURE

@@ -46,7 +46,7 @@ _UNEXPLAINED_SOME = (0.015, 0.03, 0.06, 0.15, 0.4)
 _SOME = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 1, 1, 1))
 
 _FURTHER = 8  # sets with one effect more that are fitted, at most
-_RIVALS = 2  # other effects that are put in the place of each effect of a set
+_COMPETITORS = 2  # other effects that are put in the place of each effect of a set
 # A further effect must promise so many nats over the best set without: its prior costs four.
 _PROMISE = 1.5
 
@@ -201,9 +201,9 @@ def explain_more(setting: Setting, seeds: Sequence[Explanation]) -> list[Explana
     for seed in seeds:
         others = _compatible(setting, seed.names)
         for gain, names, start in linear_starts(setting, seed.fitted, others):
-            promise, key = gain - seed.fitted.objective, frozenset(names)
-            if key not in starts or starts[key][0] < promise:
-                starts[key] = promise, (names, start, seed.fitted.angle)
+            expected_gain, key = gain - seed.fitted.objective, frozenset(names)
+            if key not in starts or starts[key][0] < expected_gain:
+                starts[key] = expected_gain, (names, start, seed.fitted.angle)
     enough = _PROMISE - min((e.fitted.objective for e in seeds), default=0.0)
     worth = sorted((s for s in starts.values() if s[0] > enough), key=lambda s: -s[0])
     return _explained(setting, [start for _, start in worth[:_FURTHER]])
@@ -228,7 +228,7 @@ def explain_fewer(setting: Setting, best: Explanation) -> list[Explanation]:
 
 
 def explain_swaps(setting: Setting, best: Explanation) -> list[Explanation]:
-    """Leave each effect of a set out, and put others in its place: other forms, best rivals."""
+    """Leave each effect of a set out, put others in its place: other forms, best competitors."""
     starts: list[Start] = []
     fewer = explain_fewer(setting, best)
     for reduced in fewer:
@@ -236,7 +236,7 @@ def explain_swaps(setting: Setting, best: Explanation) -> list[Explanation]:
         others = [key for key in _compatible(setting, reduced.names) if key != left_out]
         found = sorted(linear_starts(setting, reduced.fitted, others), key=lambda s: -s[0])
         forms = [s for s in found if effect_of(s[1][-1]) == effect_of(left_out)]
-        rivals = [s for s in found if effect_of(s[1][-1]) != effect_of(left_out)]
-        kept = [*forms, *rivals[:_RIVALS]]
+        competitors = [s for s in found if effect_of(s[1][-1]) != effect_of(left_out)]
+        kept = [*forms, *competitors[:_COMPETITORS]]
         starts += [(names, start, reduced.fitted.angle) for _, names, start in kept]
     return [*fewer, *_explained(setting, starts)]

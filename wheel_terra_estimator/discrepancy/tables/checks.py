@@ -327,14 +327,14 @@ def check_against_wheel(table: SteadyTable, radius: FloatArray, width: FloatArra
     if deep.any():
         row = int(np.flatnonzero(deep)[0])
         millimetres = abs(np.nanmedian(sinkage)) > np.median(radius)
-        cure = (
+        remedy = (
             'it looks like millimetres, divide the column by 1000'
             if millimetres
             else 'check the unit, and that --config states the wheel of the table'
         )
         raise UserError(
             f'{table.name}, line {table.lines[row]}, column sinkage: {sinkage[row]:g} m is deeper '
-            f'than the wheel radius {radius[row]:g} m; {cure}'
+            f'than the wheel radius {radius[row]:g} m; {remedy}'
         )
     strong = abs(torque) > 5.0 * load * radius
     if strong.any():

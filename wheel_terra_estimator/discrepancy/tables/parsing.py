@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""CSV files and DataFrames as columns of numbers; what cannot be read is said with its cure."""
+"""CSV files and DataFrames as columns of numbers; what cannot be read is said with its remedy."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def read_table(path: str | Path, choice: Choice | None = None) -> SteadyTable:
     Raises
     ------
     UserError
-        One line with file, row and cure for everything that makes the table unusable.
+        One line with file, row and remedy for everything that makes the table unusable.
     """
     lines, values, notes = read_columns(Path(path), choice or Choice(), one_of=ONE_OF)
     return check_table(str(path), values, lines, notes)

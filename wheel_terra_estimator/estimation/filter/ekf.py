@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
 from wheel_terra_estimator.estimation.filter.likelihood import Likelihood
-from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
+from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 
 FloatArray = NDArray[np.float64]
 _LEAST_VARIANCE = 1e-30  # of an innovation, in its own unit squared
@@ -88,7 +88,7 @@ class GatedFilter:
 
     Attributes
     ----------
-    tape : Tape or None
+    buffer : HistoryBuffer or None
         Keeps the transitions of the state for a smoother.
     likelihood : Likelihood or None
         Sums up how likely the innovations were.
@@ -104,7 +104,7 @@ class GatedFilter:
         self._start = FilterMemory(mean.copy(), covariance.copy(), 0)
         self._lower, self._upper = lower, upper
         self.restarts = 0
-        self.tape: Tape | None = None
+        self.buffer: HistoryBuffer | None = None
         self.likelihood: Likelihood | None = None
 
     @property
@@ -114,8 +114,8 @@ class GatedFilter:
 
     def reset(self) -> None:
         """Go back to the start; restarts count from 0."""
-        if self.tape is not None:
-            self.tape.cut()
+        if self.buffer is not None:
+            self.buffer.cut()
         self.restore(self._start)
 
     def start_from(self, start: FilterMemory) -> None:
@@ -140,7 +140,7 @@ class GatedFilter:
         self._ekf.F = transition
         self._ekf.Q = noise
         self._ekf.predict()
-        self._keep_sound()
+        self._enforce_bounds()
         self._keep_transition(before, transition)
 
     def update(
@@ -167,7 +167,7 @@ class GatedFilter:
         if self.likelihood is not None:
             self.likelihood.add(ekf.y, ekf.S, scale)
         ekf.P = 0.5 * (ekf.P + ekf.P.T)
-        self._keep_sound()
+        self._enforce_bounds()
 
     def fuse(self, rows: Sequence[Row], considered: Sequence[int] = ()) -> None:
         """Fuse rows in one update; without rows nothing happens."""
@@ -194,7 +194,7 @@ class GatedFilter:
         transition[index, index] = 0.0
         self._keep_transition(before, transition)
 
-    def widen(self, index: int, variance: float) -> None:
+    def inflate(self, index: int, variance: float) -> None:
         """Add variance to one entry."""
         before = self._present()
         self._ekf.P[index, index] += variance
@@ -210,16 +210,16 @@ class GatedFilter:
         self._ekf.x, self._ekf.P = mean.copy(), covariance.copy()
 
     def _present(self) -> Gaussian | None:
-        """Return a copy of the state where there is a tape to keep it."""
-        if self.tape is None:
+        """Return a copy of the state where there is a buffer to keep it."""
+        if self.buffer is None:
             return None
         return Gaussian(self._ekf.x.copy(), self._ekf.P.copy())
 
     def _keep_transition(self, before: Gaussian | None, transition: FloatArray) -> None:
-        if self.tape is not None and before is not None:
-            self.tape.add(before, transition, Gaussian(self._ekf.x, self._ekf.P))
+        if self.buffer is not None and before is not None:
+            self.buffer.add(before, transition, Gaussian(self._ekf.x, self._ekf.P))
 
-    def _keep_sound(self) -> None:
+    def _enforce_bounds(self) -> None:
         """Keep mean and covariance finite, within their bounds and positive."""
         ekf = self._ekf
         x, entries = ekf.x, ekf.P.ravel('K')
@@ -229,8 +229,8 @@ class GatedFilter:
             ekf.P = self._start.covariance.copy()
             entries = ekf.P.ravel('K')
             self.restarts += 1
-            if self.tape is not None:
-                self.tape.cut()
+            if self.buffer is not None:
+                self.buffer.cut()
         np.minimum(np.maximum(x, self._lower, out=x), self._upper, out=x)
         diagonal = entries[:: len(x) + 1]
         if np.minimum.reduce(diagonal) <= 0.0:

@@ -43,9 +43,9 @@ class ReferenceTuning:
     mean_count: float = 6.0
     """References over which their innovations' mean is taken."""
     lasting_count: float = 30.0
-    """The same of a lean that lasts: smaller, and over longer."""
+    """The same of a common-mode bias that lasts: smaller, and over longer."""
     most_deviations: float = 3.0  # deviations that one reference counts for in it
-    most_doubt: float = 100.0
+    most_variance_factor: float = 100.0
     run_excess: float = 4.0
     """Square of that mean over its variance above which the references run to one side."""
     beyond_rim: float = 1.5  # times the fastest rim speed: no rover drives faster than its wheels
@@ -123,7 +123,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         self.state = self.state._replace(rejected=rejected)
 
     @property
-    def model_doubt(self) -> float:
+    def model_variance_factor(self) -> float:
         """Factor on the variance of the wheel-soil models [-]: 1 while the references scatter.
 
         Innovations of a filter that is right are white. Where they keep to one side for several
@@ -135,7 +135,7 @@ class ReferenceUpdate(Component[ReferenceState]):
             self._excess(state.mean_innovation, tuning.mean_count),
             self._excess(state.lasting_innovation, tuning.lasting_count),
         )
-        return clipped(excess**2, 1.0, tuning.most_doubt)
+        return clipped(excess**2, 1.0, tuning.most_variance_factor)
 
     def _excess(self, mean: float, count: float) -> float:
         """Return the square of a mean of `count` innovations over the variance of white ones [-].
@@ -190,7 +190,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         score = clipped(residual / math.sqrt(total), -most, most)
         state = self.state
         state = state._replace(nis=smoothed_nis(state.nis, nis))
-        if nis <= self._gate or state.rejected_in_a_row:  # a single wild one is no lean
+        if nis <= self._gate or state.rejected_in_a_row:  # a single wild one is no bias
             mean, lasting = state.mean_innovation, state.lasting_innovation
             state = state._replace(
                 mean_innovation=mean + (score - mean) / tuning.mean_count,
@@ -206,7 +206,7 @@ class ReferenceUpdate(Component[ReferenceState]):
             agreeing = state.rejected_in_a_row + 1
             opened = same and self.believes(agreeing, beyond=beyond)
             if opened:
-                ekf.widen(SPEED, residual * residual)
+                ekf.inflate(SPEED, residual * residual)
             else:
                 gate = tuning.gate_beyond if beyond else tuning.gate
                 variance += chi_square_gate(residual, total, gate)
@@ -242,5 +242,5 @@ class ReferenceUpdate(Component[ReferenceState]):
         until = time
         if abs(forward) > max(noise, tuning.moving_rest * self._rover.rest_speed):
             until += max(tuning.slide_gaps * self.state.gap, tuning.shortest_slide)
-            ekf.widen(SPEED, forward**2)
+            ekf.inflate(SPEED, forward**2)
         self.state = self.state._replace(sliding_until=until)

@@ -89,7 +89,7 @@ class SinkageUpdate(Component[SinkageUpdateState]):
                 needed = max(used[i] + 1, tuning.first_believed_after)
                 if in_a_row[i] < min(needed, tuning.believed_after):
                     continue
-                ekf.widen(index, residual * residual)
+                ekf.inflate(index, residual * residual)
             in_a_row[i] = 0
             used[i] = min(used[i] + 1, tuning.believed_after)
             mean_nis = smoothed_nis(mean_nis, min(nis, self._gate))

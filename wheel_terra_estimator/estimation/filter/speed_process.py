@@ -85,14 +85,15 @@ class SpeedTuning:
     leaking_share: float = 0.3
     """Of gravity times the error of the attitude: what of it changes along the way."""
     leak_rate: float = 0.1  # of that change [1/s]
-    usual_slip_std: float = 0.2  # about that of the configured soil on such a slope
+    equilibrium_slip_std: float = 0.2  # about that of the configured soil on such a slope
     usual_length: float = 1.5  # rim travel over which slip returns to it [m]
-    least_usual_slip: float = -0.2
-    most_usual_slip: float = 0.8
+    least_equilibrium_slip: float = -0.2
+    most_equilibrium_slip: float = 0.8
     start_share: float = 0.5
-    """Of the usual speed: what is farther from it at a start without reference is a jolt."""
+    """Of the usual speed: what is farther from it at a start without reference is a transient of
+    the accelerometer."""
     start_noise: float = 3.0
-    """Times the accelerometer's noise over a second: what is more is no jolt but a slide."""
+    """Times the accelerometer's noise over a second: what is more is no transient but a slide."""
     present: float = 1e-6  # [s]: a cycle no older is the present
 
 
@@ -194,7 +195,7 @@ class SpeedProcess(Component[SpeedState]):
             )
         )
         self._rover, self._sensors, self._tuning = rover, sensors, tuning
-        self._usual_slip = UsualSlip(configuration, rover)
+        self._equilibrium_slip = UsualSlip(configuration, rover)
         self._noise = self._acceleration_noise(
             StatedNoise(sensors.specific_force_std, 0.0, sensors.orientation_std)
         )
@@ -250,7 +251,7 @@ class SpeedProcess(Component[SpeedState]):
         apart = spread([now - old for old, now in zip(slow, rims.each, strict=True)])
         self.inflate(tuning.side_change * max(apart - self._rim_noise, 0.0))
 
-    def turn_back(self, ekf: GatedFilter, before: float, now: float) -> None:
+    def reverse_direction(self, ekf: GatedFilter, before: float, now: float) -> None:
         """Carry v / rim speed over to the other direction: up becomes down.
 
         It is that of the last drive in this direction, else of the drive that ended. The slip
@@ -413,7 +414,7 @@ class SpeedProcess(Component[SpeedState]):
         changes = [now - old for now, old in zip(rims.each, self.state.rims.each, strict=True)]
         return max(spread(changes) - self._rim_noise, 0.0)
 
-    def towards_usual_slip(
+    def towards_equilibrium_slip(
         self, step: SpeedStep, dt: float, rim: float, *, direction: float, slope_share: float
     ) -> SpeedStep:
         """Without a reference velocity, let v / rim speed return to what such a slope takes.
@@ -424,15 +425,16 @@ class SpeedProcess(Component[SpeedState]):
         if not abs(rim) >= self._rover.low_rim:
             return step
         tuning = self._tuning
-        most = tuning.most_usual_slip
-        slip = self._usual_slip.at(direction * slope_share, beyond=most)
-        usual = 1.0 - clipped(slip, tuning.least_usual_slip, most)
+        most = tuning.most_equilibrium_slip
+        slip = self._equilibrium_slip.at(direction * slope_share, beyond=most)
+        usual = 1.0 - clipped(slip, tuning.least_equilibrium_slip, most)
         keep = math.exp(-abs(rim) * dt / tuning.usual_length)
         return SpeedStep(
             keep * step.speed_gain,
             keep * step.bias_gain,
             keep * step.constant + (1.0 - keep) * usual * rim,
-            keep * keep * step.variance + (1.0 - keep * keep) * (tuning.usual_slip_std * rim) ** 2,
+            keep * keep * step.variance
+            + (1.0 - keep * keep) * (tuning.equilibrium_slip_std * rim) ** 2,
         )
 
     def present(
@@ -466,12 +468,14 @@ class SpeedProcess(Component[SpeedState]):
             spread = max(self._tuning.first_sight_share * abs(rims.typical), self._rover.rest_speed)
             ekf.set(SPEED, self.state.ratio * rims.typical, spread * spread)
 
-    def undo_jolt(self, ekf: GatedFilter, rim: float, stated: StatedNoise = NOTHING_STATED) -> None:
+    def remove_start_transient(
+        self, ekf: GatedFilter, rim: float, stated: StatedNoise = NOTHING_STATED
+    ) -> None:
         """Let a rover that starts without a reference velocity roll as it did before.
 
-        A jolt of the accelerometer weighs much while the wheels turn slowly, and from a speed of
-        nothing the wheels' prediction, v' = v rim'/rim, goes on with nothing. A rover that slides,
-        or wheels that spin up at once, differ by more than the accelerometer's noise.
+        A start-up transient of the accelerometer weighs much while the wheels turn slowly, and from
+        a speed of zero the wheels' prediction, v' = v rim'/rim, stays zero. A rover that slides, or
+        wheels that spin up at once, differ by more than the accelerometer's noise.
         """
         state, tuning = self.state, self._tuning
         usual = state.ratio * rim
@@ -485,7 +489,7 @@ class SpeedProcess(Component[SpeedState]):
         typical = sum(abs(rim) for rim in known(rims)) / len(rims)
         lacking = (typical * LEAST_SLIP_STD) ** 2 - float(ekf.covariance[SPEED, SPEED])
         if lacking > 0.0:
-            ekf.widen(SPEED, lacking)
+            ekf.inflate(SPEED, lacking)
 
     def end_cycle(self, time: float, ekf: GatedFilter, rims: RimSpeeds, *, settled: bool) -> None:
         """Remember what the next cycle needs."""

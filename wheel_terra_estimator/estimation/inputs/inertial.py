@@ -24,7 +24,7 @@ class InertialTuning:
     """Time over which one reading is held [s]; a longer gap is not integrated over."""
     noise_time: float = 2.0
     """Time constant with which the seen noise of the accelerometer is smoothed [s]."""
-    lean_time: float = 5.0
+    levelling_time: float = 5.0
     """Time constant with which an attitude without orientation follows the specific force [s]: a
     rover's mean acceleration over longer than a start or a stop is nothing."""
 
@@ -182,7 +182,7 @@ class InertialInput(Component[InertialState]):
     def attitude_after(self, attitude: Attitude, reading: InertialReading, dt: float) -> Attitude:
         """Return the attitude after a reading that came `dt` [s] after the last one.
 
-        Without an orientation it follows the gyro and leans to the specific force: right on
+        Without an orientation it follows the gyro and is pulled to the specific force: right on
         average.
         """
         if reading.orientation is not None:
@@ -197,5 +197,5 @@ class InertialInput(Component[InertialState]):
         turned = attitude.sine_up - (0.0 if isnan(rate) else rate * dt)
         if isnan(force):
             return Attitude(clipped(turned, -1.0, 1.0), known=True)
-        lean = dt / (self._tuning.lean_time + dt)
-        return Attitude(clipped(turned + lean * (force - turned), -1.0, 1.0), known=True)
+        share = dt / (self._tuning.levelling_time + dt)
+        return Attitude(clipped(turned + share * (force - turned), -1.0, 1.0), known=True)

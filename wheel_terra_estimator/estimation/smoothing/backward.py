@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Backward pass over a tape (Rauch, Tung and Striebel 1965; Särkkä 2013, algorithm 9.1).
+"""Backward pass over a buffer (Rauch, Tung and Striebel 1965; Särkkä 2013, algorithm 9.1).
 
 With x, P after the last update, x', P' after the transition and x_s', P_s' smoothed there::
 
@@ -16,7 +16,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape, Transition
+from wheel_terra_estimator.estimation.smoothing.history_buffer import (
+    Gaussian,
+    HistoryBuffer,
+    Transition,
+)
 
 FloatArray = NDArray[np.float64]
 _LEAST_PIVOT = 1e-7
@@ -64,14 +68,16 @@ def smoothed_before(
     return Gaussian(np.clip(mean, lower, upper), covariance)
 
 
-def smoothed_states(tape: Tape, lower: FloatArray, upper: FloatArray) -> Iterator[Gaussian | None]:
-    """Yield the smoothed state at each position of a tape, the last one (its length) first.
+def smoothed_states(
+    buffer: HistoryBuffer, lower: FloatArray, upper: FloatArray
+) -> Iterator[Gaussian | None]:
+    """Yield the smoothed state at each position of a buffer, the last one (its length) first.
 
     None where the filter was started anew and nothing is known of what came after.
     """
-    state = tape.end
+    state = buffer.end
     yield state
-    for position in range(len(tape) - 1, -1, -1):
-        transition = tape.transition(position)
+    for position in range(len(buffer) - 1, -1, -1):
+        transition = buffer.transition(position)
         state = None if transition is None else smoothed_before(transition, state, lower, upper)
         yield state

@@ -39,8 +39,13 @@ from wheel_terra_estimator.estimation.outputs import Outputs
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import known
 from wheel_terra_estimator.estimation.smoothing.backward import smoothed_states
-from wheel_terra_estimator.estimation.smoothing.spool import Spool
-from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape, packed, unpacked
+from wheel_terra_estimator.estimation.smoothing.disk_buffer import DiskBuffer
+from wheel_terra_estimator.estimation.smoothing.history_buffer import (
+    Gaussian,
+    HistoryBuffer,
+    packed,
+    unpacked,
+)
 from wheel_terra_estimator.estimation.smoothing.window import Moment, centred
 from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant, WheelSoilEstimator
 from wheel_terra_estimator.estimation.words import MissingInputs
@@ -109,10 +114,10 @@ class DriveSmoother:
     def __init__(
         self, configuration: Configuration, tuning: SmootherTuning = SmootherTuning()
     ) -> None:
-        self._tape = Tape()
-        self.estimator = WheelSoilEstimator(configuration, self._tape)
+        self._buffer = HistoryBuffer()
+        self.estimator = WheelSoilEstimator(configuration, self._buffer)
         self._configuration, self._tuning = configuration, tuning
-        self._kept: Spool[Kept] = Spool()
+        self._kept: DiskBuffer[Kept] = DiskBuffer()
 
     def keep(self, estimates: EstimateSet, companion: Any = None) -> None:
         """Keep a set of the filter, with anything that is to come back beside the smoothed one."""
@@ -156,17 +161,17 @@ class DriveSmoother:
                 yield kept, None
 
     def _smoothed(self, parts: _Judges) -> Iterator[Moment]:
-        """Yield what follows from the smoothed state at each instant of the tape."""
-        tape = self._tape
-        backwards: Spool[tuple[FloatArray, FloatArray] | None] = Spool()
-        for state in smoothed_states(tape, *self.estimator.bounds):
+        """Yield what follows from the smoothed state at each instant of the buffer."""
+        buffer = self._buffer
+        backwards: DiskBuffer[tuple[FloatArray, FloatArray] | None] = DiskBuffer()
+        for state in smoothed_states(buffer, *self.estimator.bounds):
             backwards.append(packed(state) if state else None)
         position, now = -1, None
-        for index in range(len(tape.marks)):
-            mark = tape.marks[index]
+        for index in range(len(buffer.marks)):
+            mark = buffer.marks[index]
             if mark.position != position:
                 position = mark.position
-                kept = backwards[len(tape) - position]
+                kept = backwards[len(buffer) - position]
                 now = unpacked(kept) if kept else None
             if now is None:
                 continue

@@ -17,7 +17,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.estimation.smoothing.tape import Gaussian
+from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian
 from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant
 
 FloatArray = NDArray[np.float64]

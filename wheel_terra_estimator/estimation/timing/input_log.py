@@ -220,7 +220,7 @@ class InputLog:
             self._astray = True
             self._step(self.entries[last].stamp, pending, self._walk)
 
-    def settle(self, last: int) -> None:
+    def process_pending(self, last: int) -> None:
         """Make the steps up to the entry `last` that the next run would make anyway.
 
         Once between two runs, so that however many inputs come late it costs no more than those.

@@ -56,7 +56,7 @@ def _earth_pressure(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     k_gamma = (2.0 * n_gamma / tan + 1.0) * cos * cos
     depth = contact.radius * (1.0 - np.cos(contact.entrance_angle))
     weight = contact.density * contact.gravity
-    # Front of the wheel as a blade that leans by half the entrance angle from the horizontal.
+    # Front of the wheel as a blade at half the entrance angle from the horizontal.
     rake = 0.5 * np.pi - 0.5 * contact.entrance_angle
     front = np.sin(rake + friction) / (2.0 * np.sin(rake) * cos)
     pressure = 2.0 * contact.cohesion * k_c + weight * depth * k_gamma

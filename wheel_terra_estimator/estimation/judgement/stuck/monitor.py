@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Stuck warning: raised by either of two signs, cleared when neither has been there for a while.
+"""Stuck warning: raised by either of two criteria, cleared when neither has been there for a while.
 
 Slip: an entrapment, ahead or under way, is more likely than the threshold, or the median slip is
 above 0.8. Standing: the wheels stand for want of power. Only driving slip counts, and a single
@@ -33,7 +33,7 @@ from wheel_terra_estimator.estimation.scalars import NAN
 ADVICE = 'stop, back out'
 """What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
 HOLD, SINKING_HOLD, STANDING_HOLD = 0.95, 0.45, 0.15
-"""Times [s] that a sign must exceed, half a cycle short of 1, 0.5 and 0.2 s: slip, slip of wheels
+"""Times [s] that a criterion must hold, half a cycle short of 1, 0.5, 0.2 s: slip, slip of wheels
 that sink, standing (two readings of wheel odometry). Where the rover stops, a reference stands up
 to 0.9 s before the wheels do, and none of them sinks."""
 _SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
@@ -57,7 +57,7 @@ class StuckState(NamedTuple):
     """What the monitor remembers."""
 
     memory: Memory = Memory()
-    since: tuple[float, ...] = (NAN, NAN)  # when each sign came [s], nan = it is not there
+    since: tuple[float, ...] = (NAN, NAN)  # when each criterion was met [s], nan = it is not
     stuck: bool = False
     reason: str = ''
     direction: int = 0
@@ -85,8 +85,8 @@ class StuckMonitor(Component[StuckState]):
         likely = ahead.probability > settings.threshold or _digs(situation)
         there = likely and not situation.braked, situation.standing
         since = tuple(
-            (time if isnan(begun) else begun) if sign else NAN
-            for sign, begun in zip(there, old.since, strict=True)
+            (time if isnan(begun) else begun) if met else NAN
+            for met, begun in zip(there, old.since, strict=True)
         )
         holds = SINKING_HOLD if situation.digging > _SINKING else HOLD, STANDING_HOLD
         held = [time - begun > hold for begun, hold in zip(since, holds, strict=True)]
@@ -129,19 +129,19 @@ def _in_words(s: Situation, ahead: Outlook, settings: StuckSettings, held: list[
     """Return what is seen, how likely an entrapment is, and what to do."""
     count = sum(s.stalled)
     if held[1] and count > 1:
-        told = f'{count} wheels stalled near their torque limit'
+        text = f'{count} wheels stalled near their torque limit'
     elif held[1]:
-        told = f'wheels slowed to {s.rim:.2f} m/s near their torque limit'
+        text = f'wheels slowed to {s.rim:.2f} m/s near their torque limit'
     elif s.slip > ENTRAPPED_SLIP:
-        told = f'median slip {s.slip:.2f}: entrapment under way'
+        text = f'median slip {s.slip:.2f}: entrapment under way'
     elif ahead.probability <= settings.threshold:
-        told = f'median slip {s.slip:.2f}: digging in'
+        text = f'median slip {s.slip:.2f}: digging in'
     else:
-        told = (
+        text = (
             f'median slip {s.slip:.2f}: entrapment within {settings.horizon:g} s '
             f'{ahead.probability:.0%} likely'
         )
     centimetres = round(100.0 * s.digging)
     if centimetres > 0:
-        told += f', most wheels sink {centimetres} cm per metre of rim travel'
-    return f'{told}; {ADVICE}'
+        text += f', most wheels sink {centimetres} cm per metre of rim travel'
+    return f'{text}; {ADVICE}'

@@ -131,7 +131,7 @@ class Situation:
         )
 
     @cached_property
-    def climbing_room(self) -> tuple[float, ...]:
+    def travel_until_too_deep(self) -> tuple[float, ...]:
         """Rim travel after which each wheel is in too deep for its lugs to climb out [m].
 
         It sinks as it turns, as over its last travel; infinite where it does not.

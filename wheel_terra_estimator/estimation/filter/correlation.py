@@ -11,7 +11,7 @@ SAME_GROUND = 0.15
 _MOST, _LEAST_TRAVEL = 100.0, 1e-9
 
 
-def repetitions(rims: tuple[float, ...], dt: float) -> float:
+def correlated_cycles(rims: tuple[float, ...], dt: float) -> float:
     """Return how many cycles of length `dt` [s] are one piece of information.
 
     Taken as many, each linearised anew at its own noisy state, they leave T(s) = const no ridge:

@@ -18,7 +18,7 @@ LASTING = Path('/var/tmp')
 """Where temporary files may be large: on many systems /tmp lies in memory."""
 
 
-class Spool(Generic[Item]):
+class DiskBuffer(Generic[Item]):
     """Items in the order in which they were added; only their places are in memory.
 
     The file has no name and goes away with the object. It lies in the folder that the environment

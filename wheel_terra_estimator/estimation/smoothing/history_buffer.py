@@ -9,7 +9,7 @@ The filter changes its state in four ways, and each is one thing to a smoother:
 * a measurement changes what is known of the state and not the state: nothing is kept;
 * a start anew is a cut, over which nothing of the future is carried back.
 
-So the prediction on the tape is exactly what the next update started from. Of a covariance one
+So the prediction on the buffer is exactly what the next update started from. Of a covariance one
 triangle is kept, of F what differs from no change.
 """
 
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.estimation.smoothing.spool import Spool
+from wheel_terra_estimator.estimation.smoothing.disk_buffer import DiskBuffer
 
 FloatArray = NDArray[np.float64]
 
@@ -48,22 +48,22 @@ class Mark(NamedTuple):
 
 
 class TapeLength(NamedTuple):
-    """What `Tape.restore` needs."""
+    """What `HistoryBuffer.restore` needs."""
 
     transitions: int
     marks: int
 
 
-class Tape:
+class HistoryBuffer:
     """Transitions and marks of a drive in the order of their stamps.
 
     It is a part of the estimator like any other: where the estimator goes back to an earlier state
-    for a late input, the tape is wound back with it.
+    for a late input, the buffer is wound back with it.
     """
 
     def __init__(self) -> None:
-        self._transitions: Spool[tuple[FloatArray, ...] | None] = Spool()  # None: a cut
-        self.marks: Spool[Mark] = Spool()
+        self._transitions: DiskBuffer[tuple[FloatArray, ...] | None] = DiskBuffer()  # None: a cut
+        self.marks: DiskBuffer[Mark] = DiskBuffer()
         self._end: tuple[int, Gaussian] | None = None
 
     def __len__(self) -> int:
@@ -110,11 +110,11 @@ class Tape:
         """Leave everything: a new run of the same recording goes on behind the cut."""
 
     def snapshot(self) -> TapeLength:
-        """Return how far the tape is."""
+        """Return how far the buffer is."""
         return TapeLength(len(self), len(self.marks))
 
     def restore(self, snapshot: TapeLength) -> None:
-        """Wind the tape back."""
+        """Wind the buffer back."""
         self._transitions.truncate(snapshot.transitions)
         self.marks.truncate(snapshot.marks)
 
