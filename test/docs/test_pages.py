@@ -110,6 +110,19 @@ def test_the_conclusions_carry_no_date():
     assert not re.search('|'.join(DIARY[-3:]), text_without_code(DOCS / STUDIES))
 
 
+def test_the_map_of_the_code_is_short_and_leads_to_files():
+    text = (DOCS / 'architecture.md').read_text(encoding='utf-8')
+    assert len(text.split()) <= 1500
+    files = [
+        p.relative_to(ROOT).as_posix() for s in (*SOURCES, 'test') for p in (ROOT / s).rglob('*')
+    ]
+    named = re.findall(r'`(\w+/[\w/]*(?:\.py|\.yaml)?)`', re.sub(r'(?ms)^```.*?^```', '', text))
+    assert len(named) > 40
+    for name in named:
+        ends = f'/{name.rstrip("/")}', f'/{name}.py'
+        assert 'NAME' in name or any(f'/{f}'.endswith(ends) for f in files), name
+
+
 def test_the_page_of_the_interface_has_every_name():
     from wheel_terra_estimator import api
 

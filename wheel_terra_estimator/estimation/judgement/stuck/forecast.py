@@ -46,7 +46,9 @@ def outlook(s: Situation, passage: FirstPassage, settings: StuckSettings) -> Out
     before = min(int(place), len(TRAVELS) - 2)
     chances = within[:, before] + (place - before) * (within[:, before + 1] - within[:, before])
     found = []
-    by_wheel = zip(wheels, s.stalled, chances.tolist(), within, s.travel_until_too_deep, strict=True)
+    by_wheel = zip(
+        wheels, s.stalled, chances.tolist(), within, s.travel_until_too_deep, strict=True
+    )
     for wheel, stands, likely, course, room in by_wheel:
         if stands:
             found.append(WheelForecast(1.0, 0.0, 0.0))
