@@ -149,7 +149,7 @@ def test_where_only_an_unbelievable_soil_fits_the_law_leaves_one_that_can_be_bel
     law = found.proposal
     assert law.soil_held
     assert as_json(law)['soil_held']
-    far, near = (sum(shift.pull**2 for shift in soil) for soil in (found.soil, law.soil))
+    far, near = (sum(shift.z_score**2 for shift in soil) for soil in (found.soil, law.soil))
     assert near < 0.2 * far
     for quantity in ('drawbar_pull', 'torque'):
         gap = law.gap[quantity]

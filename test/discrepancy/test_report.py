@@ -165,7 +165,7 @@ def test_numbers_are_those_of_the_diagnosis(page, named):
         assert cells[-1] == candidate.why_not
     for shift in named.soil:
         cells = parsed.row(SOIL_WORDS.get(shift.name, shift.name.replace('_', ' ')), 'parameter')
-        assert cells[5] == f'{shift.pull:+.1f}'
+        assert cells[5] == f'{shift.z_score:+.1f}'
     for item in named.next_measurement:
         assert item.what in parsed.text
     for name in named.not_visible:
@@ -230,7 +230,7 @@ def test_soil_pulls_are_in_the_deviations_that_were_stated(named):
     (shift,) = (s for s in named.soil if s.name == 'sinkage_exponent')
     stated = flat['soil.sinkage_exponent_std'] or 0.05  # the default where none was stated
     assert shift.prior_std == pytest.approx(stated)
-    assert shift.pull == pytest.approx((shift.after - shift.before) / stated, rel=1e-6)
+    assert shift.z_score == pytest.approx((shift.after - shift.before) / stated, rel=1e-6)
     assert shift.before == pytest.approx(flat['soil.sinkage_exponent'])
 
 
@@ -269,7 +269,7 @@ def test_share_of_the_gap_that_closed(refit, after, share):
 def test_how_far_a_name_worsens_a_quantity_is_in_squares_of_its_noise(monkeypatch):
     """Errors of 3 where there were 2, at a noise of 5: (9 - 4) / 25."""
     monkeypatch.setattr(decision.significance, 'chi_square_p_value', lambda *_: 1.0)
-    monkeypatch.setattr(decision.significance, 'farthest_pull', lambda *_: 3.5)
+    monkeypatch.setattr(decision.significance, 'largest_z_score', lambda *_: 3.5)
     findings = SimpleNamespace(
         nothing=SimpleNamespace(outputs=np.zeros((4, 3))),
         noise=SimpleNamespace(std=np.ones((4, 3))),

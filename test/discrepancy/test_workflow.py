@@ -97,7 +97,7 @@ def test_an_effect_that_is_on_is_believed_as_far_as_its_deviation_goes(stated, v
     diagnosis = run(table, {**values, **on}, options=Options(effects=()))
     shift = next(s for s in diagnosis.moved if s.name == f'{prefix}.n1')
     assert shift.after == pytest.approx(kind, abs=0.03)
-    assert shift.pull == pytest.approx((shift.after - 0.03) / stated)
+    assert shift.z_score == pytest.approx((shift.after - 0.03) / stated)
     assert diagnosis.to_dict()['soil_pulls'][shift.name]['std'] == pytest.approx(stated)
     assert diagnosis.verdict == verdict
 
@@ -226,7 +226,7 @@ def test_soil_that_is_said_to_be_uncertain_is_no_finding():
 
     def pull(values):
         (shift,) = (s for s in run(table, values).soil if s.name == 'stiffness')
-        return abs(shift.pull)
+        return abs(shift.z_score)
 
     assert pull({**wrong, 'soil.frictional_modulus_std': std}) < 0.5 * pull(wrong)
 
@@ -323,7 +323,7 @@ def test_a_soil_that_nobody_can_believe_is_no_agreement():
     assert diagnosis.remainder_p_value > 1e-3, 'noise is all that is left'
     assert 'too far from the configured one' in diagnosis.sentence
     (friction,) = (s for s in diagnosis.soil if s.name == 'tan_friction')
-    assert friction.pull < -2.0
+    assert friction.z_score < -2.0
     assert 'friction_angle' in ' '.join(diagnosis.notes)
 
 

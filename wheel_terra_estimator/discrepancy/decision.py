@@ -44,7 +44,7 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME as
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
-_USUAL_PULL = 2.5  # stated deviations: farther than that a pull makes a name less sure
+_USUAL_Z_SCORE = 2.5  # stated deviations: a larger shift lowers the confidence of a name
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
 _LONG = 40  # iterations of a fit that may have to go far
 _MOST_TRIED = 3  # doubtful names, after which none is given
@@ -284,7 +284,7 @@ def _what_rows_show(
 
     ``worse``: how far an effect worsens a quantity; ``idle``: share of its signature in quantities
     that were never off; ``misfit``: how improbable the residual is; ``pull``: the
-    largest pull of a configured number beyond ``_USUAL_PULL`` of its stated deviations.
+    largest shift of a configured number beyond ``_USUAL_Z_SCORE`` of its stated deviations.
     """
     change = (fitted.outputs - findings.nothing.outputs)[: len(findings.noise.std)]
     worse, idle, total = 0.0, 0.0, 1e-12
@@ -296,13 +296,15 @@ def _what_rows_show(
         total += square
         idle += square if item.refit < _AT_NOISE * item.noise else 0.0
     misfit = significance.chi_square_p_value(fitted, fitted.variance)
-    alone = findings.setting.forward.active is None  # a reference's structural error pulls as well
-    largest = significance.farthest_pull(fitted) if alone else 0.0
+    alone = (
+        findings.setting.forward.active is None
+    )  # a reference's structural error shifts them as well
+    largest = significance.largest_z_score(fitted) if alone else 0.0
     return {
         'worse': float(np.tanh(worse)),
         'idle': idle / total,
         'misfit': -float(np.log10(max(misfit, 1e-6))),
-        'pull': max(largest - _USUAL_PULL, 0.0),
+        'pull': max(largest - _USUAL_Z_SCORE, 0.0),
     }
 
 

@@ -204,7 +204,7 @@ class NextMeasurement:
     distance_then: float
     # Column -> values of the proposed rows (SI); None for a zero check of an instrument
     rows: Mapping[str, FloatArray] | None = None
-    # Rival -> (n, 4) predicted sinkage, drawbar pull, torque of these rows
+    # Competing explanation -> (n, 4) predicted sinkage, drawbar pull, torque of these rows
     predictions: Mapping[str, FloatArray] = field(default_factory=dict, metadata=_ASIDE)
 
 
@@ -212,7 +212,7 @@ class NextMeasurement:
 class SoilShift:
     """A soil number, or a parameter of an effect that was on, before and after the fit.
 
-    ``pull`` is the shift in deviations of ``prior_std``, ``source`` says where these come from.
+    ``z_score`` is the shift in deviations of ``prior_std``, ``source`` says where these come from.
     """
 
     name: str
@@ -221,7 +221,7 @@ class SoilShift:
     refit: float
     after: float
     after_std: float
-    pull: float
+    z_score: float
     unit: str
     source: str = ''
 
@@ -298,7 +298,7 @@ class Diagnosis:
     remainder_p_value: float = field(metadata=_ASIDE)
     remainder_amplitude: float = field(metadata=_ASIDE)
     floor: float  # model-error floor in use, as a share of each quantity's range
-    # Warnings for people (units, duplicates, constant columns, soil pulls)
+    # Warnings for people (units, duplicates, constant columns, shifted soil numbers)
     notes: tuple[str, ...] = ()
     base_effects: tuple[str, ...] = ()  # effects that the configuration had switched on already
     # ``effect.parameter`` -> fitted value, of parameters that were on already
@@ -327,7 +327,7 @@ class Diagnosis:
         """Return the content of ``report.json``: finite numbers, text and lists only."""
         freely = {
             'soil_pulls': {
-                key: {'pull': shift.pull, 'std': std, 'source': shift.source}
+                key: {'pull': shift.z_score, 'std': std, 'source': shift.source}
                 for shift in self.moved
                 for key, std in (self._stated_std(shift),)
             },

@@ -379,7 +379,7 @@ def summary(name: str, case: Case, diagnosis: Diagnosis) -> str:
         f'{c.label} {c.log_evidence:+.1f}' for c in diagnosis.candidates[:6] if c.why_not or c.names
     ]
     lines += ['', f'ln evidence: {", ".join(best)}. {diagnosis.where.sentence}.']
-    pulls = [f'{s.name} {s.pull:+.1f}' for s in diagnosis.soil if abs(s.pull) > 3.0]
+    pulls = [f'{s.name} {s.z_score:+.1f}' for s in diagnosis.soil if abs(s.z_score) > 3.0]
     if pulls:
         lines.append(f'Soil pulled by more than 3 stated deviations: {", ".join(pulls)}.')
     if diagnosis.next_measurement:

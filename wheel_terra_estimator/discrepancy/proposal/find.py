@@ -28,10 +28,10 @@ from wheel_terra_estimator.discrepancy.selection.candidates import (
     Setting,
     linear_starts,
 )
-from wheel_terra_estimator.discrepancy.selection.remainder import FARTHEST_PULL
+from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
-from wheel_terra_estimator.discrepancy.selection.significance import farthest_pull
+from wheel_terra_estimator.discrepancy.selection.significance import largest_z_score
 from wheel_terra_estimator.discrepancy.selection.weights import explain_fewer
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
@@ -178,7 +178,7 @@ def effects_said(law: Proposal) -> frozenset[str]:
 
 
 def _can_be_believed(fitted: Fit, findings: Findings) -> bool:
-    return farthest_pull(_widened(fitted, findings)) < FARTHEST_PULL
+    return largest_z_score(_widened(fitted, findings)) < LARGEST_Z_SCORE
 
 
 def _widened(fitted: Fit, findings: Findings) -> Fit:

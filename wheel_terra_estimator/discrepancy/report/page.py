@@ -14,7 +14,7 @@ from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
 from wheel_terra_estimator.discrepancy.report.words import in_words, law_line, soil_line
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
-from wheel_terra_estimator.discrepancy.selection.remainder import FARTHEST_PULL
+from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE
 from wheel_terra_estimator.reporting.html import picture, render, write_page
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -62,7 +62,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         law_line=law_line(diagnosis),
         where=_where(diagnosis),
         soil_words=SOIL_WORDS,
-        far=FARTHEST_PULL,
+        far=LARGEST_Z_SCORE,
         # How things are written
         words=pictures.words,
         number=number,

@@ -23,7 +23,7 @@ from wheel_terra_estimator.discrepancy.result import (
     QuantityGap,
     SoilShift,
 )
-from wheel_terra_estimator.discrepancy.selection.remainder import FARTHEST_PULL, Remainder
+from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE, Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -124,7 +124,7 @@ def moved(shift: SoilShift) -> str:
     key = shift.name if shift.name.startswith('effects.') else f'soil.{shift.name}'
     return (
         f'{_KEYS.get(shift.name, key)} from {number(shift.before)} to {number(shift.after)}, '
-        f'{shift.pull:+.1f} of its standard deviations ({shift.source})'
+        f'{shift.z_score:+.1f} of its standard deviations ({shift.source})'
     )
 
 
@@ -132,7 +132,7 @@ _CLASS = 'class of source: '
 
 
 def soil_line(diagnosis: Diagnosis) -> str:
-    """Return which number the fit pulls farthest, and how well those of the soil were known."""
+    """Return which number the fit shifts farthest, and how well those of the soil were known."""
     sources = ', '.join(dict.fromkeys(s.source.removeprefix(_CLASS) for s in diagnosis.soil))
     return f'{_farthest(diagnosis.moved)}; deviations of the soil from: {sources}.'
 
@@ -147,12 +147,12 @@ def law_line(diagnosis: Diagnosis) -> str:
 
 
 def _farthest(shifts: Iterable[SoilShift]) -> str:
-    return f'Number that moved most: {moved(max(shifts, key=lambda shift: abs(shift.pull)))}'
+    return f'Number that moved most: {moved(max(shifts, key=lambda shift: abs(shift.z_score)))}'
 
 
 def far(shifts: Iterable[SoilShift]) -> list[str]:
     """Return the numbers that had to move farther than can be believed, in words."""
-    return [moved(shift) for shift in shifts if abs(shift.pull) > FARTHEST_PULL]
+    return [moved(shift) for shift in shifts if abs(shift.z_score) > LARGEST_Z_SCORE]
 
 
 def _plain(name: str) -> str:
@@ -288,8 +288,8 @@ def sentence(
     if verdict.status == 'unexplained' and left.only_far:
         return (
             'Model and measurement agree only with numbers too far from the configured ones to be '
-            f'believed (one by {left.pull:.1f} of its standard deviations, at most '
-            f'{FARTHEST_PULL:g} are believed): they are wrong, or something is missing that acts '
+            f'believed (one by {left.z_score:.1f} of its standard deviations, at most '
+            f'{LARGEST_Z_SCORE:g} are believed): they are wrong, or something is missing that acts '
             'like them and is none of the known effects.'
         )
     if verdict.status == 'unexplained':

@@ -4,7 +4,7 @@
 
 The posterior of a model family that is never quite right is too sure of itself. A logistic map of
 few features, fitted on synthetic campaigns that include other formulas, structural error, outliers,
-unknown noise and strangers, brings it to the frequency with which such names are right.
+unknown noise and unlisted effects, brings it to the frequency with which such names are right.
 """
 
 from __future__ import annotations

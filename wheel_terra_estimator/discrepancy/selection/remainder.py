@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.selection.significance import (
     chi_square_p_value,
-    farthest_pull,
+    largest_z_score,
 )
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
 
@@ -24,7 +24,7 @@ Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 IMPROBABLE = 1e-3
 # Stated deviations by which no configured number may be pulled: a chance of 5 % for the farthest of
 # seven, of which 15 % are known 2.5 times worse than stated (``coordinates.BELIEVED_WIDTHS``).
-FARTHEST_PULL = 5.0
+LARGEST_Z_SCORE = 5.0
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,12 @@ class Remainder:
     probability_of_any: float
     amplitude: float  # most probable amplitude of the structural error, share of the range
     p_value: float  # of the whole misfit under the best floor (chi-square)
-    pull: float  # farthest of a configured number, in its stated deviations
+    z_score: float  # farthest of a configured number, in its stated deviations
 
     @property
     def accounted_for(self) -> bool:
         """True where floor and noise, and numbers that can be believed, are enough."""
-        return self.p_value > IMPROBABLE and self.pull < FARTHEST_PULL
+        return self.p_value > IMPROBABLE and self.z_score < LARGEST_Z_SCORE
 
     @property
     def only_far(self) -> bool:
@@ -78,11 +78,11 @@ def remainder(selection: Selection, index: int, variance_of: Variance) -> Remain
     floor = selection.floors[best]
     variance = variance_of(floor.amplitude, explanation.posterior.noise_factor[best])
     # A reference has no misfit that asks for a name: its structural error moves the soil as well.
-    pull = farthest_pull(explanation.fitted) if selection.unexplained.any() else 0.0
+    z_score = largest_z_score(explanation.fitted) if selection.unexplained.any() else 0.0
     return Remainder(
         share,
         any_share,
         selection.floors[top].largest,
         chi_square_p_value(explanation.fitted, variance),
-        pull,
+        z_score,
     )

@@ -40,10 +40,10 @@ def pulls(fitted: Fit) -> dict[str, float]:
     }
 
 
-def farthest_pull(fitted: Fit) -> float:
-    """Return the largest pull of a configured number; 0 where none is free.
+def largest_z_score(fitted: Fit) -> float:
+    """Return the largest shift of a configured number; 0 where none is free.
 
-    A sum over all numbers would dilute one huge pull, by which a stranger that works like another
-    soil (friction that softens with slip) shows itself.
+    A sum over all numbers would dilute one huge shift, by which an effect outside the catalogue
+    that works like another soil (friction that softens with slip) shows itself.
     """
     return max(map(abs, pulls(fitted).values()), default=0.0)
