@@ -85,7 +85,8 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         '|---|---|---|',
     ]
     for effect in effects.values():
-        lines.append(f'| [`{effect.name}`](#{effect.name}) | {effect.claim} | {touched(effect)} |')
+        claim = _in_a_cell(effect.claim)
+        lines.append(f'| [`{effect.name}`](#{effect.name}) | {claim} | {touched(effect)} |')
     for effect in effects.values():
         several = len(effect.forms) > 1
         lines += ['', f'## {effect.name}', '']
@@ -129,10 +130,14 @@ def _law_table() -> list[str]:
         columns = ', '.join(feature.columns) or '-'
         targets = ', '.join(f'`{t}`' for t in feature.targets)
         only = ' \\*' if '_times_' in name else f' ({targets} only)' if targets else ''
-        lines.append(f'| `{name}` | {feature.meaning.replace("|", "&#124;")}{only} | {columns} |')
+        lines.append(f'| `{name}` | {_in_a_cell(feature.meaning)}{only} | {columns} |')
     products = {f.targets for name, f in law.FEATURES.items() if '_times_' in name}
     (targets,) = products  # all the same
     return [*lines, '', f'\\* {", ".join(f"`{t}`" for t in targets)} only', '']
+
+
+def _in_a_cell(text: str) -> str:
+    return text.replace('|', '&#124;')
 
 
 def _parameter_table(form: Effect) -> list[str]:
@@ -143,7 +148,7 @@ def _parameter_table(form: Effect) -> list[str]:
     for p in form.parameters:
         note = '' if p.free else ' (not fitted)'
         lines.append(
-            f'| `{p.name}` | {p.unit} | {p.meaning}{note} | {p.default:g} '
+            f'| `{p.name}` | {p.unit} | {_in_a_cell(p.meaning)}{note} | {p.default:g} '
             f'| {p.lower:g} to {p.upper:g} | {prior_in_words(p)} |'
         )
     return [*lines, '']
