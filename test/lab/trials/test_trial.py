@@ -25,7 +25,7 @@ def run(folder, *arguments):
 def test_one_trial_writes_table_seal_and_diagnosis(tmp_path, capsys):
     assert run(tmp_path / 'a', '--seed', 3, '--effect', 'slip_sinkage_exponent') == 0
     said = capsys.readouterr().out
-    assert 'truth sealed (SHA-256' in said
+    assert 'truth withheld (SHA-256' in said
     assert 'slip_sinkage_exponent was hidden; said: slip_sinkage_exponent' in said
     assert ': right' in said
     for word in ('as configured', 'refitted', 'after', 'noise'):
