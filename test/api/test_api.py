@@ -79,9 +79,13 @@ def drive():
     return api.simulate('firm_drive', seed=3, duration=6.0)
 
 
-def test_simulated_drive_and_its_bag_give_the_same_numbers(drive, tmp_path):
+@pytest.fixture(scope='module')
+def direct(drive):
+    return api.estimate(drive, as_frame=False)
+
+
+def test_simulated_drive_and_its_bag_give_the_same_numbers(drive, direct, tmp_path):
     api.simulate('firm_drive', seed=3, duration=6.0, output=tmp_path / 'bag')
-    direct = api.estimate(drive, as_frame=False)
     bag = api.estimate(tmp_path / 'bag', drive.configuration, as_frame=False)
     assert direct.keys() == bag.keys()
     np.testing.assert_array_equal(direct['stamp'], bag['stamp'])
@@ -113,14 +117,20 @@ def logged(drive):
     return {name: np.array([row.get(name, np.nan) for row in ordered]) for name in names}
 
 
-def test_logged_values_give_the_numbers_of_the_drive(drive):
+@pytest.fixture(scope='module')
+def of_table(drive):
+    return api.estimate(logged(drive), drive.configuration, as_frame=False)
+
+
+def test_logged_values_give_the_numbers_of_the_drive(drive, of_table):
     # A table has no late arrivals: each reading stands at its stamp.
-    in_order = replace(drive, arrivals=sorted(drive.arrivals, key=lambda a: a.measurement.stamp))
-    direct = api.estimate(in_order, as_frame=False)
-    table = api.estimate(logged(drive), drive.configuration, as_frame=False)
-    assert direct['time'].size > 50
-    for name in direct.keys() - {'stamp'}:
-        np.testing.assert_allclose(direct[name], table[name], rtol=1e-4, atol=1e-5, err_msg=name)
+    arrivals = sorted(drive.arrivals, key=lambda a: a.measurement.stamp)
+    ordered = api.estimate(replace(drive, arrivals=arrivals), as_frame=False)
+    assert ordered['time'].size > 50
+    for name in ordered.keys() - {'stamp'}:
+        np.testing.assert_allclose(
+            ordered[name], of_table[name], rtol=1e-4, atol=1e-5, err_msg=name
+        )
 
 
 @pytest.mark.parametrize(
@@ -176,21 +186,20 @@ def test_diagnose_refuses_unknown_columns():
         api.diagnose({'slipp': [0.1]}, 'hit_wh3')
 
 
-def test_pictures_return_axes(drive, named):
+def test_pictures_return_axes(drive, direct, named):
     from matplotlib import pyplot
 
     curve = api.Model.load('hit_wh3', 'hit_fit').curve([0.4, 0.1], 80.0)
     panels = api.plot_curve({'fit': curve})
     assert panels[0].get_ylabel() == 'sinkage [mm]'
     assert list(panels[1].lines[0].get_xdata()) == [0.1, 0.4]
-    estimates = api.estimate(drive, as_frame=False)
-    panel = api.plot_estimates(estimates)
+    panel = api.plot_estimates(direct)
     wheels = drive.configuration.wheels
     assert len(panel.lines) == wheels.count
-    unknown = estimates[f'slip_class.{wheels.names[0]}'] == 255
+    unknown = direct[f'slip_class.{wheels.names[0]}'] == 255
     assert np.isnan(panel.lines[0].get_ydata()[unknown]).all()
     with pytest.raises(api.UserError, match='there are slip, '):
-        api.plot_estimates(estimates, 'speed')
+        api.plot_estimates(direct, 'speed')
     bars = api.plot_diagnosis(named[1])
     assert len(bars.patches) == 9
     pyplot.close('all')
@@ -274,6 +283,7 @@ def test_units_go_with_frames(drive):
         np.testing.assert_allclose(other.table.columns[name], column)
 
     estimates, truth = api.estimate(drive), drive.truth.to_frame()
+    assert estimates['time'].iloc[0] == 0.0
     wheel = drive.configuration.wheels.names[0]
     assert estimates.attrs['units'][f'pull_margin.{wheel}'] == 'N'
     assert estimates.attrs['units'][f'lateral_force.{wheel}'] == 'N'
@@ -285,17 +295,17 @@ def test_units_go_with_frames(drive):
     assert len(estimates.resample('1s').mean()) in (6, 7)
 
 
-def test_a_log_with_an_index_of_time_and_other_units(drive):
+def test_a_log_with_an_index_of_time_and_other_units(drive, of_table):
     pandas = pytest.importorskip('pandas')
     log = pandas.DataFrame(logged(drive))
     wheels = drive.configuration.wheels.names
-    want = api.estimate(log, drive.configuration, as_frame=False)
     log.index = pandas.to_datetime(log.pop('time'), unit='s')
     for wheel in wheels:
         log[f'rate.{wheel}'] *= 30.0 / np.pi
     log.attrs['units'] = {f'rate.{wheel}': 'rpm' for wheel in wheels}
     have = api.estimate(log, drive.configuration, as_frame=False)
-    np.testing.assert_allclose(have[f'slip.{wheels[0]}'], want[f'slip.{wheels[0]}'], atol=1e-6)
+    name = f'slip.{wheels[0]}'
+    np.testing.assert_allclose(have[name], of_table[name], atol=1e-6)
     log.attrs['units'] = {f'rate.{wheels[0]}': 'knots'}
     with pytest.raises(api.UserError, match=r"in 'knots'.*give it in rad/s"):
         api.estimate(log, drive.configuration, as_frame=False)
@@ -314,17 +324,6 @@ def test_a_sweep_is_the_curves_of_its_models():
             curve = other.curve(grid['slip'], load)
             np.testing.assert_array_equal(rows['slip'][kept], curve.slip)
             np.testing.assert_allclose(rows['torque'][kept], curve.torque, rtol=1e-9)
-
-
-def test_frames(drive):
-    pandas = pytest.importorskip('pandas')
-    frame = api.estimate(drive)
-    assert isinstance(frame, pandas.DataFrame)
-    assert frame['time'].iloc[0] == 0.0
-    table = pandas.DataFrame(logged(drive))
-    assert len(api.estimate(table, drive.configuration)) > 50
-    curve = api.Model.load('hit_wh3', 'hit_fit').curve([0.1, 0.4], 80.0)
-    assert list(curve.to_frame()['slip']) == [0.1, 0.4]
 
 
 def test_without_pandas_it_says_so(monkeypatch):

@@ -150,21 +150,21 @@ def everything(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize('command', ['replay', 'replay two', 'diagnose', 'predict'])
 def test_a_disk_that_fills_up_at_any_file_leaves_the_earlier_output(
-    make_bag: Any, rover: Any, tmp_path: Path, capsys: Any, command: str
+    make_bag: Any, rover: Any, tmp_path: Path, capsys: Any, undrawn: None, command: str
 ) -> None:
     """Whichever file is the first without room: the output of the run before stands, whole."""
     read, out = tmp_path / 'read', tmp_path / 'out'
     read.mkdir()
     rover.write(read / 'rover.yaml')
-    table = read / 't.csv'
-    rows = [f'{0.05 * k},{100 + k % 3},{0.01 + 0.001 * k}\n' for k in range(1, 9)]
-    table.write_text('slip,normal_load,sinkage\n' + ''.join(rows))
+    table, few = read / 't.csv', ['--slip', '0.05:0.6:8', '--load', '35,70']
+    model = ['--config', 'hit_wh1_lug10', '--config', 'hit_lss1']  # its own rows agree
+    assert main(['predict', *model, *few, '-o', str(table)]) == 0
     bags = [str(make_bag(name=name)) for name in ('one', 'two')]
     config = ['--config', str(read / 'rover.yaml')]
     line = {
         'replay': ['replay', bags[0], *config, '-o'],
         'replay two': ['replay', *bags, *config, '-o'],
-        'diagnose': ['diagnose', str(table), '--config', 'pathfinder', '-o'],
+        'diagnose': ['diagnose', str(table), *model, '--only', 'cohesion', '-o'],
         'predict': ['predict', '--config', 'pathfinder', '-o'],
     }[command]
     line += [str(out / 'o.csv' if command == 'predict' else out), '--overwrite']

@@ -41,8 +41,11 @@ def test_smoothing_is_for_bags(tmp_path: Path, capsys: Any) -> None:
 
 
 def test_a_soil_that_nobody_stated_is_said(tmp_path: Path, capsys: Any) -> None:
-    command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
-    assert main([*command, '--no-pictures', '--config', 'hit_wh1']) == 0
+    rig = ['--config', 'hit_wh1']
+    rows = ['--slip', '0.05:0.6:8', '--load', '35,70', '-o', str(tmp_path / 'rig.csv')]
+    assert main(['predict', *rig, *rows]) == 0
+    command = ['diagnose', str(tmp_path / 'rig.csv'), *rig, '-o', str(tmp_path / 'out')]
+    assert main([*command, '--no-pictures', '--only', 'cohesion']) == 0
     assert 'no soil was stated' in capsys.readouterr().out
 
 
@@ -72,7 +75,8 @@ def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(
     tables = [str(tmp_path / f'{name}.csv') for name in ('sand', 'simulant')]
     capsys.readouterr()
     arguments = ['diagnose', *tables, *rig, '--config', 'hit_lss1', '--no-pictures']
-    arguments += ['--soil', 'own', '--jobs', '2', '-o', str(tmp_path / 'out')]
+    arguments += ['--soil', 'own', '--jobs', '2', '--only', 'drivetrain_friction']
+    arguments += ['-o', str(tmp_path / 'out')]
     assert main(arguments) == 0
     said = capsys.readouterr().out
     assert 'over all 2 tables, each with its own soil' in said

@@ -57,7 +57,7 @@ def test_what_compare_refuses(tmp_path, capsys):
     assert 'without slip angle' in capsys.readouterr().err
 
 
-def test_diagnose_says_what_another_law_leaves(tmp_path, capsys):
+def test_diagnose_says_what_another_law_leaves(tmp_path, capsys, undrawn):
     path = table(tmp_path / 'rows.csv', 'resistive_force')
     assert main(['diagnose', path, *ROVER, '-o', str(tmp_path / 'out')]) == 0
     said = capsys.readouterr().out

@@ -170,7 +170,7 @@ def test_a_frame_is_read_as_the_file_is(tmp_path):
         np.testing.assert_allclose(frame.columns['slip'], file.columns['slip'], rtol=1e-12)
         assert frame.notes == file.notes[1:]
     found = diagnose(pandas.read_csv(path, sep=';'), ['hit_wh3', 'hit_fit'], effects=['cohesion'])
-    assert found.verdict == diagnose(path, ['hit_wh3', 'hit_fit'], effects=['cohesion']).verdict
+    np.testing.assert_allclose(found.table.measured, file.measured, rtol=1e-12)
 
 
 def test_a_map_of_columns(tmp_path, capsys):
