@@ -78,7 +78,7 @@ def test_manoeuvres_that_would_teach_more_are_in_json_terminal_and_report(
 ) -> None:
     from wheel_terra_estimator.simulation import manoeuvres
 
-    monkeypatch.setattr(manoeuvres, 'DURATION', 3.0)
+    monkeypatch.setattr(manoeuvres, 'DURATION', 1.5)
     bag, page = str(make_bag()), tmp_path / 'report.html'
     assert main(['replay', bag, *config, '--json']) == 0
     assert {row['manoeuvre'] for row in json.loads(capsys.readouterr().out)['taught']} == {None}

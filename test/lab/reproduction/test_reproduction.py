@@ -29,7 +29,7 @@ def told(page: str) -> list[tuple[str, str, str]]:
     return [(place, re.sub(r'\d+', '', what), verdict) for place, what, verdict in rows]
 
 
-def test_all_papers_stand_on_one_page_with_a_verdict_each(tmp_path, capsys):
+def test_all_papers_stand_on_one_page_with_a_verdict_each(tmp_path, capsys, undrawn):
     folder = tmp_path / 'papers'
     assert main(['reproduce', 'all', '-o', str(folder)]) == 0
     page = (folder / 'reproduction.md').read_text(encoding='utf-8')
