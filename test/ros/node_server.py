@@ -74,6 +74,10 @@ class ForkedProcess:
             time.sleep(LOOK_UP)
         return status
 
+    def said(self) -> str:
+        """Return what it has said so far; where it goes on writing stays the same."""
+        return os.pread(self._output.fileno(), LONGEST_REQUEST, 0).decode()
+
     def communicate(self, timeout: float) -> tuple[str, None]:
         """Wait for the end; return what it said."""
         self.wait(timeout)

@@ -18,6 +18,11 @@ SLIP_SINKAGE = 'effects.slip_sinkage_exponent.n1'
 LEVEL, STOPS = MANOEUVRES[0], MANOEUVRES[6]
 
 
+@pytest.fixture(autouse=True)
+def shorter(monkeypatch):
+    monkeypatch.setattr(manoeuvres, 'DURATION', 10.0)
+
+
 @pytest.fixture(scope='module')
 def driven():
     drive = simulate(scenario.load('firm_drive'), seed=1, duration=6.0)
