@@ -49,17 +49,17 @@ def test_bag_without_estimates_is_refused(make_bag: Any) -> None:
         read_estimates(bag)
 
 
+TOPICS = {
+    '/joint_states': 'sensor_msgs/msg/JointState',
+    '/imu/data': 'sensor_msgs/msg/Imu',
+    '/truth/odometry': 'nav_msgs/msg/Odometry',
+}
+
+
 def test_true_slip_from_a_true_velocity(make_bag: Any, rover: Any, drive: Any) -> None:
     """Rim speed 2 rad/s x 0.21 m = 0.42 m/s, velocity 0.36 m/s: slip 1/7."""
     moved = [(t.replace('/reference_odom', '/truth/odometry'), m, time) for t, m, time in drive]
-    bag = make_bag(
-        messages=moved,
-        topics={
-            '/joint_states': 'sensor_msgs/msg/JointState',
-            '/imu/data': 'sensor_msgs/msg/Imu',
-            '/truth/odometry': 'nav_msgs/msg/Odometry',
-        },
-    )
+    bag = make_bag(messages=moved, topics=TOPICS)
     with open_bag(bag) as opened:
         truth = read_truth(opened, {}, rover)
     assert truth is not None and truth.slip is not None
@@ -81,14 +81,7 @@ def test_true_slip_of_steered_wheels_is_along_their_headings(
                 velocity=[*message.velocity, 0.0],
             )
         moved.append((topic.replace('/reference_odom', '/truth/odometry'), message, time))
-    bag = make_bag(
-        messages=moved,
-        topics={
-            '/joint_states': 'sensor_msgs/msg/JointState',
-            '/imu/data': 'sensor_msgs/msg/Imu',
-            '/truth/odometry': 'nav_msgs/msg/Odometry',
-        },
-    )
+    bag = make_bag(messages=moved, topics=TOPICS)
     steered = rover.replace({'wheels.steering_joints': ['steer', 'steer']})
     with open_bag(bag) as opened:
         truth = read_truth(opened, {}, steered)

@@ -63,16 +63,6 @@ def test_drive_gives_a_bag_a_report_and_a_summary(
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # nothing is loaded from elsewhere
 
 
-def test_same_input_gives_the_same_bytes(make_bag: Any, config: list[str], tmp_path: Path) -> None:
-    bag = str(make_bag())
-    found = []
-    for name in ('one', 'two'):
-        assert main(['replay', bag, *config, '-o', str(tmp_path / name / 'out')]) == 0
-        (file,) = (tmp_path / name / 'out').glob('*.mcap')
-        found.append(file.read_bytes())
-    assert found[0] == found[1]
-
-
 def test_manoeuvres_that_would_teach_more_are_in_json_terminal_and_report(
     make_bag: Any, config: list[str], tmp_path: Path, capsys: Any, monkeypatch: Any
 ) -> None:

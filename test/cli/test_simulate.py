@@ -17,7 +17,7 @@ from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, JOINT_STATE, stamp_of
-from wheel_terra_estimator.simulation.drive import simulate
+from wheel_terra_estimator.simulation.drive import SimulatedDrive, simulate
 from wheel_terra_estimator.simulation.scenario import load
 
 
@@ -38,8 +38,12 @@ def test_the_bag_has_inputs_and_truth(bag_path: Path) -> None:
     assert found == {**wanted, **TRUTH_TOPICS}
 
 
-def test_reading_it_back_gives_the_measurements(bag_path: Path) -> None:
-    drive = simulate(load('turns'), 3, 6.0)
+@pytest.fixture(scope='module')
+def drive() -> SimulatedDrive:
+    return simulate(load('turns'), 3, 6.0)
+
+
+def test_reading_it_back_gives_the_measurements(bag_path: Path, drive: SimulatedDrive) -> None:
     with open_bag(bag_path) as bag:
         read = [m for _, m in MeasurementReader(bag, {}, drive.configuration).measurements()]
     made = [a.measurement for a in drive.arrivals]
@@ -52,8 +56,7 @@ def test_reading_it_back_gives_the_measurements(bag_path: Path) -> None:
             np.testing.assert_array_equal(a.torque, b.torque)
 
 
-def test_truth_in_the_bag_is_that_of_the_drive(bag_path: Path) -> None:
-    drive = simulate(load('turns'), 3, 6.0)
+def test_truth_in_the_bag_is_that_of_the_drive(bag_path: Path, drive: SimulatedDrive) -> None:
     with open_bag(bag_path) as bag:
         truth = read_truth(bag, {}, drive.configuration)
         classes = list(bag.messages(('/ground_truth/slip_class',)))

@@ -13,14 +13,19 @@ from wheel_terra_estimator.simulation.suspension import suspension_of
 THREE = np.array([[1.0, 0.5], [1.0, -0.5], [-1.0, 0.0]])
 
 
-def test_three_wheels_uphill_by_hand():
-    loads = load_distribution(
+def distribution(position=THREE, height=0.4, contact_height=0.0, suspension='rigid', **more):
+    return load_distribution(
         mass=10.0,
-        position=THREE,
-        centre_of_gravity=[0.0, 0.0, 0.4],
-        contact_height=-0.1,
-        suspension='rigid',
-    ).loads([2.0, 0.0, 9.0])
+        position=position,
+        centre_of_gravity=[0.0, 0.0, height],
+        contact_height=contact_height,
+        suspension=suspension,
+        **more,
+    )
+
+
+def test_three_wheels_uphill_by_hand():
+    loads = distribution(contact_height=-0.1).loads([2.0, 0.0, 9.0])
     # Moment about the rear contact: 2 W_front * 2 = m (f_z * 1 - f_x * 0.5).
     front = 10.0 * (9.0 * 1.0 - 2.0 * 0.5) / 2.0 / 2.0
     assert loads == pytest.approx([front, front, 90.0 - 2 * front])
@@ -28,49 +33,22 @@ def test_three_wheels_uphill_by_hand():
 
 def test_side_slope_loads_the_lower_side():
     four = np.array([[1.0, 0.5], [1.0, -0.5], [-1.0, 0.5], [-1.0, -0.5]])
-    loads = load_distribution(
-        mass=10.0,
-        position=four,
-        centre_of_gravity=[0.0, 0.0, 0.5],
-        contact_height=0.0,
-        suspension='rigid',
-    ).loads([0.0, 1.0, 9.0])  # left up: the right wheels carry more
+    loads = distribution(four, 0.5).loads([0.0, 1.0, 9.0])  # left up: the right wheels carry more
     assert loads.sum() == pytest.approx(90.0)
     assert loads[1] - loads[0] == pytest.approx(10.0 * 1.0 * 0.5 / 1.0)
 
 
 def test_lifted_wheel_never_pulls_on_the_ground():
-    model = load_distribution(
-        mass=10.0,
-        position=THREE,
-        centre_of_gravity=[0.0, 0.0, 1.0],
-        contact_height=0.0,
-        suspension='rigid',
-    )
-    loads = model.loads([-12.0, 0.0, 9.0])
+    loads = distribution(height=1.0).loads([-12.0, 0.0, 9.0])
     assert loads.min() == 0.0
     assert loads.sum() == pytest.approx(90.0)
 
 
 def test_shares_are_kept_and_checked():
-    model = load_distribution(
-        mass=10.0,
-        position=THREE,
-        centre_of_gravity=[0.0, 0.0, 1.0],
-        contact_height=0.0,
-        suspension='shares',
-        shares=[1.0, 1.0, 2.0],
-    )
+    model = distribution(height=1.0, suspension='shares', shares=[1.0, 1.0, 2.0])
     assert model.loads([5.0, 0.0, 9.0]) == pytest.approx([22.5, 22.5, 45.0])
     with pytest.raises(ValueError, match='shares'):
-        load_distribution(
-            mass=1.0,
-            position=THREE,
-            centre_of_gravity=[0, 0, 0],
-            contact_height=0.0,
-            suspension='shares',
-            shares=[1.0],
-        )
+        distribution(suspension='shares', shares=[1.0])
 
 
 def test_rocker_bogie_agrees_with_the_simulators_statics():
@@ -90,13 +68,6 @@ def test_rocker_bogie_agrees_with_the_simulators_statics():
 
 
 def test_rocker_bogie_needs_three_wheels_a_side():
+    pivots = {'rocker_pivot': [0.0, 0.3], 'bogie_pivot': [0.0, 0.2]}
     with pytest.raises(ValueError, match='three wheels'):
-        load_distribution(
-            mass=1.0,
-            position=THREE,
-            centre_of_gravity=[0, 0, 0],
-            contact_height=0.0,
-            suspension='rocker_bogie',
-            rocker_pivot=[0.0, 0.3],
-            bogie_pivot=[0.0, 0.2],
-        )
+        distribution(suspension='rocker_bogie', **pivots)
