@@ -248,6 +248,16 @@ def test_torque_sign_of_one_wheel():
     only(checked(joints=replace(WHOLE.joints, torque=torque)), 'sign', 'front_right')
 
 
+@pytest.mark.parametrize(('share', 'soft'), [(0.1, False), (0.2, True)])
+def test_soft_ground_tells_no_scale_of_the_torques(share, soft):
+    """Rolling that costs so much of the weight beside the twelfth of the drive itself."""
+    joints, rover = WHOLE.joints, rolling.rover()
+    drag = share * rover.rover.mass * rover.rover.gravity * rover.wheels.radius / 4
+    report = checked(joints=replace(joints, torque=joints.torque + drag * np.sign(joints.rate)))
+    told = [entry.reason for entry in report.not_checked if entry.kind == 'gain']
+    assert [reason.startswith('torque: soft ground') for reason in told] == [True] * soft
+
+
 def test_reference():
     reference = WHOLE.reference
     reversed_ = replace(reference, velocity=-reference.velocity)
