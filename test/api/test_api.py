@@ -202,6 +202,8 @@ def test_pictures_return_axes(drive, direct, named):
         api.plot_estimates(direct, 'speed')
     bars = api.plot_diagnosis(named[1])
     assert len(bars.patches) == 9
+    middles = [bar.get_x() + 0.5 * bar.get_width() for bar in bars.patches[:3]]
+    assert middles == pytest.approx([-0.8 / 3, 0.0, 0.8 / 3])
     pyplot.close('all')
 
 

@@ -339,6 +339,9 @@ def test_transport():
     for nonzero in (np.arange(joints.stamp.size) % 10, False):
         zero = replace(joints, stamp=np.where(nonzero, joints.stamp, 0))
         only(checked(joints=zero), 'order')
+    back = joints.stamp - 10**10 * (np.arange(joints.stamp.size) == 500)
+    told = only(checked(joints=replace(joints, stamp=back)), 'order')
+    assert 'go back, by up to 9.9 s' in told.words
 
 
 def test_drives_that_send_a_message_each_repeat_no_stamp():

@@ -128,7 +128,7 @@ def test_an_orderly_life_is_quiet(drive):
 def test_a_node_without_inputs_waits_at_first_and_warns_then(drive):
     _, _, start = drive
     process, too_long = start(), lasts(60.0)
-    while 'never heard' not in process.said() and not too_long():  # nothing is published
+    while '[WARN]' not in process.said() and not too_long():  # nothing is published
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)
     said, _ = process.communicate(60.0)
