@@ -15,7 +15,7 @@ from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
-from wheel_terra_estimator.estimation.contacts.ruts import Ruts
+from wheel_terra_estimator.estimation.contacts.ruts import Ruts, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
 from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
@@ -414,6 +414,8 @@ def test_in_a_turn_wheels_run_beside_the_ruts(parts):
     ruts = Ruts(parts.rover)
     ruts.advance(0.01, 1.0, DEPTHS, 3.0 * width / reach)
     assert ruts.state.depth[2] == 0.0
+    assert curvature_of(-0.05, 0.1) == pytest.approx(2.0)
+    assert curvature_of(0.0, 0.1) < math.inf
 
 
 def test_behind_a_reversal_all_wheels_roll_in_ruts_at_first(parts):
