@@ -111,6 +111,8 @@ def test_noise_has_the_stated_size() -> None:
     assert torque.std(axis=0).mean() == pytest.approx(figures.torque_std, rel=0.15)
     force = np.array([m.specific_force for m in kind(drive, InertialReading)])
     assert force.std(axis=0).mean() == pytest.approx(figures.specific_force_std, rel=0.15)
+    rate = np.array([m.angular_rate for m in kind(drive, InertialReading)])
+    assert rate.std(axis=0).mean() == pytest.approx(figures.angular_rate_std, rel=0.15)
 
 
 def test_encoder_steps_show_in_the_rate() -> None:
