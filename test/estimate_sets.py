@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Estimate sets made up for tests."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any
 

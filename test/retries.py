@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests that were tried again are named at the end of a run, and too many of them fail it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One glossary for terminal, reports and site."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -16,13 +14,13 @@ from wheel_terra_estimator.reporting.html import render
 PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'glossary.md'
 
 
-def test_the_page_of_the_site_is_the_glossary() -> None:
+def test_the_page_of_the_site_is_the_glossary():
     table = glossary.as_markdown(glossary.terms())
     assert table in PAGE.read_text(encoding='utf-8'), table
     assert all(term.meaning.endswith('.') for term in glossary.terms())
 
 
-def test_a_word_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_word_on_the_terminal(capsys):
     for words, status, said in (
         (['--glossary', 'margin'], 0, 'pull margin: Greatest pull'),
         (['--glossary'], 0, 'not known (unknown): '),
@@ -35,7 +33,7 @@ def test_a_word_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
         assert said in ''.join(capsys.readouterr())
 
 
-def test_a_report_explains_its_words_and_no_others(tmp_path: Path) -> None:
+def test_a_report_explains_its_words_and_no_others(tmp_path):
     text = '<p title="sinkage">pull_margin</p><script>confidence</script><style>slip</style>'
     (tmp_path / 'a.html').write_text(
         '{% extends "base.html" %}{% block content %}' + text + '{% endblock %}'
@@ -47,7 +45,7 @@ def test_a_report_explains_its_words_and_no_others(tmp_path: Path) -> None:
     assert 'confidence' not in explained
 
 
-def test_no_probability_is_said_to_be_certain() -> None:
+def test_no_probability_is_said_to_be_certain():
     assert [percent(p) for p in (1.0, 0.995, 0.99, 0.5, 0.004)] == [
         'over 99 %',
         'over 99 %',

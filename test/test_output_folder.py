@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Output folders are whole or not there, and nobody else's file is ever removed."""
 
-from __future__ import annotations
-
 import errno
 import json
 import shutil
@@ -40,7 +38,7 @@ def contents(folder: Path) -> dict[str, str]:
     }
 
 
-def test_folder_is_there_when_it_is_whole_and_lists_what_it_holds(tmp_path: Path) -> None:
+def test_folder_is_there_when_it_is_whole_and_lists_what_it_holds(tmp_path):
     out = tmp_path / 'new' / 'out'
     with new_folder(out) as folder:
         (folder / 'a.txt').write_text('a')
@@ -50,7 +48,7 @@ def test_folder_is_there_when_it_is_whole_and_lists_what_it_holds(tmp_path: Path
     assert [p.name for p in out.parent.iterdir()] == ['out']
 
 
-def test_overwrite_replaces_what_was_listed_and_nothing_else(tmp_path: Path) -> None:
+def test_overwrite_replaces_what_was_listed_and_nothing_else(tmp_path):
     out = tmp_path / 'out'
     write(out, content='old')
     with pytest.raises(UserError, match='exists already'):
@@ -65,8 +63,8 @@ def test_overwrite_replaces_what_was_listed_and_nothing_else(tmp_path: Path) -> 
 
 
 def test_a_file_of_others_in_an_output_within_an_output_is_left_alone(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     out = tmp_path / 'out'
     with working_folder(out, False, False, ['inner/']):
         write(out / 'inner')
@@ -76,7 +74,7 @@ def test_a_file_of_others_in_an_output_within_an_output_is_left_alone(
 
 
 @pytest.mark.parametrize('foreign', ['summary.json', 'report.json', 'x.mcap', 'notes.md', 'deep/'])
-def test_a_folder_without_our_list_is_never_overwritten(tmp_path: Path, foreign: str) -> None:
+def test_a_folder_without_our_list_is_never_overwritten(tmp_path, foreign):
     out = tmp_path / 'out'
     out.mkdir()
     (out / foreign).mkdir() if foreign.endswith('/') else (out / foreign).write_text('mine')
@@ -98,7 +96,7 @@ def test_a_folder_without_our_list_is_never_overwritten(tmp_path: Path, foreign:
         '[' * 10000,
     ],
 )
-def test_a_forged_marker_removes_nothing(tmp_path: Path, marker: str) -> None:
+def test_a_forged_marker_removes_nothing(tmp_path, marker):
     out = tmp_path / 'a' / 'out'
     out.mkdir(parents=True)
     (tmp_path / 'victim').write_text('mine')
@@ -108,7 +106,7 @@ def test_a_forged_marker_removes_nothing(tmp_path: Path, marker: str) -> None:
     assert (tmp_path / 'victim').exists()
 
 
-def test_places_that_no_command_replaces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_places_that_no_command_replaces(tmp_path, monkeypatch):
     work, home = tmp_path / 'work', tmp_path / 'users' / 'ann'
     work.mkdir()
     home.mkdir(parents=True)
@@ -138,7 +136,7 @@ def test_places_that_no_command_replaces(tmp_path: Path, monkeypatch: pytest.Mon
             assert '\n' not in str(caught.value)
 
 
-def test_an_error_leaves_the_earlier_output_and_nothing_beside_it(tmp_path: Path) -> None:
+def test_an_error_leaves_the_earlier_output_and_nothing_beside_it(tmp_path):
     out = tmp_path / 'out'
     write(out, content='old')
     for error, seen in ((OSError(errno.ENOSPC, 'No space left on device'), UserError),
@@ -150,7 +148,7 @@ def test_an_error_leaves_the_earlier_output_and_nothing_beside_it(tmp_path: Path
         assert [p.name for p in tmp_path.iterdir()] == ['out']
 
 
-def test_what_was_written_before_an_error_is_kept_where_asked(tmp_path: Path) -> None:
+def test_what_was_written_before_an_error_is_kept_where_asked(tmp_path):
     out = tmp_path / 'out'
     with (
         pytest.raises(UserError, match='free some space'),
@@ -163,7 +161,7 @@ def test_what_was_written_before_an_error_is_kept_where_asked(tmp_path: Path) ->
     assert 'half' not in contents(out)
 
 
-def test_a_file_is_replaced_only_when_told_so(tmp_path: Path) -> None:
+def test_a_file_is_replaced_only_when_told_so(tmp_path):
     report = tmp_path / 'r.html'
     report.write_text('old')
     with pytest.raises(UserError, match='exists already'):
@@ -188,7 +186,7 @@ def test_a_file_is_replaced_only_when_told_so(tmp_path: Path) -> None:
     assert [p.name for p in sorted(tmp_path.iterdir())] == ['link.html', 'r.html']
 
 
-def test_a_report_in_an_output_folder_is_listed(tmp_path: Path) -> None:
+def test_a_report_in_an_output_folder_is_listed(tmp_path):
     out = tmp_path / 'out'
     write(out)
     with new_file(out / 'r.html') as path:
@@ -197,7 +195,7 @@ def test_a_report_in_an_output_folder_is_listed(tmp_path: Path) -> None:
     assert set(contents(out)) == {'report.json', 'below/picture.png'}
 
 
-def test_a_working_folder_goes_on_or_starts_anew(tmp_path: Path) -> None:
+def test_a_working_folder_goes_on_or_starts_anew(tmp_path):
     run = tmp_path / 'run'
     entries = ['summary.json', '.work/']
 
@@ -229,7 +227,7 @@ def test_a_working_folder_goes_on_or_starts_anew(tmp_path: Path) -> None:
     assert set(contents(run)) == {'.work/frames/1.npz', 'notes.md'}
 
 
-def test_an_earlier_output_stands_aside_until_the_new_one_is_whole(tmp_path: Path) -> None:
+def test_an_earlier_output_stands_aside_until_the_new_one_is_whole(tmp_path):
     """Through ends half-way, another start, and a folder that is another run's by this name."""
     run, aside = tmp_path / 'run', tmp_path / 'run.earlier'
 
@@ -274,7 +272,7 @@ def test_an_earlier_output_stands_aside_until_the_new_one_is_whole(tmp_path: Pat
     assert contents(run)['rows.csv'] == 'third'
 
 
-def test_an_empty_folder_of_the_user_stays(tmp_path: Path) -> None:
+def test_an_empty_folder_of_the_user_stays(tmp_path):
     run = tmp_path / 'run'
     run.mkdir()
     with pytest.raises(UserError), working_folder(run, True, False, ['.work/']):
@@ -282,7 +280,7 @@ def test_an_empty_folder_of_the_user_stays(tmp_path: Path) -> None:
     assert list(run.iterdir()) == []
 
 
-def test_commands_refuse_folders_of_others(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_commands_refuse_folders_of_others(tmp_path, capsys):
     """Of every command a folder with files of the kinds that it writes, but not by it."""
     z = tmp_path / 'z'
     z.mkdir()
@@ -305,8 +303,8 @@ def test_commands_refuse_folders_of_others(tmp_path: Path, capsys: pytest.Captur
 
 @pytest.mark.parametrize('kind', ['new_folder', 'new_file'])
 def test_what_a_killed_run_left_is_removed_by_the_next_and_a_running_one_is_left_alone(
-    tmp_path: Path, kind: str
-) -> None:
+    tmp_path, kind
+):
     out = tmp_path / 'out'
     code = (
         'import sys, time\n'

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The package as ROS and pip see it."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import re
@@ -26,7 +24,7 @@ SOURCES = sorted(
 
 
 @pytest.fixture(scope='module')
-def manifest() -> ElementTree.Element:
+def manifest():
     return ElementTree.parse(ROOT / 'package.xml').getroot()
 
 
@@ -46,7 +44,7 @@ def entry_points() -> dict[str, tuple[str, str]]:
     return {name: (module, function) for name, module, function in found}
 
 
-def test_rosdep_keys_only(manifest: ElementTree.Element) -> None:
+def test_rosdep_keys_only(manifest):
     keys = [e.text or '' for e in manifest if e.tag.endswith('depend')]
     assert len(keys) == len(set(keys))
     assert all(re.fullmatch(r'[a-z][a-z0-9_-]*', key) for key in keys)
@@ -56,7 +54,7 @@ def test_rosdep_keys_only(manifest: ElementTree.Element) -> None:
     assert {'rclpy', 'sensor_msgs', 'nav_msgs', 'diagnostic_msgs', 'std_srvs'} <= set(keys)
 
 
-def test_one_version_everywhere(manifest: ElementTree.Element) -> None:
+def test_one_version_everywhere(manifest):
     versions = {
         manifest.findtext('version'),
         setup_functions()['version'](),
@@ -66,7 +64,7 @@ def test_one_version_everywhere(manifest: ElementTree.Element) -> None:
     assert versions == {'0.1.0'}
 
 
-def test_every_pin_has_a_hash_and_the_version_of_its_source() -> None:
+def test_every_pin_has_a_hash_and_the_version_of_its_source():
     for path in sorted((ROOT / 'requirements').glob('*.txt')):
         pinned = re.split(r'\n(?=\S)', path.read_text())
         packages = [entry for entry in pinned if not entry.startswith('#')]
@@ -80,7 +78,7 @@ def test_every_pin_has_a_hash_and_the_version_of_its_source() -> None:
                 assert wanted in versions, f'{line}: run requirements/compile'
 
 
-def test_every_source_file_has_its_licence() -> None:
+def test_every_source_file_has_its_licence():
     assert len(SOURCES) > 100
     for path in SOURCES:
         head = path.read_text(encoding='utf-8').splitlines()[:3]
@@ -89,14 +87,14 @@ def test_every_source_file_has_its_licence() -> None:
         assert 'SPDX-License-Identifier: Apache-2.0' in text, path
 
 
-def test_ros_finds_the_package() -> None:
+def test_ros_finds_the_package():
     assert (ROOT / 'resource' / NAME).is_file()
     assert '/lib/wheel_terra_estimator' in (ROOT / 'setup.cfg').read_text()
     assert {'wheel-terra', 'estimator_node', 'traction_limiter_node'} == set(entry_points())
 
 
 @pytest.mark.parametrize('name', sorted(entry_points()))
-def test_entry_points_exist(name: str) -> None:
+def test_entry_points_exist(name):
     module, function = entry_points()[name]
     if '.ros.' in module:
         pytest.importorskip('rclpy')
@@ -104,7 +102,7 @@ def test_entry_points_exist(name: str) -> None:
 
 
 @pytest.mark.parametrize('name', sorted(shipped.files()))
-def test_shipped_files_load(name: str) -> None:
+def test_shipped_files_load(name):
     folder = name.split('/')[0]
     if folder in ('rovers', 'soils', 'demo'):
         configuration = reader.load([name], complete=folder == 'rovers')
@@ -115,7 +113,7 @@ def test_shipped_files_load(name: str) -> None:
         assert load(name.split('/')[1]).description
 
 
-def test_every_shipped_folder_is_installed() -> None:
+def test_every_shipped_folder_is_installed():
     installed = {file for _, files in setup_functions()['shared_files']() for file in files}
     on_disk = {
         p.relative_to(ROOT).as_posix()
@@ -127,7 +125,7 @@ def test_every_shipped_folder_is_installed() -> None:
     assert 'package.xml' in installed
 
 
-def test_no_path_of_a_machine_is_committed() -> None:
+def test_no_path_of_a_machine_is_committed():
     # Words are put together so that this file does not find itself.
     words = ['/work' + '/', '/home' + '/', '/root' + '/']
     files = [
@@ -143,7 +141,7 @@ def test_no_path_of_a_machine_is_committed() -> None:
             assert word not in text, f'{path}: {word}'
 
 
-def test_the_image_has_the_oldest_versions_and_what_rosdep_does_not() -> None:
+def test_the_image_has_the_oldest_versions_and_what_rosdep_does_not():
     text = (ROOT / 'Dockerfile').read_text(encoding='utf-8')
     pinned = (ROOT / 'requirements' / 'oldest.txt').read_text(encoding='utf-8')
     pins = re.findall(r'([\w.-]+)==([\w.]+)', text)
@@ -159,7 +157,7 @@ def test_the_image_has_the_oldest_versions_and_what_rosdep_does_not() -> None:
         assert (ROOT / line).exists()
 
 
-def test_the_conda_recipe_asks_for_what_setup_asks_for() -> None:
+def test_the_conda_recipe_asks_for_what_setup_asks_for():
     recipe = yaml.safe_load((ROOT / 'packaging' / 'conda' / 'recipe.yaml').read_text())
     assert recipe['context']['version'] == wheel_terra_estimator.__version__
     wanted = re.findall(r"'([\w-]+>=[\d.]+)'", setup_text().split('extras_require')[0])

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run says what it tried again, and fails above three retries."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -28,7 +26,7 @@ def test_second_time(case):
 
 
 @pytest.mark.parametrize(('count', 'status'), [(3, 0), (4, 1)])
-def test_retries_are_named_and_bounded(tmp_path: Path, count: int, status: int) -> None:
+def test_retries_are_named_and_bounded(tmp_path, count, status):
     (tmp_path / 'test_flaky.py').write_text(FLAKY.format(count=count))
     (tmp_path / 'pytest.ini').write_text('[pytest]\n')
     run = subprocess.run(

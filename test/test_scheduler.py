@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tasks side by side: a worker that dies takes no other task along."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import signal
@@ -11,7 +9,6 @@ import socket
 import time
 from pathlib import Path
 from threading import Thread
-from typing import Any
 
 import pytest
 
@@ -36,27 +33,25 @@ def killed_once(mark: str) -> int:
     return 0
 
 
-def test_results_and_errors_by_index() -> None:
+def test_results_and_errors_by_index():
     found = dict(finished(root, [4.0, -4.0, 9.0], jobs=2))
     assert found[0] == 2.0 and found[2] == 3.0
     assert isinstance(found[1], ValueError)
 
 
-def test_a_killed_worker_costs_its_own_task_alone() -> None:
+def test_a_killed_worker_costs_its_own_task_alone():
     found = dict(finished(root, [1.0, -1.0, 4.0, 9.0, 16.0], jobs=2))
     assert isinstance(found.pop(1), UserError)
     assert found == {0: 1.0, 2: 2.0, 3: 3.0, 4: 4.0}
 
 
-def test_a_task_whose_worker_was_killed_is_run_again(tmp_path: Path) -> None:
+def test_a_task_whose_worker_was_killed_is_run_again(tmp_path):
     ((_, process),) = finished(killed_once, [str(tmp_path / 'mark')])
     assert isinstance(process, int) and process not in (0, os.getpid())
 
 
 @pytest.mark.parametrize('greeting', [None, b'', b'SSH-2.0-OpenSSH_9.6\r\n', os.urandom(4096)])
-def test_an_address_that_does_not_answer_as_a_scheduler_does(
-    monkeypatch: Any, greeting: bytes | None
-) -> None:
+def test_an_address_that_does_not_answer_as_a_scheduler_does(monkeypatch, greeting):
     """Refused, silent, another protocol."""
     pytest.importorskip('dask.distributed')
     monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 1)
@@ -72,9 +67,7 @@ def test_an_address_that_does_not_answer_as_a_scheduler_does(
         assert time.monotonic() - begin < 10.0
 
 
-def test_a_cluster_without_workers_is_said_and_given_up(
-    monkeypatch: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_cluster_without_workers_is_said_and_given_up(monkeypatch, capsys):
     distributed = pytest.importorskip('dask.distributed')
     monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 60)
     monkeypatch.setattr(scheduler, 'LOOK', 1)
@@ -88,15 +81,13 @@ def test_a_cluster_without_workers_is_said_and_given_up(
     assert said.count(f'start one with: dask worker {cluster.scheduler_address}') == 1
 
 
-def test_an_empty_address_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_empty_address_is_refused(capsys):
     with pytest.raises(SystemExit):
         main(['replay', 'a', 'b', '-o', 'c', '--scheduler', ''])
     assert 'argument --scheduler: an empty address' in capsys.readouterr().err
 
 
-def test_a_cluster_that_loses_a_worker_ends_all_tasks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cluster_that_loses_a_worker_ends_all_tasks(tmp_path, monkeypatch):
     distributed = pytest.importorskip('dask.distributed')
     monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 60)  # on a machine that is busy
     with distributed.LocalCluster(
@@ -115,7 +106,7 @@ def test_a_cluster_that_loses_a_worker_ends_all_tasks(
 
 
 @pytest.mark.parametrize('text', ['0', '-1', '1.5', 'all', '²', '9' * 5000])
-def test_no_number_of_processes(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_number_of_processes(text, capsys):
     parser = argparse.ArgumentParser()
     add_jobs_argument(parser)
     with pytest.raises(SystemExit):

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Workers end with their parent, and what an interrupted bench has done is kept."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -46,7 +44,7 @@ def alive(process: int) -> bool:
 
 @pytest.mark.skipif(not Path('/proc/self/stat').exists(), reason='looks processes up in /proc')
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_workers_end_with_their_parent(tmp_path: Path, number: signal.Signals) -> None:
+def test_workers_end_with_their_parent(tmp_path, number):
     (tmp_path / 'program.py').write_text(PROGRAM)
     with subprocess.Popen(
         [sys.executable, str(tmp_path / 'program.py')],
@@ -65,9 +63,7 @@ def test_workers_end_with_their_parent(tmp_path: Path, number: signal.Signals) -
         assert not any(map(alive, workers))
 
 
-def test_an_interrupted_bench_keeps_and_says_what_it_has(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
-) -> None:
+def test_an_interrupted_bench_keeps_and_says_what_it_has(tmp_path, monkeypatch, capsys):
     done = []
 
     def score(world: str, kind: str, seed: int, modes: Any, rover: str | None) -> list[Any]:

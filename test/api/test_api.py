@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Python interface against the commands, and its own examples."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import doctest

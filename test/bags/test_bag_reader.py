@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings as measurements: topics, remaps, names, damaged and unknown messages."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 
@@ -19,7 +17,7 @@ def kinds(measurements: Any) -> Counter[str]:
     return Counter(type(measurement).__name__ for _, measurement in measurements)
 
 
-def test_drive_is_read_in_the_order_of_log_times(make_bag: Any, rover: Any) -> None:
+def test_drive_is_read_in_the_order_of_log_times(make_bag, rover):
     rows = list(read(make_bag(), {}, rover))
     assert kinds(rows) == {'WheelOdometry': 40, 'InertialReading': 40, 'ReferenceVelocity': 4}
     times = [log_time for log_time, _ in rows]
@@ -29,7 +27,7 @@ def test_drive_is_read_in_the_order_of_log_times(make_bag: Any, rover: Any) -> N
     assert first.rate.tolist() == [2.0, 2.0]
 
 
-def test_remapped_topics(make_bag: Any, rover: Any, drive: Any) -> None:
+def test_remapped_topics(make_bag, rover, drive):
     moved = [
         (topic.replace('/reference_odom', '/truth/odometry'), message, time)
         for topic, message, time in drive
@@ -41,9 +39,7 @@ def test_remapped_topics(make_bag: Any, rover: Any, drive: Any) -> None:
     assert kinds(read(bag, remaps, rover))['ReferenceVelocity'] == 4
 
 
-def test_missing_wheel_odometry_says_which_and_what_is_there(
-    make_bag: Any, rover: Any, drive: Any
-) -> None:
+def test_missing_wheel_odometry_says_which_and_what_is_there(make_bag, rover, drive):
     others = [row for row in drive if row[0] != '/joint_states']
     sinkage = [('/sinkage', *row[1:]) for row in drive if row[0] == '/joint_states']
     bag = make_bag(
@@ -63,7 +59,7 @@ def test_missing_wheel_odometry_says_which_and_what_is_there(
     assert '-p wheel_odometry:=odom --remap odom:=/reference_odom' in text
 
 
-def test_what_is_missing_is_told_with_what_it_costs(make_bag: Any, rover: Any, drive: Any) -> None:
+def test_what_is_missing_is_told_with_what_it_costs(make_bag, rover, drive):
     path = make_bag(
         messages=[row for row in drive if row[0] == '/joint_states'],
         topics={'/joint_states': 'sensor_msgs/msg/JointState'},
@@ -74,7 +70,7 @@ def test_what_is_missing_is_told_with_what_it_costs(make_bag: Any, rover: Any, d
     assert 'without a reference velocity slip can be wrong' in cost
 
 
-def test_remap_to_a_topic_that_is_not_there_or_of_another_type(make_bag: Any, rover: Any) -> None:
+def test_remap_to_a_topic_that_is_not_there_or_of_another_type(make_bag, rover):
     bag = make_bag()
     with pytest.raises(UserError, match=r'/vo is not in the bag.*--remap reference_odom:='):
         list(read(bag, {'reference_odom': '/vo'}, rover))
@@ -82,7 +78,7 @@ def test_remap_to_a_topic_that_is_not_there_or_of_another_type(make_bag: Any, ro
         list(read(bag, {'sinkage': '/imu/data'}, rover))
 
 
-def test_wheel_names_that_do_not_match_are_told_with_both_lists(make_bag: Any, rover: Any) -> None:
+def test_wheel_names_that_do_not_match_are_told_with_both_lists(make_bag, rover):
     other = rover.replace({'wheels.names': ['front_left', 'front_right']})
     with pytest.raises(UserError) as error:
         list(read(make_bag(), {}, other))
@@ -90,15 +86,15 @@ def test_wheel_names_that_do_not_match_are_told_with_both_lists(make_bag: Any, r
     assert 'arm, left, right' in str(error.value)
 
 
-def test_odometry_in_place_of_joint_states(make_bag: Any, rover: Any) -> None:
+def test_odometry_in_place_of_joint_states(make_bag, rover):
     by_odometry = rover.replace({'wheel_odometry': 'odom'})
     found = kinds(read(make_bag(), {'odom': '/reference_odom'}, by_odometry))
     assert found['WheelOdometry'] == 4
 
 
 def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(
-    make_bag: Any, rover: Any, drive: Any, tmp_path: Any
-) -> None:
+    make_bag, rover, drive, tmp_path
+):
     """Types that nobody knows are never unpacked; a damaged message costs itself alone."""
     from rosbags.interfaces import ConnectionExtRosbag2
     from rosbags.rosbag2 import StoragePlugin, Writer
@@ -128,7 +124,7 @@ def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(
         assert reader.absent == ['imu/data', 'sinkage', 'leaving_angle', 'reference_odom']
 
 
-def test_bag_without_message_definitions(make_bag: Any, rover: Any) -> None:
+def test_bag_without_message_definitions(make_bag, rover):
     """SQLite recordings of Foxy and Humble have none: Jazzy's own are used."""
     import sqlite3
 
@@ -147,7 +143,7 @@ def test_bag_without_message_definitions(make_bag: Any, rover: Any) -> None:
         ('slip:=/x', 'does not listen to slip'),
     ],
 )
-def test_remaps_are_checked(text: str, words: str) -> None:
+def test_remaps_are_checked(text, words):
     with pytest.raises(UserError, match=words):
         parse_remaps([text])
     assert parse_remaps(['/imu/data:=imu', 'odom:=/a']) == {'imu/data': '/imu', 'odom': '/a'}

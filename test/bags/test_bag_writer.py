@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Output bags: names, types, quality of service, log times, and that they are always readable."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 from typing import Any
@@ -43,7 +41,7 @@ def sets(count: int = 25) -> list[Any]:
 
 
 @pytest.fixture
-def bag(tmp_path: Path) -> Path:
+def bag(tmp_path):
     path = tmp_path / 'estimates'
     with EstimateBagWriter(path, NAMES) as writer:
         writer.clear_stuck(STAMP)
@@ -63,7 +61,7 @@ def messages(path: Path) -> list[tuple[int, str, Any]]:
         ]
 
 
-def test_topics_have_full_names_and_their_types(bag: Path) -> None:
+def test_topics_have_full_names_and_their_types(bag):
     joint_state = 'sensor_msgs/msg/JointState'
     with open_bag(bag) as opened:
         found = {name: (topic.type, topic.message_count) for name, topic in opened.topics.items()}
@@ -88,7 +86,7 @@ def test_topics_have_full_names_and_their_types(bag: Path) -> None:
     assert 3 < found['/diagnostics'][1] <= 25
 
 
-def test_messages_of_a_set_share_stamp_and_log_time(bag: Path) -> None:
+def test_messages_of_a_set_share_stamp_and_log_time(bag):
     by_time: dict[int, list[tuple[str, Any]]] = {}
     for log_time, topic, message in messages(bag):
         by_time.setdefault(log_time, []).append((topic, message))
@@ -106,7 +104,7 @@ def test_messages_of_a_set_share_stamp_and_log_time(bag: Path) -> None:
     assert not by_time
 
 
-def test_slip_class_layout(bag: Path) -> None:
+def test_slip_class_layout(bag):
     found = [m for _, topic, m in messages(bag) if topic.endswith('slip_class')]
     (dimension,) = found[2].layout.dim
     assert (dimension.label, dimension.size, dimension.stride) == ('wheel', 2, 2)
@@ -115,9 +113,7 @@ def test_slip_class_layout(bag: Path) -> None:
 
 
 @pytest.mark.parametrize(('topic', 'led'), [('stuck', True), ('stuck_direction', -1)])
-def test_stuck_and_its_direction_are_sent_at_start_and_on_change(
-    bag: Path, topic: str, led: int
-) -> None:
+def test_stuck_and_its_direction_are_sent_at_start_and_on_change(bag, topic, led):
     found = [(t, m.data) for t, name, m in messages(bag) if name.endswith(f'/{topic}')]
     assert found == [
         (STAMP, 0),
@@ -126,7 +122,7 @@ def test_stuck_and_its_direction_are_sent_at_start_and_on_change(
     ]
 
 
-def test_quality_of_service_in_the_metadata(bag: Path) -> None:
+def test_quality_of_service_in_the_metadata(bag):
     metadata = yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
     assert metadata['storage_identifier'] == 'mcap'
     for topic in metadata['topics_with_message_count']:
@@ -137,7 +133,7 @@ def test_quality_of_service_in_the_metadata(bag: Path) -> None:
         assert (profile['history'], profile['depth']) == ('keep_last', 1 if latched else 10)
 
 
-def test_estimates_come_back_as_they_went(bag: Path) -> None:
+def test_estimates_come_back_as_they_went(bag):
     recorder = HistoryRecorder(NAMES)
     for estimates in sets():
         recorder.add(estimates)
@@ -154,7 +150,7 @@ def test_estimates_come_back_as_they_went(bag: Path) -> None:
         np.testing.assert_array_equal(stored.values[name], values, err_msg=name)
 
 
-def test_a_bag_of_some_outputs_gives_those(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bag_of_some_outputs_gives_those(bag, monkeypatch):
     """As ``ros2 bag record`` of some topics leaves it, or a version that knew fewer outputs."""
     with open_bag(bag) as opened:
         whole = read_estimates(opened)
@@ -178,7 +174,7 @@ def test_a_bag_of_some_outputs_gives_those(bag: Path, monkeypatch: pytest.Monkey
     assert all(d.rms == 0.0 for d in differences)
 
 
-def test_a_reset_clears_the_stuck_warning(tmp_path: Path) -> None:
+def test_a_reset_clears_the_stuck_warning(tmp_path):
     path = tmp_path / 'reset'
     stuck = next(estimates for estimates in sets() if estimates.stuck)
     with EstimateBagWriter(path, NAMES) as writer:
@@ -191,7 +187,7 @@ def test_a_reset_clears_the_stuck_warning(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('cut', [False, True], ids=['whole', 'on a disk that fills up'])
-def test_bags_carry_checksums(make_bag: Any, tmp_path: Path, cut: bool) -> None:
+def test_bags_carry_checksums(make_bag, tmp_path, cut):
     """As the format asks: of a chunk over its records, of the summary up to the checksum itself."""
     if cut:
         with largest_file(int(2.5 * 2**20)), pytest.raises(UserError):
@@ -212,7 +208,7 @@ def test_bags_carry_checksums(make_bag: Any, tmp_path: Path, cut: bool) -> None:
     assert checksum == crc32(content[summary : at + 25])
 
 
-def test_a_changed_byte_in_a_message_is_said(make_bag: Any) -> None:
+def test_a_changed_byte_in_a_message_is_said(make_bag):
     folder = make_bag()
     (file,) = folder.glob('*.mcap')
     with open_bag(folder) as bag:

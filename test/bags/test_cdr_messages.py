@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages that are unpacked quickly give the measurements that rosbags' own messages give."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterator
 from typing import Any
@@ -78,9 +76,7 @@ def quickly(reader: TopicMessages, data: bytes) -> Any:
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('name', INPUT_TYPES)
 @pytest.mark.parametrize('little', [True, False])
-def test_measurements_are_those_of_rosbags(
-    name: str, little: bool, factory: MessageFactory, rover: Any
-) -> None:
+def test_measurements_are_those_of_rosbags(name, little, factory, rover):
     dice = random.Random(name)
     kind, store = INPUT_TYPES[name], factory.store
     reader = topic_messages(kind)
@@ -104,7 +100,7 @@ def test_measurements_are_those_of_rosbags(
     assert (quick > 150) == little
 
 
-def test_every_field_that_anybody_reads(factory: MessageFactory) -> None:
+def test_every_field_that_anybody_reads(factory):
     dice = random.Random(1)
     for name in ('joint_states', 'imu/data', 'odom'):
         reader = topic_messages(INPUT_TYPES[name])
@@ -116,7 +112,7 @@ def test_every_field_that_anybody_reads(factory: MessageFactory) -> None:
         assert_same(found, message)
 
 
-def test_a_stamped_twist(factory: MessageFactory) -> None:
+def test_a_stamped_twist(factory):
     twist = factory.twist_with_covariance(0.3, -0.1, [float(i) for i in range(36)])
     message = factory.make(TWIST, header=factory.header(START), twist=twist)
     data = bytes(factory.store.serialize_cdr(message, TWIST))
@@ -129,9 +125,7 @@ def test_a_stamped_twist(factory: MessageFactory) -> None:
 
 @pytest.mark.parametrize('frame', ['', 'base_link', 'ab', 'ü'])
 @pytest.mark.parametrize('names', [(), ('left', 'right'), ('a', 'ab', 'abc', 'abcd', 'ü')])
-def test_packed_messages_are_the_bytes_of_rosbags(
-    frame: str, names: tuple[str, ...], factory: MessageFactory
-) -> None:
+def test_packed_messages_are_the_bytes_of_rosbags(frame, names, factory):
     dice = random.Random(7)
     joint_states, twists = JointStatePacker(frame), TwistPacker(frame)
     for lengths in ((0, 0, 0), (3, 0, 1), (1, 2, 3), (0, 4, 0), (1, 2, 3)):
@@ -167,9 +161,7 @@ def plain(value: Any) -> Any:
 
 @pytest.mark.parametrize('name', ['joint_states', 'imu/data', 'odom'])
 @pytest.mark.parametrize('little', [True, False])
-def test_many_at_once_hold_what_each_alone_holds(
-    name: str, little: bool, factory: MessageFactory
-) -> None:
+def test_many_at_once_hold_what_each_alone_holds(name, little, factory):
     dice = random.Random(7)
     kind = INPUT_TYPES[name]
     data = []

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged recordings lose what is damaged, nothing else, and it is said what is lost."""
 
-from __future__ import annotations
-
 import random
 import re
 import shutil
@@ -53,7 +51,7 @@ def damaged(folder: Path, source: Path, at: int, count: int = 512) -> Path:
     return copy
 
 
-def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path: Path) -> None:
+def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path):
     """The sector lies in the first of four chunks, which alone holds schemas and channels."""
     found, notes = read(damaged(tmp_path, DEMO, 100_000))
     whole, _ = read(DEMO)
@@ -72,9 +70,7 @@ def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path: Path) 
     assert last - first < gone[-1] - gone[0] + 0.2
 
 
-def test_every_command_says_what_is_damaged(
-    make_bag: Any, rover: Any, tmp_path: Path, capsys: Any
-) -> None:
+def test_every_command_says_what_is_damaged(make_bag, rover, tmp_path, capsys):
     rover.write(tmp_path / 'rover.yaml')
     config = ['--config', str(tmp_path / 'rover.yaml')]
     bag = make_bag()
@@ -100,9 +96,7 @@ def test_every_command_says_what_is_damaged(
 
 @pytest.mark.parametrize('closed', [True, False])
 @pytest.mark.parametrize('chunk_size', [0, 900])
-def test_a_file_by_topic_without_index_gives_all_topics_in_order(
-    tmp_path: Path, chunk_size: int, closed: bool
-) -> None:
+def test_a_file_by_topic_without_index_gives_all_topics_in_order(tmp_path, chunk_size, closed):
     layout = Layout(chunk_size, summary=False, by_topic=True, closed=closed)
     (tmp_path / 'a.mcap').write_bytes(make(samples(), TYPES, layout).content)
     found, notes = read(tmp_path / 'a.mcap')
@@ -111,7 +105,7 @@ def test_a_file_by_topic_without_index_gives_all_topics_in_order(
 
 
 @pytest.mark.parametrize('codec', ['', 'zstd', 'lz4'])
-def test_channels_from_the_summary_and_chunks_behind_the_damage(tmp_path: Path, codec: str) -> None:
+def test_channels_from_the_summary_and_chunks_behind_the_damage(tmp_path, codec):
     made = make(samples(), TYPES, Layout(900, codec))
     begin, end, lost = made.parts[0]
     content = made.content[:begin] + bytes(end - begin) + made.content[end:]
@@ -121,7 +115,7 @@ def test_channels_from_the_summary_and_chunks_behind_the_damage(tmp_path: Path, 
     assert f'lost: {(len(lost) + 1) // 2} of 45 on /joint_states' in notes[0]
 
 
-def test_records_behind_a_damage_within_a_chunk_are_found(tmp_path: Path) -> None:
+def test_records_behind_a_damage_within_a_chunk_are_found(tmp_path):
     made = make(samples(), TYPES, Layout(100_000))
     at = made.content.index(struct.pack('<Q', 40) * 8)
     content = made.content[: at - 3] + b'\xff' * 8 + made.content[at + 5 :]
@@ -138,7 +132,7 @@ def test_records_behind_a_damage_within_a_chunk_are_found(tmp_path: Path) -> Non
     assert 'lost: 1 of 45 on /joint_states; from 0.4 s to 0.4 s' in notes[0]
 
 
-def test_damaged_names_are_no_traceback(tmp_path: Path) -> None:
+def test_damaged_names_are_no_traceback(tmp_path):
     made = make(samples(), TYPES, Layout(900, summary=False))
     content = made.content.replace(b'/imu/data', b'/imu\xff\xfe\xfa\xf0a')
     (tmp_path / 'a.mcap').write_bytes(content)
@@ -148,7 +142,7 @@ def test_damaged_names_are_no_traceback(tmp_path: Path) -> None:
     assert 'messages of channels that are not described' in notes[0]
 
 
-def test_loose_messages_are_read_behind_a_damaged_beginning(tmp_path: Path) -> None:
+def test_loose_messages_are_read_behind_a_damaged_beginning(tmp_path):
     whole = samples()
     made = make(whole, TYPES, Layout(chunk_size=0, closed=False))
     path = tmp_path / 'a.mcap'
@@ -156,7 +150,7 @@ def test_loose_messages_are_read_behind_a_damaged_beginning(tmp_path: Path) -> N
     assert read(path)[0] == [RawMessage(*sample) for sample in whole]
 
 
-def test_a_chunk_that_seems_to_end_with_another_does_not_hide_it(tmp_path: Path) -> None:
+def test_a_chunk_that_seems_to_end_with_another_does_not_hide_it(tmp_path):
     """As many bytes are missing as bring the end of a later chunk to where this one should end."""
     dice = random.Random(1)
     whole = [sample._replace(data=dice.randbytes(200)) for sample in samples()]
@@ -171,7 +165,7 @@ def test_a_chunk_that_seems_to_end_with_another_does_not_hide_it(tmp_path: Path)
     assert all(RawMessage(*sample) in found for part in intact for sample in part)
 
 
-def test_two_copies_of_a_channel_that_differ_are_said(tmp_path: Path) -> None:
+def test_two_copies_of_a_channel_that_differ_are_said(tmp_path):
     """No checksum tells which of them is right."""
     made = make(samples(), TYPES, Layout(checksums=False))
     content = made.content.replace(b'/joint_states', b'/joint_statas', 1)
@@ -183,7 +177,7 @@ def test_two_copies_of_a_channel_that_differ_are_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('codec', ['zstd', 'lz4'])
-def test_a_channel_in_a_chunk_that_unpacks_decides(tmp_path: Path, codec: str) -> None:
+def test_a_channel_in_a_chunk_that_unpacks_decides(tmp_path, codec):
     made = make(samples(), TYPES, Layout(codec=codec, checksums=False))
     at = made.content.rindex(b'/joint_states')
     content = made.content[:at] + b'/joint_statas' + made.content[at + 13 :]
@@ -195,7 +189,7 @@ def test_a_channel_in_a_chunk_that_unpacks_decides(tmp_path: Path, codec: str) -
     assert 'copies of channel 1 differ: /joint_statas or /joint_states' in notes[0]
 
 
-def test_a_channel_in_a_chunk_with_a_wrong_checksum_yields(tmp_path: Path) -> None:
+def test_a_channel_in_a_chunk_with_a_wrong_checksum_yields(tmp_path):
     made = make(samples(), TYPES, Layout(900, 'lz4'))
     content = bytearray(made.content.replace(b'imu/data', b'imu/datc', 1))
     assert content.index(b'imu/datc') < made.parts[0][1]
@@ -215,7 +209,7 @@ def left_out(tmp_path: Path, begin: int, end: int, content: bytes) -> tuple[int,
     return len(found), notes
 
 
-def test_messages_whose_chunk_lost_its_head_are_said(tmp_path: Path) -> None:
+def test_messages_whose_chunk_lost_its_head_are_said(tmp_path):
     """Bytes are missing, by chance so many that a record ends where another begins."""
     made = make(samples(), TYPES, Layout(900, checksums=False, summary=False))
     begin, _, part = made.parts[2]
@@ -225,7 +219,7 @@ def test_messages_whose_chunk_lost_its_head_are_said(tmp_path: Path) -> None:
     assert 'lost from' in notes[0]
 
 
-def test_the_index_alone_decides_nothing(tmp_path: Path) -> None:
+def test_the_index_alone_decides_nothing(tmp_path):
     """A chunk index entry that points elsewhere, in a file without checksums."""
     made = make(samples(), TYPES, Layout(900, checksums=False))
     content = bytearray(made.content)
@@ -253,7 +247,7 @@ def lying(text: str, old: str, new: str) -> str:
         ('relative_file_paths:', 'relative_file_paths: [gone.mcap]\n  old:'),
     ],
 )
-def test_metadata_that_lie_are_set_aside_and_said(make_bag: Any, old: str, new: str) -> None:
+def test_metadata_that_lie_are_set_aside_and_said(make_bag, old, new):
     folder = make_bag()
     whole, notes = read(folder)
     assert len(whole) == 84
@@ -271,7 +265,7 @@ def big_sqlite(tmp_path: Path, count: int = 4000) -> tuple[Path, list[RawMessage
     return path, [RawMessage(*s) for s in found]
 
 
-def test_rows_behind_damaged_pages_of_sqlite_are_read(tmp_path: Path) -> None:
+def test_rows_behind_damaged_pages_of_sqlite_are_read(tmp_path):
     path, whole = big_sqlite(tmp_path)
     assert read(path) == (whole, [])
     content = bytearray(path.read_bytes())
@@ -285,7 +279,7 @@ def test_rows_behind_damaged_pages_of_sqlite_are_read(tmp_path: Path) -> None:
     assert 'from 19.' in notes[0] or 'from 20.' in notes[0]
 
 
-def test_a_damaged_row_number_of_sqlite_hides_no_row_behind(tmp_path: Path) -> None:
+def test_a_damaged_row_number_of_sqlite_hides_no_row_behind(tmp_path):
     """The rows of a page have great numbers and no data, the last of them cannot be read."""
     path, whole = big_sqlite(tmp_path)
     content = bytearray(path.read_bytes())
@@ -304,7 +298,7 @@ def test_a_damaged_row_number_of_sqlite_hides_no_row_behind(tmp_path: Path) -> N
     assert 'is damaged' in notes[0]
 
 
-def test_pages_that_sqlite_does_not_miss_are_read(tmp_path: Path) -> None:
+def test_pages_that_sqlite_does_not_miss_are_read(tmp_path):
     """The page that lists the pages of the table states too few of them, which is no error."""
     path, whole = big_sqlite(tmp_path)
     content = bytearray(path.read_bytes())
@@ -318,7 +312,7 @@ def test_pages_that_sqlite_does_not_miss_are_read(tmp_path: Path) -> None:
     assert 'is damaged: 4000 whole messages recovered' in notes[0]
 
 
-def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path: Path) -> None:
+def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path):
     path, whole = big_sqlite(tmp_path)
     with sqlite3.connect(path) as connection:
         connection.execute('PRAGMA writable_schema=ON')
@@ -328,7 +322,7 @@ def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path: Path) -> None:
     assert read(path)[0] == whole
 
 
-def test_rows_of_sqlite_out_of_order_are_sorted(tmp_path: Path) -> None:
+def test_rows_of_sqlite_out_of_order_are_sorted(tmp_path):
     path, whole = big_sqlite(tmp_path, 50)
     with sqlite3.connect(path) as connection:
         connection.execute('UPDATE messages SET timestamp = ? WHERE id = 30', (START - 5,))
@@ -339,7 +333,7 @@ def test_rows_of_sqlite_out_of_order_are_sorted(tmp_path: Path) -> None:
     assert len(found) == len(whole)
 
 
-def test_the_write_ahead_log_of_a_recorder_that_died_is_read(tmp_path: Path) -> None:
+def test_the_write_ahead_log_of_a_recorder_that_died_is_read(tmp_path):
     path, whole = big_sqlite(tmp_path, 50)
     live = sqlite3.connect(path)
     live.execute('PRAGMA journal_mode=WAL')
@@ -359,7 +353,7 @@ def test_the_write_ahead_log_of_a_recorder_that_died_is_read(tmp_path: Path) -> 
     assert sorted(p.name for p in other.iterdir()) == before
 
 
-def test_a_chunk_above_the_limit_is_left_out_and_said(tmp_path: Path) -> None:
+def test_a_chunk_above_the_limit_is_left_out_and_said(tmp_path):
     few = samples()
     few.insert(45, Sample(few[44].log_time + 1, '/imu/data', bytes(50_000)))
     (tmp_path / 'a.mcap').write_bytes(make(few, TYPES, Layout(900, 'zstd')).content)
@@ -368,16 +362,14 @@ def test_a_chunk_above_the_limit_is_left_out_and_said(tmp_path: Path) -> None:
     assert 'was left out' in notes[0]
 
 
-def test_more_than_can_be_held_is_refused_not_swapped(tmp_path: Path) -> None:
+def test_more_than_can_be_held_is_refused_not_swapped(tmp_path):
     layout = Layout(900, by_topic=True)
     (tmp_path / 'a.mcap').write_bytes(make(samples(900), TYPES, layout).content)
     with pytest.raises(UserError, match='sort it first'):
         read(tmp_path / 'a.mcap', limits=Limits(held=5_000))
 
 
-def test_garbage_in_a_damaged_recording_is_not_put_down_to_the_driver(
-    make_bag: Any, tmp_path: Path, capsys: Any
-) -> None:
+def test_garbage_in_a_damaged_recording_is_not_put_down_to_the_driver(make_bag, tmp_path, capsys):
     """Stamps of 0 on four messages, in a file that was cut off."""
     folder = make_bag()
     (file,) = folder.glob('*.mcap')

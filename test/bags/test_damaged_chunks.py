@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever field of a chunk's head is damaged, its messages are found."""
 
-from __future__ import annotations
-
 import random
-from pathlib import Path
 
 import pytest
 
@@ -29,9 +26,7 @@ FIELDS = {  # of a chunk's record: offset and size [byte]
 @pytest.mark.parametrize('summary', [True, False])
 @pytest.mark.parametrize('codec', ['', 'zstd', 'lz4'])
 @pytest.mark.parametrize('name', FIELDS)
-def test_messages_of_a_chunk_with_a_damaged_head(
-    tmp_path: Path, name: str, codec: str, summary: bool, value: bytes
-) -> None:
+def test_messages_of_a_chunk_with_a_damaged_head(tmp_path, name, codec, summary, value):
     dice = random.Random(2)
     topics = list(TYPES)
     samples = [
@@ -53,7 +48,7 @@ def test_messages_of_a_chunk_with_a_damaged_head(
     assert 'GB' not in notes
 
 
-def test_messages_outside_of_the_times_of_their_chunk_are_said(tmp_path: Path) -> None:
+def test_messages_outside_of_the_times_of_their_chunk_are_said(tmp_path):
     """No checksum covers them; the head of the chunk states between which times they lie."""
     samples = [Sample(START + 10_000_000 * i, '/imu/data', bytes(80)) for i in range(200)]
     layout = Layout(4000, 'lz4', checksums=False)
@@ -73,9 +68,7 @@ def test_messages_outside_of_the_times_of_their_chunk_are_said(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(('most', 'left_out'), [(1, 1), (3, 0)])
-def test_chunks_without_their_heads_are_tried_up_to_a_number(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most: int, left_out: int
-) -> None:
+def test_chunks_without_their_heads_are_tried_up_to_a_number(tmp_path, monkeypatch, most, left_out):
     """Two of them, with a sound chunk between: each gap takes from what all of them may."""
     monkeypatch.setattr(mcap_file, '_MOST_HEADLESS', most)
     samples = [

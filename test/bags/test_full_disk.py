@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A disk that takes no more leaves a bag that is closed, and one line."""
 
-from __future__ import annotations
-
 import errno
 import os
 import resource
@@ -44,9 +42,7 @@ def largest_file(size: int) -> Iterator[None]:
 
 
 @pytest.mark.parametrize('fails_at', [2.5, 3.02, 4.0])
-def test_bag_on_a_disk_that_fills_up_is_closed_and_readable(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails_at: float
-) -> None:
+def test_bag_on_a_disk_that_fills_up_is_closed_and_readable(tmp_path, monkeypatch, fails_at):
     from rosbags.rosbag2 import Reader
 
     with (
@@ -69,14 +65,14 @@ def test_bag_on_a_disk_that_fills_up_is_closed_and_readable(
     assert fill_again == ['out']
 
 
-def test_a_disk_without_room_for_one_chunk_keeps_nothing(tmp_path: Path) -> None:
+def test_a_disk_without_room_for_one_chunk_keeps_nothing(tmp_path):
     with largest_file(400_000), pytest.raises(UserError) as caught:
         fill(tmp_path / 'out', 1000)
     assert 'kept' not in str(caught.value)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_disk_that_is_full_at_the_end_only(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_disk_that_is_full_at_the_end_only(tmp_path, monkeypatch):
     """The last chunk does not fit when the bag is closed."""
     from rosbags.rosbag2.storage_mcap import McapWriter
 
@@ -92,8 +88,8 @@ def test_a_disk_that_is_full_at_the_end_only(tmp_path: Path, monkeypatch: Any) -
 
 @pytest.mark.parametrize('command', ['replay', 'simulate', 'diagnose', 'evaluate', 'predict'])
 def test_places_that_cannot_be_written_are_one_line_before_anything_is_computed(
-    make_bag: Any, tmp_path: Path, capsys: Any, command: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    make_bag, tmp_path, capsys, command, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     table = tmp_path / 't.csv'
     table.write_text('slip,normal_load,sinkage\n0.1,100,0.01\n')
@@ -150,8 +146,8 @@ def everything(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize('command', ['replay', 'replay two', 'diagnose', 'predict'])
 def test_a_disk_that_fills_up_at_any_file_leaves_the_earlier_output(
-    make_bag: Any, rover: Any, tmp_path: Path, capsys: Any, undrawn: None, command: str
-) -> None:
+    make_bag, rover, tmp_path, capsys, undrawn, command
+):
     """Whichever file is the first without room: the output of the run before stands, whole."""
     read, out = tmp_path / 'read', tmp_path / 'out'
     read.mkdir()

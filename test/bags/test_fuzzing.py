@@ -2,33 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Some hundred damaged inputs; any number: ``python -m wheel_terra_lab.studies.fuzz_files``."""
 
-from __future__ import annotations
-
 import random
-from pathlib import Path
 from typing import Any
-
-import pytest
 
 from wheel_terra_lab.studies.fuzz_files import fuzz
 from wheel_terra_lab.studies.fuzzing import cases
 from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, make
 
 
-def test_damaged_inputs_of_all_kinds() -> None:
+def test_damaged_inputs_of_all_kinds():
     done, faults = fuzz(0, 200)
     assert not faults
     assert set(done) == set(cases.CASES)
 
 
-def test_a_message_that_lost_bytes_hides_no_chunk_behind_it() -> None:
+def test_a_message_that_lost_bytes_hides_no_chunk_behind_it():
     """5,000 bytes left out: by its length a message takes the next chunk's head with it."""
     done, faults = fuzz(75084681, 1)
     assert set(done) == {'mcap'}
     assert not faults
 
 
-def test_the_judgement_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_judgement_can_fail(tmp_path, monkeypatch):
     """A reader that drops one message is found out."""
     from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
 
@@ -44,7 +39,7 @@ def test_the_judgement_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert any('intact messages missing' in words for words in said)
 
 
-def test_the_maker_is_read_by_another_reader(tmp_path: Path) -> None:
+def test_the_maker_is_read_by_another_reader(tmp_path):
     from rosbags.rosbag2 import Reader
 
     dice = random.Random(5)

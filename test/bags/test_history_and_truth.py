@@ -2,11 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of a whole drive, and the truth beside it."""
 
-from __future__ import annotations
-
 import csv
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +18,7 @@ from wheel_terra_estimator.estimation.estimates import SlipClass
 SECOND = 1_000_000_000
 
 
-def test_time_in_class_counts_no_pauses() -> None:
+def test_time_in_class_counts_no_pauses():
     recorder = HistoryRecorder(('left', 'right'))
     stamps = [0.0, 0.5, 1.0, 1.5, 60.0, 60.5, 20.0]  # a pause of a minute, a step back
     classes = [0, 0, 3, 3, 2, 2, 2]
@@ -38,13 +34,13 @@ def test_time_in_class_counts_no_pauses() -> None:
     assert times[SlipClass.UNKNOWN][1] == pytest.approx(2.0)
 
 
-def test_history_of_nothing() -> None:
+def test_history_of_nothing():
     history = HistoryRecorder(('left',)).history()
     assert history.seconds.size == 0
     assert history.values['slip'].shape == (0, 1)
 
 
-def test_bag_without_estimates_is_refused(make_bag: Any) -> None:
+def test_bag_without_estimates_is_refused(make_bag):
     with open_bag(make_bag()) as bag, pytest.raises(UserError, match='no estimates'):
         read_estimates(bag)
 
@@ -56,7 +52,7 @@ TOPICS = {
 }
 
 
-def test_true_slip_from_a_true_velocity(make_bag: Any, rover: Any, drive: Any) -> None:
+def test_true_slip_from_a_true_velocity(make_bag, rover, drive):
     """Rim speed 2 rad/s x 0.21 m = 0.42 m/s, velocity 0.36 m/s: slip 1/7."""
     moved = [(t.replace('/reference_odom', '/truth/odometry'), m, time) for t, m, time in drive]
     bag = make_bag(messages=moved, topics=TOPICS)
@@ -67,9 +63,7 @@ def test_true_slip_from_a_true_velocity(make_bag: Any, rover: Any, drive: Any) -
     np.testing.assert_allclose(truth.slip.value, np.full((40, 2), 1 / 7), atol=1e-12)
 
 
-def test_true_slip_of_steered_wheels_is_along_their_headings(
-    make_bag: Any, rover: Any, drive: Any, factory: Any
-) -> None:
+def test_true_slip_of_steered_wheels_is_along_their_headings(make_bag, rover, drive, factory):
     """Both wheels head 0.3 rad to the left: the rover moves along them with 0.36 / cos 0.3."""
     moved = []
     for topic, message, time in drive:
@@ -90,13 +84,13 @@ def test_true_slip_of_steered_wheels_is_along_their_headings(
     np.testing.assert_allclose(truth.slip.value, np.full((40, 2), expected), atol=1e-12)
 
 
-def test_no_truth_in_a_bag_without(make_bag: Any, rover: Any) -> None:
+def test_no_truth_in_a_bag_without(make_bag, rover):
     with open_bag(make_bag()) as bag:
         assert read_truth(bag, {}, rover) is None
 
 
 @pytest.mark.shared
-def test_true_slip_of_a_measured_drive_is_that_of_its_table(shared: Path) -> None:
+def test_true_slip_of_a_measured_drive_is_that_of_its_table(shared):
     """The table has wheel speeds and the speed of each side, of the author's own making."""
     configuration = reader.load(['frostyboy'])
     with open_bag(shared / 'bags' / 'frostyboy_event_1_6_mcap') as bag:

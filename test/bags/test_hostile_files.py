@@ -2,13 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files that were made to cost time or memory: each ends soon, in an error of one line or notes."""
 
-from __future__ import annotations
-
 import random
 import resource
 import struct
 import time
-from collections.abc import Callable
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -227,7 +224,7 @@ def read(path: Path, sender: Any) -> None:
     'size', [10**5, pytest.param(20 * 2**20, marks=[pytest.mark.slow, pytest.mark.timeout(900)])]
 )
 @pytest.mark.parametrize('make', [*MCAPS, *SQLITES], ids=lambda make: make.__name__)
-def test_no_file_costs_much(tmp_path: Path, make: Callable[[int], bytes], size: int) -> None:
+def test_no_file_costs_much(tmp_path, make, size):
     path = tmp_path / ('a.mcap' if make in MCAPS else 'a.db3')
     path.write_bytes(make(size))
     receiver, sender = get_context('fork').Pipe(False)

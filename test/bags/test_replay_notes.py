@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a replay says of stamps that stand still and of a filter that fails."""
 
-from __future__ import annotations
-
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,9 +14,7 @@ from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 
 
-def test_stamps_that_stand_still_are_counted(
-    make_bag: Any, factory: Any, rover: Any, tmp_path: Path, capsys: Any
-) -> None:
+def test_stamps_that_stand_still_are_counted(make_bag, factory, rover, tmp_path, capsys):
     header = factory.header(1_700_000_000_000_000_000)
     rows = [
         ('/joint_states', factory.joint_state(header, ('left', 'right'), velocity=(2.0, -2.0)), i)
@@ -33,8 +28,8 @@ def test_stamps_that_stand_still_are_counted(
 
 @pytest.mark.filter_fails
 def test_a_failing_filter_is_said_in_summary_and_diagnostics(
-    make_bag: Any, rover: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+    make_bag, rover, monkeypatch, tmp_path
+):
     usual, calls = WheelSoilEstimator.estimates, []
 
     def failing(self: Any) -> Any:
@@ -54,7 +49,7 @@ def test_a_failing_filter_is_said_in_summary_and_diagnostics(
     assert b'filter_restarts' in next((tmp_path / 'out').glob('*.mcap')).read_bytes()
 
 
-def test_odometry_that_might_be_the_reference_is_named() -> None:
+def test_odometry_that_might_be_the_reference_is_named():
     """On a measured drive, on which the filter never restarts."""
     from wheel_terra_estimator.cli.demo import DRIVES
 

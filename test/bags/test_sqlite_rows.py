@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows of damaged SQLite files: all that are intact, none that was deleted, none twice."""
 
-from __future__ import annotations
-
 import random
 import shutil
 import sqlite3
@@ -54,7 +52,7 @@ def zeroed(path: Path, begin: int, count: int) -> None:
     path.write_bytes(content)
 
 
-def test_nothing_is_lost_with_the_page_that_lists_all_others(tmp_path: Path) -> None:
+def test_nothing_is_lost_with_the_page_that_lists_all_others(tmp_path):
     path = tmp_path / 'a.db3'
     samples = made(path)
     zeroed(path, root_of(path, 'messages'), PAGE)
@@ -63,7 +61,7 @@ def test_nothing_is_lost_with_the_page_that_lists_all_others(tmp_path: Path) -> 
     assert 'a.db3 is damaged: 600 whole messages recovered' in notes[0]
 
 
-def test_nothing_is_lost_with_the_header_of_the_file(tmp_path: Path) -> None:
+def test_nothing_is_lost_with_the_header_of_the_file(tmp_path):
     path = tmp_path / 'a.db3'
     samples = made(path)
     zeroed(path, 0, PAGE)
@@ -73,9 +71,7 @@ def test_nothing_is_lost_with_the_header_of_the_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('size', [512, 1024, 65536])
-def test_the_size_of_pages_is_learnt_where_the_header_is_lost(
-    tmp_path: Path, size: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_size_of_pages_is_learnt_where_the_header_is_lost(tmp_path, size, monkeypatch):
     monkeypatch.setattr(sqlite_maker, 'PAGE', size)
     path = tmp_path / 'a.db3'
     samples = made(path)
@@ -84,9 +80,7 @@ def test_the_size_of_pages_is_learnt_where_the_header_is_lost(
 
 
 @pytest.mark.parametrize('missing', [1, 700, PAGE, 3 * PAGE + 5])
-def test_rows_behind_missing_bytes_are_found_off_the_raster_of_pages(
-    tmp_path: Path, missing: int
-) -> None:
+def test_rows_behind_missing_bytes_are_found_off_the_raster_of_pages(tmp_path, missing):
     path = tmp_path / 'a.db3'
     samples = made(path)
     content = path.read_bytes()
@@ -113,7 +107,7 @@ def deleted(path: Path, condition: str) -> None:
 
 
 @pytest.mark.parametrize('condition', ['id > 200 AND id <= 400', 'id % 2 = 0', 'topic_id = 2'])
-def test_deleted_rows_do_not_come_back(tmp_path: Path, condition: str) -> None:
+def test_deleted_rows_do_not_come_back(tmp_path, condition):
     """Their bytes stand on free pages and in the gaps of used ones."""
     path = tmp_path / 'a.db3'
     samples = made(path)
@@ -127,8 +121,8 @@ def test_deleted_rows_do_not_come_back(tmp_path: Path, condition: str) -> None:
 
 
 def test_without_the_list_of_free_pages_it_is_said_that_deleted_rows_may_come_back(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     path = tmp_path / 'a.db3'
     made(path)
     deleted(path, 'id > 200 AND id <= 400')
@@ -138,7 +132,7 @@ def test_without_the_list_of_free_pages_it_is_said_that_deleted_rows_may_come_ba
     assert 'deleted rows may be among them' in read(path)[1][0]
 
 
-def test_no_row_comes_twice(tmp_path: Path) -> None:
+def test_no_row_comes_twice(tmp_path):
     """A page that stands in the file a second time, as a file system may leave it."""
     path = tmp_path / 'a.db3'
     samples = made(path)
@@ -150,7 +144,7 @@ def test_no_row_comes_twice(tmp_path: Path) -> None:
     assert read(path)[0] == Counter(map(tuple, samples))
 
 
-def test_a_large_message_whose_page_is_another_s_is_left_out(tmp_path: Path) -> None:
+def test_a_large_message_whose_page_is_another_s_is_left_out(tmp_path):
     path = tmp_path / 'a.db3'
     samples = made(path)
     content = bytearray(path.read_bytes())
@@ -163,7 +157,7 @@ def test_a_large_message_whose_page_is_another_s_is_left_out(tmp_path: Path) -> 
     assert tuple(samples[105]) not in found
 
 
-def test_rows_in_the_write_ahead_log_of_a_damaged_file(tmp_path: Path) -> None:
+def test_rows_in_the_write_ahead_log_of_a_damaged_file(tmp_path):
     path = tmp_path / 'live.db3'
     samples = made(path)
     live = sqlite3.connect(path)
@@ -190,7 +184,7 @@ def test_rows_in_the_write_ahead_log_of_a_damaged_file(tmp_path: Path) -> None:
     assert {file: file.read_bytes() for file in tmp_path.glob('a.db3*')} == before
 
 
-def test_what_is_left_of_other_files_is_no_recording(tmp_path: Path) -> None:
+def test_what_is_left_of_other_files_is_no_recording(tmp_path):
     path = tmp_path / 'a.db3'
     with sqlite3.connect(path) as connection:
         connection.execute('CREATE TABLE notes(id INTEGER PRIMARY KEY, text)')

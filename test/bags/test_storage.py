@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings in every shape and state give the messages that are whole."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from typing import Any
@@ -23,13 +21,11 @@ def contents(path: Path) -> list[RawMessage]:
 
 
 @pytest.fixture
-def whole(make_bag: Any) -> list[RawMessage]:
+def whole(make_bag):
     return contents(make_bag(name='whole'))
 
 
-def test_bags_of_the_tests_are_closed_as_the_library_does_it(
-    make_bag: Any, request: pytest.FixtureRequest
-) -> None:
+def test_bags_of_the_tests_are_closed_as_the_library_does_it(make_bag, request):
     stated = []
     for number in range(2):
         if number:
@@ -41,9 +37,7 @@ def test_bags_of_the_tests_are_closed_as_the_library_does_it(
 
 
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
-def test_folder_single_file_and_folder_without_metadata_are_the_same(
-    make_bag: Any, whole: list[RawMessage], storage: str
-) -> None:
+def test_folder_single_file_and_folder_without_metadata_are_the_same(make_bag, whole, storage):
     folder = make_bag(storage=storage)
     (file,) = (p for p in folder.iterdir() if p.suffix in ('.mcap', '.db3'))
     assert len(whole) == 84
@@ -55,21 +49,19 @@ def test_folder_single_file_and_folder_without_metadata_are_the_same(
         assert 'metadata.yaml is missing' in bag.notes[0]
 
 
-def test_a_sound_file_is_read_by_its_index(
-    make_bag: Any, whole: list[RawMessage], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_sound_file_is_read_by_its_index(make_bag, whole, monkeypatch):
     monkeypatch.setattr(McapFile, '_survey', lambda _: pytest.fail('read from front to end'))
     assert contents(make_bag()) == whole
 
 
-def test_unreadable_metadata_is_set_aside(make_bag: Any, whole: list[RawMessage]) -> None:
+def test_unreadable_metadata_is_set_aside(make_bag, whole):
     folder = make_bag()
     (folder / 'metadata.yaml').write_text('rosbag2_bagfile_information: {version: 9}\n')
     assert contents(folder) == whole
 
 
 @pytest.mark.parametrize('mode', ['FILE', 'MESSAGE', 'STORAGE'])
-def test_compressed_bags(tmp_path: Path, drive: Any, whole: list[RawMessage], mode: str) -> None:
+def test_compressed_bags(tmp_path, drive, whole, mode):
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
     from wheel_terra_estimator.bags.message_types import jazzy_types
@@ -89,9 +81,7 @@ def test_compressed_bags(tmp_path: Path, drive: Any, whole: list[RawMessage], mo
     assert contents(tmp_path / 'bag') == whole
 
 
-def test_truncated_mcap_gives_the_messages_before_the_cut(
-    make_bag: Any, whole: list[RawMessage], tmp_path: Path
-) -> None:
+def test_truncated_mcap_gives_the_messages_before_the_cut(make_bag, whole, tmp_path):
     (file,) = make_bag().glob('*.mcap')
     content = file.read_bytes()
     cut = tmp_path / 'cut.mcap'
@@ -120,9 +110,7 @@ def test_truncated_mcap_gives_the_messages_before_the_cut(
         ('rubbish.db3', b'rubbish' * 100, 'cannot be read'),
     ],
 )
-def test_what_is_no_recording_is_refused_by_name(
-    tmp_path: Path, name: str, content: bytes | None, words: str
-) -> None:
+def test_what_is_no_recording_is_refused_by_name(tmp_path, name, content, words):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
@@ -133,7 +121,7 @@ def test_what_is_no_recording_is_refused_by_name(
     assert '\n' not in str(error.value)
 
 
-def test_empty_bag_and_empty_folder(make_bag: Any, tmp_path: Path) -> None:
+def test_empty_bag_and_empty_folder(make_bag, tmp_path):
     with pytest.raises(UserError, match='holds no messages'), open_bag(make_bag(messages=[])):
         pass
     empty = tmp_path / 'empty'
@@ -142,7 +130,7 @@ def test_empty_bag_and_empty_folder(make_bag: Any, tmp_path: Path) -> None:
         pass
 
 
-def test_split_bag_is_read_as_one(make_bag: Any, drive: Any, whole: list[RawMessage]) -> None:
+def test_split_bag_is_read_as_one(make_bag, drive, whole):
     first = make_bag(messages=drive[:40], name='first')
     second = make_bag(messages=drive[40:], name='second')
     for file in second.glob('*.mcap'):
@@ -152,7 +140,7 @@ def test_split_bag_is_read_as_one(make_bag: Any, drive: Any, whole: list[RawMess
 
 
 @pytest.mark.shared
-def test_measured_bag_in_both_storages_is_the_same(shared: Path) -> None:
+def test_measured_bag_in_both_storages_is_the_same(shared):
     mcap = contents(shared / 'bags' / 'frostyboy_event_1_6_mcap')
     sqlite = contents(shared / 'bags' / 'frostyboy_event_1_6_db3')
     assert len(mcap) == 2570

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive of any length takes the same memory, and its figures are those of all its sets."""
 
-from __future__ import annotations
-
 import tracemalloc
 from dataclasses import replace
 
@@ -17,7 +15,7 @@ from wheel_terra_estimator.reporting.drive_summary import summarise
 
 
 @pytest.mark.parametrize('count', [1, 7, 8, 9, 16, 17, 100, 1000, 1023])
-def test_rows_stay_in_order_evenly_spread_and_few(count: int) -> None:
+def test_rows_stay_in_order_evenly_spread_and_few(count):
     rows = ThinnedRows(8)
     for stamp in range(count):
         rows.add(stamp, [float(stamp)])
@@ -44,7 +42,7 @@ def sets(count: int):
         )
 
 
-def test_figures_of_a_thinned_drive_are_those_of_all_sets() -> None:
+def test_figures_of_a_thinned_drive_are_those_of_all_sets():
     names = tuple(f'w{i}' for i in range(estimate_set().slip.size))
     whole, thinned = HistoryRecorder(names), HistoryRecorder(names, 50)
     everything = list(sets(700))
@@ -69,7 +67,7 @@ def test_figures_of_a_thinned_drive_are_those_of_all_sets() -> None:
         assert wheel.seconds['high'] == pytest.approx(0.05 * (classes[:-1, i] == 2).sum())
 
 
-def test_memory_of_a_recorder_does_not_grow() -> None:
+def test_memory_of_a_recorder_does_not_grow():
     names = tuple(f'w{i}' for i in range(estimate_set().slip.size))
     recorder = HistoryRecorder(names, 200)
     sizes = []

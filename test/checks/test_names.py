@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joints that steer are not passed over where the rover file knows of none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -16,7 +14,7 @@ STEERED = "['', '', '', '', rear_left_steering_joint, rear_right_steering_joint]
 
 
 @pytest.mark.parametrize('stated', [False, True])
-def test_joints_that_steer(stated: bool) -> None:
+def test_joints_that_steer(stated):
     parameters = [f'wheels.steering_joints:={STEERED}'] if stated else []
     rover = reader.load(['generic_six_wheel'], parameters)
     names = (*rover.wheels.names, 'rear_left_steering_joint', 'rear_right_steering_joint')
@@ -31,6 +29,6 @@ def test_joints_that_steer(stated: bool) -> None:
     assert cures == ([] if stated else [told])
 
 
-def test_names_that_are_like_none_are_taken_in_the_usual_order() -> None:
+def test_names_that_are_like_none_are_taken_in_the_usual_order():
     assert _pairs(['fore', 'hind'], ['m1', 'm2']) == {'fore': 'm1', 'hind': 'm2'}
     assert _pairs(['fore', 'hind'], ['m1', 'm2', 'm3']) == {}

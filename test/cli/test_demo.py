@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The demonstration where DDS does not connect: the drives are replayed."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 

@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """``wheel-terra diagnose``: what is asked of a recording is checked as ``replay`` checks it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,7 +11,7 @@ from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 
 
-def test_packed_recording_is_a_recording(tmp_path: Path, capsys: Any) -> None:
+def test_packed_recording_is_a_recording(tmp_path, capsys):
     packed = tmp_path / 'drive.mcap.zstd'
     packed.write_bytes(b'no recording')
     arguments = ['diagnose', str(packed), '-o', str(tmp_path / 'out'), '--config', 'pathfinder']
@@ -28,19 +25,19 @@ def _table(path: Path) -> str:
     return str(path)
 
 
-def test_remap_is_for_bags(tmp_path: Path, capsys: Any) -> None:
+def test_remap_is_for_bags(tmp_path, capsys):
     command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
     assert main([*command, '--remap', 'odom:=/vo']) == 2
     assert 'rig.csv is a table' in capsys.readouterr().err
 
 
-def test_smoothing_is_for_bags(tmp_path: Path, capsys: Any) -> None:
+def test_smoothing_is_for_bags(tmp_path, capsys):
     command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
     assert main([*command, '--smooth']) == 2
     assert '--smooth: goes with a bag' in capsys.readouterr().err
 
 
-def test_a_soil_that_nobody_stated_is_said(tmp_path: Path, capsys: Any) -> None:
+def test_a_soil_that_nobody_stated_is_said(tmp_path, capsys):
     rig = ['--config', 'hit_wh1']
     rows = ['--slip', '0.05:0.6:8', '--load', '35,70', '-o', str(tmp_path / 'rig.csv')]
     assert main(['predict', *rig, *rows]) == 0
@@ -49,7 +46,7 @@ def test_a_soil_that_nobody_stated_is_said(tmp_path: Path, capsys: Any) -> None:
     assert 'no soil was stated' in capsys.readouterr().out
 
 
-def test_json_is_the_report_and_nothing_else(tmp_path: Path, capsys: Any) -> None:
+def test_json_is_the_report_and_nothing_else(tmp_path, capsys):
     config = ['--config', 'hit_wh3', '--config', 'dlr_mss']
     rows = str(tmp_path / 'rows.csv')
     assert main(['predict', *config, '--slip', '0.1:0.5:5', '--load', '60,90', '-o', rows]) == 0
@@ -61,9 +58,7 @@ def test_json_is_the_report_and_nothing_else(tmp_path: Path, capsys: Any) -> Non
     assert json.loads(said) == json.loads((out / 'report.json').read_text())
 
 
-def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(
-    tmp_path: Path, capsys: Any
-) -> None:
+def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(tmp_path, capsys):
     """The same friction of the drive in two soils: each table gets its soil, both the one size."""
     rig = ['--config', 'hit_wh3_lug10']
     for name, soil in (('sand', 'hit_lss1'), ('simulant', 'fjs1_ishigami')):

@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """wheel-terra effects: the catalogue for people, for programs and for the documentation."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
-import pytest
 from document_effects import as_markdown
 
 from wheel_terra_estimator.cli.main import main
@@ -16,7 +13,7 @@ from wheel_terra_estimator.terramechanics.effects import catalogue
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_text_names_every_effect_and_parameter(capsys: pytest.CaptureFixture[str]) -> None:
+def test_text_names_every_effect_and_parameter(capsys):
     assert main(['effects']) == 0
     text = capsys.readouterr().out
     for name, effect in catalogue().items():
@@ -29,7 +26,7 @@ def test_text_names_every_effect_and_parameter(capsys: pytest.CaptureFixture[str
     assert max(map(len, text.splitlines())) <= 100
 
 
-def test_json_holds_what_a_program_needs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_holds_what_a_program_needs(capsys):
     assert main(['effects', '--format', 'json']) == 0
     records = {record['name']: record for record in json.loads(capsys.readouterr().out)}
     assert records.keys() == catalogue().keys()
@@ -37,7 +34,7 @@ def test_json_holds_what_a_program_needs(capsys: pytest.CaptureFixture[str]) -> 
     assert digging['touches'] == ['sinkage'] and digging['parameters'][0]['name'] == 'kd'
 
 
-def test_one_effect_and_a_misspelt_one(capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_effect_and_a_misspelt_one(capsys):
     assert main(['effects', 'soil_mound']) == 0
     text = capsys.readouterr().out
     assert text.startswith('soil_mound') and 'lug_digging' not in text
@@ -45,7 +42,7 @@ def test_one_effect_and_a_misspelt_one(capsys: pytest.CaptureFixture[str]) -> No
     assert "did you mean 'soil_mound'?" in capsys.readouterr().err
 
 
-def test_the_page_and_its_pictures_are_up_to_date() -> None:
+def test_the_page_and_its_pictures_are_up_to_date():
     page = (ROOT / 'docs' / 'effects.md').read_text(encoding='utf-8')
     assert page == as_markdown(catalogue()), 'run python tools/document_effects.py'
     for name, effect in catalogue().items():

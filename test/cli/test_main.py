@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What all commands share: complaints, exit status, examples, generated page."""
 
-from __future__ import annotations
-
 import errno
 import io
 import shlex

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """No command writes to what it reads: every output of every command against every input."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import socket
@@ -58,7 +56,7 @@ PAIRS = [
 
 
 @pytest.mark.parametrize('words', COMMANDS, ids=' '.join)
-def test_every_option_says_whether_it_is_read_or_written(words: tuple[str, ...]) -> None:
+def test_every_option_says_whether_it_is_read_or_written(words):
     for action in COMMANDS[words]._actions:
         if isinstance(action, HARMLESS) or action.choices or isinstance(action, Output):
             continue
@@ -67,7 +65,7 @@ def test_every_option_says_whether_it_is_read_or_written(words: tuple[str, ...])
             assert action.type in READ, f'{action.dest}: type=Path or action=Output'
 
 
-def test_the_walk_finds_what_it_is_for() -> None:
+def test_the_walk_finds_what_it_is_for():
     assert len(PAIRS) > 30
     assert {words[0] for words, parser in COMMANDS.items() if outputs(parser)} == {
         'simulate', 'calibrate', 'init', 'compare', 'convert', 'replay', 'predict', 'diagnose',
@@ -91,12 +89,12 @@ def command_line(words: tuple[str, ...], given: dict[str, Path], spare: Path) ->
 
 @pytest.mark.parametrize(('words', 'output', 'given'), PAIRS)
 def test_no_output_is_an_input_or_holds_one_or_lies_in_it(
-    words: tuple[str, ...],
-    output: str,
-    given: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture,
-) -> None:
+    words,
+    output,
+    given,
+    tmp_path,
+    capsys,
+):
     """By whatever name: the path itself, another spelling, a hard link, our own folder."""
     ours = tmp_path / 'ours'
     with new_folder(ours) as folder:
@@ -118,9 +116,7 @@ def test_no_output_is_an_input_or_holds_one_or_lies_in_it(
     assert [p.name for p in ours.iterdir() if p.name != '.wheel-terra.json'] == ['mine.yaml']
 
 
-def test_the_effect_file_of_a_rover_file_is_an_input(
-    tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_the_effect_file_of_a_rover_file_is_an_input(tmp_path, capsys):
     effects = tmp_path / 'effects.py'
     effects.write_text('mine = 1\n')
     rover = tmp_path / 'rover.yaml'
@@ -131,15 +127,13 @@ def test_the_effect_file_of_a_rover_file_is_an_input(
     assert effects.read_text() == 'mine = 1\n'
 
 
-def test_one_path_for_two_outputs_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_one_path_for_two_outputs_is_refused(tmp_path, capsys):
     out = str(tmp_path / 'out.csv')
     assert main(['replay', 'bag', '--table', out, '--track', out]) == 2
     assert 'named for two outputs' in capsys.readouterr().err
 
 
-def test_a_soil_file_replaces_no_file_of_another_kind(
-    tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_a_soil_file_replaces_no_file_of_another_kind(tmp_path, capsys):
     """--overwrite is for earlier soil files: a rover file is none."""
     mine = tmp_path / 'my_rover.yaml'
     reader.load(['pathfinder']).write(mine)
@@ -172,17 +166,17 @@ REFUSED = {
 """Command line of every command that writes, refused as late as can be; the place is appended."""
 
 
-def test_the_refused_are_all_commands() -> None:
+def test_the_refused_are_all_commands():
     assert {' '.join(words) for words, parser in COMMANDS.items() if outputs(parser)} == {*REFUSED}
 
 
 @pytest.mark.parametrize('command', REFUSED)
 def test_a_refused_run_leaves_nothing_and_its_place_free(
-    command: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-) -> None:
+    command,
+    tmp_path,
+    monkeypatch,
+    capsys,
+):
     """The next try is refused for the same reason, not because of what the first one left."""
     monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 0.2)
     refused = argparse.Namespace(returncode=2, stdout='')

@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """wheel-terra predict: tables and pictures of the model, and what it refuses."""
 
-from __future__ import annotations
-
 import csv
 import io
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,7 +22,7 @@ def table(text: str) -> dict[str, np.ndarray]:
     return {k: np.array([float(r[k] or 'nan') for r in rows]) for k in rows[0]}
 
 
-def test_the_table_is_the_model(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_table_is_the_model(capsys):
     assert main([*BASE, '--slip', '-0.4:0.9:14', '--load', '40,80', '--slope', '0,0.1']) == 0
     got = table(capsys.readouterr().out)
     assert got['slip'].size == 14 * 4
@@ -40,7 +37,7 @@ def test_the_table_is_the_model(capsys: pytest.CaptureFixture[str]) -> None:
         assert got[name] == pytest.approx(getattr(answer, name), rel=1e-7, abs=1e-9)
 
 
-def test_text_angles_and_closed_form(capsys: pytest.CaptureFixture[str]) -> None:
+def test_text_angles_and_closed_form(capsys):
     assert main([*BASE, '--slip', '0.2,0.6', '--table', 'text', '--angles']) == 0
     text = capsys.readouterr().out
     assert 'sinkage [m]' in text and 'entrance_angle [rad]' in text
@@ -53,7 +50,7 @@ def test_text_angles_and_closed_form(capsys: pytest.CaptureFixture[str]) -> None
     assert (close['drawbar_pull'] != exact['drawbar_pull']).all()
 
 
-def test_points_of_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_points_of_a_table(tmp_path, capsys):
     path = tmp_path / 'rows.csv'
     path.write_text(
         'slip,normal_load,sinkage,drawbar_pull,lug_height,leaving_angle\n'
@@ -74,9 +71,7 @@ def test_points_of_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert "line 3, column normal_load: 'heavy' is not a number" in capsys.readouterr().err
 
 
-def test_picture_and_the_refusal_to_overwrite(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_picture_and_the_refusal_to_overwrite(tmp_path, capsys):
     picture = tmp_path / 'curves.png'
     assert main([*BASE, '--load', '40,80', '-o', str(picture)]) == 0
     assert picture.read_bytes().startswith(b'\x89PNG') and picture.stat().st_size > 10_000
@@ -109,13 +104,13 @@ def test_picture_and_the_refusal_to_overwrite(
         (['-p', 'soil.cohesion:=-1.0'], 'soil.cohesion'),
     ],
 )
-def test_refusals(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_refusals(arguments, words, capsys):
     assert main([*BASE, *arguments]) == 2
     error = capsys.readouterr().err
     assert words in error and len(error.splitlines()) == 1
 
 
-def test_rows_that_the_soil_cannot_carry_stay_empty(capsys: pytest.CaptureFixture[str]) -> None:
+def test_rows_that_the_soil_cannot_carry_stay_empty(capsys):
     assert main([*BASE, '--slip', '0.2', '--load', '80,1e6']) == 0
     captured = capsys.readouterr()
     got = table(captured.out)
@@ -123,7 +118,7 @@ def test_rows_that_the_soil_cannot_carry_stay_empty(capsys: pytest.CaptureFixtur
     assert '1 of 2 points left empty' in captured.err
 
 
-def test_noise_makes_virtual_measurements(capsys: pytest.CaptureFixture[str]) -> None:
+def test_noise_makes_virtual_measurements(capsys):
     arguments = [*BASE, '--slip', '0:0.6:500', '--load', '80']
     assert main(arguments) == 0
     exact = table(capsys.readouterr().out)
@@ -143,12 +138,12 @@ def test_noise_makes_virtual_measurements(capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.parametrize('noise', ['0.001', '0.001,1', '0.001,-1,0.1', 'a,b,c'])
-def test_noise_that_makes_no_sense(noise: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_noise_that_makes_no_sense(noise, capsys):
     assert main([*BASE, '--slip', '0.1', '--load', '80', f'--noise={noise}']) == 2
     assert '--noise' in capsys.readouterr().err
 
 
-def test_a_wheel_climbs_at_the_slip_that_gives_the_pull(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wheel_climbs_at_the_slip_that_gives_the_pull(capsys):
     arguments = [*BASE, '--climb', 'wheel', '--load', '80', '--slope', '0:0.9:10']
     assert main(arguments) == 0
     out = capsys.readouterr()
@@ -169,9 +164,7 @@ def test_a_wheel_climbs_at_the_slip_that_gives_the_pull(capsys: pytest.CaptureFi
         assert driven[name][0] == pytest.approx(climbed[name][row], rel=1e-4)
 
 
-def test_a_rover_climbs_on_all_its_wheels(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_rover_climbs_on_all_its_wheels(tmp_path, capsys):
     rover = (
         'predict',
         '--config',
@@ -199,7 +192,7 @@ def test_a_rover_climbs_on_all_its_wheels(
     assert main([*rover, '--slip', '0.2']) == 2
 
 
-def test_laws(capsys: pytest.CaptureFixture[str]) -> None:
+def test_laws(capsys):
     smooth = ('predict', '--config', 'hit_wh3', '--config', 'hit_fit', '--slip', '-0.4:0.9:5')
     assert main([*smooth, '--law', 'bekker_wong_janosi']) == 0
     closed = capsys.readouterr().out
@@ -220,7 +213,7 @@ def test_laws(capsys: pytest.CaptureFixture[str]) -> None:
     assert '--law' in capsys.readouterr().err
 
 
-def test_the_law_of_the_configuration(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_law_of_the_configuration(capsys):
     rows = ('predict', '--config', 'hit_wh3', '--config', 'hit_fit', '--slip', '-0.4:0.9:5')
     # On the Moon too the pressures are the same at the width of the wheel.
     moon = [*rows, '-p', 'rover.gravity:=1.62', '-p', 'effects.stress_peak_shift.enabled:=true']

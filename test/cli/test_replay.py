@@ -2,13 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """``wheel-terra replay`` from the command line."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re
 import signal
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,7 +27,7 @@ THINNED = ('-p', 'reference_odom_max_rate:=1.0')
 
 
 @pytest.fixture
-def config(tmp_path: Path, rover: Any) -> list[str]:
+def config(tmp_path, rover):
     rover.write(tmp_path / 'rover.yaml')
     return ['--config', str(tmp_path / 'rover.yaml')]
 
@@ -43,9 +40,7 @@ def assert_slip_follows_the_reference(history: EstimateHistory) -> None:
     np.testing.assert_allclose(history.values['slip'][just_heard], 1 / 7, atol=0.06)
 
 
-def test_drive_gives_a_bag_a_report_and_a_summary(
-    make_bag: Any, config: list[str], tmp_path: Path, capsys: Any
-) -> None:
+def test_drive_gives_a_bag_a_report_and_a_summary(make_bag, config, tmp_path, capsys):
     out, report = tmp_path / 'out', tmp_path / 'report.html'
     arguments = ['replay', str(make_bag()), *config, '-o', str(out), '--report', str(report)]
     assert main(arguments) == 0
@@ -64,8 +59,8 @@ def test_drive_gives_a_bag_a_report_and_a_summary(
 
 
 def test_manoeuvres_that_would_teach_more_are_in_json_terminal_and_report(
-    make_bag: Any, config: list[str], tmp_path: Path, capsys: Any, monkeypatch: Any
-) -> None:
+    make_bag, config, tmp_path, capsys, monkeypatch
+):
     from wheel_terra_estimator.simulation import manoeuvres
 
     monkeypatch.setattr(manoeuvres, 'DURATION', 1.5)
@@ -83,9 +78,7 @@ def test_manoeuvres_that_would_teach_more_are_in_json_terminal_and_report(
     assert '--manoeuvres: belongs to one recording' in capsys.readouterr().err
 
 
-def test_what_was_learned_is_a_further_config_of_every_command(
-    make_bag: Any, config: list[str], tmp_path: Path, capsys: Any
-) -> None:
+def test_what_was_learned_is_a_further_config_of_every_command(make_bag, config, tmp_path, capsys):
     bag, kept = str(make_bag(storage='sqlite3')), tmp_path / 'learned.yaml'
     stated = ['-p', 'sensors.torque_zero:=[0.5, -0.25]']
     assert main(['replay', bag, *config, *stated, '--save-soil', str(kept)]) == 0
@@ -105,9 +98,7 @@ def test_what_was_learned_is_a_further_config_of_every_command(
     assert read_values(kept)['sensors.torque_zero'] == [0.0, 0.0]
 
 
-def test_a_proposed_law_and_errors_of_readings_are_further_configs(
-    make_bag: Any, config: list[str], tmp_path: Path
-) -> None:
+def test_a_proposed_law_and_errors_of_readings_are_further_configs(make_bag, config, tmp_path):
     """The law of a ``proposal.yaml`` acts on the estimates; a stated gain is taken off once."""
     law = {
         'enabled': True,
@@ -134,9 +125,7 @@ def test_a_proposed_law_and_errors_of_readings_are_further_configs(
     assert not np.allclose(found['model'], found['plain'])
 
 
-def test_existing_output_is_refused_unless_overwrite(
-    make_bag: Any, config: list[str], tmp_path: Path, capsys: Any
-) -> None:
+def test_existing_output_is_refused_unless_overwrite(make_bag, config, tmp_path, capsys):
     out = tmp_path / 'out'
     arguments = ['replay', str(make_bag()), *config, '-o', str(out)]
     assert main(arguments) == 0
@@ -159,8 +148,8 @@ def test_existing_output_is_refused_unless_overwrite(
     ],
 )
 def test_what_cannot_be_used_is_one_line_and_status_2(
-    make_bag: Any, config: list[str], extra: list[str], words: str, tmp_path: Path, capsys: Any
-) -> None:
+    make_bag, config, extra, words, tmp_path, capsys
+):
     out = tmp_path / 'out'
     assert main(['replay', str(make_bag()), *config, *extra, '-o', str(out)]) == 2
     said = capsys.readouterr().err
@@ -170,8 +159,8 @@ def test_what_cannot_be_used_is_one_line_and_status_2(
 
 
 def test_bad_values_are_counted_and_the_good_data_is_used(
-    make_bag: Any, config: list[str], drive: Any, factory: Any, tmp_path: Path, capsys: Any
-) -> None:
+    make_bag, config, drive, factory, tmp_path, capsys
+):
     """NaN rates, infinite forces, zero stamps, a negative variance among a good drive."""
     rows = []
     for number, (topic, message, log_time) in enumerate(drive):
@@ -198,8 +187,8 @@ def test_bad_values_are_counted_and_the_good_data_is_used(
 
 
 def test_interrupted_replay_leaves_a_readable_bag(
-    make_bag: Any, make_drive: Any, config: list[str], tmp_path: Path, capsys: Any, monkeypatch: Any
-) -> None:
+    make_bag, make_drive, config, tmp_path, capsys, monkeypatch
+):
     """Ctrl-C in the midst of a drive of half a minute (of a process: test_several_bags)."""
     bag, out = make_bag(messages=make_drive(300), name='long'), tmp_path / 'out'
     write, count = BagFile.write_raw, itertools.count()
@@ -227,9 +216,7 @@ def test_interrupted_replay_leaves_a_readable_bag(
         pytest.param('wvu_pathfinder_test17_mcap', 'pathfinder', marks=pytest.mark.slow),
     ],
 )
-def test_measured_recordings_with_a_rover_file_and_remaps(
-    shared: Path, tmp_path: Path, name: str, rover_name: str
-) -> None:
+def test_measured_recordings_with_a_rover_file_and_remaps(shared, tmp_path, name, rover_name):
     out = tmp_path / 'out'
     bag = str(shared / 'bags' / name)
     command = ['replay', bag, '--config', rover_name, *REAL, *THINNED, '-o', str(out)]
@@ -243,9 +230,7 @@ def test_measured_recordings_with_a_rover_file_and_remaps(
     assert bool(history.warnings) == (rover_name == 'frostyboy')
 
 
-def test_slip_on_slopes_is_in_the_table_as_it_was_published_last(
-    make_bag: Any, config: list[str], tmp_path: Path
-) -> None:
+def test_slip_on_slopes_is_in_the_table_as_it_was_published_last(make_bag, config, tmp_path):
     table, out = tmp_path / 'slopes.csv', tmp_path / 'out'
     arguments = ['replay', str(make_bag()), *config, '-o', str(out), '--slip-on-slope', str(table)]
     assert main(arguments) == 0

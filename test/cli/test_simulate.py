@@ -2,10 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``wheel-terra simulate``: the bag that a user gets, and one line for what cannot be done."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -17,12 +13,12 @@ from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, JOINT_STATE, stamp_of
-from wheel_terra_estimator.simulation.drive import SimulatedDrive, simulate
+from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
 
 
 @pytest.fixture(scope='module')
-def bag_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bag_path(tmp_path_factory):
     path = tmp_path_factory.mktemp('bags') / 'drive'
     status = main(
         ['simulate', '--scenario', 'turns', '--seed', '3', '--duration', '6', '-o', str(path)]
@@ -31,7 +27,7 @@ def bag_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_bag_has_inputs_and_truth(bag_path: Path) -> None:
+def test_the_bag_has_inputs_and_truth(bag_path):
     with open_bag(bag_path) as bag:
         found = {name: topic.type for name, topic in bag.topics.items()}
     wanted = {f'/{name}': kind for name, kind in INPUT_TYPES.items() if name != 'leaving_angle'}
@@ -39,11 +35,11 @@ def test_the_bag_has_inputs_and_truth(bag_path: Path) -> None:
 
 
 @pytest.fixture(scope='module')
-def drive() -> SimulatedDrive:
+def drive():
     return simulate(load('turns'), 3, 6.0)
 
 
-def test_reading_it_back_gives_the_measurements(bag_path: Path, drive: SimulatedDrive) -> None:
+def test_reading_it_back_gives_the_measurements(bag_path, drive):
     with open_bag(bag_path) as bag:
         read = [m for _, m in MeasurementReader(bag, {}, drive.configuration).measurements()]
     made = [a.measurement for a in drive.arrivals]
@@ -56,7 +52,7 @@ def test_reading_it_back_gives_the_measurements(bag_path: Path, drive: Simulated
             np.testing.assert_array_equal(a.torque, b.torque)
 
 
-def test_truth_in_the_bag_is_that_of_the_drive(bag_path: Path, drive: SimulatedDrive) -> None:
+def test_truth_in_the_bag_is_that_of_the_drive(bag_path, drive):
     with open_bag(bag_path) as bag:
         truth = read_truth(bag, {}, drive.configuration)
         classes = list(bag.messages(('/ground_truth/slip_class',)))
@@ -68,7 +64,7 @@ def test_truth_in_the_bag_is_that_of_the_drive(bag_path: Path, drive: SimulatedD
     assert len(classes) == len(drive.truth.stamp)
 
 
-def test_true_slip_of_wheels_at_rest_is_unknown(tmp_path: Path) -> None:
+def test_true_slip_of_wheels_at_rest_is_unknown(tmp_path):
     """About a standing side a rover can be entrapped: only the wheels that turn say so."""
     pivot = {'drive.forward': [0.025], 'drive.turn_rate': [-0.05], 'duration': 2.0}
     drive = simulate(load({'configuration': ['generic_six_wheel', 'test_sand'], **pivot}))
@@ -83,7 +79,7 @@ def test_true_slip_of_wheels_at_rest_is_unknown(tmp_path: Path) -> None:
     np.testing.assert_array_equal(truth.slip.value, drive.truth.slip)
 
 
-def test_log_times_are_arrivals(bag_path: Path) -> None:
+def test_log_times_are_arrivals(bag_path):
     from wheel_terra_estimator.bags.message_types import jazzy_types
 
     store = jazzy_types()
@@ -108,12 +104,12 @@ def test_log_times_are_arrivals(bag_path: Path) -> None:
     ],
 )
 def test_bad_arguments(
-    arguments: list[str],
-    words: str,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    arguments,
+    words,
+    capsys,
+    tmp_path,
+    monkeypatch,
+):
     monkeypatch.chdir(tmp_path)
     assert main(['simulate', *arguments]) == 2
     error = capsys.readouterr().err
@@ -122,6 +118,6 @@ def test_bad_arguments(
     assert not list(tmp_path.iterdir())
 
 
-def test_list_names_the_shipped_scenarios(capsys: pytest.CaptureFixture[str]) -> None:
+def test_list_names_the_shipped_scenarios(capsys):
     assert main(['simulate', '--list']) == 0
     assert 'climb_soft_patch' in capsys.readouterr().out

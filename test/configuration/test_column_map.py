@@ -25,11 +25,11 @@ KNOWN = {
 
 
 @pytest.mark.parametrize(('quantity', 'unit'), KNOWN)
-def test_a_unit_is_that_of_the_tables(quantity: str, unit: str) -> None:
+def test_a_unit_is_that_of_the_tables(quantity, unit):
     assert UNITS[quantity][unit] == pytest.approx(KNOWN[quantity, unit], rel=1e-12)
 
 
-def test_the_unit_of_a_quantity_is_one_and_all_are_positive() -> None:
+def test_the_unit_of_a_quantity_is_one_and_all_are_positive():
     for quantity, units in UNITS.items():
         if quantity in units:
             assert units[quantity] == 1.0

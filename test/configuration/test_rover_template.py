@@ -2,15 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a rover file is begun with."""
 
-from pathlib import Path
-
 import pytest
 
 from wheel_terra_estimator.configuration.rover_template import passes
 from wheel_terra_estimator.configuration.urdf import read_urdf
 
 
-def test_a_wheel_runs_in_the_rut_of_those_before_it_on_its_own_side() -> None:
+def test_a_wheel_runs_in_the_rut_of_those_before_it_on_its_own_side():
     assert passes([0.4, 0.4, 0.0, 0.0, -0.4, -0.4], [0.3, -0.3] * 3) == [1, 1, 2, 2, 3, 3]
     assert passes([0.4, -0.4, -0.4], [0.3, 0.3, -0.3]) == [1, 2, 1]  # no wheel before the right one
     assert passes([0.4, -0.4, -0.4], [0.0, 0.3, -0.3]) == [1, 1, 1]
@@ -24,7 +22,7 @@ JOINT = (
 WHEELS = {'left_wheel': '0.2 0.3 0.1', 'right_wheel': '0.2 -0.3 0.1'}
 
 
-def test_wheels_and_base_that_hang_side_by_side_on_one_root(tmp_path: Path) -> None:
+def test_wheels_and_base_that_hang_side_by_side_on_one_root(tmp_path):
     """Base turned to the left by a quarter and 0.1 m up: x of the root is its -y."""
     joints = [JOINT.format(name, 'continuous', at, '0 0 0') for name, at in WHEELS.items()]
     joints.append(JOINT.format('base_link', 'fixed', '0.2 0 0.1', '0 0 1.5707963267948966'))

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """compare --laws: the law that made a table wins on it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loop: what a table taught the model makes the onboard estimates of another drive better."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The written model is the fitted one, whatever the verdict; a second pass goes on from it."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A user's own effect, registered from a file, takes part like the built-in ones."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables with slip angle and lateral force: read, predicted, diagnosed."""
 
-from __future__ import annotations
-
 import csv
 import io
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The smooth part of what a model leaves, against dense algebra of the Gaussian process."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

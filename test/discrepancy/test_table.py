@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables that cannot be used end in one line with file, row and cure; good ones are read."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

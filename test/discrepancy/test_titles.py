@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Titles of columns: read as what they say, asked for where that is open, never lost."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands in all pages are understood by the programs they name; tutorials also run them."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import shlex
@@ -36,12 +34,12 @@ CASES = [
 ]
 
 
-def test_there_are_commands_to_judge() -> None:
+def test_there_are_commands_to_judge():
     assert len(CASES) > 60
 
 
 @pytest.mark.parametrize('line', CASES)
-def test_a_command_of_a_page_is_understood(line: str) -> None:
+def test_a_command_of_a_page_is_understood(line):
     words = shlex.split(re.sub(r'\$\w+', '1', line))
     if words[0] == 'wheel-terra':
         if words[1].startswith('-'):

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """README quotes no figure that the results file (docs/figures.yaml) does not hold."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from pathlib import Path
@@ -31,13 +29,13 @@ def tables() -> list[list[str]]:
     return [row for i, row in enumerate(rows) if i not in heads]
 
 
-def test_every_row_of_the_readme_is_a_result() -> None:
+def test_every_row_of_the_readme_is_a_result():
     rows = tables()
     assert {row[0]: row[1:-1] for row in rows} == ROWS
     assert len(rows) == len(ROWS)
 
 
-def test_every_number_of_the_text_is_a_result() -> None:
+def test_every_number_of_the_text_is_a_result():
     text = '\n'.join(line for line in SECTION.splitlines() if not line.startswith('|'))
     quoted = [words for result in RESULTS for words in result.get('text', [])]
     for words in quoted:
@@ -48,7 +46,7 @@ def test_every_number_of_the_text_is_a_result() -> None:
 
 
 @pytest.mark.parametrize('result', RESULTS, ids=lambda result: result['what'])
-def test_a_result_says_where_it_comes_from(result: dict[str, Any]) -> None:
+def test_a_result_says_where_it_comes_from(result):
     assert result['command'] and result['seeds']
     commits = result['commit'] if isinstance(result['commit'], list) else [result['commit']]
     assert commits and all(re.fullmatch(r'[0-9a-f]{7,40}', commit) for commit in commits)

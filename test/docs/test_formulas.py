@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Formulas of the catalogue become mathematics: nothing is lost, brackets close."""
 
-from __future__ import annotations
-
 import re
 
 import formulas
@@ -24,7 +22,7 @@ SYMBOLS = [form.symbol for effect in catalogue().values() for form in effect.for
          ['z = (3 W )^{2/(2 N +1)}', 'T += 2 \\mathrm{sgn}(w )']),
     ],
 )  # fmt: skip
-def test_statements_symbols_and_powers(formula: str, tex: list[str]) -> None:
+def test_statements_symbols_and_powers(formula, tex):
     def bare(text: str) -> str:
         return re.sub(r'\s', '', text)
 
@@ -32,7 +30,7 @@ def test_statements_symbols_and_powers(formula: str, tex: list[str]) -> None:
 
 
 @pytest.mark.parametrize('formula', SYMBOLS)
-def test_every_formula_of_the_catalogue_is_whole(formula: str) -> None:
+def test_every_formula_of_the_catalogue_is_whole(formula):
     tex = ' '.join(formulas.as_tex(formula))
     assert tex.count('{') == tex.count('}')
     numbers = r'\d+(?:\.\d+)?'

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The built site: two clicks to every page, nothing cut or from elsewhere, a search that leads."""
 
-from __future__ import annotations
-
 import html
 import importlib.util
 import json
@@ -95,20 +93,20 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope='module')
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp('site')
     made = build(ROOT, folder)
     assert made.returncode == 0, made.stdout + made.stderr
     return folder
 
 
-def test_pages_need_nothing_from_elsewhere(site: Path) -> None:
+def test_pages_need_nothing_from_elsewhere(site):
     for path in site.rglob('*.html'):
         for address in Page(path.read_text(encoding='utf-8')).loads:
             assert not re.match(r'(https?:)?//', address), f'{path.name}: {address}'
 
 
-def test_formulas_are_mathematics(site: Path) -> None:
+def test_formulas_are_mathematics(site):
     text = (site / 'models' / 'models.html').read_text(encoding='utf-8')
     assert text.count('<math') > 40
     for path in site.rglob('*.html'):
@@ -116,7 +114,7 @@ def test_formulas_are_mathematics(site: Path) -> None:
         assert 'class="arithmatex"' not in page, f'{path.name}: a formula is left as TeX'
 
 
-def test_notebooks_are_shown_with_what_they_print_and_draw(site: Path) -> None:
+def test_notebooks_are_shown_with_what_they_print_and_draw(site):
     for source in (ROOT / 'docs' / 'notebooks').glob('*.ipynb'):
         page = (site / 'notebooks' / f'{source.stem}.html').read_text(encoding='utf-8')
         assert page.count('data:image/svg+xml') >= 1, source.stem
@@ -139,12 +137,12 @@ def cut(site: Path, width: int) -> dict[str, list[str]]:
 
 
 @with_a_browser
-def test_nothing_is_cut_on_a_wide_screen(site: Path) -> None:
+def test_nothing_is_cut_on_a_wide_screen(site):
     assert not [page for page in cut(site, WIDTH) if not page.startswith(STUDIES)]
 
 
 @with_a_browser
-def test_no_page_runs_off_a_phone(site: Path) -> None:
+def test_no_page_runs_off_a_phone(site):
     """Code, formulas and tables scroll by themselves, the page does not."""
     found = cut(site, PHONE)
     assert not {page: what for page, what in found.items() if what[-1].startswith('PAGE')}
@@ -160,7 +158,7 @@ def test_no_page_runs_off_a_phone(site: Path) -> None:
         ('install', 'install.html'),
     ],
 )
-def test_a_search_leads_to_the_page_of_the_task(site: Path, words: str, page: str) -> None:
+def test_a_search_leads_to_the_page_of_the_task(site, words, page):
     text = dumped(f'{(site / "index.html").as_uri()}?q={words.replace(" ", "+")}')
     first = re.search(r'<a href="([^"]*)" class="md-search-result__link', text)
     assert first[1].partition('?')[0] == (site / page).as_uri()

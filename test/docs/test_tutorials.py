@@ -8,8 +8,6 @@ for any. After a change of the estimator they are written anew by
     WRITE_EXPECTED=1 pytest -n 0 -m '' test/docs/test_tutorials.py -k blocks
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Slip angle, lateral force and lateral speed: rigid bodies, balances and simulated drives."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bits and verdicts against the posterior of linear measurements, worked out by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from parts import SAND

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``wheel-terra replay BAG BAG ...``: the numbers of one replay, failures, restarts, summary."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -12,7 +10,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -21,13 +18,13 @@ from wheel_terra_estimator.output_folder import MARKER
 
 
 @pytest.fixture
-def config(tmp_path: Path, rover: Any) -> list[str]:
+def config(tmp_path, rover):
     rover.write(tmp_path / 'rover.yaml')
     return ['--config', str(tmp_path / 'rover.yaml')]
 
 
 @pytest.fixture
-def bags(make_bag: Any, drive: Any) -> list[str]:
+def bags(make_bag, drive):
     """Drives of three lengths, and what is none."""
     paths = [make_bag(drive[: len(drive) * k // 3], name=f'drive{k}') for k in (3, 2, 1)]
     broken = paths[0].parent / 'broken.mcap'
@@ -40,9 +37,7 @@ def estimates(folder: Path) -> bytes:
     return file.read_bytes()
 
 
-def test_several_are_what_each_is_alone(
-    bags: list[str], config: list[str], tmp_path: Path, capsys: Any
-) -> None:
+def test_several_are_what_each_is_alone(bags, config, tmp_path, capsys):
     out = tmp_path / 'out'
     arguments = ['replay', *bags, *config, '-o', str(out), '--jobs', '2', '--table', 't.csv']
     assert main(arguments) == 1
@@ -64,9 +59,7 @@ def test_several_are_what_each_is_alone(
     assert '<td>drive3</td>' in page and 'broken.mcap' in page
 
 
-def test_several_are_smoothed_and_mapped_alike(
-    bags: list[str], config: list[str], tmp_path: Path
-) -> None:
+def test_several_are_smoothed_and_mapped_alike(bags, config, tmp_path):
     out, alone = tmp_path / 'out', tmp_path / 'alone' / 'drive3'
     options = [*config, '--smooth', '--track', 'way.csv']
     assert main(['replay', bags[0], bags[2], *options, '-o', str(out)]) == 0
@@ -78,9 +71,7 @@ def test_several_are_smoothed_and_mapped_alike(
     assert (out / 'drive2' / 'way.csv').is_file()
 
 
-def test_a_restart_passes_over_what_is_done_by_content(
-    bags: list[str], config: list[str], tmp_path: Path
-) -> None:
+def test_a_restart_passes_over_what_is_done_by_content(bags, config, tmp_path):
     out = tmp_path / 'out'
     good = [bags[0], *bags[2:]]
     assert main(['replay', *good[:2], *config, '-o', str(out)]) == 0
@@ -103,9 +94,7 @@ def test_a_restart_passes_over_what_is_done_by_content(
     assert written()['drive3'] == first['drive3'] and written()['drive2'] != first['drive2']
 
 
-def test_an_output_that_has_lost_a_file_is_made_anew(
-    bags: list[str], config: list[str], tmp_path: Path, undrawn: None
-) -> None:
+def test_an_output_that_has_lost_a_file_is_made_anew(bags, config, tmp_path, undrawn):
     out = tmp_path / 'out'
     arguments = ['replay', bags[1], bags[3], *config, '-o', str(out), '--report', 'r.html']
     assert main(arguments) == 1
@@ -123,9 +112,7 @@ def test_an_output_that_has_lost_a_file_is_made_anew(
     assert not (out / 'drive1').exists()
 
 
-def test_bags_of_one_name_get_folders_of_their_own(
-    bags: list[str], config: list[str], tmp_path: Path, capsys: Any
-) -> None:
+def test_bags_of_one_name_get_folders_of_their_own(bags, config, tmp_path, capsys):
     (tmp_path / 'other').mkdir()
     Path(bags[2]).rename(tmp_path / 'other' / 'drive3')
     out = tmp_path / 'out'
@@ -147,9 +134,9 @@ def test_bags_of_one_name_get_folders_of_their_own(
     ],
 )
 def test_what_cannot_be_done_is_said_first(
-    bags: list[str], config: list[str], tmp_path: Path, monkeypatch: Any, capsys: Any,
-    more: list[str], words: str,
-) -> None:  # fmt: skip
+    bags, config, tmp_path, monkeypatch, capsys,
+    more, words,
+):  # fmt: skip
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'taken').mkdir()
     (tmp_path / 'taken' / 'note.txt').touch()
@@ -163,8 +150,8 @@ def test_what_cannot_be_done_is_said_first(
 
 
 def test_ctrl_c_leaves_whole_outputs_and_the_next_run_goes_on(
-    make_bag: Any, make_drive: Any, config: list[str], tmp_path: Path
-) -> None:
+    make_bag, make_drive, config, tmp_path
+):
     long = make_bag(make_drive(300), name='long')
     short = make_bag(name='short')
     out = tmp_path / 'out'

@@ -2,11 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests of a mutant run on the mutated copy; only a test that fails because of it catches it."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from wheel_terra_lab.studies.mutation import PACKAGE, Mutant, verdict
@@ -39,8 +34,8 @@ def test_half(sound):
     ],
 )
 def test_a_mutant_is_caught_by_a_test_that_fails_because_of_it(
-    tmp_path: Path, monkeypatch: Any, asked: str, fixture: str, file: str, said: str
-) -> None:
+    tmp_path, monkeypatch, asked, fixture, file, said
+):
     monkeypatch.setenv('PYTEST_DISABLE_PLUGIN_AUTOLOAD', '1')  # half of the time of a run
     module = tmp_path / PACKAGE / 'errors.py'  # a module that the study has loaded itself
     module.parent.mkdir()

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages to measurements, estimates to message fields."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from dataclasses import replace
@@ -27,17 +25,15 @@ from wheel_terra_estimator.messages.convert import (
 
 
 @pytest.fixture
-def converter(rover: Any) -> InputConverter:
+def converter(rover):
     return InputConverter(input_layout(rover))
 
 
-def test_stamp_is_exact(factory: Any) -> None:
+def test_stamp_is_exact(factory):
     assert stamp_of(factory.joint_state(factory.header(STAMP), [])) == STAMP
 
 
-def test_joint_state_is_sorted_into_the_order_of_the_wheels(
-    converter: InputConverter, factory: Any
-) -> None:
+def test_joint_state_is_sorted_into_the_order_of_the_wheels(converter, factory):
     message = factory.joint_state(
         factory.header(STAMP),
         ('right', 'mast', 'left'),
@@ -51,9 +47,7 @@ def test_joint_state_is_sorted_into_the_order_of_the_wheels(
     assert measured.torque.tolist() == [4.0, 5.0]
 
 
-def test_wheels_that_a_message_does_not_hold_are_unknown(
-    converter: InputConverter, factory: Any
-) -> None:
+def test_wheels_that_a_message_does_not_hold_are_unknown(converter, factory):
     message = factory.joint_state(factory.header(STAMP), ('right',), velocity=(-3.0,))
     measured = converter.convert('joint_states', message)
     assert math.isnan(measured.rate[0])
@@ -71,16 +65,14 @@ def test_wheels_that_a_message_does_not_hold_are_unknown(
     ],
 )
 def test_joint_state_that_does_not_fit_is_counted(
-    converter: InputConverter, factory: Any, names: Any, velocity: Any, effort: Any, reason: str
-) -> None:
+    converter, factory, names, velocity, effort, reason
+):
     message = factory.joint_state(factory.header(STAMP), names, velocity=velocity, effort=effort)
     assert converter.convert('joint_states', message) is None
     assert converter.rejected == {('joint_states', reason): 1}
 
 
-def test_effort_of_another_length_costs_the_torque_only(
-    converter: InputConverter, factory: Any
-) -> None:
+def test_effort_of_another_length_costs_the_torque_only(converter, factory):
     message = factory.joint_state(
         factory.header(STAMP), ('left', 'right'), velocity=(1.0, -1.0), effort=(1.0,)
     )
@@ -90,7 +82,7 @@ def test_effort_of_another_length_costs_the_torque_only(
     assert converter.rejected == {('joint_states', 'effort and name differ in length'): 1}
 
 
-def test_unknown_rate_of_a_named_wheel_is_counted(converter: InputConverter, factory: Any) -> None:
+def test_unknown_rate_of_a_named_wheel_is_counted(converter, factory):
     header = factory.header(STAMP)
     message = factory.joint_state(header, ('left', 'mast'), velocity=(1.0, math.nan))
     converter.convert('joint_states', message)
@@ -102,7 +94,7 @@ def test_unknown_rate_of_a_named_wheel_is_counted(converter: InputConverter, fac
     assert sum(converter.rejected.values()) == 1
 
 
-def test_odometry_gives_each_wheel_its_own_rim_speed(rover: Any, factory: Any) -> None:
+def test_odometry_gives_each_wheel_its_own_rim_speed(rover, factory):
     converter = InputConverter(input_layout(rover.replace({'wheel_odometry': 'odom'})))
     twist = factory.twist_with_covariance(1.0, 0.5, np.zeros(36))
     measured = converter.convert('odom', factory.odometry(factory.header(STAMP), twist))
@@ -111,7 +103,7 @@ def test_odometry_gives_each_wheel_its_own_rim_speed(rover: Any, factory: Any) -
     assert np.isnan(measured.torque).all()
 
 
-def test_imu_without_orientation(converter: InputConverter, factory: Any) -> None:
+def test_imu_without_orientation(converter, factory):
     message = factory.imu(factory.header(STAMP), (0.1, 0.2, 9.8), (0.01, 0.02, 0.03), None)
     measured = converter.convert('imu/data', message)
     assert measured.orientation is None
@@ -124,9 +116,7 @@ def test_imu_without_orientation(converter: InputConverter, factory: Any) -> Non
 
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('absurd', [math.nan, math.inf, -math.inf, 1.7e308])
-def test_absurd_values_pass_without_a_warning_on_the_terminal(
-    rover: Any, factory: Any, absurd: float
-) -> None:
+def test_absurd_values_pass_without_a_warning_on_the_terminal(rover, factory, absurd):
     turned = rover.replace({'wheel_odometry': 'odom', 'sensors.imu_mounting_yaw_deg': 30.0})
     converter = InputConverter(input_layout(turned))
     header = factory.header(STAMP)
@@ -139,9 +129,7 @@ def test_absurd_values_pass_without_a_warning_on_the_terminal(
 
 
 @pytest.mark.parametrize('field', ['linear_acceleration', 'angular_velocity'])
-def test_imu_that_says_it_lacks_a_field_keeps_the_others(
-    converter: InputConverter, factory: Any, field: str
-) -> None:
+def test_imu_that_says_it_lacks_a_field_keeps_the_others(converter, factory, field):
     message = factory.imu(factory.header(STAMP), (0.0, 0.0, 9.8), (0.0, 0.0, 0.0), None)
     getattr(message, f'{field}_covariance')[0] = -1.0
     measured = converter.convert('imu/data', message)
@@ -156,9 +144,7 @@ def test_imu_that_says_it_lacks_a_field_keeps_the_others(
     assert field.replace('_', ' ') in reason
 
 
-def test_imu_with_nothing_but_an_orientation_keeps_that(
-    converter: InputConverter, factory: Any
-) -> None:
+def test_imu_with_nothing_but_an_orientation_keeps_that(converter, factory):
     level = (0.0, 0.0, 0.0, 1.0)
     for orientation in (level, None):
         message = factory.imu(factory.header(STAMP), (0.0,) * 3, (0.0,) * 3, orientation)
@@ -170,7 +156,7 @@ def test_imu_with_nothing_but_an_orientation_keeps_that(
             assert measured.orientation.tolist() == list(level)
 
 
-def test_mounting_turns_the_imu_into_base_link(rover: Any, factory: Any) -> None:
+def test_mounting_turns_the_imu_into_base_link(rover, factory):
     """A sensor turned by 90 deg to the left and tilted sees the same rover."""
     turned = rover.replace(
         {'sensors.imu_mounting_yaw_deg': 90.0, 'sensors.imu_mounting_roll_deg': 180.0}
@@ -193,7 +179,7 @@ def _with_variances(factory: Any, **fields: tuple[float, float, float]) -> Any:
     return message
 
 
-def test_imu_states_its_variances_along_the_axes_of_the_rover(rover: Any, factory: Any) -> None:
+def test_imu_states_its_variances_along_the_axes_of_the_rover(rover, factory):
     message = _with_variances(
         factory,
         linear_acceleration=(0.01, 0.04, 0.09),
@@ -224,9 +210,7 @@ def test_imu_states_its_variances_along_the_axes_of_the_rover(rover: Any, factor
         (math.inf,) * 3,
     ],
 )
-def test_placeholders_in_an_imu_state_nothing(
-    converter: InputConverter, factory: Any, diagonal: tuple[float, float, float]
-) -> None:
+def test_placeholders_in_an_imu_state_nothing(converter, factory, diagonal):
     message = _with_variances(
         factory, linear_acceleration=diagonal, angular_velocity=diagonal, orientation=diagonal
     )
@@ -235,7 +219,7 @@ def test_placeholders_in_an_imu_state_nothing(
     assert converter.convert('imu/data', message).variance == (0.0, 0.0, 0.0)
 
 
-def test_orientation_of_base_link_agrees_with_the_turned_vectors(rover: Any, factory: Any) -> None:
+def test_orientation_of_base_link_agrees_with_the_turned_vectors(rover, factory):
     """World vectors do not depend on how the sensor is mounted: R_base f_base = R_imu f_imu."""
     turned = rover.replace(
         {
@@ -257,7 +241,7 @@ def test_orientation_of_base_link_agrees_with_the_turned_vectors(rover: Any, fac
     )
 
 
-def test_roll_pitch_yaw_are_about_fixed_axes(rover: Any) -> None:
+def test_roll_pitch_yaw_are_about_fixed_axes(rover):
     roll, pitch, yaw = 0.3, -0.5, 1.1
     x = np.array([[1, 0, 0], [0, np.cos(roll), -np.sin(roll)], [0, np.sin(roll), np.cos(roll)]])
     y = np.array([[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]])
@@ -270,7 +254,7 @@ def test_roll_pitch_yaw_are_about_fixed_axes(rover: Any) -> None:
     np.testing.assert_allclose(found, z @ y @ x, atol=1e-15)
 
 
-def test_sinkage_leaving_angle_and_reference(converter: InputConverter, factory: Any) -> None:
+def test_sinkage_leaving_angle_and_reference(converter, factory):
     header = factory.header(STAMP)
     message = factory.joint_state(header, ('right', 'left'), position=(0.03, math.nan))
     sinkage = converter.convert('sinkage', message)
@@ -283,9 +267,7 @@ def test_sinkage_leaving_angle_and_reference(converter: InputConverter, factory:
 
 
 @pytest.mark.ros
-def test_messages_of_rclpy_and_of_rosbags_are_the_same_measurements(
-    converter: InputConverter, drive: Any
-) -> None:
+def test_messages_of_rclpy_and_of_rosbags_are_the_same_measurements(converter, drive):
     serialization = pytest.importorskip('rclpy.serialization')
     from wheel_terra_estimator.bags.message_factory import MessageFactory
     from wheel_terra_estimator.messages.convert import INPUT_TYPES
@@ -305,7 +287,7 @@ def test_messages_of_rclpy_and_of_rosbags_are_the_same_measurements(
         )
 
 
-def test_every_output_field_is_where_the_contract_wants_it() -> None:
+def test_every_output_field_is_where_the_contract_wants_it():
     aside = Sideways(*((k, k + 0.5) for k in range(4)), 0.02, 1e-4)
     e = some_estimates(sideways=aside)
     names = ('left', 'right')
@@ -326,7 +308,7 @@ def test_every_output_field_is_where_the_contract_wants_it() -> None:
         assert [list(column) for column in found[topic][1:]] == [list(c) for c in columns]
 
 
-def test_slips_on_slopes_go_out_where_a_set_has_them() -> None:
+def test_slips_on_slopes_go_out_where_a_set_has_them():
     slopes = SlipOnSlope(*np.arange(33.0).reshape(3, 11))
     found = joint_fields(some_estimates(slip_on_slope=slopes), ('left', 'right'))
     assert found['slip_on_slope'].name == tuple(f'slope_{d}deg' for d in range(-20, 31, 5))
@@ -335,7 +317,7 @@ def test_slips_on_slopes_go_out_where_a_set_has_them() -> None:
     assert found['slip_on_slope'].velocity == slopes.entrapment.tolist()
 
 
-def test_twist_covariance_is_row_major_and_positive() -> None:
+def test_twist_covariance_is_row_major_and_positive():
     e = some_estimates()
     assert planar_velocity(e) == (e.forward_velocity, 0.0)
     unknown = np.array(twist_covariance(e)).reshape(6, 6)
@@ -351,14 +333,12 @@ def test_twist_covariance_is_row_major_and_positive() -> None:
 
 
 @pytest.fixture
-def steered(rover: Any) -> InputConverter:
+def steered(rover):
     """The left wheel steers; the right one does not."""
     return InputConverter(input_layout(rover.replace({'wheels.steering_joints': ['turn', '']})))
 
 
-def test_steering_angles_come_in_the_position_of_their_joints(
-    steered: InputConverter, factory: Any
-) -> None:
+def test_steering_angles_come_in_the_position_of_their_joints(steered, factory):
     message = factory.joint_state(
         factory.header(STAMP),
         ('turn', 'right', 'left'),
@@ -370,9 +350,7 @@ def test_steering_angles_come_in_the_position_of_their_joints(
     np.testing.assert_array_equal(measured.steering, [0.2, math.nan])
 
 
-def test_a_message_of_steering_joints_alone_is_no_fault(
-    steered: InputConverter, factory: Any
-) -> None:
+def test_a_message_of_steering_joints_alone_is_no_fault(steered, factory):
     message = factory.joint_state(factory.header(STAMP), ('turn',), position=(-0.1,))
     measured = steered.convert('joint_states', message)
     assert np.isnan(measured.rate).all()
@@ -383,9 +361,7 @@ def test_a_message_of_steering_joints_alone_is_no_fault(
     assert steered.rejected == {('joint_states', 'position of steering joints missing'): 1}
 
 
-def test_without_steering_joints_positions_are_not_looked_at(
-    converter: InputConverter, factory: Any
-) -> None:
+def test_without_steering_joints_positions_are_not_looked_at(converter, factory):
     message = factory.joint_state(
         factory.header(STAMP), ('left',), position=(math.nan,), velocity=(2.0,)
     )
@@ -403,13 +379,13 @@ def test_without_steering_joints_positions_are_not_looked_at(
     ],
 )
 def test_a_reference_tells_a_lateral_speed_where_it_knows_one(
-    converter: InputConverter,
-    factory: Any,
-    lateral: float,
-    stated: float,
-    told: float,
-    variance: float,
-) -> None:
+    converter,
+    factory,
+    lateral,
+    stated,
+    told,
+    variance,
+):
     covariance = np.zeros(36)
     covariance[[0, 7]] = 4e-4, stated
     twist = factory.twist_with_covariance(0.7, 0.0, covariance)

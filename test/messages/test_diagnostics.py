@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """When /diagnostics is due, and what it says."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -33,7 +31,7 @@ def levels(statuses: Any) -> list[int]:
     return [status.level for status in statuses]
 
 
-def test_one_status_for_the_node_and_one_per_wheel_with_units_in_the_keys() -> None:
+def test_one_status_for_the_node_and_one_per_wheel_with_units_in_the_keys():
     found = Diagnostics(NAMES, lambda: {'imu/data_received': 7}).due(at(0.0))
     assert [status.name.rpartition(': ')[2] for status in found] == ['estimator', 'left', 'right']
     assert all(status.hardware_id for status in found)
@@ -44,7 +42,7 @@ def test_one_status_for_the_node_and_one_per_wheel_with_units_in_the_keys() -> N
     assert found[1].message == 'low slip'
 
 
-def test_due_every_second_of_stamps_and_at_once_on_a_change_of_level() -> None:
+def test_due_every_second_of_stamps_and_at_once_on_a_change_of_level():
     diagnostics = Diagnostics(NAMES)
     high = np.array([2, 0], dtype=np.uint8)
     sent = [
@@ -55,14 +53,14 @@ def test_due_every_second_of_stamps_and_at_once_on_a_change_of_level() -> None:
     assert sent == [0.0, 1.0, 1.4, 2.4, 3.4]
 
 
-def test_a_step_back_of_the_clock_does_not_silence_it() -> None:
+def test_a_step_back_of_the_clock_does_not_silence_it():
     diagnostics = Diagnostics(NAMES)
     assert diagnostics.due(at(100.0))
     assert diagnostics.due(at(3.0))
     assert not diagnostics.due(at(3.5))
 
 
-def test_levels_follow_class_and_warning() -> None:
+def test_levels_follow_class_and_warning():
     classes = np.array([2, 3], dtype=np.uint8)
     found = Diagnostics(NAMES).due(at(0.0, slip_class=classes, stuck=True))
     assert levels(found) == [ERROR, WARN, ERROR]
@@ -77,7 +75,7 @@ def test_levels_follow_class_and_warning() -> None:
     assert levels(found) == [WARN, STALE, STALE]
 
 
-def test_a_sensor_that_was_never_there_is_no_fault_one_that_fell_silent_is() -> None:
+def test_a_sensor_that_was_never_there_is_no_fault_one_that_fell_silent_is():
     diagnostics = Diagnostics(NAMES)
     lacking = {'sinkage': 'no sinkage: held by its model'}
     assert levels(diagnostics.due(at(0.0, faults=lacking)))[0] == OK
@@ -89,7 +87,7 @@ def test_a_sensor_that_was_never_there_is_no_fault_one_that_fell_silent_is() -> 
     assert levels(diagnostics.due(at(1.2, faults=lacking)))[0] == WARN
 
 
-def test_the_first_second_waits_for_inputs_and_for_nothing_else() -> None:
+def test_the_first_second_waits_for_inputs_and_for_nothing_else():
     missing = {'imu': 'no IMU', 'wheel_odometry': 'joint_states silent', 'filter': 'started anew'}
     for faults in (missing, {'imu': 'no IMU'}):
         diagnostics = Diagnostics(NAMES)
@@ -110,7 +108,7 @@ def once(faults: Any) -> Any:
     return lambda: next(left, [])
 
 
-def test_a_fault_is_told_until_it_was_published_and_for_ten_seconds() -> None:
+def test_a_fault_is_told_until_it_was_published_and_for_ten_seconds():
     """Whatever comes between: sets that tell nothing, messages of the topic, other faults."""
     lost = [('imu/data', f'299 {LOST}'), ('joint_states', f'300 {LOST}')]
     diagnostics = Diagnostics(NAMES, faults=once(lost))
@@ -125,7 +123,7 @@ def test_a_fault_is_told_until_it_was_published_and_for_ten_seconds() -> None:
     assert any(i > 100 for i, _ in told)
 
 
-def test_a_fault_that_nobody_could_be_told_of_waits_for_who_can() -> None:
+def test_a_fault_that_nobody_could_be_told_of_waits_for_who_can():
     diagnostics = Diagnostics(NAMES, faults=once([('joint_states', f'3 {LOST}')]))
     for i in range(100):
         diagnostics.follow(at(float(i)))  # inactive: nothing is published
@@ -134,7 +132,7 @@ def test_a_fault_that_nobody_could_be_told_of_waits_for_who_can() -> None:
     assert diagnostics.now(at(111.0))[0].message == 'running'
 
 
-def test_a_fault_seen_again_is_one_fault_with_its_latest_count() -> None:
+def test_a_fault_seen_again_is_one_fault_with_its_latest_count():
     counts = iter(range(30))
     diagnostics = Diagnostics(NAMES, faults=lambda: [('joint_states', f'{next(counts)} {LOST}')])
     for i in range(30):
@@ -143,7 +141,7 @@ def test_a_fault_seen_again_is_one_fault_with_its_latest_count() -> None:
         assert bool(diagnostics.new_faults) is (i == 0)
 
 
-def test_two_faults_of_a_topic_are_both_told() -> None:
+def test_two_faults_of_a_topic_are_both_told():
     both = [('odom', 'silent for 2.1 s'), ('odom', f'7 {LOST}')]
     assert (
         Diagnostics(NAMES, faults=once(both)).due(at(0.0))[0].message
@@ -151,7 +149,7 @@ def test_two_faults_of_a_topic_are_both_told() -> None:
     )
 
 
-def test_what_is_left_out_of_the_inputs_is_told_by_reason() -> None:
+def test_what_is_left_out_of_the_inputs_is_told_by_reason():
     """By the pipeline of node and replay alike, each reason apart, with its count."""
     pipeline = Pipeline(reader.load(['generic_six_wheel']))
     names, make = pipeline.names, MessageFactory()

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every path in the layouts names a field that the node publishes, for any wheels."""
 
-from __future__ import annotations
-
 import json
 import re
 from xml.etree import ElementTree
@@ -22,7 +20,7 @@ FIELDS = {
 }
 
 
-def test_foxglove_paths_are_published_and_labelled() -> None:
+def test_foxglove_paths_are_published_and_labelled():
     document = json.loads(layouts.foxglove(WHEELS))
     panels = document['configById'].values()
     paths = [path for panel in panels for path in panel.get('paths', [])]
@@ -50,7 +48,7 @@ def panels_path(document: dict[str, dict[str, dict[str, str]]]) -> str:
     return document['configById']['Indicator!stuck']['path']
 
 
-def test_plotjuggler_curves_are_its_names_of_joint_states() -> None:
+def test_plotjuggler_curves_are_its_names_of_joint_states():
     """PlotJuggler names a series topic/joint/field (ParserROS::parseJointStateMsg)."""
     plots = ElementTree.fromstring(layouts.plotjuggler(WHEELS)).iter('DockArea')
     curves = {plot.attrib['name']: [c.attrib['name'] for c in plot.iter('curve')] for plot in plots}

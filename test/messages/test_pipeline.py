@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was left out of the inputs is counted once, whoever left it out."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -15,9 +13,7 @@ TOPIC = 'joint_states'
 NAMES = ('left', 'right')
 
 
-def test_refusals_of_transport_converter_and_core_are_counted_together(
-    rover: Any, factory: Any
-) -> None:
+def test_refusals_of_transport_converter_and_core_are_counted_together(rover, factory):
     def joints(milliseconds: int, velocity: tuple[float, ...]) -> Any:
         return factory.joint_state(
             factory.header(STAMP + milliseconds * 1_000_000), NAMES, velocity=velocity

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lines keep their peaks, names lose what they share, pages hold what they show."""
 
-from __future__ import annotations
-
 import re
 from types import SimpleNamespace
 
@@ -28,7 +26,7 @@ from wheel_terra_estimator.reporting.style import (
 )
 
 
-def test_a_thinned_line_keeps_ends_and_extremes() -> None:
+def test_a_thinned_line_keeps_ends_and_extremes():
     x = np.linspace(0.0, 100.0, 50_000)
     y = np.sin(x)
     y[31_234], y[7_777] = 9.0, -9.0
@@ -40,7 +38,7 @@ def test_a_thinned_line_keeps_ends_and_extremes() -> None:
     np.testing.assert_array_equal(few_y, y[np.searchsorted(x, few_x)])
 
 
-def test_short_lines_and_gaps_are_left_alone() -> None:
+def test_short_lines_and_gaps_are_left_alone():
     x, y = np.arange(10.0), np.full(10, np.nan)
     assert thin(x, y)[1] is y
     x, y = np.arange(10_000.0), np.full(10_000, np.nan)
@@ -48,7 +46,7 @@ def test_short_lines_and_gaps_are_left_alone() -> None:
     assert np.nanmax(thin(x, y, 100)[1]) == 1.0
 
 
-def test_short_names() -> None:
+def test_short_names():
     assert short_names(['front_left_wheel_joint', 'rear_right_wheel_joint']) == [
         'front_left',
         'rear_right',
@@ -58,7 +56,7 @@ def test_short_names() -> None:
     assert short_names(['only_wheel']) == ['only_wheel']
 
 
-def test_figures_of_any_size_stand_apart() -> None:
+def test_figures_of_any_size_stand_apart():
     seconds = {c.name.lower(): 86400.0 for c in SlipClass}
     wheel = WheelSummary(
         'a', seconds, seconds, 0.95, 0.19, 0.13, 0, 0, 0, (0.4, 0.6), (0.1, 0.16), 0.09
@@ -71,7 +69,7 @@ def test_figures_of_any_size_stand_apart() -> None:
     assert len(titles) == len(row)
 
 
-def test_the_same_picture_is_the_same_text_and_no_setting_stays() -> None:
+def test_the_same_picture_is_the_same_text_and_no_setting_stays():
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -86,7 +84,7 @@ def test_the_same_picture_is_the_same_text_and_no_setting_stays() -> None:
     assert dict(mpl.rcParams) == before
 
 
-def test_a_picture_is_compact_and_every_point_stays_where_it_was() -> None:
+def test_a_picture_is_compact_and_every_point_stays_where_it_was():
     import base64
     import re
     from io import StringIO
@@ -116,7 +114,7 @@ def test_a_picture_is_compact_and_every_point_stays_where_it_was() -> None:
     assert 'metadata' not in made
 
 
-def test_text_of_others_is_escaped(tmp_path: object) -> None:
+def test_text_of_others_is_escaped(tmp_path):
     from pathlib import Path
 
     folder = Path(str(tmp_path))
@@ -135,7 +133,7 @@ def lightness(colour: str) -> float:
     return 116.0 * luminance ** (1.0 / 3.0) - 16.0
 
 
-def test_classes_differ_in_grey_and_darker_is_worse() -> None:
+def test_classes_differ_in_grey_and_darker_is_worse():
     ranked = [SlipClass.LOW, SlipClass.MODERATE, SlipClass.HIGH, SlipClass.STUCK]
     levels = [lightness(CLASS_COLOURS[c]) for c in ranked]
     assert (-np.diff(levels) > 12.0).all(), levels
@@ -143,7 +141,7 @@ def test_classes_differ_in_grey_and_darker_is_worse() -> None:
     assert (np.diff(dark) > 12.0).all(), dark
 
 
-def test_what_is_beyond_the_border_is_not_known() -> None:
+def test_what_is_beyond_the_border_is_not_known():
     values = {
         'slip': np.array([[1.0], [0.2], [0.3]]),
         'slip_std': np.array([[0.1], [0.25], [0.26]]),
@@ -156,7 +154,7 @@ def test_what_is_beyond_the_border_is_not_known() -> None:
     np.testing.assert_array_equal(known(history, 'sinkage', border)[:, 0], [np.nan, 0.02, 0.01])
 
 
-def test_pictures_follow_the_dark_mode_of_the_reader() -> None:
+def test_pictures_follow_the_dark_mode_of_the_reader():
     """Every dark ink of a picture has a rule that makes it light; nothing else is touched."""
     import re
     from io import StringIO

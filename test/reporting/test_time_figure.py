@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The drawing of a drive: paths are where the data are, words are beside them."""
 
-from __future__ import annotations
-
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -40,7 +37,7 @@ def a_figure() -> TimeFigure:
     return figure
 
 
-def test_a_path_is_where_the_data_are_and_broken_where_they_are_not() -> None:
+def test_a_path_is_where_the_data_are_and_broken_where_they_are_not():
     line = next(c for c in a_figure().drawn()[0].curves if 'line' in c.classes)
     assert line.path.count('M') == 2
     places = np.array(re.findall(r'[ML]([-\d.]+) ([-\d.]+)', line.path), dtype=float)
@@ -49,7 +46,7 @@ def test_a_path_is_where_the_data_are_and_broken_where_they_are_not() -> None:
     assert slip == pytest.approx(np.sin(places[:, 0] / 20.0), abs=2e-4)
 
 
-def test_strips_begin_and_end_with_their_class() -> None:
+def test_strips_begin_and_end_with_their_class():
     (strip,) = a_figure().drawn()[1].curves
     assert [float(v) for v in re.findall(r'M([\d.]+) ', strip.path)] == [10.0, 25.0, 40.0]
     tops = [float(v) for v in re.findall(r'M[\d.]+ ([\d.]+)H', strip.path)]
@@ -57,7 +54,7 @@ def test_strips_begin_and_end_with_their_class() -> None:
     assert rows.tolist() == [0, 1, 2]
 
 
-def test_no_two_words_meet_and_none_lies_in_a_drawing(tmp_path: Path) -> None:
+def test_no_two_words_meet_and_none_lies_in_a_drawing(tmp_path):
     figure = a_figure()
     for panel in figure.drawn():
         places = np.sort([tick.share for tick in panel.ticks])
@@ -76,7 +73,7 @@ def test_no_two_words_meet_and_none_lies_in_a_drawing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('low', 'high'), [(0.0, 1.0), (-0.05, 1.2), (-3e3, 7e3), (0.011, 0.0118)])
-def test_round_numbers_within_limits(low: float, high: float) -> None:
+def test_round_numbers_within_limits(low, high):
     numbers = nice(low, high)
     assert 2 <= len(numbers) <= 6
     for value, text in numbers:
@@ -85,7 +82,7 @@ def test_round_numbers_within_limits(low: float, high: float) -> None:
     assert nice(1.0, 1.0) == []
 
 
-def test_limits_leave_the_same_room_on_both_sides() -> None:
+def test_limits_leave_the_same_room_on_both_sides():
     low, high = limits(np.array([0.0, np.nan, 10.0]), within=(2.0, 3.0))
     assert 0.0 - low == pytest.approx(high - 10.0)
     assert 0.5 < high - 10.0 < 1.0
@@ -101,5 +98,5 @@ def test_limits_leave_the_same_room_on_both_sides() -> None:
         (DriveRow('a', sets=10, seconds={'high': 0.0, 'stuck': 0.0}), 'good'),
     ],
 )
-def test_the_colour_of_a_drive_among_many(row: DriveRow, tone: str) -> None:
+def test_the_colour_of_a_drive_among_many(row, tone):
     assert row.tone == tone

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the terminal says of warnings, right and wrong."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest
@@ -14,7 +12,7 @@ from wheel_terra_estimator.reporting.replay_report import _error_row, _tone
 from wheel_terra_estimator.reporting.truth_scores import QuantityError, TruthErrors, as_lines
 
 
-def test_a_warning_without_its_slip_is_said() -> None:
+def test_a_warning_without_its_slip_is_said():
     warnings = (
         (3.0, Verdict(Outcome.ENTRAPPED, 12.5)),
         (16.0, Verdict(Outcome.ENTRAPPED, -0.5)),
@@ -31,14 +29,12 @@ def test_a_warning_without_its_slip_is_said() -> None:
 @pytest.mark.parametrize(
     ('high', 'stuck', 'tone'), [(0.0, 0.0, 'good'), (2.0, 0.0, 'warn'), (0.0, 5.0, 'warn')]
 )
-def test_a_drive_with_high_slip_or_stuck_wheels_is_shown_as_a_warning(
-    high: float, stuck: float, tone: str
-) -> None:
+def test_a_drive_with_high_slip_or_stuck_wheels_is_shown_as_a_warning(high, stuck, tone):
     wheels = [SimpleNamespace(seconds={'high': high, 'stuck': stuck})]
     assert _tone(SimpleNamespace(wheels=wheels)) == tone
 
 
-def test_errors_in_the_report_are_in_millimetres_degrees_and_per_cent() -> None:
+def test_errors_in_the_report_are_in_millimetres_degrees_and_per_cent():
     row = _error_row(QuantityError('slip_angle', 'rad', 0.1, -0.05, 0.2, 0.961))
     assert list(row.values()) == ['slip angle [deg]', '5.73', '-2.9', '11.5', '96 %']
     row = _error_row(QuantityError('sinkage', 'm', 0.0012, 0.0005, 0.004, 0.5))
@@ -46,7 +42,7 @@ def test_errors_in_the_report_are_in_millimetres_degrees_and_per_cent() -> None:
 
 
 @pytest.mark.parametrize(('count', 'more'), [(5, '4.0 s: digs'), (7, '4.0 s and 2 more: digs')])
-def test_a_verdict_names_five_warnings_and_counts_the_rest(count: int, more: str) -> None:
+def test_a_verdict_names_five_warnings_and_counts_the_rest(count, more):
     warnings = tuple(WarningSpan(float(k), None, 'digs') for k in range(count))
     verdict = DriveSummary('drive', 60.0, 600, (), warnings, (), ()).verdict
     assert verdict == f'Stuck warnings at 0.0 s, 1.0 s, 2.0 s, 3.0 s, {more}.'

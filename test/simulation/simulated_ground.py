@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rover, soils and grounds for the tests of the simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forces at a given depth against the reference model, which solves for the depth."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
@@ -59,7 +57,7 @@ def answer(
 
 
 @pytest.mark.parametrize('effects', [{}, EFFECTS], ids=['plain', 'effects'])
-def test_at_the_steady_depth_it_is_the_reference_model(effects: dict[str, dict]) -> None:
+def test_at_the_steady_depth_it_is_the_reference_model(effects):
     random = np.random.default_rng(3)
     count = 200
     wheel = wheels(random, count)
@@ -79,7 +77,7 @@ def test_at_the_steady_depth_it_is_the_reference_model(effects: dict[str, dict])
     np.testing.assert_allclose(depth + forces.lug_sinkage, steady.sinkage, atol=1e-9)
 
 
-def test_a_wheel_above_its_depth_of_balance_is_sinking() -> None:
+def test_a_wheel_above_its_depth_of_balance_is_sinking():
     wheel = wheels(np.random.default_rng(4), 20)
     load, slip = 5e3 * wheel.radius * wheel.width, np.full(20, 0.2)
     model = ContactModel(wheel, SOIL, wheel.tip_radius, {}, 9.80665)
@@ -92,7 +90,7 @@ def test_a_wheel_above_its_depth_of_balance_is_sinking() -> None:
     assert (ratios[-1] < 1.0).all()
 
 
-def test_stiffness_changes_the_support_and_nothing_else() -> None:
+def test_stiffness_changes_the_support_and_nothing_else():
     wheel = wheels(np.random.default_rng(5), 20)
     load, slip = 5e3 * wheel.radius * wheel.width, np.full(20, 0.3)
     model = ContactModel(wheel, SOIL, wheel.tip_radius, {}, 9.80665)
@@ -103,7 +101,7 @@ def test_stiffness_changes_the_support_and_nothing_else() -> None:
     np.testing.assert_allclose(soft.pull, firm.pull, rtol=1e-9)
 
 
-def test_side_slip_acts_against_the_motion_and_costs_pull() -> None:
+def test_side_slip_acts_against_the_motion_and_costs_pull():
     wheel = wheels(np.random.default_rng(6), 20)
     load, slip = 5e3 * wheel.radius * wheel.width, np.full(20, 0.4)
     model = ContactModel(wheel, SOIL, wheel.tip_radius, {}, 9.80665)
@@ -121,7 +119,7 @@ def test_side_slip_acts_against_the_motion_and_costs_pull() -> None:
     assert (shear < 1.2 * (np.tan(np.radians(31.9)) * load + cohesion)).all()
 
 
-def test_without_friction_and_cohesion_pull_is_the_compaction_resistance() -> None:
+def test_without_friction_and_cohesion_pull_is_the_compaction_resistance():
     # F = -b k z^(n+1)/(n+1) when the stress starts at the bottom of the wheel (Bekker).
     slick = Soil(0.0, 1e6, 1.0, 0.0, 1e-9, 0.01, 1e-6, 0.0)
     wheel = Wheel(np.array([0.2]), np.array([0.1]))
@@ -134,14 +132,14 @@ def test_without_friction_and_cohesion_pull_is_the_compaction_resistance() -> No
     assert forces.torque == pytest.approx(0.0, abs=1e-6)
 
 
-def test_bad_geometry_and_effects_are_refused() -> None:
+def test_bad_geometry_and_effects_are_refused():
     wheel = Wheel(np.array([0.2]), np.array([0.1]))
     with pytest.raises(ValueError, match='not in the catalogue'):
         ContactModel(wheel, SOIL, wheel.radius, {'magic': {}}, 9.81)
 
 
 @pytest.mark.parametrize('law', LAWS)
-def test_the_ground_of_each_contact_law_is_that_law(law: str) -> None:
+def test_the_ground_of_each_contact_law_is_that_law(law):
     random = np.random.default_rng(9)
     count = 60
     radius = random.uniform(0.08, 0.25, count)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whole drives: seeds, sensors against truth, and what the scenarios promise."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -40,11 +38,11 @@ def kind(drive: SimulatedDrive, type_: type) -> list[Any]:
 
 
 @pytest.fixture(scope='module')
-def exact() -> SimulatedDrive:
+def exact():
     return simulate(load(EXACT | {'slope.angle_deg': [6.0]}))
 
 
-def test_exact_sensors_show_the_truth(exact: SimulatedDrive) -> None:
+def test_exact_sensors_show_the_truth(exact):
     truth = exact.truth
     row = {int(stamp): i for i, stamp in enumerate(truth.stamp)}
     odometry = kind(exact, WheelOdometry)
@@ -69,7 +67,7 @@ def test_exact_sensors_show_the_truth(exact: SimulatedDrive) -> None:
     assert all((m.leaving_angle <= 0.0).all() for m in kind(exact, LeavingAngleReading))
 
 
-def test_reference_comes_late_by_its_delay() -> None:
+def test_reference_comes_late_by_its_delay():
     for delay in (0.0, 0.4, 2.0):
         drive = simulate(load(EXACT | {'sensors.reference_delay': delay, 'duration': 4.0}))
         late = [
@@ -82,7 +80,7 @@ def test_reference_comes_late_by_its_delay() -> None:
         assert arrivals == sorted(arrivals)
 
 
-def test_a_seed_is_a_drive() -> None:
+def test_a_seed_is_a_drive():
     scenario = load('firm_drive')
     first, again, other = (simulate(scenario, seed, 3.0) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.truth.sinkage, again.truth.sinkage)
@@ -90,7 +88,7 @@ def test_a_seed_is_a_drive() -> None:
     assert not np.allclose(first.truth.sinkage, other.truth.sinkage)
 
 
-def test_sensors_do_not_change_the_drive() -> None:
+def test_sensors_do_not_change_the_drive():
     whole = simulate(load('firm_drive'), 3, 3.0)
     blind = simulate(load('firm_drive', sensors__sinkage=False, sensors__torque=False), 3, 3.0)
     np.testing.assert_array_equal(whole.truth.sinkage, blind.truth.sinkage)
@@ -98,7 +96,7 @@ def test_sensors_do_not_change_the_drive() -> None:
     assert all(np.isnan(m.torque).all() for m in kind(blind, WheelOdometry))
 
 
-def test_noise_has_the_stated_size() -> None:
+def test_noise_has_the_stated_size():
     drive = simulate(
         load(LEVEL | {'sensors.sinkage_outliers': 0.0, 'duration': 15.0, 'drive.forward': [0.0]}),
         4,
@@ -115,14 +113,14 @@ def test_noise_has_the_stated_size() -> None:
     assert rate.std(axis=0).mean() == pytest.approx(figures.angular_rate_std, rel=0.15)
 
 
-def test_encoder_steps_show_in_the_rate() -> None:
+def test_encoder_steps_show_in_the_rate():
     drive = simulate(load(EXACT | {'sensors.encoder_counts': 1000, 'duration': 5.0}))
     step = 2.0 * np.pi / 1000 / 0.1
     rates = np.array([m.rate for m in kind(drive, WheelOdometry)])
     np.testing.assert_allclose(rates / step, np.round(rates / step), atol=1e-6)
 
 
-def test_sensor_faults_come_and_go() -> None:
+def test_sensor_faults_come_and_go():
     drive = simulate(
         load(
             EXACT
@@ -145,7 +143,7 @@ def test_sensor_faults_come_and_go() -> None:
     assert 5 < (stamps == 0).sum() < 15
 
 
-def test_wheel_faults_concern_their_wheel() -> None:
+def test_wheel_faults_concern_their_wheel():
     drive = simulate(
         load(
             EXACT
@@ -166,7 +164,7 @@ def test_wheel_faults_concern_their_wheel() -> None:
     assert truth.normal_load[-1, 1] < 0.1 * truth.normal_load[-1].mean()
 
 
-def test_a_weak_drive_ends_at_a_quarter_of_its_torque_and_a_coasting_one_has_none() -> None:
+def test_a_weak_drive_ends_at_a_quarter_of_its_torque_and_a_coasting_one_has_none():
     faults = {
         'faults.kind': ['weak', 'coasting'],
         'faults.wheel': ['front_left', 'front_right'],
@@ -180,7 +178,7 @@ def test_a_weak_drive_ends_at_a_quarter_of_its_torque_and_a_coasting_one_has_non
     assert (torque[2:] > 11.0).all()
 
 
-def test_closed_loop_steps_and_profile_agree() -> None:
+def test_closed_loop_steps_and_profile_agree():
     scenario = load('firm_drive')
     whole = simulate(scenario, 5, 3.0)
     drive = Drive(scenario, 5)
@@ -193,13 +191,13 @@ def test_closed_loop_steps_and_profile_agree() -> None:
     assert len(arrivals) == len(whole.arrivals)
 
 
-def test_classes_have_their_upper_bound_included() -> None:
+def test_classes_have_their_upper_bound_included():
     slip = np.array([0.0, 0.3, 0.30001, -0.6, 0.9, 0.91, -1.0, np.nan])
     classes = slip_classes(slip, np.array([0.3, 0.6, 0.9]))
     assert classes.tolist() == [0, 0, 1, 1, 2, 3, 3, 255]
 
 
-def test_entrapment_needs_a_second_and_clears_after_three() -> None:
+def test_entrapment_needs_a_second_and_clears_after_three():
     stamp = (np.arange(120) * 10**8).astype(np.int64)
     slip = np.full((120, 4), 0.2)
     slip[20:28] = 0.95  # 0.8 s: too short
@@ -219,7 +217,7 @@ SEEDS = range(2, 6)
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', sorted(shipped_scenarios()))
-def test_scenarios_do_what_they_say(name: str) -> None:
+def test_scenarios_do_what_they_say(name):
     found = []
     for seed in SEEDS:
         truth = simulate(load(name), seed).truth
@@ -238,7 +236,7 @@ def test_scenarios_do_what_they_say(name: str) -> None:
         assert all(greatest < 0.6 for _, greatest in found)
 
 
-def test_messages_of_one_topic_never_overtake_each_other() -> None:
+def test_messages_of_one_topic_never_overtake_each_other():
     fast = {**LEVEL, 'duration': 5.0, 'sensors.jitter': 0.02}
     drive = simulate(load(fast))
     for type_ in (WheelOdometry, InertialReading, SinkageReading, ReferenceVelocity):

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Manoeuvres: what is promised against what a filter that drives them ends with."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rover obeys mechanics: balances, limits, symmetry, and the steady state of the reference."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -24,7 +22,7 @@ MakePlant = Callable[..., RoverPlant]
 
 
 @pytest.fixture
-def plant() -> Callable[..., RoverPlant]:
+def plant():
     def make(configuration: Configuration | None = None, **terrain: Any) -> RoverPlant:
         configuration = configuration or rover()
         return RoverPlant(configuration, ground(**terrain), drives(configuration))
@@ -39,7 +37,7 @@ def drive(plant: RoverPlant, seconds: float, forward: float = 0.05, turn: float 
 
 
 @pytest.mark.parametrize('slope', [-8.0, pytest.param(7.0, marks=pytest.mark.slow), 13.0])
-def test_steady_climb_is_the_steady_state_of_the_reference(plant: MakePlant, slope: float) -> None:
+def test_steady_climb_is_the_steady_state_of_the_reference(plant, slope):
     configuration = rover()
     truth = drive(plant(configuration, slope_deg=slope), 35.0)
     wheels, mass = configuration.wheels, configuration.rover.mass
@@ -62,7 +60,7 @@ def test_steady_climb_is_the_steady_state_of_the_reference(plant: MakePlant, slo
     assert load.sum() == pytest.approx(weight * np.cos(np.radians(slope)), rel=1e-6)
 
 
-def test_energy_balance_over_a_climb(plant: MakePlant) -> None:
+def test_energy_balance_over_a_climb(plant):
     rover_plant = plant(slope_deg=9.0)
     mass = rover().rover.mass
     pulled = driven = dissipated = 0.0
@@ -82,7 +80,7 @@ def test_energy_balance_over_a_climb(plant: MakePlant) -> None:
     assert dissipated > 0.3 * pulled
 
 
-def test_a_parked_rover_stays_where_it_is(plant: MakePlant) -> None:
+def test_a_parked_rover_stays_where_it_is(plant):
     truth = drive(plant(slope_deg=12.0, side_deg=5.0), 10.0, forward=0.0)
     assert np.abs(truth.position[:2]).max() < 1e-4
     assert np.isnan(truth.slip).all()
@@ -91,8 +89,8 @@ def test_a_parked_rover_stays_where_it_is(plant: MakePlant) -> None:
 
 
 def test_a_rover_parked_on_a_kink_is_held_against_the_slope_under_each_wheel(
-    plant: MakePlant,
-) -> None:
+    plant,
+):
     kink = {'slope_position': np.array([0.1, 0.3]), 'slope_angle': np.radians([0.0, 12.0])}
     truth = drive(plant(**kink), 8.0, forward=0.0)
     under_front = truth.normal_load[:2].sum()  # hubs at 0.61, 0 and -0.61 m
@@ -100,7 +98,7 @@ def test_a_rover_parked_on_a_kink_is_held_against_the_slope_under_each_wheel(
     assert truth.drawbar_pull.sum() == pytest.approx(expected, rel=0.03)
 
 
-def test_accelerometer_at_rest_shows_the_attitude_of_the_chassis(plant: MakePlant) -> None:
+def test_accelerometer_at_rest_shows_the_attitude_of_the_chassis(plant):
     truth = drive(plant(slope_deg=10.0, side_deg=6.0), 5.0, forward=0.0)
     assert np.linalg.norm(truth.specific_force) == pytest.approx(G, rel=1e-3)
     assert truth.specific_force[0] == pytest.approx(G * np.sin(truth.pitch), abs=5e-3)
@@ -111,8 +109,8 @@ def test_accelerometer_at_rest_shows_the_attitude_of_the_chassis(plant: MakePlan
 
 
 def test_specific_force_times_mass_is_the_sum_of_pulls_while_accelerating(
-    plant: MakePlant,
-) -> None:
+    plant,
+):
     rover_plant = plant(slope_deg=5.0)
     for _ in range(40):
         truth = rover_plant.step(Command(0.08), 0.05)
@@ -121,7 +119,7 @@ def test_specific_force_times_mass_is_the_sum_of_pulls_while_accelerating(
         assert truth.specific_force[0] == pytest.approx(expected, abs=0.01)
 
 
-def test_too_steep_a_slope_entraps(plant: MakePlant) -> None:
+def test_too_steep_a_slope_entraps(plant):
     rover_plant = plant(slope_deg=24.0)
     truth = drive(rover_plant, 15.0)
     assert truth.forward_velocity < 0.002
@@ -130,14 +128,14 @@ def test_too_steep_a_slope_entraps(plant: MakePlant) -> None:
     assert (deeper.sinkage > truth.sinkage).all()
 
 
-def test_weak_drives_stall(plant: MakePlant) -> None:
+def test_weak_drives_stall(plant):
     configuration = rover(f'wheels.torque_limit:={[6.0] * 6}')
     truth = drive(plant(configuration, slope_deg=10.0), 12.0)
     np.testing.assert_allclose(np.abs(truth.torque).max(), 6.0, rtol=0.05)
     assert abs(truth.forward_velocity) < 0.01
 
 
-def test_descent_skids_and_a_locked_wheel_is_dragged(plant: MakePlant) -> None:
+def test_descent_skids_and_a_locked_wheel_is_dragged(plant):
     rover_plant = plant(slope_deg=-16.0)
     truth = drive(rover_plant, 20.0)
     assert (truth.slip < -0.03).all()
@@ -149,7 +147,7 @@ def test_descent_skids_and_a_locked_wheel_is_dragged(plant: MakePlant) -> None:
     assert truth.drawbar_pull[0] < truth.drawbar_pull[1:].min()
 
 
-def test_reverse_mirrors_forward(plant: MakePlant) -> None:
+def test_reverse_mirrors_forward(plant):
     # A rover that looks the same from both ends.
     ends = [
         'rover.suspension:=rigid',
@@ -165,7 +163,7 @@ def test_reverse_mirrors_forward(plant: MakePlant) -> None:
     np.testing.assert_allclose(back.sinkage[mirror], ahead.sinkage, rtol=1e-4)
 
 
-def test_left_mirrors_right_and_scrub_slows_the_turn(plant: MakePlant) -> None:
+def test_left_mirrors_right_and_scrub_slows_the_turn(plant):
     left = drive(plant(), 8.0, turn=0.05)
     right = drive(plant(), 8.0, turn=-0.05)
     mirror = [1, 0, 3, 2, 5, 4]
@@ -176,7 +174,7 @@ def test_left_mirrors_right_and_scrub_slows_the_turn(plant: MakePlant) -> None:
     assert left.drawbar_pull[1] > left.drawbar_pull[0]
 
 
-def test_the_path_closes_on_a_turn_in_place(plant: MakePlant) -> None:
+def test_the_path_closes_on_a_turn_in_place(plant):
     truth = drive(plant(), 10.0, forward=0.0, turn=0.1)
     assert truth.yaw_rate > 0.01
     assert np.abs(truth.position[:2]).max() < 0.1
@@ -185,7 +183,7 @@ def test_the_path_closes_on_a_turn_in_place(plant: MakePlant) -> None:
     assert (outward[[0, 2, 4]] < 0).all()
 
 
-def test_a_shorter_step_gives_the_same_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shorter_step_gives_the_same_drive(monkeypatch):
     configuration = rover()
     ends = []
     for step in (0.05, 0.0125):
@@ -199,7 +197,7 @@ def test_a_shorter_step_gives_the_same_drive(monkeypatch: pytest.MonkeyPatch) ->
     np.testing.assert_allclose(ends[0].position, ends[1].position, atol=5e-3)
 
 
-def test_wheels_sink_one_after_the_other_in_a_patch(plant: MakePlant) -> None:
+def test_wheels_sink_one_after_the_other_in_a_patch(plant):
     from wheel_terra_estimator.simulation.terrain import Patch
 
     patch = Patch(1.0, 9.0, -9.0, 9.0, {'stiffness': 0.3})
@@ -220,7 +218,7 @@ def test_wheels_sink_one_after_the_other_in_a_patch(plant: MakePlant) -> None:
 CORNERS = "[front_left_steer, front_right_steer, '', '', rear_left_steer, rear_right_steer]"
 
 
-def test_a_steered_rover_turns_about_its_middle_axle_without_scrub(plant: MakePlant) -> None:
+def test_a_steered_rover_turns_about_its_middle_axle_without_scrub(plant):
     """Ackermann: radius v / w, wheels on their circles, no lateral motion of the middle axle."""
     steered = plant(rover(f'wheels.steering_joints:={CORNERS}'))
     skidding = plant()
@@ -243,7 +241,7 @@ def test_a_steered_rover_turns_about_its_middle_axle_without_scrub(plant: MakePl
     np.testing.assert_allclose(truth.slip_velocity, truth.wheel_rate * wheels.slip_radius - along)
 
 
-def test_the_forces_of_steered_wheels_add_up_in_the_body(plant: MakePlant) -> None:
+def test_the_forces_of_steered_wheels_add_up_in_the_body(plant):
     truth = drive(plant(rover(f'wheels.steering_joints:={CORNERS}')), 12.0, 0.05, 0.03)
     cosine, sine = np.cos(truth.steering), np.sin(truth.steering)
     along = (truth.drawbar_pull * cosine - truth.lateral_force * sine).sum()

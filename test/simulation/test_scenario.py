@@ -2,10 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenario files: all shipped ones load, bad ones are refused in one line."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -43,7 +39,7 @@ NAMES = sorted(scenarios.shipped_scenarios())
         ({'truth': ['soil.cohesoin:=1.0']}, ['soil.cohesoin', 'soil.cohesion']),
     ],
 )
-def test_bad_scenarios_are_refused(changes: dict, words: list[str]) -> None:
+def test_bad_scenarios_are_refused(changes, words):
     with pytest.raises(UserError) as caught:
         scenarios.load(changes)
     message = str(caught.value)
@@ -52,7 +48,7 @@ def test_bad_scenarios_are_refused(changes: dict, words: list[str]) -> None:
         assert word in message
 
 
-def test_a_file_that_is_not_a_scenario_is_named(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_scenario_is_named(tmp_path):
     path = tmp_path / 'mine.yaml'
     path.write_text('/**:\n  ros__parameters:\n    duraton: 3.0\n')
     with pytest.raises(UserError, match=r'mine\.yaml.*duraton.*duration'):
@@ -61,7 +57,7 @@ def test_a_file_that_is_not_a_scenario_is_named(tmp_path: Path) -> None:
         scenarios.load(tmp_path / 'missing.yaml')
 
 
-def test_changes_and_parameters_win_over_the_file() -> None:
+def test_changes_and_parameters_win_over_the_file():
     scenario = scenarios.load(
         'firm_drive', parameters=['rover.mass:=99.0'], sensors__reference=False, duration=5.0
     )
@@ -70,12 +66,12 @@ def test_changes_and_parameters_win_over_the_file() -> None:
     assert not scenario.sensors.reference
 
 
-def test_degrees_become_radians() -> None:
+def test_degrees_become_radians():
     scenario = scenarios.load({'slope.angle_deg': [10.0]})
     np.testing.assert_allclose(scenario.slope.angle, np.radians([10.0]))
 
 
-def test_every_scenario_file_is_listed() -> None:
+def test_every_scenario_file_is_listed():
     found = [key for key in shipped.files() if key.startswith('scenarios/')]
     assert len(found) == len(NAMES)
 

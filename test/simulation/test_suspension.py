@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Loads against statics done by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from simulated_ground import rover
@@ -13,7 +11,7 @@ from wheel_terra_estimator.simulation.suspension import LEAST_LOAD_SHARE, suspen
 G = 9.80665
 
 
-def test_rocker_bogie_statics_on_the_level() -> None:
+def test_rocker_bogie_statics_on_the_level():
     configuration = rover()
     loads = suspension_of(configuration).normal_loads(
         180.0, np.array([0.0, 0.0, G]), np.zeros(6), np.zeros(6)
@@ -22,7 +20,7 @@ def test_rocker_bogie_statics_on_the_level() -> None:
     np.testing.assert_allclose(loads, 180.0 * G / 6.0, rtol=1e-9)
 
 
-def test_moments_balance_for_any_force() -> None:
+def test_moments_balance_for_any_force():
     configuration = rover()
     suspension = suspension_of(configuration)
     x, y = configuration.wheels.x, configuration.wheels.y
@@ -41,14 +39,14 @@ def test_moments_balance_for_any_force() -> None:
             assert about_pivot[bogie].sum() == pytest.approx(0.0, abs=1e-6)
 
 
-def test_no_wheel_pulls_on_the_ground() -> None:
+def test_no_wheel_pulls_on_the_ground():
     suspension = suspension_of(rover('rover.suspension:=rigid'))
     loads = suspension.normal_loads(180.0, np.array([9.0, 0.0, 4.0]), np.zeros(6), np.zeros(6))
     assert loads.min() >= LEAST_LOAD_SHARE * 180.0 * 4.0 / 6.0 * 0.5
     assert loads.sum() == pytest.approx(720.0)
 
 
-def test_given_shares() -> None:
+def test_given_shares():
     configuration = rover(
         'rover.suspension:=shares', 'rover.load_shares:=[0.1, 0.1, 0.2, 0.2, 0.2, 0.2]'
     )

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ground: height is the integral of the slope, soil changes where the patches say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from simulated_ground import ground
@@ -11,7 +9,7 @@ from simulated_ground import ground
 from wheel_terra_estimator.simulation.terrain import GRID, Patch, smooth_noise
 
 
-def test_height_is_the_integral_of_the_slope() -> None:
+def test_height_is_the_integral_of_the_slope():
     hill = ground(
         slope_position=np.array([0.0, 5.0]), slope_angle=np.radians([0.0, 10.0]), undulation=0.02
     )
@@ -22,7 +20,7 @@ def test_height_is_the_integral_of_the_slope() -> None:
     assert hill.height(np.array([0.0]), np.array([0.0])) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_beyond_its_extent_the_slope_goes_on() -> None:
+def test_beyond_its_extent_the_slope_goes_on():
     hill = ground(slope_deg=10.0)
     far = np.array([19.0, 25.0, -15.0])
     np.testing.assert_allclose(
@@ -30,7 +28,7 @@ def test_beyond_its_extent_the_slope_goes_on() -> None:
     )
 
 
-def test_patch_has_its_factor_inside_and_a_smooth_border() -> None:
+def test_patch_has_its_factor_inside_and_a_smooth_border():
     patch = Patch(2.0, 4.0, -9.0, 0.0, {'stiffness': 0.25, 'cohesion': 3.0})
     soft = ground(patches=[patch], base_factors={'stiffness': 1.2})
     x = np.array([1.0, 2.0, 3.0, 3.0, 5.0])
@@ -43,7 +41,7 @@ def test_patch_has_its_factor_inside_and_a_smooth_border() -> None:
     assert np.abs(np.diff(line)).max() < 0.03
 
 
-def test_noise_has_the_stated_spread_and_length() -> None:
+def test_noise_has_the_stated_spread_and_length():
     noise = smooth_noise(np.random.default_rng(2), 200_000, 0.5)
     assert noise.std() == pytest.approx(1.0, rel=0.1)
     lag = round(0.5 / GRID)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A second wheel-soil model, adaptive and scalar, and random contacts."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

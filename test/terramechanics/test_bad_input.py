@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bad input ends in a ValueError that names the quantity, its value and the allowed range."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -76,23 +74,23 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
         ),
     ],
 )
-def test_the_complaint_names_quantity_value_and_range(make, words: str) -> None:
+def test_the_complaint_names_quantity_value_and_range(make, words):
     with pytest.raises(ValueError, match=words):
         make()
 
 
-def test_a_wheel_may_be_smooth() -> None:
+def test_a_wheel_may_be_smooth():
     assert Wheel(0.1, 0.1).tip_radius == 0.1
     assert WHEEL.tip_radius == pytest.approx(0.1674)
 
 
-def test_what_effects_leave_of_the_soil_is_flagged_where_nothing_may_be_raised() -> None:
+def test_what_effects_leave_of_the_soil_is_flagged_where_nothing_may_be_raised():
     model = WheelSoilModel(SAND, {'cohesion': {'delta': -3000.0}}, strict=False)
     assert model.steady_state(points([0.1, 0.2])).flags.tolist() == [2, 2]
     assert WheelSoilModel(SAND).steady_state(points(np.zeros(0))).sinkage.shape == (0,)
 
 
-def test_a_great_many_points_at_once() -> None:
+def test_a_great_many_points_at_once():
     state = WheelSoilModel(SAND, method='closed_form').steady_state(
         points(np.linspace(-1.0, 1.0, 200_001))
     )

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Climbing, digging in, and how the sinkage grows with the slip."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -27,7 +25,7 @@ def climb(slopes, effects=None):
     return rover_climb(WheelSoilModel(SAND, effects), WHEEL, [80.0], slopes)
 
 
-def test_the_climb_balances() -> None:
+def test_the_climb_balances():
     slopes = np.radians([-10.0, 0.0, 5.0, 12.0])
     steady = climb(slopes)
     assert steady.drawbar_pull[:, 0] == pytest.approx(80.0 * np.sin(slopes), abs=1e-6)
@@ -39,14 +37,14 @@ def test_the_climb_balances() -> None:
     assert steady.power_number[2] == pytest.approx(steady.torque[2, 0] / (80.0 * speed))
 
 
-def test_the_climb_is_the_effect_slope_gravity_at_zero_hitch_pull() -> None:
+def test_the_climb_is_the_effect_slope_gravity_at_zero_hitch_pull():
     hitch = state(climb([0.15]).slip, slope=0.15, effects={'slope_gravity': {}}).drawbar_pull
     assert hitch == pytest.approx(0.0, abs=1e-6)
     with pytest.raises(ValueError, match='slope_gravity is on'):
         climb([0.15], {'slope_gravity': {}})
 
 
-def test_a_rover_of_equal_wheels_climbs_like_one_of_them() -> None:
+def test_a_rover_of_equal_wheels_climbs_like_one_of_them():
     slopes = np.radians([-5.0, 0.0, 8.0, 14.0])
     one = climb(slopes)
     rover = rover_climb(WheelSoilModel(SAND), WHEEL, [80.0] * 4, slopes)
@@ -55,7 +53,7 @@ def test_a_rover_of_equal_wheels_climbs_like_one_of_them() -> None:
     assert rover.power_number == pytest.approx(one.power_number)
 
 
-def test_too_steep_is_nan() -> None:
+def test_too_steep_is_nan():
     slips = np.linspace(0.0, 0.98, 50)
     loads = np.full_like(slips, 80.0 * math.cos(0.3))
     steepest = math.asin(state(slips, loads).drawbar_pull.max() / 80.0)
@@ -64,7 +62,7 @@ def test_too_steep_is_nan() -> None:
     assert np.isfinite(flat) and np.isnan(steep)
 
 
-def test_a_rover_s_wheels_pull_the_weight_together() -> None:
+def test_a_rover_s_wheels_pull_the_weight_together():
     """Unequal loads and wheels that run in ruts: the sum is W sin a, none of them by itself."""
     slopes = np.radians([0.0, 10.0])
     level = np.array([60.0, 90.0, 90.0])
@@ -81,7 +79,7 @@ def test_a_rover_s_wheels_pull_the_weight_together() -> None:
     assert (compacted < virgin).all()
 
 
-def test_digging_starts_near_stuck_and_grows_with_the_lugs() -> None:
+def test_digging_starts_near_stuck_and_grows_with_the_lugs():
     assert digging_share(0.85) == 0.0 and digging_share(1.0) == 1.0
     assert digging_share(0.925) == pytest.approx(0.5)
     assert digging_rate(-0.98, WHEEL, 1.0) == 0.0
@@ -91,7 +89,7 @@ def test_digging_starts_near_stuck_and_grows_with_the_lugs() -> None:
     assert digging_rate(0.98, WHEEL, -2.0) == pytest.approx(2.0 * digging_rate(0.98, WHEEL, 1.0))
 
 
-def test_a_spinning_wheel_throws_out_the_layer_of_its_lugs_once_per_lug() -> None:
+def test_a_spinning_wheel_throws_out_the_layer_of_its_lugs_once_per_lug():
     """Thirty lugs of 10 mm pass in a turn; with all of it thrown out it is 300 mm deeper."""
     assert digging_per_turn(WHEEL, efficiency=1.0) == pytest.approx(0.300)
     assert digging_rate(1.0, WHEEL, 2.0 * math.pi) == pytest.approx(digging_per_turn(WHEEL))

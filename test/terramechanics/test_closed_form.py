@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed forms: against integrals, the quadrature and finite differences; safe at the edges."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import astuple, replace
 from types import SimpleNamespace
@@ -26,7 +24,7 @@ MOUND = {**EFFECTS, 'soil_mound': {'kappa': 1.5, 'onset': 0.2}}
 
 
 @pytest.mark.parametrize('angles', [(0.5, 0.25, -0.1), (0.9, 0.3, -0.6), (0.3, 0.15, 0.0)])
-def test_coefficients_are_the_integrals_of_a_triangle(angles: tuple[float, float, float]) -> None:
+def test_coefficients_are_the_integrals_of_a_triangle(angles):
     t1, tm, t2 = angles
 
     def triangle(t: float) -> float:
@@ -39,7 +37,7 @@ def test_coefficients_are_the_integrals_of_a_triangle(angles: tuple[float, float
         assert ours == pytest.approx(truth, abs=1e-11)
 
 
-def test_decoupled_pull_is_exact_for_triangles() -> None:
+def test_decoupled_pull_is_exact_for_triangles():
     for soil, effects, row in random_cases(20, 5):
         answer = WheelSoilModel(soil, effects, 'triangles', strict=False).steady_state(row)
         good = answer.flags == 0
@@ -68,7 +66,7 @@ def family_errors(method: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return np.abs(pull), np.abs(depth)
 
 
-def test_accuracy_over_random_contacts() -> None:
+def test_accuracy_over_random_contacts():
     pull, depth = family_errors('closed_form', 11)
     assert pull.size > 500
     assert np.mean((pull < 0.05) & (depth < 0.1)) > 0.98
@@ -90,7 +88,7 @@ def answer(model: ConditionedForces, ratio, sinkage, load=80.0, **others):
 
 
 @pytest.mark.parametrize('slip', [-0.4, 0.0, 0.2, 0.5, 0.9])
-def test_conditioned_forces_are_the_closed_form_at_its_own_sinkage(slip: float) -> None:
+def test_conditioned_forces_are_the_closed_form_at_its_own_sinkage(slip):
     # The load balance that gave the sinkage and the one that eliminates the stress are the same.
     steady = WheelSoilModel(SAND, MOUND, 'closed_form').steady_state(points([slip]))
     ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
@@ -98,7 +96,7 @@ def test_conditioned_forces_are_the_closed_form_at_its_own_sinkage(slip: float) 
     assert got == pytest.approx((steady.torque[0], steady.drawbar_pull[0]), rel=1e-6, abs=1e-6)
 
 
-def test_conditioned_forces_are_close_to_the_quadrature() -> None:
+def test_conditioned_forces_are_close_to_the_quadrature():
     slip = np.linspace(0.0, 0.9, 10)
     truth = WheelSoilModel(SAND, MOUND).steady_state(points(slip))
     model = conditioned(MOUND, Wheel(*(np.full(10, v) for v in astuple(WHEEL))))
@@ -108,7 +106,7 @@ def test_conditioned_forces_are_close_to_the_quadrature() -> None:
     assert torque == pytest.approx(truth.torque, abs=0.02 * 80.0 * 0.16)
 
 
-def test_wheels_and_rows_are_worked_out_alike() -> None:
+def test_wheels_and_rows_are_worked_out_alike():
     """Each of many at once as alone: no wheel and no finite step sees another."""
     random = np.random.default_rng(3)
     rows = random.uniform([0.1, 0.005, 40.0], [1.5, 0.04, 120.0], (5, 6, 3)).transpose(2, 0, 1)
@@ -126,7 +124,7 @@ def test_wheels_and_rows_are_worked_out_alike() -> None:
 
 @pytest.mark.parametrize('ratio', [-0.5, 0.0, 1e-9, 1.0, 1e6, 1e12])
 @pytest.mark.parametrize('sinkage', [-0.01, 0.0, 1e-6, 0.05, 0.3])
-def test_edges_are_those_of_the_model(ratio: float, sinkage: float) -> None:
+def test_edges_are_those_of_the_model(ratio, sinkage):
     assert np.isfinite(answer(conditioned(MOUND), ratio, sinkage)).all()
     within = min(max(sinkage, 0.0), WHEEL.radius)
     plain = conditioned({})
@@ -135,7 +133,7 @@ def test_edges_are_those_of_the_model(ratio: float, sinkage: float) -> None:
 
 @pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize('entry', range(7))
-def test_no_input_ends_in_an_exception_or_in_nan(entry: int, value: float) -> None:
+def test_no_input_ends_in_an_exception_or_in_nan(entry, value):
     for effects in ({}, MOUND):
         inputs = [0.7, 0.012, 80.0, 250.0, 0.6, 0.0114, 0.01]
         inputs[entry] = value
@@ -143,7 +141,7 @@ def test_no_input_ends_in_an_exception_or_in_nan(entry: int, value: float) -> No
         assert np.isfinite([torque[0], pull[0]]).all()
 
 
-def test_a_measured_leaving_angle_overrides_the_law() -> None:
+def test_a_measured_leaving_angle_overrides_the_law():
     low, raised, flat, none = (
         answer(conditioned(MOUND), 0.2, 0.02, leaving_angle=angle)
         for angle in (None, -0.5, 0.0, np.array([math.nan]))
@@ -153,7 +151,7 @@ def test_a_measured_leaving_angle_overrides_the_law() -> None:
     assert none == low
 
 
-def test_soil_without_shear_strength_takes_no_torque_and_resists() -> None:
+def test_soil_without_shear_strength_takes_no_torque_and_resists():
     """Without c and tan(phi) there are normal stresses alone: they turn nothing and push back."""
     model = ConditionedForces(WHEEL, SAND)
     torque, pull = model.forces(ConditionedInputs(0.5, 0.02, 80.0, 0.0, 0.0, 0.012))
@@ -164,7 +162,7 @@ def test_soil_without_shear_strength_takes_no_torque_and_resists() -> None:
     assert backwards == spinning
 
 
-def test_balance_without_iteration_agrees_with_the_bracketed_solver() -> None:
+def test_balance_without_iteration_agrees_with_the_bracketed_solver():
     random, count = np.random.default_rng(12), 500
     wheel = Wheel(random.uniform(0.05, 0.3, count), random.uniform(0.05, 0.3, count), 0.01, 20)
     # One in ten is more than the soil carries.
@@ -184,7 +182,7 @@ def test_balance_without_iteration_agrees_with_the_bracketed_solver() -> None:
         np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-9 * np.abs(b).max(), err_msg=name)
 
 
-def test_closed_form_in_skid_is_as_close_as_in_slip() -> None:
+def test_closed_form_in_skid_is_as_close_as_in_slip():
     """Random contacts of skidding wheels against 40 nodes: 95 % in shares of the load."""
     random = np.random.default_rng(77)
     count = 300
@@ -210,7 +208,7 @@ def test_closed_form_in_skid_is_as_close_as_in_slip() -> None:
     assert np.quantile(np.abs(form.sinkage / exact.sinkage - 1.0), 0.95) < 0.02
 
 
-def test_the_turn_from_rolling_to_skid_is_smooth() -> None:
+def test_the_turn_from_rolling_to_skid_is_smooth():
     slip = np.linspace(-0.12, 0.05, 171)
     pull = state(slip, effects=EFFECTS, method='closed_form').drawbar_pull
     steps = np.diff(pull)
@@ -219,7 +217,7 @@ def test_the_turn_from_rolling_to_skid_is_smooth() -> None:
 
 
 @pytest.mark.parametrize('peak', [-2.0, -0.3, 0.4, 2.0])
-def test_a_peak_beyond_the_contact_is_moved_into_it_alike_everywhere(peak: float) -> None:
+def test_a_peak_beyond_the_contact_is_moved_into_it_alike_everywhere(peak):
     """By a thousandth of the contact: in the explicit balance as in the general one."""
     soil = SimpleNamespace(leaving_ratio=-0.3, peak_ratio=peak)
     set_angles(soil, 0.5, None, SimpleNamespace(apply=lambda *_: None))

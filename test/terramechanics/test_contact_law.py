@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rival contact laws: published maps, limits known by hand, where the laws must agree."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -41,13 +39,13 @@ def published(beta: float, gamma: float) -> tuple[float, float]:
     return up, along + sum(d * math.sin(phase(k)) for k, d in D.items())
 
 
-def test_the_maps_are_the_published_sum() -> None:
+def test_the_maps_are_the_published_sum():
     for beta in np.linspace(-1.5, 1.5, 7):
         for gamma in np.linspace(-1.5, 1.5, 7):
             assert stress_maps(beta, gamma) == pytest.approx(published(beta, gamma), abs=1e-12)
 
 
-def test_plates_that_the_paper_pushes() -> None:
+def test_plates_that_the_paper_pushes():
     # Down, a flat plate: 1.000 N/cm^3, by the sum of five coefficients; up: a quarter of it.
     assert stress_maps(0.0, math.pi / 2) == pytest.approx((1.0, 0.0), abs=1e-12)
     assert stress_maps(0.0, -math.pi / 2) == pytest.approx((-0.25, 0.0), abs=1e-12)
@@ -66,7 +64,7 @@ def test_plates_that_the_paper_pushes() -> None:
     assert mirrored[0] == pytest.approx(up) and mirrored[1] == pytest.approx(-along)
 
 
-def test_a_wheel_is_the_sum_of_its_plates() -> None:
+def test_a_wheel_is_the_sum_of_its_plates():
     state = ResistiveForce(2.0).steady_state(OperatingPoints(SLIPS, 60.0, WHEEL))
     for k, slip in enumerate(SLIPS):
         hub = 0.15 * (1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip))
@@ -86,7 +84,7 @@ def test_a_wheel_is_the_sum_of_its_plates() -> None:
         assert state.torque[k] == pytest.approx(torque, rel=2e-3, abs=0.005)
 
 
-def test_limit_of_a_shallow_contact() -> None:
+def test_limit_of_a_shallow_contact():
     # Flat plates that slide along the surface: every stress has the same two components.
     state = ResistiveForce(1.0).steady_state(OperatingPoints([0.5, -0.5], 1e-4, WHEEL))
     friction = (-0.124 + 0.253 + 0.007) / (0.206 + 0.169)
@@ -96,7 +94,7 @@ def test_limit_of_a_shallow_contact() -> None:
     assert state.entrance_angle == pytest.approx(angle, rel=0.02)
 
 
-def test_resistive_forces_scale_with_size() -> None:
+def test_resistive_forces_scale_with_size():
     # Stress grows with depth: forces with width and the square of the length.
     small = ResistiveForce(1.0).steady_state(OperatingPoints(SLIPS, 20.0, WHEEL))
     large = ResistiveForce(1.0).steady_state(OperatingPoints(SLIPS, 160.0, Wheel(0.3, 0.2)))
@@ -107,7 +105,7 @@ def test_resistive_forces_scale_with_size() -> None:
     assert ResistiveForce(1.0).steady_state(back).torque == pytest.approx(-small.torque)
 
 
-def test_the_table_gives_the_forces_of_the_integrals() -> None:
+def test_the_table_gives_the_forces_of_the_integrals():
     rng = np.random.default_rng(11)
     slip, angle = rng.uniform(-0.66, 1.0, 2000), rng.uniform(0.02, 1.5, 2000)
     points = OperatingPoints(slip, 1.0, WHEEL)
@@ -124,7 +122,7 @@ def test_the_table_gives_the_forces_of_the_integrals() -> None:
     assert (np.sqrt(np.mean(errors**2, axis=1)) < 1e-3).all()
 
 
-def test_what_resistive_force_refuses() -> None:
+def test_what_resistive_force_refuses():
     law = ResistiveForce(1.0)
     with pytest.raises(ValueError, match='plane of the wheel'):
         law.steady_state(OperatingPoints(0.2, 20.0, WHEEL, slip_angle=0.1))
@@ -136,7 +134,7 @@ def test_what_resistive_force_refuses() -> None:
     assert lugged.flags[0] == OUTSIDE_VALIDITY
 
 
-def test_laws_agree_where_their_assumptions_do() -> None:
+def test_laws_agree_where_their_assumptions_do():
     points = OperatingPoints(SLIPS, 60.0, WHEEL)
     shift = {'stress_peak_shift': {'c2': 0.32}}
     bekker = contact_law('bekker_wong_janosi', SAND, shift, 0.1).steady_state(points)
@@ -162,7 +160,7 @@ def test_laws_agree_where_their_assumptions_do() -> None:
         contact_law('coulomb', SAND, {}, 0.1)
 
 
-def test_a_learned_law_is_on_top_of_the_stress_laws() -> None:
+def test_a_learned_law_is_on_top_of_the_stress_laws():
     points = OperatingPoints(SLIPS, 60.0, WHEEL)
     learned = {'learned_closure': {'drawbar_pull_by_slip': -0.05}}
     for name in ('bekker_wong_janosi', 'wong_reece'):

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each form of an effect against a contact integrated by hand, written from the equations alone."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -30,13 +28,13 @@ def model(slip: float, name: str, load: float = LOAD, **others) -> np.ndarray:
 
 
 @pytest.mark.parametrize('slip', SLIPS)
-def test_the_default_form_of_shear_deformation_is_a_factor_on_the_modulus(slip: float) -> None:
+def test_the_default_form_of_shear_deformation_is_a_factor_on_the_modulus(slip):
     stiff = Soil(**{**SAND.__dict__, 'shear_modulus': 1.5 * SAND.shear_modulus})
     ours = model(slip, 'shear_deformation', values={'log_factor': math.log(1.5)})
     assert ours == pytest.approx(state(slip, LOAD, soil=stiff).outputs()[0])
 
 
-def test_channel_effects_are_what_they_say() -> None:
+def test_channel_effects_are_what_they_say():
     for slip in SLIPS:
         z, pull, torque = state(slip, LOAD).outputs()[0]
         zero = model(slip, 'pull_zero', values={'offset': 3.0})
@@ -58,7 +56,7 @@ def test_channel_effects_are_what_they_say() -> None:
     assert unknown[2] == pytest.approx(state(0.3, LOAD).torque[0])
 
 
-def test_a_gain_acts_before_a_zero_error_and_after_the_soil() -> None:
+def test_a_gain_acts_before_a_zero_error_and_after_the_soil():
     settings = {
         'sinkage_offset': {'offset': 0.002},
         'sinkage_gain': {'gain': 0.2},
@@ -69,7 +67,7 @@ def test_a_gain_acts_before_a_zero_error_and_after_the_soil() -> None:
     assert read == pytest.approx(1.2 * (z + 0.5 * WHEEL.lug_height) + 0.002)
 
 
-def test_lug_terms() -> None:
+def test_lug_terms():
     z = state(0.5, LOAD).sinkage[0]
     for height, saved in ((0.005, 0.0), (0.010, 0.0015), (0.015, 0.003)):
         wheel = Wheel(WHEEL.radius, WHEEL.width, height, 30)
@@ -80,7 +78,7 @@ def test_lug_terms() -> None:
     assert dug - z == pytest.approx(WHEEL.lug_height * (1.0 - math.exp(-2.0)))
 
 
-def test_bulldozing_after_terzaghi() -> None:
+def test_bulldozing_after_terzaghi():
     """Printed bearing factors of Terzaghi at 30 degrees: Nc 37.2, Nq 22.5, Ng 19.7."""
     phi = math.radians(30.0)
     soil = Soil(**{**SAND.__dict__, 'friction_angle': phi})
@@ -96,7 +94,7 @@ def test_bulldozing_after_terzaghi() -> None:
     assert pull - pushed == pytest.approx(expected, rel=0.03)
 
 
-def test_textbook_grousers_carry_the_whole_surcharge() -> None:
+def test_textbook_grousers_carry_the_whole_surcharge():
     """Rankine: Np = 3.246 at 32 degrees; the two forms differ by q h (Np - (Np - 1) s)."""
     slip = 0.4
     z, pull, torque = state(slip, LOAD).outputs()[0]
@@ -117,7 +115,7 @@ def test_textbook_grousers_carry_the_whole_surcharge() -> None:
         assert ours[2] - torque == pytest.approx(thrust * (WHEEL.radius + h / 2), rel=1e-9)
 
 
-def test_soil_carried_round_balances_volume_and_energy() -> None:
+def test_soil_carried_round_balances_volume_and_energy():
     slip, fill = 0.5, 0.8
     z, pull, torque = state(slip, LOAD).outputs()[0]
     ours = model(slip, 'soil_transport', values={'fill': fill})
@@ -135,7 +133,7 @@ VARIANTS = [form.name for effect in catalogue().values() for form in effect.form
 
 @pytest.mark.parametrize('name', [name for name in VARIANTS if name not in ON_STRESS])
 @pytest.mark.parametrize('slip', [-0.3, 0.4])
-def test_the_filter_s_forces_from_the_sinkage_agree_with_the_model(name: str, slip: float) -> None:
+def test_the_filter_s_forces_from_the_sinkage_agree_with_the_model(name, slip):
     """What stands at the sinkage of the steady state gives its torque and pull."""
     steady = state(slip, 150.0, effects={name: {}}, method='closed_form', angular_velocity=2.0)
     wheel = ConditionedForces(WHEEL, SAND, {name: {}})
@@ -161,7 +159,7 @@ LASTING = (
 )  # fmt: skip
 
 
-def test_a_term_may_change_what_stays_from_call_to_call(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_term_may_change_what_stays_from_call_to_call(monkeypatch):
     """Wheel, soil and motion are those of the call, however often the term has changed them."""
 
     def halve(contact, p) -> None:

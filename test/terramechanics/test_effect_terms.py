@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The catalogue: each effect does what it says, vanishes when neutral, is refused by name."""
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -54,7 +51,7 @@ def outputs(settings: dict, method: str = 'quadrature') -> np.ndarray:
     return state(**ROW, effects=settings, method=method).outputs()
 
 
-def test_all_listed_names_are_there_and_complete() -> None:
+def test_all_listed_names_are_there_and_complete():
     known = catalogue()
     assert set(LISTED) <= set(known)
     for effect in known.values():
@@ -75,7 +72,7 @@ VARIANTS = [
 
 @pytest.mark.parametrize('name', VARIANTS)
 @pytest.mark.parametrize('method', ['quadrature', 'closed_form'])
-def test_neutral_values_change_nothing_and_defaults_what_is_said(name: str, method: str) -> None:
+def test_neutral_values_change_nothing_and_defaults_what_is_said(name, method):
     effect = catalogue()[name]
     off = outputs({}, method)
     assert outputs({name: effect.neutral()}, method) == pytest.approx(off, rel=1e-9, abs=1e-12)
@@ -97,14 +94,14 @@ def test_neutral_values_change_nothing_and_defaults_what_is_said(name: str, meth
 
 
 @pytest.mark.parametrize('name', VARIANTS)
-def test_closed_form_and_quadrature_tell_the_same_change(name: str) -> None:
+def test_closed_form_and_quadrature_tell_the_same_change(name):
     change = [outputs({name: {}}, m) - outputs({}, m) for m in ('quadrature', 'closed_form')]
     for ours, truth, scale in zip(change[1].T, change[0].T, (0.02, 100.0, 10.0), strict=True):
         assert ours == pytest.approx(truth, rel=0.25, abs=0.02 * scale)
 
 
 @pytest.mark.parametrize('name', LISTED)
-def test_a_soil_that_cannot_carry_the_wheel_gives_no_warning_of_numpy(name: str) -> None:
+def test_a_soil_that_cannot_carry_the_wheel_gives_no_warning_of_numpy(name):
     for ratio, exponent, modulus, load in ((-1.0, 1.1, 1e4, 1e3), (-1.5, 0.3, 1e3, 1e4)):
         soil = replace(
             SAND,
@@ -119,7 +116,7 @@ def test_a_soil_that_cannot_carry_the_wheel_gives_no_warning_of_numpy(name: str)
             model.steady_state(points(**{**ROW, 'load': load}))
 
 
-def test_effects_without_their_column_do_nothing() -> None:
+def test_effects_without_their_column_do_nothing():
     base = state(0.3).outputs()
     for name in ('multipass', 'rate_dependence', 'slope_gravity'):
         assert state(0.3, effects={name: {}}).outputs() == pytest.approx(base), name
@@ -140,7 +137,7 @@ def test_effects_without_their_column_do_nothing() -> None:
         ),
     ],
 )
-def test_settings_that_are_refused(settings: dict, words: str) -> None:
+def test_settings_that_are_refused(settings, words):
     with pytest.raises(ValueError, match=words):
         check_settings(settings)
 
@@ -165,7 +162,7 @@ SPRING = Effect(
 """
 
 
-def test_a_user_s_effect_takes_part_everywhere(tmp_path: Path) -> None:
+def test_a_user_s_effect_takes_part_everywhere(tmp_path):
     path = tmp_path / 'own.py'
     path.write_text(OWN)
     load_file(path)
@@ -184,7 +181,7 @@ def test_a_user_s_effect_takes_part_everywhere(tmp_path: Path) -> None:
     assert with_effect == pytest.approx(without - 3.0)
 
 
-def test_registering_refuses_taken_names_and_empty_effects(tmp_path: Path) -> None:
+def test_registering_refuses_taken_names_and_empty_effects(tmp_path):
     with pytest.raises(ValueError, match='cohesion is in the catalogue already'):
         register(catalogue()['cohesion'])
     with pytest.raises(ValueError, match='has no term'):
@@ -207,7 +204,7 @@ def test_registering_refuses_taken_names_and_empty_effects(tmp_path: Path) -> No
         load_file(tmp_path / 'missing.py')
 
 
-def test_no_effect_stands_twice_in_the_catalogue() -> None:
+def test_no_effect_stands_twice_in_the_catalogue():
     """Over sixty rows in which all inputs vary, no two effects change the answers in proportion.
 
     The nearest are the two errors of the sinkage reading (0.96); an effect that was copied under

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Slip ratio and the shear displacement that follows from it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -32,11 +30,11 @@ from wheel_terra_estimator.terramechanics.kinematics import (
         (-0.001, 0.10, 1.0),
     ],
 )
-def test_slip_ratio_of_driving_and_braking(speed: float, rim: float, slip: float) -> None:
+def test_slip_ratio_of_driving_and_braking(speed, rim, slip):
     assert slip_ratio(speed, rim) == pytest.approx(slip)
 
 
-def test_slip_is_not_known_at_rest_and_always_in_range() -> None:
+def test_slip_is_not_known_at_rest_and_always_in_range():
     assert np.isnan(slip_ratio(0.001, -0.001))
     speeds = np.linspace(-0.3, 0.3, 61)
     grid = slip_ratio(speeds[:, None], speeds[None, :])
@@ -44,7 +42,7 @@ def test_slip_is_not_known_at_rest_and_always_in_range() -> None:
     assert known.min() >= -1.0 and known.max() <= 1.0
 
 
-def test_speed_ratio_is_the_inverse() -> None:
+def test_speed_ratio_is_the_inverse():
     slip = np.linspace(-0.99, 1.0, 50)
     assert slip_of_speed_ratio(speed_ratio(slip)) == pytest.approx(slip)
     # Opposed, standing, driving, rolling, braking.
@@ -52,7 +50,7 @@ def test_speed_ratio_is_the_inverse() -> None:
     assert found == pytest.approx([1.0, 1.0, 0.7, 0.0, -0.6])
 
 
-def test_shear_displacement_starts_at_zero_and_has_its_slope() -> None:
+def test_shear_displacement_starts_at_zero_and_has_its_slope():
     assert shear_displacement(0.5, 0.5, 0.16, 0.1) == 0.0
     # d j/dt = -(R - (v/w) cos t), from the rim's speed against the soil.
     t, step = 0.2, 1e-6

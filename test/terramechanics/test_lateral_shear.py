@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A wheel that slides sideways: against integrals of its own, symmetry, limits, closed form."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import fields, replace
 
@@ -68,7 +66,7 @@ def second_model(slip: float, beta: float, load: float, ks: float) -> tuple[floa
 
 
 @pytest.mark.parametrize(('slip', 'beta'), [(0.3, 0.1), (-0.4, 0.5), (0.0, 0.8), (0.8, 1.4)])
-def test_agrees_with_integrals_of_its_own(slip: float, beta: float) -> None:
+def test_agrees_with_integrals_of_its_own(slip, beta):
     truth = second_model(slip, beta, 80.0, 0.8)
     ours = state([slip], slip_angle=beta, effects=FLANK)
     found = (*ours.outputs()[0], ours.lateral_force[0])
@@ -76,7 +74,7 @@ def test_agrees_with_integrals_of_its_own(slip: float, beta: float) -> None:
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_no_slip_angle_changes_no_digit(method: str) -> None:
+def test_no_slip_angle_changes_no_digit(method):
     slip = np.linspace(-0.9, 0.9, 13)
     plain = state(slip, effects={**EFFECTS, **FLANK}, method=method)
     told = state(slip, effects={**EFFECTS, **FLANK}, method=method, slip_angle=0.0)
@@ -93,7 +91,7 @@ def test_no_slip_angle_changes_no_digit(method: str) -> None:
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_left_mirrors_right(method: str) -> None:
+def test_left_mirrors_right(method):
     slip = np.tile(np.linspace(-0.8, 0.9, 9), 2)
     angle = np.repeat([0.2, 1.3], 9)
     effects = {**EFFECTS, **FLANK}
@@ -104,7 +102,7 @@ def test_left_mirrors_right(method: str) -> None:
     assert (left.lateral_force < 0.0).all()
 
 
-def test_reverse_slides_to_the_same_side() -> None:
+def test_reverse_slides_to_the_same_side():
     forward = state([0.3], slip_angle=0.4, angular_velocity=1.0)
     backward = state([0.3], slip_angle=math.pi - 0.4, angular_velocity=-1.0)
     assert backward.drawbar_pull == pytest.approx(-forward.drawbar_pull)
@@ -112,7 +110,7 @@ def test_reverse_slides_to_the_same_side() -> None:
 
 
 @pytest.mark.parametrize('method', ['quadrature', 'closed_form'])
-def test_at_90_degrees_the_two_speeds_decide(method: str) -> None:
+def test_at_90_degrees_the_two_speeds_decide(method):
     # Spinning on the spot while pushed aside: j turns nowhere, so Fy/(T/r) is v_y over r w.
     for ratio in (0.05, 0.5, 3.0):
         there = state([1.0], slip_angle=math.pi / 2, lateral_speed_ratio=ratio, method=method)
@@ -128,7 +126,7 @@ def test_at_90_degrees_the_two_speeds_decide(method: str) -> None:
     assert np.isfinite(locked.outputs()).all()
 
 
-def test_closed_form_keeps_to_the_quadrature_sideways() -> None:
+def test_closed_form_keeps_to_the_quadrature_sideways():
     drawn = np.random.default_rng(4)
     errors = []
     for soil, effects, row in random_cases(120, 4):
@@ -150,7 +148,7 @@ def test_closed_form_keeps_to_the_quadrature_sideways() -> None:
     assert off.max() < 0.03
 
 
-def test_flank_needs_sideways_motion_and_grows_with_sinkage() -> None:
+def test_flank_needs_sideways_motion_and_grows_with_sinkage():
     def flank(load: float, angle: float) -> float:
         row = points([0.2], load, slip_angle=angle)
         on, off = (WheelSoilModel(SAND, e).steady_state(row) for e in (FLANK, {}))
@@ -162,7 +160,7 @@ def test_flank_needs_sideways_motion_and_grows_with_sinkage() -> None:
     assert flank(200.0, 0.5) > 2.5 * flank(80.0, 0.5)  # faster than the load
 
 
-def test_sliding_sideways_digs_in_as_slip_does() -> None:
+def test_sliding_sideways_digs_in_as_slip_does():
     exponent = {'slip_sinkage_exponent': {'n1': 0.3}}
     depth = state(np.zeros(4), slip_angle=[0.0, 0.3, 0.8, 1.3], effects=exponent).sinkage
     assert (np.diff(depth) > 0.0).all()
@@ -184,7 +182,7 @@ def plate_state(slip: float, beta: float, load: float, **points_of: float):
 
 
 @pytest.mark.parametrize('beta', [0.05, 0.6, 1.2])
-def test_flank_as_a_plate_agrees_with_an_integral_of_its_own(beta: float) -> None:
+def test_flank_as_a_plate_agrees_with_an_integral_of_its_own(beta):
     slip, load = 0.2, 200.0
     push, rub, on, off = plate_state(slip, beta, load)
     r, phi = WHEEL.radius, SAND.friction_angle
@@ -208,7 +206,7 @@ def test_flank_as_a_plate_agrees_with_an_integral_of_its_own(beta: float) -> Non
     assert float(on.torque[0] - off.torque[0]) == pytest.approx(2.0 / 3.0 * r * rub)
 
 
-def test_a_wheel_pushed_straight_aside_is_a_plate() -> None:
+def test_a_wheel_pushed_straight_aside_is_a_plate():
     aside = {'beta': math.pi / 2, 'load': 80.0}
     push, rub, _, _ = plate_state(1.0, **aside, lateral_speed_ratio=0.02)
     # Spinning fast, all friction of the flank drives the wheel on; hardly turning, none does.

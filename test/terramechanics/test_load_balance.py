@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The angle at which the soil carries a load, against laws with a known inverse."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -20,7 +18,7 @@ from wheel_terra_estimator.terramechanics.soil import PRESSURE_LAWS
 
 
 @pytest.mark.parametrize('load', [1e-6, 1.0, 1e6])
-def test_a_load_is_met_to_a_share_of_itself(load: float) -> None:
+def test_a_load_is_met_to_a_share_of_itself(load):
     """However light: the force is a power of the angle, 0.3 rad at the load."""
     angle, carries = solve_entrance_angle(
         lambda t: load * (t / 0.3) ** 2.2, np.array([load]), np.array([0.5])
@@ -29,7 +27,7 @@ def test_a_load_is_met_to_a_share_of_itself(load: float) -> None:
     assert angle == pytest.approx(0.3, rel=1e-9)
 
 
-def test_what_three_angles_do_not_settle_goes_to_the_bracketed_solver() -> None:
+def test_what_three_angles_do_not_settle_goes_to_the_bracketed_solver():
     """A force that is no power of the angle: W = exp(20 t) - 1, so that t = ln(1 + W) / 20."""
 
     def form(count: int) -> Any:
@@ -53,9 +51,7 @@ def test_what_three_angles_do_not_settle_goes_to_the_bracketed_solver() -> None:
 
 
 @pytest.mark.parametrize('law', PRESSURE_LAWS)
-def test_the_first_guess_is_near_in_either_pressure_law(
-    law: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_first_guess_is_near_in_either_pressure_law(law, monkeypatch):
     guesses: list[Any] = []
 
     def watched(contact: Any) -> Any:
@@ -74,7 +70,7 @@ def test_the_first_guess_is_near_in_either_pressure_law(
     np.testing.assert_allclose(guesses[0], found.entrance_angle, rtol=0.4)
 
 
-def test_a_derivative_within_the_range_is_taken_to_both_sides() -> None:
+def test_a_derivative_within_the_range_is_taken_to_both_sides():
     soil = {'cohesion': 250.0, 'shear_modulus': 0.0114, 'sinkage_exponent': 1.1}
     names = [f'soil.{name}' for name in soil]
     batch = model_module._Batch(soil, {}, points(np.array([0.2]), 80.0), names)
@@ -85,7 +81,7 @@ def test_a_derivative_within_the_range_is_taken_to_both_sides() -> None:
         assert batch.steps[index] == pytest.approx(raised - lowered)
 
 
-def test_soil_without_weight_does_not_bulldoze() -> None:
+def test_soil_without_weight_does_not_bulldoze():
     light = replace(SAND, density=0.0, cohesion=0.0)
     plain, pushed = (
         state(0.3, soil=light, effects=effects) for effects in (None, {'bulldozing': {'kb': 1.0}})

@@ -2,10 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Published measurements: what the validation page claims, held to its targets."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 import yaml
@@ -26,7 +22,7 @@ from wheel_terra_lab.studies.model_validation.fitting import Misfit, deviations,
 pytestmark = pytest.mark.shared
 
 
-def test_hit_lugged_wheel_from_the_smooth_one(shared: Path) -> None:
+def test_hit_lugged_wheel_from_the_smooth_one(shared):
     table = shared.parent / 'reference' / 'measured_single_wheel.csv'
     smooth = hit_wheels.read(table, 'HIT_Wh34_smooth')
     lugged = hit_wheels.read(table, 'HIT_Wh32_lug10')
@@ -39,7 +35,7 @@ def test_hit_lugged_wheel_from_the_smooth_one(shared: Path) -> None:
     assert misfit.sinkage_rms < 0.0015
 
 
-def test_plates_predict_the_rolling_cmu_wheel(shared: Path) -> None:
+def test_plates_predict_the_rolling_cmu_wheel(shared):
     folder = shared / 'cmu_single_wheel'
     soil, rms, _ = cmu_wheel.plates(folder / 'pressure_sinkage.csv')
     assert rms < 0.15
@@ -51,7 +47,7 @@ def test_plates_predict_the_rolling_cmu_wheel(shared: Path) -> None:
 @pytest.mark.parametrize(
     ('name', 'case'), [('cmu_sand_fit', shipped_soils.cmu_sand), ('grc3_fit', shipped_soils.grc3)]
 )
-def test_shipped_soil_is_its_fit_and_states_its_deviations(name, case, shared: Path) -> None:
+def test_shipped_soil_is_its_fit_and_states_its_deviations(name, case, shared):
     model, data, sigma, free = case(shared.parent)
     fitted, values = fit(model, data, sigma, free)
     std = deviations(fitted, data, sigma, free)
@@ -68,7 +64,7 @@ def test_shipped_soil_is_its_fit_and_states_its_deviations(name, case, shared: P
         assert place[f'{last}_std{ending}'] == pytest.approx(unit * std[key], rel=0.2)
 
 
-def test_shipped_cmu_sand_agrees_with_its_own_rows(shared: Path, tmp_path: Path) -> None:
+def test_shipped_cmu_sand_agrees_with_its_own_rows(shared, tmp_path):
     case = cmu_fitted(shared.parent)
     diagnosis = diagnose(case.table, case.configuration)
     assert diagnosis.verdict == 'agrees'
@@ -79,7 +75,7 @@ def test_shipped_cmu_sand_agrees_with_its_own_rows(shared: Path, tmp_path: Path)
     assert diagnose(case.table, written).verdict == 'agrees'
 
 
-def test_mound_predicts_the_rows_it_did_not_see_on_grc3(shared: Path) -> None:
+def test_mound_predicts_the_rows_it_did_not_see_on_grc3(shared):
     slip, measured = grc3_wheel.read(shared.parent)
     even = np.arange(slip.size) % 2 == 0
     data = [(grc3_wheel.points_at(slip[even]), measured[even])]

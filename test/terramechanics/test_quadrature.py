@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The reference model against a second model, limit cases, symmetry and scaling."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -21,7 +19,7 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 
 @pytest.mark.parametrize('slip', [-0.6, -0.05, 0.0, 0.05, 0.3, 0.6, 0.9])
-def test_agrees_with_a_second_model(slip: float) -> None:
+def test_agrees_with_a_second_model(slip):
     effects = {
         'slip_sinkage_exponent': {'n1': 0.3},
         'stress_peak_shift': {'c2': 0.15},
@@ -32,7 +30,7 @@ def test_agrees_with_a_second_model(slip: float) -> None:
     assert ours == pytest.approx(truth, rel=3e-4, abs=1e-5)
 
 
-def test_error_of_the_nodes_is_below_a_thousandth() -> None:
+def test_error_of_the_nodes_is_below_a_thousandth():
     for soil, effects, row in random_cases(40, 3):
         coarse = WheelSoilModel(soil, effects).steady_state(row)
         fine = WheelSoilModel(soil, effects, nodes=40).steady_state(row)
@@ -42,7 +40,7 @@ def test_error_of_the_nodes_is_below_a_thousandth() -> None:
         )
 
 
-def test_frictionless_soil_gives_minus_the_compaction_resistance() -> None:
+def test_frictionless_soil_gives_minus_the_compaction_resistance():
     # c1 = c3 = 0: stress at the bottom only rises towards it, and pull is the work of the rut.
     soil = replace(
         SAND, cohesion=0.0, friction_angle=0.0, peak_stress_ratio=0.0, leaving_angle_ratio=0.0
@@ -55,7 +53,7 @@ def test_frictionless_soil_gives_minus_the_compaction_resistance() -> None:
     assert answer.drawbar_pull == pytest.approx(-resistance, rel=2e-3)
 
 
-def test_forces_scale_with_size() -> None:
+def test_forces_scale_with_size():
     # All lengths times 2 at the same pressures: forces times 4, torque times 8.
     big = replace(
         SAND,
@@ -72,7 +70,7 @@ def test_forces_scale_with_size() -> None:
     assert b.torque == pytest.approx(8 * a.torque, rel=1e-8, abs=1e-8)
 
 
-def test_reverse_mirrors_pull_and_torque() -> None:
+def test_reverse_mirrors_pull_and_torque():
     forward = state([0.3, -0.2], effects={'bulldozing': {}, 'drivetrain_friction': {}},
                     angular_velocity=1.0)  # fmt: skip
     back = state([0.3, -0.2], effects={'bulldozing': {}, 'drivetrain_friction': {}},
@@ -82,7 +80,7 @@ def test_reverse_mirrors_pull_and_torque() -> None:
     assert back.torque == pytest.approx(-forward.torque)
 
 
-def test_seed_1_s_printed_shear_is_the_shear_slip_radius() -> None:
+def test_seed_1_s_printed_shear_is_the_shear_slip_radius():
     # With R = r + h/2 and slip referred to R, v/w = (1 - s) R: equation 14 as printed.
     effects = {'lug_shear_radius': {'lam': 0.5}}
     printed = state([0.2], effects=effects, slip_radius='shear')
@@ -91,7 +89,7 @@ def test_seed_1_s_printed_shear_is_the_shear_slip_radius() -> None:
     assert printed.outputs() == pytest.approx(contract.outputs(), rel=1e-9)
 
 
-def test_reece_law_equals_bekker_s_at_one_width_and_gravity() -> None:
+def test_reece_law_equals_bekker_s_at_one_width_and_gravity():
     # (c kc' + rho g b kphi') (z/b)^n = k z^n with k = (...) b^-n.
     reece = replace(SAND, pressure_law='reece', cohesive_modulus=30.0, frictional_modulus=600.0)
     b = WHEEL.width
@@ -105,7 +103,7 @@ def test_reece_law_equals_bekker_s_at_one_width_and_gravity() -> None:
 
 
 @pytest.mark.parametrize('method', ['quadrature', 'closed_form'])
-def test_jacobian_against_central_differences(method: str) -> None:
+def test_jacobian_against_central_differences(method):
     effects = {**EFFECTS, 'soil_mound': {'kappa': 1.0, 'onset': 0.3}, 'bulldozing': {'kb': 0.3}}
     row = points(np.array([-0.3, 0.1, 0.5, 0.8]), np.array([40.0, 80.0, 80.0, 120.0]))
     model = WheelSoilModel(SAND, effects, method)
@@ -141,7 +139,7 @@ def test_jacobian_against_central_differences(method: str) -> None:
         ), name
 
 
-def test_jacobian_by_slip_and_load_and_of_effects_that_are_off() -> None:
+def test_jacobian_by_slip_and_load_and_of_effects_that_are_off():
     row = points(np.array([0.2, 0.6]))
     model = WheelSoilModel(SAND)
     _, jacobian = model.jacobian(row, ['slip', 'normal_load', 'effects.lug_digging.kd'])
@@ -157,7 +155,7 @@ def test_jacobian_by_slip_and_load_and_of_effects_that_are_off() -> None:
         model.jacobian(row, ['effects.no_such.kd'])
 
 
-def test_load_that_the_soil_cannot_carry() -> None:
+def test_load_that_the_soil_cannot_carry():
     with pytest.raises(ValueError, match=r'normal load is 1e\+06 N .* carries at most'):
         state([0.1], 1e6)
     clamped = WheelSoilModel(SAND, strict=False).steady_state(points([0.1, 0.97], [1e6, 80.0]))
@@ -166,7 +164,7 @@ def test_load_that_the_soil_cannot_carry() -> None:
     assert clamped.sinkage[0] == pytest.approx(WHEEL.radius)
 
 
-def test_measured_leaving_angle_overrides_the_law() -> None:
+def test_measured_leaving_angle_overrides_the_law():
     answer = state([0.8, 0.8], effects={'soil_mound': {}}, leaving_angle=[math.nan, -0.35])
     assert answer.leaving_angle[1] == pytest.approx(-0.35)
     assert answer.leaving_angle[0] != pytest.approx(-0.35)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A skidding wheel digs in; an effect has several forms, of which settings choose one."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -30,7 +28,7 @@ FRICTIONLESS = Soil(0.0, 1.2e6, 0.9, 0.0, 0.0, 0.01, 0.3, 0.0)
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_a_wheel_without_shear_sinks_by_slip_and_skid_alike(method: str) -> None:
+def test_a_wheel_without_shear_sinks_by_slip_and_skid_alike(method):
     """Without friction and cohesion motion acts through |s| alone, so the sinkage is even in s."""
     model = WheelSoilModel(FRICTIONLESS, {SKID: {'n1': 0.5}}, method)
     z = model.steady_state(points([-0.6, 0.6, 0.0])).sinkage
@@ -40,7 +38,7 @@ def test_a_wheel_without_shear_sinks_by_slip_and_skid_alike(method: str) -> None
 
 
 @pytest.mark.parametrize('rover', ['hit_wh3_lug10'])
-def test_shipped_wheel_digs_in_while_it_skids(rover: str) -> None:
+def test_shipped_wheel_digs_in_while_it_skids(rover):
     configuration = reader.load([f'rovers/{rover}', 'soils/hit_fit'], [])
     wheels = configuration.wheels.wheel
     wheel = Wheel(wheels.radius[0], wheels.width[0], wheels.lug_height[0], wheels.lug_count[0])
@@ -50,7 +48,7 @@ def test_shipped_wheel_digs_in_while_it_skids(rover: str) -> None:
         assert z[0] > z[1] > z[2], method
 
 
-def test_skid_has_a_coefficient_of_its_own() -> None:
+def test_skid_has_a_coefficient_of_its_own():
     settings = {SKID: {'n1': 0.4, 'n2': -0.1}}
     skid = state(-0.4, effects=settings)
     same = WheelSoilModel(
@@ -62,7 +60,7 @@ def test_skid_has_a_coefficient_of_its_own() -> None:
     )
 
 
-def test_lyasko_multiplies_the_sinkage_at_rest() -> None:
+def test_lyasko_multiplies_the_sinkage_at_rest():
     """Small angles, no shear: z(s)/z(0) = (1 + s)/(1 - s/2), the printed law."""
     stiff = Soil(0.0, 4e8, 0.9, 0.0, 0.0, 0.01, 0.3, 0.0)
     model = WheelSoilModel(stiff, {SKID: {'form': 'lyasko', 'gain': 1.0}})
@@ -72,7 +70,7 @@ def test_lyasko_multiplies_the_sinkage_at_rest() -> None:
     assert z / z[0] == pytest.approx((1.0 + s) / (1.0 - 0.5 * s), rel=2e-3)
 
 
-def test_exponent_that_grows_with_pressure_is_the_soil_s_at_three_kilopascal() -> None:
+def test_exponent_that_grows_with_pressure_is_the_soil_s_at_three_kilopascal():
     load = np.array([3000.0, 6000.0]) * WHEEL.width * WHEEL.radius
     settings = {SKID: {'form': 'load', 'nw': 0.2, 'n1': 0.0}}
     z = state(0.2, load, effects=settings).sinkage
@@ -87,7 +85,7 @@ def test_exponent_that_grows_with_pressure_is_the_soil_s_at_three_kilopascal() -
 # The mechanism ---------------------------------------------------------------------------------
 
 
-def test_forms_are_effects_of_one_form_under_keys_of_their_own() -> None:
+def test_forms_are_effects_of_one_form_under_keys_of_their_own():
     effect = catalogue()[SKID]
     names = [form.name for form in effect.forms]
     assert names == [SKID, f'{SKID}:lyasko', f'{SKID}:load']
@@ -112,12 +110,12 @@ def test_forms_are_effects_of_one_form_under_keys_of_their_own() -> None:
         ),
     ],
 )
-def test_settings_of_a_wrong_form_are_refused(settings: dict, words: str) -> None:
+def test_settings_of_a_wrong_form_are_refused(settings, words):
     with pytest.raises(ValueError, match=words):
         check_settings(settings)
 
 
-def test_two_forms_stand_side_by_side_in_one_model() -> None:
+def test_two_forms_stand_side_by_side_in_one_model():
     """What a search over forms needs: the one at its neutral value leaves the other alone."""
     both = state(0.4, effects={SKID: {'n1': 0.3}, f'{SKID}:lyasko': {'gain': 0.0}})
     assert both.outputs() == pytest.approx(state(0.4, effects={SKID: {'n1': 0.3}}).outputs())
@@ -127,7 +125,7 @@ def test_two_forms_stand_side_by_side_in_one_model() -> None:
     assert rates[..., 0] == pytest.approx(change, rel=1e-3)
 
 
-def test_the_order_of_settings_does_not_matter() -> None:
+def test_the_order_of_settings_does_not_matter():
     """A misread slip is put right before any law of the soil sees it."""
     settings = {SKID: {'n1': 0.4}, 'wheel_radius_bias': {'bias': 0.1}, 'stress_peak_shift': {}}
     turned = dict(reversed(settings.items()))
@@ -142,7 +140,7 @@ def test_the_order_of_settings_does_not_matter() -> None:
     )
 
 
-def test_a_shared_parameter_means_the_same_in_every_form() -> None:
+def test_a_shared_parameter_means_the_same_in_every_form():
     def term(contact, p):
         contact.torque = contact.torque + p.a
 
@@ -155,7 +153,7 @@ def test_a_shared_parameter_means_the_same_in_every_form() -> None:
         )  # fmt: skip
 
 
-def test_the_filter_s_forces_know_the_forms() -> None:
+def test_the_filter_s_forces_know_the_forms():
     inputs = ConditionedInputs(0.7, 0.01, 80.0, 250.0, 0.6, 0.01)
     _, plain = ConditionedForces(WHEEL, SAND).forces(inputs)
     # With the sinkage given, the bearing law sets no force: the exponent does, a factor on it not.
@@ -174,7 +172,7 @@ def configured(*keys: str) -> dict:
     return reader.load(['hit_wh3'], [ON, *(f'effects.{SKID}.{key}' for key in keys)]).effects
 
 
-def test_the_form_is_a_key_of_the_configuration() -> None:
+def test_the_form_is_a_key_of_the_configuration():
     assert configured('n1:=0.4')[SKID] == {'n1': 0.4, 'n2': 0.0, 'side': 0.0}
     settings = configured('form:=lyasko', 'gain:=0.7')
     assert settings[SKID] == {'form': 'lyasko', 'gain': 0.7}
@@ -190,6 +188,6 @@ def test_the_form_is_a_key_of_the_configuration() -> None:
         (['gain:=0.7'], f"the form 'linear' has no such parameter; state effects.{SKID}.form: lya"),
     ],
 )
-def test_keys_of_another_form_are_refused(keys: list[str], words: str) -> None:
+def test_keys_of_another_form_are_refused(keys, words):
     with pytest.raises(UserError, match=words):
         configured(*keys)

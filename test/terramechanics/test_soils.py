@@ -2,10 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shipped soils: each loads, says where every value comes from, and carries a rover wheel."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from terra_tools import WHEEL, points
 
@@ -16,12 +12,12 @@ from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 FILES = sorted((configuration_folder() / 'soils').glob('*.yaml'))
 
 
-def test_there_are_soils() -> None:
+def test_there_are_soils():
     assert len(FILES) >= 25
 
 
 @pytest.mark.parametrize('path', FILES, ids=lambda p: p.stem)
-def test_soil_file(path: Path) -> None:
+def test_soil_file(path):
     text = path.read_text(encoding='utf-8').splitlines()
     values = [line for line in text if ':' in line and not line.lstrip().startswith('#')]
     bare = [

@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """README's table of the estimator: figures by hand, intervals over soils, written in its place."""
 
-from __future__ import annotations
-
 import csv
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -41,7 +38,7 @@ def rows() -> list[dict[str, Any]]:
     ]
 
 
-def test_figures_are_those_by_hand() -> None:
+def test_figures_are_those_by_hand():
     found = readme_figures.table(rows())
     # sqrt((0.1^2 + 0.1^2 + 0.4^2) / 3); soils drawn anew are all of 0.1, or all of 0.4, at the ends
     assert found['with one: slip, rms error'][0] == '0.245 (0.100 to 0.400)'
@@ -53,7 +50,7 @@ def test_figures_are_those_by_hand() -> None:
     assert warned[0] == '1 of 3; 6 in 1.5 h'
 
 
-def test_each_kind_on_half_of_the_soils_and_an_entrapment_of_each_simulator_on_each() -> None:
+def test_each_kind_on_half_of_the_soils_and_an_entrapment_of_each_simulator_on_each():
     driven = readme_figures.drives(7800, 10)
     counts = Counter((simulator, kind) for simulator, kind, _ in driven)
     assert set(counts.values()) == {5} and len(driven) == len(set(driven))
@@ -64,7 +61,7 @@ def test_each_kind_on_half_of_the_soils_and_an_entrapment_of_each_simulator_on_e
         assert set(trapped) == set(range(7800, 7810))
 
 
-def test_rows_of_two_commits_are_refused() -> None:
+def test_rows_of_two_commits_are_refused():
     from wheel_terra_estimator.errors import UserError
 
     mixed = rows()
@@ -73,7 +70,7 @@ def test_rows_of_two_commits_are_refused() -> None:
         readme_figures.write(mixed)
 
 
-def test_written_in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_written_in_its_place(tmp_path, monkeypatch):
     for name in ('README', 'WORTH', 'FIGURES'):
         source = getattr(readme_figures, name)
         copy = tmp_path / source.name
@@ -94,7 +91,7 @@ def test_written_in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.skipif(not readme_figures.RESULTS.is_file(), reason='the study was not run yet')
-def test_the_pages_show_the_committed_results() -> None:
+def test_the_pages_show_the_committed_results():
     with readme_figures.RESULTS.open(encoding='utf-8', newline='') as stream:
         found = list(csv.DictReader(stream))
     assert readme_figures.markdown(found) in readme_figures.README.read_text(encoding='utf-8')

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulator C against physics that does not come from it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``wheel-terra reproduce``: pages from installed code and shipped data, verdicts that can fail."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two implementations of the same physics: the campaigns' quadrature and the package's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

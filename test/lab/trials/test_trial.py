@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A trial that anyone can run: hidden by another quadrature, sealed, diagnosed blind, opened."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json
