@@ -13,7 +13,7 @@ from wheel_terra_estimator.estimation.filter.initial_state import (
     bounds,
     layout_of,
 )
-from wheel_terra_estimator.estimation.filter.state import SHEAR_MODULUS
+from wheel_terra_estimator.estimation.filter.state import SHEAR_MODULUS, SLIP_SINKAGE
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
@@ -34,6 +34,7 @@ TEN_LINES = {
     'sensors.sinkage_std': 0.002,
     'sensors.torque_std': 0.1,
 }
+EFFECT = 'effects.slip_sinkage_exponent'
 SLIP = 0.01  # of a wheel that rolls on hard ground
 SPEED = 0.17  # [m/s]
 
@@ -85,6 +86,17 @@ def test_hard_ground_may_be_stiffer_than_any_soil_but_no_ground_gives_way_by_dec
     )
     assert low < 0.001
     assert 0.036 < high < 0.05
+
+
+@pytest.mark.parametrize('n1', [None, 0.4])
+def test_no_soil_lifts_a_wheel_that_slips(n1):
+    """Every slip-sinkage law (Ding 2010, Lyasko 2010) has more sinkage at more slip."""
+    stated = {} if n1 is None else {f'{EFFECT}.enabled': True, f'{EFFECT}.n1': n1}
+    configuration = reader.from_parameters({**TEN_LINES, **stated})
+    rover = Rover.from_configuration(configuration)
+    layout = layout_of(rover, SensorFigures.from_configuration(configuration))
+    least, _ = bounds(rover, layout, SoilPriors.from_configuration(configuration))
+    assert (n1 or 0.0) + least[SLIP_SINKAGE] == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize('scale', [0.3, 3.0])

@@ -30,6 +30,7 @@ from wheel_terra_estimator.estimation.filter.state import (
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 FloatArray = NDArray[np.float64]
+_BY_SLIP = 'slip_sinkage_exponent'
 
 
 @dataclass(frozen=True)
@@ -86,13 +87,14 @@ class PriorTuning:
 
 @dataclass(frozen=True)
 class SoilPriors:
-    """Prior standard deviations of the soil [ln], and of the errors of the shear model."""
+    """Prior standard deviations of the soil [ln], and of the errors of the shear model; n1."""
 
     strength_std: float
     shear_modulus_std: float
     stiffness_std: float
     shear_error_std: float  # of each wheel
     shear_error_common_std: float
+    slip_sinkage: float  # n1 as configured [-]
 
     @classmethod
     def from_configuration(
@@ -109,6 +111,7 @@ class SoilPriors:
                 float(figures.shear_error_std), float(configuration.sensors.torque_gain_std)
             ),
             shear_error_common_std=float(figures.shear_error_common_std),
+            slip_sinkage=float(configuration.effects.get(_BY_SLIP, {}).get('n1', 0.0)),
         )
 
     def shear_error_covariance(self, wheel_count: int) -> FloatArray:
@@ -214,7 +217,7 @@ def initial_filter(
 
 
 def bounds(
-    rover: Rover, layout: StateLayout, priors: SoilPriors, tuning: PriorTuning
+    rover: Rover, layout: StateLayout, priors: SoilPriors, tuning: PriorTuning = PriorTuning()
 ) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds of the state, (size,) each."""
     upper = np.zeros(layout.size)
@@ -233,6 +236,8 @@ def bounds(
         upper[layout.reference_error] = tuning.most_speed
     lower = -upper
     lower[[SLIP_PER_DEMAND, RUT_SHARE]] = 0.0
+    # Slip makes a wheel sink, never rise: else wheels that leave soft ground tell of slip.
+    lower[SLIP_SINKAGE] = -max(priors.slip_sinkage, 0.0)
     # Ground may be harder than any soil. K of decimetres is none: it makes every slope a trap.
     lower[SHEAR_MODULUS] = -max(tuning.most_shear_modulus, most * priors.shear_modulus_std)
     upper[layout.sinkage] = rover.rim_radius
