@@ -81,7 +81,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
             std = min(before.std + self._tuning.forgetting, 1.0)
             return before._replace(std=std, resting=False, judged=False)
         rest = self._rover.rest_speed
-        if body.stopped and abs(body.speed) < rest:
+        if body.stopped and abs(body.speed) < rest and abs(rim) < rest:
             # All wheels stand: what the gyro says beside them is noise.
             v, v_std = 0.0, 0.0
         else:
