@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias
@@ -25,7 +26,6 @@ from wheel_terra_estimator.errors import UserError
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-_Test: TypeAlias = Callable[[FloatArray], Mask]
 _Refuse: TypeAlias = Callable[[Mask, str, str], None]
 
 MINIMUM_ROWS = 6
@@ -36,6 +36,7 @@ FLIPPED = 0.5  # a sign is wrong where the other one halves the misfit of the wh
 CLEAR_SLIP = 0.2  # beyond it a wheel's torque has the sign of its slip
 _TIMES_LOAD = {'three': 3.0, 'five': 5.0}  # a sunken flank gives more than a thrust
 _NO_FORCE = 2e-3  # share of the load
+_NO_LOAD = 0.5  # [N]: no wheel of a test bears less
 CLEAR_SLIP_ANGLE = 0.1  # beyond it the lateral force has the sign against it [rad]
 LIKE_WHEEL = 1.4  # factor within which a row's wheel may differ from that of the model file
 
@@ -108,35 +109,6 @@ def _columns(arrays: Mapping[str, FloatArray], names: Sequence[str], count: int)
     return np.column_stack([arrays.get(name, np.full(count, np.nan)) for name in names])
 
 
-def _above(limit: float) -> _Test:
-    return lambda values: values > limit
-
-
-def _below(limit: float) -> _Test:
-    return lambda values: values < limit
-
-
-def _beyond(limit: float) -> _Test:
-    """Above a limit in either direction."""
-    return lambda values: np.abs(values) > limit
-
-
-def _outside(least: float, most: float) -> _Test:
-    return lambda values: (values < least) | (values > most)
-
-
-def _negative(values: FloatArray) -> Mask:
-    return values < 0.0
-
-
-def _not_positive(values: FloatArray) -> Mask:
-    return values <= 0.0
-
-
-def _all_below(limit: float) -> _Test:
-    return lambda values: np.full(values.shape, values.max() < limit)
-
-
 _PERCENT = 'looks like percent; divide the column by 100'
 _KILONEWTON = 'looks like kN; multiply the column by 1000'
 _DEGREES = 'looks like degrees; multiply the column by pi/180'
@@ -145,32 +117,33 @@ _NO_LENGTH = 'is not a positive length in m'
 _NO_DEVIATION = 'is not positive, or next to nothing; leave it empty where the deviation is unknown'
 _LEAST_DEVIATION = 1e-12  # [m], [N], [N m] or [rad]: below all that is measured
 
-_RANGES: tuple[tuple[str, _Test, str], ...] = (
-    ('slip', _beyond(1.5), _PERCENT),
-    ('slip', _beyond(1.0), 'is outside -1..1; check how the slip ratio was computed'),
-    ('normal_load', _not_positive, 'is not positive; state the load in N'),
-    ('normal_load', _above(1e7), 'is more than any wheel bears; state the load in N'),
-    ('normal_load', _all_below(0.5), _KILONEWTON),
-    ('slope', _beyond(0.9), _DEGREES),
-    ('slip_angle', _beyond(3.15), _DEGREES),
-    ('leaving_angle', _beyond(1.7), _DEGREES),
-    ('wheel_radius', _above(5.0), _MILLIMETRES),
-    ('wheel_radius', _not_positive, _NO_LENGTH),
-    ('wheel_width', _above(5.0), _MILLIMETRES),
-    ('wheel_width', _not_positive, _NO_LENGTH),
-    ('lug_height', _above(0.5), _MILLIMETRES),
-    ('lug_height', _negative, _NO_LENGTH),
-    ('lug_count', _outside(0.0, 1000.0), 'is outside 0..1000'),
-    ('gravity', _outside(1e-3, 100.0), 'is outside 0.001..100'),
-    ('pass_number', _outside(1.0, 1000.0), 'is outside 1..1000'),
-    ('angular_velocity', _beyond(60.0), 'looks like degrees per second; give rad/s'),
-    ('sinkage', _beyond(1.0), 'looks like millimetres (or centimetres); give it in m'),
-    *((f'{name}_std', _below(_LEAST_DEVIATION), _NO_DEVIATION) for name in QUANTITIES),
-    ('slip_std', _negative, _NO_DEVIATION),
-    ('slip_std', _above(0.5), 'is over 0.5; it looks like percent'),
-    ('leaving_angle_std', _below(_LEAST_DEVIATION), _NO_DEVIATION),
+_MOST = math.inf
+_LEAST = 5e-324  # above nought
+# Columns, in SI: the least and the greatest value that can be, and what one beyond looks like.
+_RANGES: tuple[tuple[str, float, float, str], ...] = (
+    ('slip', -1.5, 1.5, _PERCENT),
+    ('slip', -1.0, 1.0, 'is outside -1..1; check how the slip ratio was computed'),
+    ('normal_load', _LEAST, _MOST, 'is not positive; state the load in N'),
+    ('normal_load', _LEAST, 1e7, 'is more than any wheel bears; state the load in N'),
+    ('slope', -0.9, 0.9, _DEGREES),
+    ('slip_angle', -3.15, 3.15, _DEGREES),
+    ('leaving_angle', -1.7, 1.7, _DEGREES),
+    ('wheel_radius', -_MOST, 5.0, _MILLIMETRES),
+    ('wheel_radius', _LEAST, _MOST, _NO_LENGTH),
+    ('wheel_width', -_MOST, 5.0, _MILLIMETRES),
+    ('wheel_width', _LEAST, _MOST, _NO_LENGTH),
+    ('lug_height', -_MOST, 0.5, _MILLIMETRES),
+    ('lug_height', 0.0, _MOST, _NO_LENGTH),
+    ('lug_count', 0.0, 1000.0, 'is outside 0..1000'),
+    ('gravity', 1e-3, 100.0, 'is outside 0.001..100'),
+    ('pass_number', 1.0, 1000.0, 'is outside 1..1000'),
+    ('angular_velocity', -60.0, 60.0, 'looks like degrees per second; give rad/s'),
+    ('sinkage', -1.0, 1.0, 'looks like millimetres (or centimetres); give it in m'),
+    *((f'{name}_std', _LEAST_DEVIATION, _MOST, _NO_DEVIATION) for name in QUANTITIES),
+    ('slip_std', 0.0, _MOST, _NO_DEVIATION),
+    ('slip_std', 0.0, 0.5, 'is over 0.5; it looks like percent'),
+    ('leaving_angle_std', _LEAST_DEVIATION, _MOST, _NO_DEVIATION),
 )
-"""What no value of a column can be, in SI, and what one that is looks like."""
 
 
 def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np.intp]) -> None:
@@ -189,9 +162,10 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np
         refuse(np.isnan(arrays[column]), column, 'is missing; every row needs it')
     for column, values in arrays.items():
         refuse(np.isinf(values), column, 'is not finite; leave the cell empty')
-    for column, impossible, why in _RANGES:
+    for column, least, greatest, why in _RANGES:
         if column in arrays:
-            refuse(impossible(arrays[column]), column, why)
+            refuse((arrays[column] < least) | (arrays[column] > greatest), column, why)
+    refuse(np.full(lines.shape, arrays['normal_load'].max() < _NO_LOAD), 'normal_load', _KILONEWTON)
     if 'wheel_radius' in arrays and 'lug_height' in arrays:
         high = arrays['lug_height'] > arrays['wheel_radius']
         refuse(high, 'lug_height', 'is more than the wheel radius; check both, in m')
