@@ -37,7 +37,7 @@ from wheel_terra_estimator.discrepancy.fitting.soil_deviations import deviations
 from wheel_terra_estimator.discrepancy.report.words import _repeatability
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import confidence
-from wheel_terra_estimator.discrepancy.selection import significance as gap_test
+from wheel_terra_estimator.discrepancy.selection import remainder as gap_test
 from wheel_terra_estimator.discrepancy.selection.verdict import _competitors
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
@@ -142,7 +142,7 @@ def test_evidence_is_the_integral_over_parameters(setting):
     model = linear_fit(rng, problem, 2, coordinates)
     amplitude = 0.02
     floor = Floor((amplitude,) * 4, 0.0, False)
-    got = evidence(problem, model, (floor,), KNOWN).log_evidence[0]
+    got = evidence(problem, model, (floor,), KNOWN).log_joint[0]
 
     row, quantity = problem.row, problem.quantity
     smooth = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
@@ -189,7 +189,7 @@ def test_gap_test_is_calibrated(forward, setting):
     problem = build_problem(truth, std, inputs, scale)
     one = np.ones(problem.size)
     at_truth = fit(
-        forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], [one], None, 3
+        forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], one, None, 3
     )[0]
     squares = []
     for _ in range(200):
@@ -255,7 +255,7 @@ def test_outliers_are_found_and_a_hump_is_none(forward, setting):
         problem = build_problem(measured, std, inputs, scale)
         one = [problem.variance(0.02), problem.variance(0.25)]
         nothing = fit(
-            forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], [one[0]]
+            forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], one[0]
         )[0]
         found = outliers.find_outliers(problem, nothing, one, problem.observed, narrow)
         return {cell[:2] for cell in found}
@@ -288,7 +288,7 @@ def test_noise_is_estimated_beside_an_effect(forward, setting):
             problem.observed,
             [((), soil)],
             [np.zeros(len(soil))],
-            [problem.variance(0.1)],
+            problem.variance(0.1),
         )[0]
         before = Noise(guess, origin, dict.fromkeys(origin, 0.0))
         after = noise.estimate_noise(before, nothing, problem, problem.observed)
@@ -368,9 +368,9 @@ def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
             measured[forward.points.slip > 0.6, 1] += 12.0 * std[0, 1]
         problem = build_problem(measured, std, inputs, scale)
         one = np.ones(problem.size)
-        nothing = fit(
-            forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], [one]
-        )[0]
+        nothing = fit(forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], one)[
+            0
+        ]
         named = dict(zip(QUANTITIES, measured.T, strict=True))
         table = check_table('t', {**columns, **named})
         found.append(locate(table, problem, nothing, problem.observed, len(table)))
@@ -403,9 +403,9 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
         measured[rows, :3] += (other.steady_state(forward.points).outputs() - truth[:, :3])[rows]
         problem = build_problem(measured, std, inputs, scale)
         one = np.ones(problem.size)
-        nothing = fit(
-            forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], [one]
-        )[0]
+        nothing = fit(forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], one)[
+            0
+        ]
         table = SimpleNamespace(columns={'time': order.astype(float)})
         work = SimpleNamespace(problem=problem, observed=problem.observed)
         return changed_stretch(table, work, nothing, one)

@@ -21,7 +21,6 @@ from wheel_terra_estimator.discrepancy.assessment.gaps import (
 )
 from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.fitting.reference import shared_error
 from wheel_terra_estimator.discrepancy.proposal.find import (
     closed_by,
     effects_said,
@@ -30,10 +29,9 @@ from wheel_terra_estimator.discrepancy.proposal.find import (
 )
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
-from wheel_terra_estimator.discrepancy.selection import significance
+from wheel_terra_estimator.discrepancy.selection import remainder
 from wheel_terra_estimator.discrepancy.selection.candidates import FIT_FLOOR
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
-from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, choose
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -87,19 +85,9 @@ class Decision:
     proposal: Proposal | None = None  # A law, where something is missing and no name is given
 
     @property
-    def left(self) -> Remainder:
-        """What the chosen explanation leaves."""
-        return self.verdict.left
-
-    @property
     def floor(self) -> float:
         """Model-error floor in use, share of each quantity's range."""
         return self.findings.selection.floors[self.floor_index].largest
-
-    @property
-    def nothing(self) -> Fit:
-        """The soil refitted alone, under the floor."""
-        return self.findings.nothing
 
 
 def decide(
@@ -160,7 +148,7 @@ class _Laws:
         if law is not None and ahead < -_CLEARLY and not same:
             return names, False
         ahead_of_all = same or (ahead >= _CLEARLY and len(names) > 1)
-        odds = _BEATS_LAW if ahead_of_all and not decision.left.significant else 1.0
+        odds = _BEATS_LAW if ahead_of_all and not decision.verdict.left.significant else 1.0
         surer = [confidences.confidence(n.features, int(n.features['alike']), odds) for n in names]
         names = tuple(replace(n, confidence=c) for n, c in zip(names, surer, strict=True))
         return names, _least(names, odds) >= _LIKELY
@@ -185,7 +173,7 @@ def _left_open(
     findings = decision.findings
     if decision.verdict.status not in OPEN:
         return decision
-    law = laws.beside(decision, decision.left.only_far)
+    law = laws.beside(decision, decision.verdict.left.only_far)
     # Estimated noise may be next to nothing beside a few smooth rows.
     setting, exact = findings.setting, 'estimated' not in findings.noise.origin.values()
     variance = setting.problem.variance(0.0 if exact else FIT_FLOOR)
@@ -295,11 +283,9 @@ def _what_rows_show(
         square = float(np.nanmean(change[:, q] ** 2)) / item.noise**2
         total += square
         idle += square if item.refit < _AT_NOISE * item.noise else 0.0
-    misfit = significance.chi_square_p_value(fitted, fitted.variance)
-    alone = (
-        findings.setting.forward.active is None
-    )  # a reference's structural error shifts them as well
-    largest = significance.largest_z_score(fitted) if alone else 0.0
+    misfit = remainder.chi_square_p_value(fitted, fitted.variance)
+    alone = findings.setting.forward.active is None  # a reference's structural error pulls as well
+    largest = remainder.largest_z_score(fitted) if alone else 0.0
     return {
         'worse': float(np.tanh(worse)),
         'idle': idle / total,
@@ -350,9 +336,20 @@ def _curves(
 
 
 def _shared_error(findings: Findings, fitted: Fit, floor: float) -> FloatArray:
-    """(N, 4) structural error known from a reference; zero without one."""
-    setting = findings.setting
-    active = setting.forward.active
+    """(N, 4) structural error of the rows under diagnosis as a reference shows it, elsewhere zero.
+
+    Conditional mean of the smooth error given the residuals of the reference rows alone.
+    """
+    setting, error = findings.setting, np.zeros_like(fitted.outputs)
+    active, problem = setting.forward.active, setting.problem
     if active is None or floor == 0.0:
-        return np.zeros_like(fitted.outputs)
-    return shared_error(setting.problem, fitted, setting.observed, floor, active)
+        return error
+    unrotate = np.linalg.inv(problem.rotation)
+    noise = problem.variance(0.0)
+    smooth = (unrotate * (problem.variance(floor) - noise)) @ unrotate.T
+    total = smooth + (unrotate * noise) @ unrotate.T
+    ours = active[problem.row]
+    residual = setting.observed - problem.flat(fitted.outputs)
+    weights = np.linalg.solve(total[np.ix_(~ours, ~ours)], residual[~ours])
+    error[problem.row[ours], problem.quantity[ours]] = smooth[np.ix_(ours, ~ours)] @ weights
+    return error

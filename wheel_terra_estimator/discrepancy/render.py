@@ -32,7 +32,7 @@ from wheel_terra_estimator.discrepancy.result import (
     Proposal,
     SoilShift,
 )
-from wheel_terra_estimator.discrepancy.selection import significance
+from wheel_terra_estimator.discrepancy.selection.remainder import chi_square_p_value
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import CLEAR
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -57,12 +57,12 @@ def render(
         The rows under diagnosis, and with those of a reference behind them.
     """
     findings, after, variance = decision.findings, decision.after, decision.variance
-    setting, known, left = findings.setting, catalogue(), decision.left
+    setting, known, left = findings.setting, catalogue(), decision.verdict.left
     effects = _effects(decision, known)
     nearest = () if after.names else _nearest(decision)
     stretch = changed_stretch(both, setting, after, variance)
     proposal = _proposal(decision)
-    gap_p_value = significance.chi_square_p_value(decision.nothing, decision.variance)
+    gap_p_value = chi_square_p_value(decision.findings.nothing, decision.variance)
     law = None if proposal is None else proposal.fit
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
     soil = _shifts(findings, after, variance, 'soil')
@@ -86,7 +86,9 @@ def render(
         gap=decision.gap,
         not_visible=dict(findings.not_visible),
         smallest_visible=_smallest_visible(findings, known),
-        where=locate(both, setting.problem, decision.nothing, setting.observed, len(table)),
+        where=locate(
+            both, setting.problem, decision.findings.nothing, setting.observed, len(table)
+        ),
         next_measurement=_next(decision),
         curves=decision.curves,
         noise=replace(findings.noise, std=findings.noise.std[: len(table)]),
@@ -144,7 +146,7 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
                 naming.confidence.of_name,
                 naming.confidence.of_set,
                 competitors,
-                decision.left.noticeable,
+                decision.verdict.left.noticeable,
                 known[key].claim,
                 known[key].source,
                 {
@@ -162,15 +164,6 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
             )
         )
     return tuple(found)
-
-
-def _shown(findings: Findings, chosen: int) -> list[int]:
-    """Return the explanations that are listed: the best, and the chosen one among them."""
-    with_names = [h for h, e in enumerate(findings.selection.explanations) if e.names]
-    shown = with_names[:_CANDIDATES_SHOWN]
-    if findings.selection.explanations[chosen].names and chosen not in shown:
-        shown.append(chosen)
-    return shown
 
 
 def _parameters(
@@ -224,10 +217,12 @@ def _candidates(decision: Decision) -> tuple[Candidate, ...]:
     """Return the best explanations, nothing among them, each with why it was not the one."""
     findings, verdict = decision.findings, decision.verdict
     selection, setting = findings.selection, findings.setting
-    shown = _shown(findings, verdict.index)
     nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
+    shown = [h for h, e in enumerate(selection.explanations) if e.names][:_CANDIDATES_SHOWN]
+    if verdict.index not in (nothing, *shown):
+        shown.append(verdict.index)
     totals = np.logaddexp.reduce(selection.log_joint, axis=1)
-    kept = [decision.nothing, *(selection.explanations[h].fitted for h in shown)]
+    kept = [decision.findings.nothing, *(selection.explanations[h].fitted for h in shown)]
     scores = log_scores(setting, kept, decision.variance, decision.groups)
     gains = dict(zip((nothing, *shown), (s - scores[0] for s in scores), strict=True))
     evidence = {h: selection.explanations[h].log_evidence for h in gains}
@@ -282,7 +277,7 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
         best = list(by_effects.values())
         if verdict.status in OPEN:  # the two names that come nearest, and nothing
             after, *competitors = [f for f in best if f.names][:2] or [after]
-            competitors.append(decision.nothing)
+            competitors.append(decision.findings.nothing)
         else:
             named = verdict.status == 'named'
             wanted = [f for f in best if f.names != after.names and (f.names or named)]

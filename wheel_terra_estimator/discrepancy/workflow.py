@@ -20,12 +20,12 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     soil_coordinates,
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
-from wheel_terra_estimator.discrepancy.fitting.reference import join
 from wheel_terra_estimator.discrepancy.fitting.soil_deviations import deviations
 from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
 from wheel_terra_estimator.discrepancy.selection.search import search
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
+from wheel_terra_estimator.discrepancy.tables.averaging import join
 from wheel_terra_estimator.discrepancy.tables.checks import (
     check_against_wheel,
     check_pull_against_model,

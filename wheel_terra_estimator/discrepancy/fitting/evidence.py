@@ -48,7 +48,7 @@ class Floor:
 class Posterior:
     """Linear posterior of one hypothesis for every floor."""
 
-    log_evidence: FloatArray  # (F,) without the prior of the floor
+    log_joint: FloatArray  # (F,) of evidence and prior of the floor
     mean: FloatArray  # (F, P) of u
     covariance: FloatArray  # (F, P, P)
     noise_factor: FloatArray  # (F, 4) most probable factor on the noise
@@ -116,7 +116,7 @@ def evidence(
     best = np.argmax(value, axis=0)
     rows = np.arange(len(floors))
     return Posterior(
-        log_sum(value + np.log(weights)[:, None], axis=0),
+        log_sum(value + np.log(weights)[:, None], axis=0) + [f.log_prior for f in floors],
         mean[best, rows],
         covariance[best, rows],
         factor,
@@ -193,8 +193,3 @@ def _log_mass(a: FloatArray, b: FloatArray) -> FloatArray:
     swap = a > 0.0
     low, high = log_ndtr(np.where(swap, -b, a)), log_ndtr(np.where(swap, -a, b))
     return high + np.log1p(-np.exp(np.minimum(low - high, -1e-12)))
-
-
-def marginal(posterior: Posterior, floors: tuple[Floor, ...]) -> float:
-    """Return the log evidence with the floor integrated out."""
-    return float(log_sum(posterior.log_evidence + np.array([f.log_prior for f in floors])))

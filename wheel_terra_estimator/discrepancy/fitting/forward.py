@@ -298,36 +298,19 @@ class Forward:
     def _step(coordinate: Coordinate, x: float) -> float:
         return -STEP if x + STEP > coordinate.upper else STEP
 
-    def by_slip(
-        self, hypothesis: Sequence[Coordinate], u: FloatArray, angle: FloatArray
+    def by_input(
+        self, name: str, hypothesis: Sequence[Coordinate], u: FloatArray, angle: FloatArray
     ) -> FloatArray:
-        """Return (N, 4) derivative of the outputs by the recorded slip."""
-        step = np.where(self.points.slip > 0.99, -1e-4, 1e-4)
-        return self._by_input('slip', step, hypothesis, u, angle)
-
-    def by_leaving_angle(
-        self, hypothesis: Sequence[Coordinate], u: FloatArray, angle: FloatArray
-    ) -> FloatArray:
-        """Return (N, 4) derivative of the outputs by the measured leaving angle; 0 without one."""
-        step = np.full(len(self.points), -1e-4)
-        return np.nan_to_num(self._by_input('leaving_angle', step, hypothesis, u, angle))
-
-    def _by_input(
-        self,
-        name: str,
-        step: FloatArray,
-        hypothesis: Sequence[Coordinate],
-        u: FloatArray,
-        angle: FloatArray,
-    ) -> FloatArray:
+        """Return (N, 4) derivative of the outputs by slip or leaving angle; 0 where it is nan."""
         given = np.asarray(getattr(self.points, name), dtype=float)
+        step = np.where((given > 0.99) | (name == 'leaving_angle'), -1e-4, 1e-4)
         moved: dict[str, Any] = {name: given + step}
         beside = self.at(replace(self.points, **moved))
         base, other = (
             model.solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
             for model in (self, beside)
         )
-        return np.asarray((other - base) / np.where(np.isnan(given), np.nan, step)[:, None])
+        return np.where(np.isnan(given)[:, None], 0.0, (other - base) / step[:, None])
 
     def _balance(
         self,

@@ -69,14 +69,14 @@ def fit(
     observed: FloatArray,
     hypotheses: Sequence[tuple[tuple[str, ...], tuple[Coordinate, ...]]],
     starts: Sequence[FloatArray],
-    variances: Sequence[FloatArray],
+    variance: FloatArray,
     angles: FloatArray | None = None,
     iterations: int = 10,
 ) -> list[Fit]:
-    """Fit all hypotheses; each has its own start and its own variance of the rotated axes.
+    """Fit all hypotheses to the (m,) cells ``observed``; the variance is (m,), of the rotated axes.
 
-    To be matched are the (m,) cells ``observed``. Each of the B hypotheses, (names, coordinates),
-    has a start (P,), a variance (m,) of the rotated axes, and entrance angles (N,) near its end.
+    Each of the B hypotheses, (names, coordinates), has a start (P,), and entrance angles (N,) near
+    its end.
     """
     count = len(hypotheses)
     limits = [bounds(coordinates) for _, coordinates in hypotheses]
@@ -100,7 +100,7 @@ def fit(
         for index, b in enumerate(active):
             u = trial[b]
             residual = problem.rotate(observed - problem.flat(state.outputs[index]))
-            objective = 0.5 * float(residual @ (residual / variances[b]) + u @ (priors[b] * u))
+            objective = 0.5 * float(residual @ (residual / variance) + u @ (priors[b] * u))
             previous = best[b]
             angle[b] = state.angle[index]
             improved = previous is None or objective <= previous.objective
@@ -115,7 +115,7 @@ def fit(
                     sensitivity,
                     residual,
                     problem.rotate(sensitivity),
-                    variances[b],
+                    variance,
                     objective,
                     priors[b],
                 )

@@ -28,10 +28,9 @@ from wheel_terra_estimator.discrepancy.selection.candidates import (
     Setting,
     linear_starts,
 )
-from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE
+from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE, largest_z_score
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
-from wheel_terra_estimator.discrepancy.selection.significance import largest_z_score
 from wheel_terra_estimator.discrepancy.selection.weights import explain_fewer
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of

@@ -19,7 +19,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     effect_coordinates,
     loose_precision,
 )
-from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, Posterior, evidence, marginal
+from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, Posterior, evidence, log_sum
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
@@ -39,7 +39,7 @@ class Explanation:
 
     fitted: Fit
     posterior: Posterior
-    log_evidence: float
+    log_evidence: float  # the floor integrated out
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,7 +86,7 @@ class Setting:
             self.observed,
             [(names, self.coordinates(names)) for names in sets],
             starts,
-            [weights] * len(sets),
+            weights,
             angles,
             iterations,
         )
@@ -96,7 +96,7 @@ class Setting:
         posterior = evidence(
             self.problem, fitted, self.floors, self.noise_freedom, self.believed_widths
         )
-        return Explanation(fitted, posterior, marginal(posterior, self.floors))
+        return Explanation(fitted, posterior, float(log_sum(posterior.log_joint)))
 
 
 def linear_starts(

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is left after the best explanation: an absolute test, not a comparison."""
+"""What an explanation leaves, and whether its soil can be believed: absolute tests of a fit."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import chdtrc  # scipy.stats takes longer to load than a diagnosis
 
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
-from wheel_terra_estimator.discrepancy.selection.significance import (
-    chi_square_p_value,
-    largest_z_score,
-)
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
 
-Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
+FloatArray = NDArray[np.float64]
+Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], FloatArray]
 
 # Misfit that even the best floor leaves improbable.
 IMPROBABLE = 1e-3
@@ -86,3 +85,29 @@ def remainder(selection: Selection, index: int, variance_of: Variance) -> Remain
         chi_square_p_value(explanation.fitted, variance),
         z_score,
     )
+
+
+def chi_square_p_value(fitted: Fit, variance: FloatArray) -> float:
+    """P-value of the whole misfit, parameters and their priors integrated out.
+
+    Under the hypothesis, residual and the soil's prior pull together are chi-square with one degree
+    of freedom per cell, however many soil parameters were fitted; an effect's strength takes one.
+    """
+    target = fitted.residual + fitted.jacobian @ fitted.u
+    weighted = fitted.jacobian / variance[:, None]
+    strength = np.array([c.role == 'strength' for c in fitted.coordinates])
+    precision = weighted.T @ fitted.jacobian + np.diag(np.where(strength, 1e-9, 1.0))
+    right = weighted.T @ target
+    square = float(target @ (target / variance) - right @ np.linalg.solve(precision, right))
+    return float(chdtrc(len(target) - strength.sum(), square))
+
+
+def largest_z_score(fitted: Fit) -> float:
+    """Return the largest shift of a configured number in its stated deviations; 0 if none is free.
+
+    Soil numbers and parameters of effects that are on: a fit may hide what is missing in either. A
+    sum over all numbers would dilute one huge shift, by which an effect outside the catalogue that
+    works like another soil (friction that softens with slip) shows itself.
+    """
+    believed = zip(fitted.coordinates, fitted.u, strict=True)
+    return max((abs(c.stated * float(u)) for c, u in believed if c.role == 'believed'), default=0.0)

@@ -179,7 +179,7 @@ def _fit_nothing(
     start = np.zeros(len(nuisance)) if previous is None else previous.u
     angles = None if previous is None else previous.angle[None]
     variance = problem.variance(FIT_FLOOR)
-    return fit(forward, problem, observed, [((), nuisance)], [start], [variance], angles, 12)[0]
+    return fit(forward, problem, observed, [((), nuisance)], [start], variance, angles, 12)[0]
 
 
 def _select(setting: Setting, nothing: Fit) -> Selection:
@@ -310,8 +310,8 @@ class _Builder:
     def read_leaving_angles(self, nothing: Fit) -> None:
         """Find how the stated errors of measured leaving angles act on the cells."""
         if self.table.leaving_angle_std.any():
-            self._by_angle = self.forward.by_leaving_angle(
-                nothing.coordinates, nothing.u, nothing.angle
+            self._by_angle = self.forward.by_input(
+                'leaving_angle', nothing.coordinates, nothing.u, nothing.angle
             )
 
     def _common_errors(self) -> list[CommonError]:
@@ -329,7 +329,7 @@ class _Builder:
         Where the curves bend within an error of the slip, a tangent at the reading is not enough.
         """
         slip, std = self.table.columns['slip'], self.table.slip_std
-        self._by_slip = self.forward.by_slip(nothing.coordinates, nothing.u, nothing.angle)
+        self._by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, nothing.angle)
         problem, observed = self.build(self.noise_std, ())
         here = nothing.within(problem, observed)
         inverse = problem.rotation.T @ inverse_covariance(
@@ -346,7 +346,7 @@ class _Builder:
         self.forward = self.forward.at(replace(self.forward.points, slip=slip + moved))
         self._moved = moved
         angle = self.forward.solve([nothing.coordinates], [nothing.u], jacobian=False).angle[0]
-        self._by_slip = self.forward.by_slip(nothing.coordinates, nothing.u, angle)
+        self._by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, angle)
 
     def build(
         self, std: FloatArray, outliers: list[tuple[int, int, float]] | tuple[()]

@@ -166,10 +166,7 @@ def weigh(
 ) -> Selection:
     """Return posterior probabilities of all explanations and floors."""
     keys = tuple(visible)
-    floor_prior = np.array([floor.log_prior for floor in floors])
-    joint = np.array(
-        [e.posterior.log_evidence + floor_prior + log_prior(e.names, keys) for e in explanations]
-    )
+    joint = np.array([e.posterior.log_joint + log_prior(e.names, keys) for e in explanations])
     order = np.argsort(-log_sum(joint, axis=1))
     joint = joint[order]
     return Selection(

@@ -1,6 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Long tables averaged over neighbouring inputs; several tables as one."""
+"""Long tables averaged over neighbouring inputs; several tables, or one and a reference, as one.
+
+In a reference the effect in question is absent: both tables are fitted as one. Soil and structural
+error are shared by all rows, candidate effects act on the rows under diagnosis only.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +19,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     SteadyTable,
     concatenated,
 )
+from wheel_terra_estimator.errors import UserError
 
 FloatArray = NDArray[np.float64]
 
@@ -83,6 +88,30 @@ def together(tables: Sequence[SteadyTable]) -> SteadyTable:
         *dict.fromkeys(f'{part.name}: {note}' for part in parts for note in part.notes),
     )
     return concatenated(' + '.join(part.name for part in parts), parts, notes)
+
+
+def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, NDArray[np.bool_]]:
+    """Return both tables as one, and which rows candidate effects act on.
+
+    Raises
+    ------
+    UserError
+        If the two share no measured quantity, or only one of them states a column.
+    """
+    if not set(table.quantities) & set(reference.quantities):
+        raise UserError(
+            f'{reference.name}: measures {", ".join(reference.quantities)}, but {table.name} '
+            f'{", ".join(table.quantities)}; a reference needs a quantity of the table'
+        )
+    for column in set(table.columns) ^ set(reference.columns):
+        if column in INPUT_UNITS or column == 'leaving_angle':
+            has, lacks = (table, reference) if column in table.columns else (reference, table)
+            raise UserError(
+                f'{lacks.name}: no column {column!r}, which {has.name} has; state it in both'
+            )
+    notes = (*table.notes, f'{len(reference)} rows of {reference.name} as reference')
+    joined = concatenated(table.name, (table, reference), notes)
+    return joined, np.arange(len(joined)) < len(table)
 
 
 def _halved(scaled: FloatArray, cells: list[NDArray[np.intp]], most: int) -> list[NDArray[np.intp]]:
