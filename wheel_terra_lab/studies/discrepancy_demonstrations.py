@@ -6,13 +6,9 @@
         [--only hit kls1 ...]
     python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations --no-pictures \
         --page cases.md
-    python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations --only \
-        --table bin=bed.csv --config bin=bed.yaml
 
 Measured data are looked for in ``../shared`` (``--shared`` says where else); a case whose data are
-not there is skipped, visibly. ``--table NAME=FILE`` adds a table of one's own, such as other rows
-of the virtual soil bin, with ``--config NAME=FILE`` and ``--reference NAME=FILE`` for its model and
-for a table without the effect. Each case writes ``report.json``, ``report.html``, ``model.yaml``
+not there is skipped, visibly. Each case writes ``report.json``, ``report.html``, ``model.yaml``
 and pictures into a folder of its name; the verdicts are listed on the terminal and in
 ``summary.md``; ``--page`` writes the table of all cases, each with its gap and whether it was
 halved or why not. What they mean is discussed in ``docs/discrepancy/demonstrations.md``.
@@ -26,15 +22,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.report.model_file import write_files
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
-from wheel_terra_estimator.discrepancy.tables.parsing import read_table
-from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS, SteadyTable
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 from wheel_terra_estimator.errors import UserError
 
@@ -95,11 +89,17 @@ def _known_to(share: float, soil: str) -> list[str]:
     return [*stated, f'soil.friction_angle_std_deg:={0.5 * share * angle!r}', *_ASSUMED]
 
 
+def _hit(shared: Path, question: str, kind: str, paired: bool = False) -> Case:
+    """HIT wheel, smooth or with 10 mm lugs, against the soil as measured, no effect on."""
+    reference = _hit_rows(shared, 'smooth') if paired else None
+    return Case(question, _hit_rows(shared, kind), _on_rim('hit_lss1', 0.3), reference)
+
+
 def hit(shared: Path) -> Case:
     """HIT wheel with 10 mm lugs against the model fitted to its smooth twin."""
     return Case(
         'What do 10 mm lugs add to the smooth wheel of the same size, in the same sand?',
-        _lugs(shared),
+        _hit_rows(shared, 'lug10'),
         # The share of rim friction that lugs take away was fitted to this very wheel: put back.
         reader.load(
             ['hit_fit'],
@@ -109,35 +109,14 @@ def hit(shared: Path) -> Case:
     )
 
 
-def _lugs(shared: Path) -> SteadyTable:
-    return check_table('HIT wheel, 10 mm lugs', _published(shared, 'ding2011_lug10', _READING))
-
-
-def _smooth(shared: Path) -> SteadyTable:
-    return check_table('HIT wheel, smooth', _published(shared, 'ding2011_smooth', _READING))
+def _hit_rows(shared: Path, kind: str) -> SteadyTable:
+    title = {'smooth': 'HIT wheel, smooth', 'lug10': 'HIT wheel, 10 mm lugs'}[kind]
+    return check_table(title, _published(shared, f'ding2011_{kind}', _READING))
 
 
 def _on_rim(soil: str, share: float) -> Configuration:
     """Return the soil as measured, its numbers known to a share; slip is that of the rim."""
     return reader.load([soil], ['slip_radius:=rim', *_known_to(share, soil)], complete=False)
-
-
-def hit_smooth(shared: Path) -> Case:
-    """HIT smooth wheel against the measured soil, no effect on."""
-    question = 'Smooth HIT wheel against the soil as measured, no effect switched on.'
-    return Case(question, _smooth(shared), _on_rim('hit_lss1', 0.3))
-
-
-def hit_paired(shared: Path) -> Case:
-    """The same question with the smooth rows as the table in which the effect is absent."""
-    question = 'The same, from the soil as measured, the smooth wheel being the reference table.'
-    return Case(question, _lugs(shared), _on_rim('hit_lss1', 0.3), _smooth(shared))
-
-
-def hit_static(shared: Path) -> Case:
-    """HIT lugged wheel alone against the measured soil, no effect on."""
-    question = 'Lugged HIT wheel against the soil as measured, no effect switched on.'
-    return Case(question, _lugs(shared), _on_rim('hit_lss1', 0.3))
 
 
 def kls1(shared: Path) -> Case:
@@ -174,7 +153,7 @@ def _cmu_rows(shared: Path, least: float, most: float) -> SteadyTable:
 
 
 def _cmu_plates(shared: Path, least: float) -> Case:
-    """Return the rows against static Bekker from plates of the same rig."""
+    """CMU smooth wheel from a slip on, against static Bekker from plates of the same rig."""
     from wheel_terra_lab.studies.model_validation.cmu_wheel import plates
 
     soil, scatter, _ = plates(shared / 'measured' / 'cmu_single_wheel' / 'pressure_sinkage.csv')
@@ -202,16 +181,6 @@ def _cmu_plates(shared: Path, least: float) -> Case:
     )
 
 
-def cmu(shared: Path) -> Case:
-    """CMU smooth wheel, driving."""
-    return _cmu_plates(shared, 0.0)
-
-
-def cmu_braking(shared: Path) -> Case:
-    """The same with its braking rows, the locked wheel aside."""
-    return _cmu_plates(shared, -0.98)
-
-
 def cmu_fitted(shared: Path) -> Case:
     """The same rows, driving and braking, against the shipped soil that was fitted to them."""
     return Case(
@@ -221,48 +190,17 @@ def cmu_fitted(shared: Path) -> Case:
     )
 
 
-def _frostyboy(shared: Path, event: str) -> Case:
-    """FrostyBoy in deep snow, up to its immobilisation."""
+def _drive(shared: Path, question: str, bag: str, rover: str, *notes: str) -> Case:
+    """Rows of a recorded drive, its reference velocity the true one."""
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
-    bag = shared / 'measured' / 'bags' / f'frostyboy_event_{event}_mcap'
-    if not bag.exists():
-        raise FileNotFoundError(2, 'no such bag', str(bag))
-    configuration = reader.load(['frostyboy'])
-    rows = rows_from_bag(bag, configuration, parse_remaps(['reference_odom:=/truth/odometry']))
-    return Case(
-        'What does the model lack in deep snow?',
-        rows.table(),
-        configuration,
-        notes=('torque is not calibrated, the soil is assumed', *rows.notes),
-    )
-
-
-def frostyboy_4(shared: Path) -> Case:
-    """Event 1-4."""
-    return _frostyboy(shared, '1_4')
-
-
-def frostyboy_6(shared: Path) -> Case:
-    """Event 1-6."""
-    return _frostyboy(shared, '1_6')
-
-
-def pathfinder(shared: Path) -> Case:
-    """Pathfinder rover on firm ground: the stated radius is 6 % too small."""
-    from wheel_terra_estimator.bags.reader import parse_remaps
-    from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
-
-    bag = shared / 'measured' / 'bags' / 'wvu_pathfinder_test17_mcap'
-    configuration = reader.load(['pathfinder'])
-    rows = rows_from_bag(bag, configuration, parse_remaps(['reference_odom:=/truth/odometry']))
-    return Case(
-        'Why does a rover that rolls freely seem to skid by 5 %?',
-        rows.table(),
-        configuration,
-        notes=rows.notes,
-    )
+    path = shared / 'measured' / 'bags' / bag
+    if not path.exists():
+        raise FileNotFoundError(2, 'no such bag', str(path))
+    configuration = reader.load([rover])
+    rows = rows_from_bag(path, configuration, parse_remaps(['reference_odom:=/truth/odometry']))
+    return Case(question, rows.table(), configuration, notes=(*notes, *rows.notes))
 
 
 def grc3(shared: Path) -> Case:
@@ -290,7 +228,7 @@ def grc3(shared: Path) -> Case:
     )
 
 
-def _soilbin(title: str, *tables: str) -> Case:
+def _soilbin(_: Path, title: str, *tables: str) -> Case:
     """Return the rows of sweeps of the discrete elements against the model of their wheel."""
     folder = Path(__file__).resolve().parents[2] / 'docs' / 'laboratory' / 'soilbin'
     rows: Rows = {}
@@ -308,58 +246,31 @@ def _soilbin(title: str, *tables: str) -> Case:
     )
 
 
-def soilbin_pull(_: Path) -> Case:
-    """Virtual soil bin, free travel, pull raised in steps."""
-    return _soilbin('soil bin, pull sweep', 'pull_sweep.csv')
-
-
-def soilbin_slip(_: Path) -> Case:
-    """Virtual soil bin, travel speed imposed."""
-    return _soilbin('soil bin, slip sweep', 'slip_sweep.csv')
-
-
-def soilbin_slope(_: Path) -> Case:
-    """Virtual soil bin, free travel: pull raised in steps, and slopes of 5 to 25 degrees."""
-    return _soilbin('soil bin, pull and slopes', 'pull_sweep.csv', 'slope_sweep.csv')
-
-
+_STATIC = 'HIT wheel against the soil as measured, no effect switched on'
+_PAIRED = 'The same, from the soil as measured, the smooth wheel being the reference table.'
+_SNOW = ('What does the model lack in deep snow?', 'torque is not calibrated, the soil is assumed')
+_ROLLING = 'Why does a rover that rolls freely seem to skid by 5 %?'  # its radius is 6 % too small
+# Name -> the rows with their model, of the folder of measured data. The soil bin: free travel under
+# a pull raised in steps, travel speed imposed, and slopes of 5 to 25 degrees beside the pulls.
 CASES: dict[str, Callable[[Path], Case]] = {
     'hit': hit,
-    'hit_paired': hit_paired,
-    'hit_static': hit_static,
-    'hit_smooth': hit_smooth,
+    'hit_paired': lambda shared: _hit(shared, _PAIRED, 'lug10', paired=True),
+    'hit_static': lambda shared: _hit(shared, f'Lugged {_STATIC}.', 'lug10'),
+    'hit_smooth': lambda shared: _hit(shared, f'Smooth {_STATIC}.', 'smooth'),
     'kls1': kls1,
-    'cmu': cmu,
-    'cmu_braking': cmu_braking,
+    'cmu': lambda shared: _cmu_plates(shared, 0.0),
+    'cmu_braking': lambda shared: _cmu_plates(shared, -0.98),  # the locked wheel aside
     'cmu_fitted': cmu_fitted,
-    'pathfinder': pathfinder,
-    'frostyboy_4': frostyboy_4,
-    'frostyboy_6': frostyboy_6,
+    'pathfinder': lambda s: _drive(s, _ROLLING, 'wvu_pathfinder_test17_mcap', 'pathfinder'),
+    'frostyboy_4': lambda s: _drive(s, _SNOW[0], 'frostyboy_event_1_4_mcap', 'frostyboy', _SNOW[1]),
+    'frostyboy_6': lambda s: _drive(s, _SNOW[0], 'frostyboy_event_1_6_mcap', 'frostyboy', _SNOW[1]),
     'grc3': grc3,
-    'soilbin_pull': soilbin_pull,
-    'soilbin_slip': soilbin_slip,
-    'soilbin_slope': soilbin_slope,
+    'soilbin_pull': lambda s: _soilbin(s, 'soil bin, pull sweep', 'pull_sweep.csv'),
+    'soilbin_slip': lambda s: _soilbin(s, 'soil bin, slip sweep', 'slip_sweep.csv'),
+    'soilbin_slope': lambda s: _soilbin(
+        s, 'soil bin, pull and slopes', 'pull_sweep.csv', 'slope_sweep.csv'
+    ),
 }
-
-
-def from_table(name: str, arguments: argparse.Namespace) -> Case:
-    """Return the case of a table of one's own (``--table``, ``--config``, ``--reference``)."""
-    tables, configs, references = (
-        dict(text.partition('=')[::2] for text in texts)
-        for texts in (arguments.table, arguments.config, arguments.reference)
-    )
-    return Case(
-        f'Table {tables[name]}.',
-        read_table(tables[name]),
-        reader.load([configs[name]] if name in configs else [], complete=False),
-        read_table(references[name]) if name in references else None,
-    )
-
-
-def write(folder: Path, diagnosis: Diagnosis, *, pictures: bool) -> None:
-    """Write what the command ``wheel-terra diagnose`` writes."""
-    folder.mkdir(parents=True, exist_ok=True)
-    write_files(diagnosis, folder, pictures=pictures)
 
 
 def summary(name: str, case: Case, diagnosis: Diagnosis) -> str:
@@ -386,30 +297,6 @@ def summary(name: str, case: Case, diagnosis: Diagnosis) -> str:
         lines.append(f'Next: {diagnosis.next_measurement[0].what}.')
     lines += [f'({note})' for note in case.notes]
     return '\n'.join(lines) + '\n'
-
-
-def gap_row(name: str, diagnosis: Diagnosis) -> str:
-    """Return a row of the table of gaps: as configured, soil refitted, in the end (noise)."""
-    cells = []
-    for quantity in QUANTITIES:
-        gap, scale = diagnosis.gap.get(quantity), 1e3 if UNITS[quantity] == 'm' else 1.0
-        if gap is None:
-            cells.append('-')
-            continue
-        values = [f'{scale * value:.3g}' for value in (gap.before, gap.refit, gap.after)]
-        noise = '' if gap.noise is None else f' ({scale * gap.noise:.2g})'
-        cells.append(' → '.join(values) + noise)
-    return f'| {name} | {diagnosis.verdict} | {" | ".join(cells)} |'
-
-
-_GAP_HEAD = """## Gap before and after
-
-Root-mean-square error on rows that the fit did not see: as configured → soil refitted → in the end
-(noise).
-
-| case | verdict | sinkage [mm] | pull [N] | torque [N m] |
-|---|---|---|---|---|
-"""
 
 
 _PAGE_HEAD = """# Every real case: was the gap halved?
@@ -484,25 +371,14 @@ def main() -> None:
     parser.add_argument('-o', '--output', type=Path, required=True)
     parser.add_argument('--shared', type=Path, default=default, help='folder of measured data')
     parser.add_argument('--only', nargs='*', default=list(CASES), choices=list(CASES))
-    parser.add_argument('--table', action='append', default=[], metavar='NAME=FILE')
-    parser.add_argument('--config', action='append', default=[], metavar='NAME=FILE')
-    parser.add_argument('--reference', action='append', default=[], metavar='NAME=FILE')
     parser.add_argument('--no-pictures', action='store_true', help='no report.html')
     parser.add_argument('--page', type=Path, help='Markdown page of all cases, to be written')
     arguments = parser.parse_args()
-    cases: dict[str, Callable[[], Case]] = {
-        name: lambda name=name: CASES[name](arguments.shared)  # type: ignore[misc]
-        for name in arguments.only
-    }
-    for text in arguments.table:
-        name = text.partition('=')[0]
-        cases[name] = lambda name=name: from_table(name, arguments)  # type: ignore[misc]
     parts: list[str] = []
-    gaps: list[str] = []
     judged: list[str] = []
-    for name, make in cases.items():
+    for name in arguments.only:
         try:
-            case: Any = make()
+            case = CASES[name](arguments.shared)
         except FileNotFoundError as missing:
             parts.append(f'## {name}\n\nskipped: {missing.filename} is not here\n')
         except UserError as error:
@@ -511,13 +387,12 @@ def main() -> None:
             judged.append(f'| {name} | no verdict | | | | | | | no: {why} |')
         else:
             diagnosis = diagnose(case.table, case.configuration, case.reference)
-            write(arguments.output / name, diagnosis, pictures=not arguments.no_pictures)
+            folder = arguments.output / name
+            folder.mkdir(parents=True, exist_ok=True)
+            write_files(diagnosis, folder, pictures=not arguments.no_pictures)
             judged.append(case_rows(name, diagnosis))
             parts.append(summary(name, case, diagnosis))
-            gaps.append(gap_row(name, diagnosis))
         print(parts[-1], flush=True)
-    parts.append(_GAP_HEAD + '\n'.join(gaps) + '\n')
-    print(parts[-1])
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / 'summary.md').write_text('\n'.join(parts), encoding='utf-8')
     if arguments.page:
