@@ -107,6 +107,7 @@ def test_the_configuration_is_read_without_the_heavy_libraries():
 # Folder -> (folders of the package, libraries beyond the standard one) that its modules may
 # import, at the top or inside a function. A new folder needs a line here.
 COMMON = {
+    'arrays',
     'errors',
     'csv_file',
     'frames',

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
@@ -54,9 +55,7 @@ def units_in(table: Any) -> Mapping[str, str]:
     return units
 
 
-def to_frame(
-    columns: Mapping[str, NDArray[Any]], stamp: NDArray[np.int64] | None = None
-) -> DataFrame:
+def to_frame(columns: Mapping[str, NDArray[Any]], stamp: IntArray | None = None) -> DataFrame:
     """Return columns as a DataFrame with their units in ``attrs['units']``.
 
     Parameters
@@ -84,7 +83,7 @@ def to_frame(
     return frame
 
 
-def columns_of(table: Any, name: str) -> dict[str, NDArray[np.float64]]:
+def columns_of(table: Any, name: str) -> dict[str, FloatArray]:
     """Return the columns of a DataFrame or mapping as arrays of one length.
 
     An index of dates or durations of a DataFrame stands for a column ``time`` that is not there.
@@ -105,7 +104,7 @@ def columns_of(table: Any, name: str) -> dict[str, NDArray[np.float64]]:
     from wheel_terra_estimator.configuration.column_map import UNITS, factor
 
     units = units_in(table)
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, FloatArray] = {}
     for key in table:
         try:
             column = np.asarray(table[key], dtype=np.float64)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
     from wheel_terra_estimator.estimation.core import EstimatorCore
 
-FloatArray = NDArray[np.float64]
 
 NANOSECONDS = 1_000_000_000
 AXES = ('x', 'y', 'z')

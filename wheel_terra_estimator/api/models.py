@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wheel_terra_estimator.api.soils import Soil, configuration_of
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.readings import Readings
@@ -31,8 +32,6 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
 from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
@@ -25,8 +26,6 @@ from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, S
 from wheel_terra_estimator.messages.cdr import DamagedMessageError
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, OUTPUT_TYPES, stamp_of
 from wheel_terra_estimator.messages.diagnostics import NODE
-
-FloatArray = NDArray[np.float64]
 
 WHEEL_FIELDS = (
     'slip',
@@ -156,7 +155,7 @@ class EstimateHistory:
     """
 
     names: tuple[str, ...]
-    stamp: NDArray[np.int64]  # [ns]
+    stamp: IntArray  # [ns]
     values: dict[str, FloatArray]
     slip_class: NDArray[np.uint8]
     forward_velocity: FloatArray  # [m/s]
@@ -171,7 +170,7 @@ class EstimateHistory:
         return (self.stamp - self.stamp[0]) * 1e-9 if self.stamp.size else np.empty(0)
 
     @property
-    def stuck(self) -> NDArray[np.bool_]:
+    def stuck(self) -> BoolArray:
         """Whether a stuck warning ran, per set."""
         running = np.zeros(self.stamp.size, dtype=bool)
         for warning in self.warnings:

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.messages.convert import BASE_FRAME, JOINT_STATE
 from wheel_terra_estimator.messages.diagnostics import Status
@@ -122,7 +123,7 @@ class MessageFactory:
         header: Any,
         specific_force: Sequence[float],
         angular_rate: Sequence[float],
-        orientation: Sequence[float] | NDArray[np.float64] | None,
+        orientation: Sequence[float] | FloatArray | None,
         variances: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> Any:
         """Return an Imu; ``variances`` of orientation, angular rate and specific force."""

@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 
 MOST_ROWS = 20_000
 """Rows that are kept: a thousand seconds at 20 Hz, ten times what a picture can show."""
@@ -39,7 +39,7 @@ class ThinnedRows:
         self._count = 1
         self._rows.append((stamp, np.array(values, dtype=np.float64)))
 
-    def stamps(self) -> NDArray[np.int64]:
+    def stamps(self) -> IntArray:
         """Return the stamps that were kept, (k,) [ns]."""
         return np.array([stamp for stamp, _ in self._rows], dtype=np.int64)
 

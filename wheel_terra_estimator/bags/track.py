@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
@@ -26,8 +26,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading, Measurement
 from wheel_terra_estimator.messages.convert import ODOMETRY, stamp_of
-
-FloatArray = NDArray[np.float64]
 
 SPACING = 0.02
 """Way between two points of a track [m]."""
@@ -71,7 +69,7 @@ class Track:
     an entrapment and whether the warning ran.
     """
 
-    stamp: NDArray[np.int64]  # [ns]
+    stamp: IntArray  # [ns]
     values: dict[str, FloatArray]
     source: str  # of the position, in words
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.series_reader import credible
@@ -24,8 +24,6 @@ from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.messages.cdr import TWIST, DamagedMessageError
 from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, OUTPUT_TYPES, stamp_of
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
-
-FloatArray = NDArray[np.float64]
 
 BODY_VELOCITY = '/truth/odometry'
 _TYPES = {
@@ -42,7 +40,7 @@ _TYPES = {
 class WheelTruth:
     """A true quantity per wheel: stamps (k,) [ns], values (k, n), nan where unknown."""
 
-    stamp: NDArray[np.int64]
+    stamp: IntArray
     value: FloatArray
 
     def known(self) -> WheelTruth:
@@ -172,7 +170,7 @@ def _slip_from_velocity(
 def _along_wheels(
     body: FloatArray,
     turning: FloatArray,
-    stamp: NDArray[np.int64],
+    stamp: IntArray,
     steering: WheelTruth,
     configuration: Configuration,
 ) -> FloatArray:

@@ -7,8 +7,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -17,7 +17,6 @@ from wheel_terra_estimator.terramechanics.slope_locomotion import rover_climb
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.configuration import Configuration
 
-FloatArray = NDArray[np.float64]
 WHO = ('wheel', 'rover')
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
 STEEPEST = np.radians(60.0)  # [rad]

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.cli.climb import WHO, climb
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
@@ -39,7 +39,6 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.configuration import Configuration
 
-FloatArray = NDArray[np.float64]
 
 EXAMPLES = (
     'wheel-terra predict --config hit_wh3 --config hit_fit --slip 0:0.6:13 --load 80',

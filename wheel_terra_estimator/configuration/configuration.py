@@ -11,15 +11,14 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration import ros_yaml
 from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
-FloatArray: TypeAlias = NDArray[np.float64]
 EffectSettings: TypeAlias = dict[str, dict[str, Any]]
 
 _SOIL_LABELS = ('soil.name', 'soil.source')

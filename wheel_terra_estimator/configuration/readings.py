@@ -7,11 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,7 @@ class Readings:
             np.array([sensors.sinkage_zero[wheel], 0.0, sensors.torque_zero[wheel]]),
         )
 
-    def true_on(self, rows: NDArray[np.bool_]) -> Readings:
+    def true_on(self, rows: BoolArray) -> Readings:
         """Return (N, 3) errors, none on the given rows: theirs were taken off before."""
         true = rows[:, None]
         return Readings(np.where(true, 1.0, self.gain), np.where(true, 0.0, self.zero))

@@ -15,8 +15,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.rover_template import (
     CENTRE_HEIGHT,
     DEFAULT_WIDTH_SHARE,
@@ -31,7 +31,7 @@ BASE_LINKS = ('base_link', 'base_footprint')
 _UPRIGHT = 0.8
 """Cosine between the axis of a joint that steers and the vertical, at least."""
 
-Pose = NDArray[np.float64]  # (4, 4)
+Pose = FloatArray  # (4, 4)
 
 
 def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None) -> RoverSketch:
@@ -263,7 +263,7 @@ def _steering_joint(
     return '', 0.0
 
 
-def _axis(joint: ElementTree.Element, path: Path) -> NDArray[np.float64]:
+def _axis(joint: ElementTree.Element, path: Path) -> FloatArray:
     axis = joint.find('axis')
     return np.array(_numbers(axis.get('xyz') if axis is not None else None, (1.0, 0, 0), path))
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.assessment.gaps import (
     channels_off,
     gaps,
@@ -38,9 +38,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, St
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME as LAW
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 _USUAL_Z_SCORE = 2.5  # stated deviations: a larger shift lowers the confidence of a name
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off

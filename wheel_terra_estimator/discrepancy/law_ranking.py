@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import gammaln
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
@@ -24,8 +24,7 @@ from wheel_terra_estimator.terramechanics.contact_law import LAWS, RESISTIVE_FOR
 from wheel_terra_estimator.terramechanics.effects import by_variant, catalogue
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
-FloatArray = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+Rows = BoolArray
 
 STRAIGHT = 0.02  # slip angle below which a row counts as without [rad]
 # Prior of the misfit: as if one cell beside those of the table were off by this share of the range.

@@ -9,8 +9,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
@@ -39,8 +39,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, St
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
-
-FloatArray = NDArray[np.float64]
 
 _CANDIDATES_SHOWN = 12
 _NEAREST = 3  # effects named as nearest where nothing is named

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK, effect_of
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.discrepancy.assessment.structural_error import StructuralError
     from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
-FloatArray = NDArray[np.float64]
 _ASIDE: Mapping[str, Any] = {'json': False}  # metadata of a field that is no part of report.json
 OPEN = ('unexplained', 'undecided')  # verdicts for which a law may be proposed
 
@@ -179,7 +178,7 @@ class Where:
     shares: Mapping[str, float]
     # Region with the largest gap; empty = everywhere (a constant shift)
     box: tuple[InputRange, ...]
-    rows: NDArray[np.intp]  # indices of the table rows inside the box
+    rows: IndexArray  # indices of the table rows inside the box
     # Shares of the misfit and of the rows inside
     share_of_gap: float
     share_of_rows: float

@@ -17,12 +17,9 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, stamp_of
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 IMU = 'sensor_msgs/msg/Imu'
 TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'

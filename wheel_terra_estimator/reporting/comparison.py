@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import IndexArray, IntArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.bags.writer import Origin
@@ -31,8 +31,6 @@ from wheel_terra_estimator.reporting.time_figure import (
     TimeFigure,
     limits,
 )
-
-FloatArray = NDArray[np.float64]
 
 COMPARED = ('slip', 'sinkage', 'drawbar_pull', 'normal_load', 'rim_travel_left', 'pull_margin')
 RUN_COLOURS = {'A': LINE_COLOURS[0], 'B': LINE_COLOURS[1]}
@@ -122,9 +120,7 @@ def compare(
     )
 
 
-def common_rows(
-    first: NDArray[np.int64], second: NDArray[np.int64]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def common_rows(first: IntArray, second: IntArray) -> tuple[IndexArray, IndexArray]:
     """Return rows of both that belong together: each of the first, the nearest of the second."""
     if not first.size or not second.size:
         return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
@@ -141,8 +137,8 @@ def _difference(
     name: str,
     first: EstimateHistory,
     second: EstimateHistory,
-    a: NDArray[np.intp],
-    b: NDArray[np.intp],
+    a: IndexArray,
+    b: IndexArray,
 ) -> Difference:
     change = second.values[name][b] - first.values[name][a]
     row, wheel = np.unravel_index(int(np.argmax(np.abs(change))), change.shape)

@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
@@ -36,7 +36,7 @@ class Border:
     """Standard deviations beyond which slip [-] and sinkage [m] (scalar or (n,)) are not known."""
 
     slip: float = SLIP_BORDER
-    sinkage: float | NDArray[np.float64] = np.inf
+    sinkage: float | FloatArray = np.inf
 
     @classmethod
     def of(cls, configuration: Configuration) -> Border:
@@ -45,7 +45,7 @@ class Border:
         return cls(configuration.filter.class_std, SINKAGE_BORDER * radius)
 
 
-def known(history: EstimateHistory, quantity: str, border: Border) -> NDArray[np.float64]:
+def known(history: EstimateHistory, quantity: str, border: Border) -> FloatArray:
     """Return a quantity of `WHEEL_FIELDS`, (k, n): nan where it is not known."""
     values = history.values[quantity]
     if quantity == 'slip':

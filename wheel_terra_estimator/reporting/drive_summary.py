@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.taught import LEARNED, Taught
@@ -189,13 +189,13 @@ def _wheels(history: EstimateHistory, border: Border) -> tuple[WheelSummary, ...
 
 
 def _median_std(
-    history: EstimateHistory, quantity: str, values: NDArray[np.float64], wheel: int
+    history: EstimateHistory, quantity: str, values: FloatArray, wheel: int
 ) -> float | None:
     there = history.values[f'{quantity}_std'][np.isfinite(values[:, wheel]), wheel]
     return float(np.median(there)) if there.size else None
 
 
-def _percentiles(values: NDArray[np.float64]) -> tuple[float, float] | None:
+def _percentiles(values: FloatArray) -> tuple[float, float] | None:
     there = values[np.isfinite(values)]
     if not there.size:
         return None

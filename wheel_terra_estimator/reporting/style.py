@@ -12,9 +12,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import FloatArray
 
 LINE_COLOURS = (
     '#0083d3',

@@ -14,11 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.reporting.style import DARK, thin
-
-FloatArray = NDArray[np.float64]
 
 LINE_POINTS, BAND_POINTS, TRUTH_POINTS = 2000, 300, 600
 """Points of a line in the page: what a wide screen shows, and a file below 4 MB."""
@@ -167,7 +165,7 @@ class TimeFigure:
         self._lines.append(_Line(panel, few, edges, classes, '', colour))
 
     def strips(
-        self, panel: int, x: FloatArray, member: NDArray[np.bool_], name: str, colour: str,
+        self, panel: int, x: FloatArray, member: BoolArray, name: str, colour: str,
         *, slender: bool = False,
     ) -> None:  # fmt: skip
         """Add the stretches (k, n) of n strips that belong to one class, first strip on top."""

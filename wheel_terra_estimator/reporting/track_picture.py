@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS
@@ -58,8 +58,8 @@ def is_straight(track: Track) -> bool:
     return bool(spans.min() < STRAIGHT * spans.max())
 
 
-def _main_axes(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    axes: NDArray[np.float64] = np.linalg.eigh(np.cov(points.T))[1]
+def _main_axes(points: FloatArray) -> FloatArray:
+    axes: FloatArray = np.linalg.eigh(np.cov(points.T))[1]
     return axes
 
 
@@ -76,7 +76,7 @@ def maps(track: Track) -> tuple[Map, Map]:
     return _map(track, by_class), _map(track, by_soil)
 
 
-def _map(track: Track, kinds: list[tuple[str, NDArray[np.bool_], str]]) -> Map:
+def _map(track: Track, kinds: list[tuple[str, BoolArray, str]]) -> Map:
     x, y = track.values['x'], track.values['y']
     extent = max(np.ptp(x), np.ptp(y))
     left, top = x.min() - ROOM * extent, y.max() + ROOM * extent

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.estimation.estimates import SlipClass
@@ -24,8 +25,6 @@ from wheel_terra_estimator.estimation.judgement.entrapment import (
     verdicts,
 )
 from wheel_terra_estimator.reporting.drive_style import Border, known
-
-FloatArray = NDArray[np.float64]
 
 LONGEST_BRIDGE = 0.5
 """Truth further away than this [s] is not compared."""
@@ -112,7 +111,7 @@ def truth_errors(
     )
 
 
-def at_stamps(truth: WheelTruth, stamps: NDArray[np.int64]) -> FloatArray:
+def at_stamps(truth: WheelTruth, stamps: IntArray) -> FloatArray:
     """Return the truth (k, n) at stamps [ns], linear between its own; nan where it is silent."""
     time, at = truth.stamp * 1e-9, stamps * 1e-9
     columns = [np.interp(at, time, column) for column in truth.value.T]

@@ -17,8 +17,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.terramechanics import effects as effect_catalogue
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement, speed_ratio
@@ -26,8 +26,6 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.stresses import front_stress
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
-
-FloatArray = NDArray[np.float64]
 
 NODES = 6
 """Gauss-Legendre nodes on each side of the angle of greatest stress."""

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation.contact import (
     LEAST_ANGLE,
@@ -29,7 +29,6 @@ from wheel_terra_estimator.terramechanics.resistive_force import PER_CUBIC_METRE
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
-FloatArray = NDArray[np.float64]
 _SIDE_FRICTION = 0.36  # of the theory for a flat plate that slides [-]
 _SIDE_SLIP = 0.05  # resultant slip at which half of it acts [-]
 

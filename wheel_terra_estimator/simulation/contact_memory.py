@@ -15,13 +15,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.simulation.contact import SoilForces
 from wheel_terra_estimator.terramechanics.entrapment import digging_rate
 from wheel_terra_estimator.terramechanics.wheel import Wheel
-
-FloatArray = NDArray[np.float64]
 
 SHEAR_TRAVEL = 0.25
 """Travel over which the shear follows the slip, as a share of the contact length."""

@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import FloatArray
 
 CONTROL_BAND = 0.2
 """Rate error, as a share of the working rate, at which the full torque is applied."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.contact import SoilForces
@@ -26,8 +26,6 @@ from wheel_terra_estimator.simulation.suspension import Suspension, suspension_o
 from wheel_terra_estimator.simulation.terrain import Terrain
 from wheel_terra_estimator.simulation.truth import Truth
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
-
-FloatArray = NDArray[np.float64]
 
 LONGEST_STEP = 0.05  # [s]
 LOAD_TIME = 0.1  # [s]; the suspension settles

@@ -14,9 +14,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -29,8 +29,6 @@ from wheel_terra_estimator.estimation.measurements import (
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 from wheel_terra_estimator.simulation.scenario import Fault, Scenario
 from wheel_terra_estimator.simulation.truth import Truth
-
-FloatArray = NDArray[np.float64]
 
 START = 1_000_000_000_000
 """Stamp of the start of a drive [ns]; not 0, which is no stamp."""
@@ -227,7 +225,7 @@ class SensorSuite:
 
     # Faults and transport -----------------------------------------------------------------------
 
-    def _failed(self, kind: str, time: float) -> NDArray[np.bool_] | None:
+    def _failed(self, kind: str, time: float) -> BoolArray | None:
         """Return the (n,) wheels that a fault of this kind concerns now; None if there is none."""
         wheels = None
         for fault in self._faults:

@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation.commands import Command
-
-FloatArray = NDArray[np.float64]
 
 STEERING_RATE = 0.5
 """How fast a wheel is steered [rad/s]: half a minute for a full circle of a wheel, as of rovers."""

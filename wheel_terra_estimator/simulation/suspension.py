@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
-
-FloatArray = NDArray[np.float64]
 
 LEAST_LOAD_SHARE = 0.02
 """Least load of a wheel as a share of the mean: a lifted wheel still touches the ground."""
@@ -47,7 +45,7 @@ class Suspension:
     centre_of_gravity: FloatArray
     rocker_pivot: tuple[float, float] | None = None
     bogie_pivot: tuple[float, float] | None = None
-    bogie_wheels: NDArray[np.bool_] | None = None
+    bogie_wheels: BoolArray | None = None
     shares: FloatArray | None = None
 
     @cached_property

@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
 from wheel_terra_estimator.estimation.judgement.entrapment import entrapments
 from wheel_terra_estimator.frames import Columns, to_frame
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.frames import DataFrame
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ class TruthTable:
         Names of the n wheels.
     """
 
-    stamp: NDArray[np.int64]
+    stamp: IntArray
     slip: FloatArray
     slip_velocity: FloatArray
     drawbar_pull: FloatArray
@@ -89,7 +88,7 @@ class TruthTable:
     slip_angle: FloatArray
     lateral_force: FloatArray
     slip_class: NDArray[np.uint8]
-    stuck: NDArray[np.bool_]
+    stuck: BoolArray
     forward_velocity: FloatArray
     lateral_velocity: FloatArray
     yaw_rate: FloatArray
@@ -167,11 +166,11 @@ def slip_classes(slip: FloatArray, thresholds: FloatArray) -> NDArray[np.uint8]:
 
 
 def entrapped(
-    stamp: NDArray[np.int64],
+    stamp: IntArray,
     slip: FloatArray,
     below: float = 0.6,
     clear: float = 3.0,
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Return where the rover is entrapped, from an entrapment until it is free again.
 
     Parameters
@@ -183,7 +182,7 @@ def entrapped(
     below, clear : float
         Free once the median abs(slip) has been below ``below`` for ``clear`` [s].
     """
-    turning: NDArray[np.bool_] = np.asarray(~np.isnan(slip).all(axis=1))
+    turning: BoolArray = np.asarray(~np.isnan(slip).all(axis=1))
     median = np.zeros(len(stamp))
     median[turning] = np.nanmedian(np.abs(slip[turning]), axis=1)
     result = np.zeros(len(stamp), dtype=bool)

@@ -7,15 +7,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.outliers import inverse_covariance
 from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.selection.candidates import Setting
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
-
-FloatArray = NDArray[np.float64]
 
 # What differs most between stretches of ground; prior deviations of the difference (widened ones).
 _FIELDS = ('stiffness', 'tan_friction')

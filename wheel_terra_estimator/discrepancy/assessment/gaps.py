@@ -7,13 +7,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.result import Curves, QuantityGap
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
-
-FloatArray = NDArray[np.float64]
 
 _DRAWS = 1000
 _SEED = 5

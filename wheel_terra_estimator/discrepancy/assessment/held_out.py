@@ -7,16 +7,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.fitting.coordinates import bounds
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.selection.candidates import Setting
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 GROUPS = 8
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
@@ -20,8 +20,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     QUANTITIES,
     SteadyTable,
 )
-
-FloatArray = NDArray[np.float64]
 
 _DRAWS = 2000
 _SEED = 11

@@ -14,14 +14,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem, kernel
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 
-FloatArray = NDArray[np.float64]
 _SHORTENED = (0.5, 0.25)
 """Further factors on the lengths over which a structural error is smooth: a hump is shorter."""
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number
@@ -18,8 +18,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     QUANTITIES,
     SteadyTable,
 )
-
-FloatArray = NDArray[np.float64]
 
 _LEVELS = 7  # steps into which an input is cut
 _LARGEST_SHARE = 0.7  # of the rows in a box; more is "everywhere"
@@ -92,7 +90,7 @@ def locate(
 
 def _boxes(table: SteadyTable, names: list[str]) -> tuple[FloatArray, list[tuple[InputRange, ...]]]:
     """Return (boxes, N) membership and the sides of each box: one input, or slip and another."""
-    intervals: dict[str, list[tuple[NDArray[np.bool_], InputRange]]] = {}
+    intervals: dict[str, list[tuple[BoolArray, InputRange]]] = {}
     for name in names:
         values = table.columns[name]
         levels = np.unique(values)
@@ -107,7 +105,7 @@ def _boxes(table: SteadyTable, names: list[str]) -> tuple[FloatArray, list[tuple
             if 2 <= member.sum() <= _LARGEST_SHARE * len(values):
                 found.append((member, InputRange(name, float(low), float(high), INPUT_UNITS[name])))
         intervals[name] = found
-    boxes: list[NDArray[np.bool_]] = []
+    boxes: list[BoolArray] = []
     sides: list[tuple[InputRange, ...]] = []
     for name in names:
         for member, side in intervals[name]:

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -18,8 +18,6 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

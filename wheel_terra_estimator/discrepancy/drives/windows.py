@@ -34,9 +34,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.drives.series import Channel, DriveSeries, collect
 from wheel_terra_estimator.discrepancy.drives.smoothed_speed import SpeedSmoother
@@ -51,7 +51,6 @@ from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 if TYPE_CHECKING:
     from wheel_terra_estimator.bags.salvage.limits import Limits
 
-FloatArray = NDArray[np.float64]
 
 _GREATEST_CORRELATION = 0.95  # of neighbouring segments
 

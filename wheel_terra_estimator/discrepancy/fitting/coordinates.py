@@ -13,14 +13,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.soil_deviations import Deviation
 from wheel_terra_estimator.terramechanics.effects import by_variant
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 from wheel_terra_estimator.terramechanics.soil import Soil
-
-FloatArray = NDArray[np.float64]
 
 # Stated uncertainties are often optimistic: the coordinates are this many times wider, and the
 # evidence weighs both widths.

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
@@ -32,8 +32,6 @@ from wheel_terra_estimator.terramechanics.terms import (
     build_contact,
     set_angles,
 )
-
-FloatArray = NDArray[np.float64]
 
 STEP = 1e-5  # of u, for one-sided differences
 NODES = 8  # quadrature nodes on each side of the peak stress
@@ -66,7 +64,7 @@ class Forward:
         base_effects: Mapping[str, Mapping[str, float]],
         catalogue: Mapping[str, Effect],
         nodes: int = NODES,
-        active: NDArray[np.bool_] | None = None,
+        active: BoolArray | None = None,
         readings: Readings | None = None,
     ) -> None:
         self.points = points

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     Coordinate,
     bounds,
@@ -17,8 +17,6 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
-
-FloatArray = NDArray[np.float64]
 
 _LONGEST_STEP = 2.0  # prior standard deviations
 _CLOSE_ENOUGH = 0.02  # in the objective

@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.result import Noise
@@ -17,8 +17,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     QUANTITIES,
     SteadyTable,
 )
-
-FloatArray = NDArray[np.float64]
 
 ENOUGH_REPEATS = 6  # degrees of freedom from which repeats alone set the noise
 # Amplitudes of the smooth misfit that compete while the noise is estimated: whatever is smooth,

@@ -9,13 +9,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import bdtrc
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import OUTLIER_FACTOR, Problem
-
-FloatArray = NDArray[np.float64]
 
 SHARE = 0.02  # prior share of outliers among the cells
 # Sizes of features narrow in slip that rows may share [share of the range].

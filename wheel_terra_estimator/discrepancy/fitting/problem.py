@@ -14,10 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 
 # Structural errors are smooth over about a third of the range of an input, with slower parts.
 _LENGTHS = (0.35, 1.0)
@@ -36,7 +35,7 @@ class Problem:
     row: IndexArray
     quantity: IndexArray
     std: FloatArray  # (m,) noise standard deviation, inflated for outliers
-    outlier: NDArray[np.bool_]  # (m,) bool
+    outlier: BoolArray  # (m,) bool
     scale: FloatArray  # (3,) range of each quantity: the unit of the floor
     rotation: FloatArray  # (m, m) whitening and rotation
     # (m,) variance of the floor along each rotated axis at amplitude 1, in noise variances

@@ -16,8 +16,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
 from wheel_terra_estimator.discrepancy.fitting.coordinates import AS_THEY_ARE, narrowed
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
@@ -43,9 +43,6 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import (
     PRODUCTS,
     pair_of,
 )
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 MOST_TERMS = 4
 _BRANCHES = 3  # first terms that are gone on from, where laws do not predict what was left out

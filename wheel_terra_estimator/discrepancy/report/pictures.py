@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.numbers import SHOWN
 from wheel_terra_estimator.discrepancy.result import Diagnosis, NextMeasurement
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, QUANTITIES
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 
 SHOWN_INPUT = {
     'slope': (180.0 / np.pi, 'deg'),
@@ -133,7 +132,7 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
     return figure
 
 
-def _sweeps(diagnosis: Diagnosis) -> list[tuple[str, NDArray[np.intp]]]:
+def _sweeps(diagnosis: Diagnosis) -> list[tuple[str, IndexArray]]:
     """Return values and rows, by slip, of each setting of the inputs other than slip."""
     table = diagnosis.table
     others = [name for name in table.varying() if name != 'slip']
@@ -445,7 +444,7 @@ def _last(diagnosis: Diagnosis) -> str:
     return f'with {" and ".join(names)}' if names else 'soil refitted'
 
 
-def _rejected_cells(diagnosis: Diagnosis, q: int) -> NDArray[np.bool_]:
+def _rejected_cells(diagnosis: Diagnosis, q: int) -> BoolArray:
     mask = np.zeros(len(diagnosis.table), dtype=bool)
     for row, quantity, _ in diagnosis.outliers:
         mask[row] |= QUANTITIES.index(quantity) == q

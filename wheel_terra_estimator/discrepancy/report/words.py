@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
@@ -30,8 +30,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, St
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
-
-FloatArray = NDArray[np.float64]
 
 _KEYS = {
     'stiffness': 'the factor on soil.frictional_modulus and soil.cohesive_modulus',

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     BELIEVED_WIDTHS,
     Coordinate,
@@ -25,8 +25,6 @@ from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.selection.signatures import shapes
 from wheel_terra_estimator.terramechanics.effects.base import Effect
-
-FloatArray = NDArray[np.float64]
 
 # Floor during the fits [share of the range]; the evidence then weighs all floors.
 FIT_FLOOR = 0.01

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import chdtrc  # scipy.stats takes longer to load than a diagnosis
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
 
-FloatArray = NDArray[np.float64]
 Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], FloatArray]
 
 # Misfit that even the best floor leaves improbable.

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.fitting import noise as noises
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
@@ -41,8 +41,6 @@ from wheel_terra_estimator.discrepancy.selection.weights import (
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
-
-FloatArray = NDArray[np.float64]
 
 _FLEXIBLE = 0.25  # floor of the first robust pass: wide enough for any effect [share of range]
 _ROBUST_FLOOR = 0.02  # floor of the later ones
@@ -279,7 +277,7 @@ def _outliers_of_best(
     )
 
 
-def _slip_groups(table: SteadyTable) -> NDArray[np.intp]:
+def _slip_groups(table: SteadyTable) -> IndexArray:
     """(N,) rows that share a reading of the slip: equal to the last digit, not a set value."""
     slip = table.columns['slip']
     _, group = np.unique(slip, return_inverse=True)

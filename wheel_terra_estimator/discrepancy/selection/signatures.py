@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     Coordinate,
     bounds,
@@ -20,8 +20,6 @@ from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect
-
-FloatArray = NDArray[np.float64]
 
 LARGE = 4.0  # prior deviations: no effect is expected to be larger
 SEEN = 2.0  # d' from which an effect counts as visible

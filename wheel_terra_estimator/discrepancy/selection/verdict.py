@@ -11,8 +11,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.selection.remainder import (
     Remainder,
@@ -21,8 +21,6 @@ from wheel_terra_estimator.discrepancy.selection.remainder import (
 )
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
-
-FloatArray = NDArray[np.float64]
 
 # "Something is missing" must beat "nothing is missing" by these odds, and by more where agreement
 # itself is sure to need a model-error floor: a model with one error can have another.

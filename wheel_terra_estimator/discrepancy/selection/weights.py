@@ -17,8 +17,8 @@ from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.selection.candidates import (
@@ -28,8 +28,6 @@ from wheel_terra_estimator.discrepancy.selection.candidates import (
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
-
-FloatArray = NDArray[np.float64]
 
 # Prior probabilities: nothing missing, one effect, two effects.
 PRIOR_NOTHING, PRIOR_ONE, PRIOR_TWO = 0.50, 0.45, 0.05
@@ -100,7 +98,7 @@ class Selection:
     floors: tuple[Floor, ...]
 
     @property
-    def unexplained(self) -> NDArray[np.bool_]:
+    def unexplained(self) -> BoolArray:
         """(F,) True for floors that ask for a name."""
         return np.array([floor.unexplained for floor in self.floors])
 

@@ -12,16 +12,14 @@ import heapq
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
     SteadyTable,
     concatenated,
 )
 from wheel_terra_estimator.errors import UserError
-
-FloatArray = NDArray[np.float64]
 
 MOST_ROWS = 240  # more are averaged over neighbouring inputs: the time grows with their cube
 
@@ -90,7 +88,7 @@ def together(tables: Sequence[SteadyTable]) -> SteadyTable:
     return concatenated(' + '.join(part.name for part in parts), parts, notes)
 
 
-def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, NDArray[np.bool_]]:
+def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, BoolArray]:
     """Return both tables as one, and which rows candidate effects act on.
 
     Raises
@@ -114,9 +112,9 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, NDArr
     return joined, np.arange(len(joined)) < len(table)
 
 
-def _halved(scaled: FloatArray, cells: list[NDArray[np.intp]], most: int) -> list[NDArray[np.intp]]:
+def _halved(scaled: FloatArray, cells: list[IndexArray], most: int) -> list[IndexArray]:
     """Split the cell with the most rows times extent until there are ``most``."""
-    done: list[NDArray[np.intp]] = []
+    done: list[IndexArray] = []
     heap = [(-_weight(scaled[cell]), i, cell) for i, cell in enumerate(cells)]
     heapq.heapify(heap)
     label = len(heap)

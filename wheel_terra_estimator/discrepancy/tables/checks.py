@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.tables.averaging import MOST_ROWS, averaged
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
@@ -24,8 +24,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
 )
 from wheel_terra_estimator.errors import UserError
 
-FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+Mask = BoolArray
 _Refuse: TypeAlias = Callable[[Mask, str, str], None]
 
 MINIMUM_ROWS = 6
@@ -44,7 +43,7 @@ LIKE_WHEEL = 1.4  # factor within which a row's wheel may differ from that of th
 def check_table(
     name: str,
     values: Mapping[str, Iterable[float]],
-    lines: Sequence[int] | NDArray[np.intp] | None = None,
+    lines: Sequence[int] | IndexArray | None = None,
     notes: Sequence[str] = (),
     most: int = MOST_ROWS,
 ) -> SteadyTable:
@@ -146,7 +145,7 @@ _RANGES: tuple[tuple[str, float, float, str], ...] = (
 )
 
 
-def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np.intp]) -> None:
+def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray) -> None:
     """Raise where a value is impossible, with the unit that it looks like."""
 
     def refuse(bad: Mask, column: str, why: str) -> None:
@@ -207,7 +206,7 @@ def _check_size_of_deviation(
             )
 
 
-def _check_signs(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np.intp]) -> None:
+def _check_signs(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray) -> None:
     """Raise where torque works against the slip, or where most sinkages are negative."""
     direction = np.where(arrays.get('angular_velocity', np.ones(len(lines))) < 0.0, -1.0, 1.0)
     if 'torque' in arrays:

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.csv_file import CsvFile, is_number, number, open_csv, value_of
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.header import Choice, Header, meaning_of, with_unit
@@ -29,7 +29,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import units_in
 from wheel_terra_estimator.input_file import LARGEST_TABLE
 
-FloatArray = NDArray[np.float64]
 Rows = Iterable[tuple[int, Sequence[Any]]]
 
 REQUIRED = ('slip', 'normal_load')
@@ -61,7 +60,7 @@ def read_columns(
     choice: Choice,
     wanted: Sequence[str] = COLUMNS,
     one_of: Sequence[str] = (),
-) -> tuple[NDArray[np.intp], dict[str, FloatArray], list[str]]:
+) -> tuple[IndexArray, dict[str, FloatArray], list[str]]:
     """Return the lines of the rows, the wanted columns of a CSV file in SI, and notes.
 
     Of the columns ``one_of`` there has to be one, beside slip and normal load; columns that are not
@@ -146,7 +145,7 @@ def _check_layout(file: CsvFile, rows: Sequence[tuple[int, list[str]]]) -> None:
 
 def _read_rows(
     source: str, header: Header, rows: Rows, decimal_comma: bool
-) -> tuple[NDArray[np.intp], dict[str, FloatArray]]:
+) -> tuple[IndexArray, dict[str, FloatArray]]:
     """Return the lines of the rows and the columns that are used; ask for the others."""
     lines = array('q')
     values = [(column, array('d')) for column in header.columns if column.name not in ORDER_COLUMNS]

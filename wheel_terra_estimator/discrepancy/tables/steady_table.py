@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 
 QUANTITIES = ('sinkage', 'drawbar_pull', 'torque', 'lateral_force')
 UNITS = {'sinkage': 'm', 'drawbar_pull': 'N', 'torque': 'N m', 'lateral_force': 'N'}
@@ -40,7 +39,7 @@ class SteadyTable:
     """Checked rows of steady operating points."""
 
     name: str  # where the rows came from, for messages
-    lines: NDArray[np.intp]  # (N,) line of each row in the file, the header being line 1
+    lines: IndexArray  # (N,) line of each row in the file, the header being line 1
     # Input column -> (N,) values [SI], only those that the table has; nan = not stated
     columns: Mapping[str, FloatArray]
     measured: FloatArray  # (N, 4) of `QUANTITIES` [m, N, N m, N]; nan = not measured
@@ -50,7 +49,7 @@ class SteadyTable:
     leaving_angle_std: FloatArray
     # (N,) rows that hold true values instead of readings: the stated zeros and gains of the
     # sensors (``sensors.*``) were taken off before, as of a drive's
-    true_rows: NDArray[np.bool_]
+    true_rows: BoolArray
     notes: tuple[str, ...] = ()  # what the reader found odd but usable
 
     def __len__(self) -> int:
@@ -82,7 +81,7 @@ class SteadyTable:
             columns.append((values - values.min()) / np.ptp(values))
         return np.column_stack(columns) if columns else np.zeros((len(self), 0))
 
-    def select(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> SteadyTable:
+    def select(self, rows: IndexArray | BoolArray) -> SteadyTable:
         """Return the table of these rows."""
         return self.each(lambda values: values[rows])
 
