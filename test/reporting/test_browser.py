@@ -203,14 +203,14 @@ def test_two_runs_over_an_hour_on_one_time_axis(comparison_report: Path) -> None
 
 @pytest.fixture(scope='module')
 def soilbin_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_lab.soilbin import report
+    from wheel_terra_lab.soilbin import output
     from wheel_terra_lab.soilbin.bookkeeping import SERIES
     from wheel_terra_lab.soilbin.case import Case
 
     series = np.random.default_rng(1).random((200, len(SERIES)))
     series[:, 0] = np.linspace(0.0, 40.0, 200)
     folder = tmp_path_factory.mktemp('soilbin')
-    report.write_report(folder, series, Case(), {'slip (second half)': '21.3 % (24.1 %)'})
+    output.write_report(folder, series, Case(), {'slip (second half)': '21.3 % (24.1 %)'})
     return folder / 'report.html'
 
 

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import argparse
 import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -104,7 +106,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run_one(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.output_folder import working_folder
-    from wheel_terra_lab.soilbin import output, progress, snapshots
+    from wheel_terra_lab.soilbin import output, snapshots
     from wheel_terra_lab.soilbin.bookkeeping import STATE
     from wheel_terra_lab.soilbin.case import check
     from wheel_terra_lab.soilbin.launch import StoppedByUserError, run_case
@@ -117,7 +119,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
     try:
         with working_folder(folder, arguments.overwrite, arguments.resume, output.FILES):
             try:
-                with progress.bar() as report:
+                with _progress_bar() as report:
                     summary = run_case(case, work, cache, report)
                 output.write_folder(folder, work, case, summary, arguments.film)
             except UserError:
@@ -133,6 +135,32 @@ def _run_one(arguments: argparse.Namespace) -> int:
     if summary['stopped']:
         print(f'stopped early: {summary["stopped"]}')
     return 0
+
+
+@contextmanager
+def _progress_bar() -> Iterator[Callable[[str, float], None]]:
+    """Show one bar per stage with the time left; yield what takes (stage, fraction)."""
+    from tqdm import tqdm
+
+    shown: dict[str, tqdm] = {}
+    form = '{l_bar}{bar}| {elapsed}, {remaining} left'
+
+    def report(stage: str, fraction: float) -> None:
+        if stage not in shown:
+            close()
+            shown[stage] = tqdm(total=1.0, desc=f'{stage:14s}', bar_format=form, leave=True)
+        current = shown[stage]
+        current.n = min(1.0, fraction)
+        current.refresh()
+
+    def close() -> None:
+        for current in shown.values():
+            current.close()
+
+    try:
+        yield report
+    finally:
+        close()
 
 
 def case_of(arguments: argparse.Namespace) -> Case:

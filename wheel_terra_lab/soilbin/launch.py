@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_lab.soilbin import results
+from wheel_terra_lab.soilbin.bookkeeping import summary
 from wheel_terra_lab.soilbin.case import Case, check, to_dict
 from wheel_terra_lab.soilbin.stability import time_step
 
@@ -61,7 +61,7 @@ def run_case(
     series = np.load(folder / 'series.npy')
     if len(series) < 4:
         raise CaseFailedError(f'{case.name}: {outcome["stopped"] or "the travel is too short"}')
-    return results.summary(case, series, outcome['facts'], outcome['stopped'])
+    return summary(case, series, outcome['facts'], outcome['stopped'])
 
 
 def _plain(data: object) -> object:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from wheel_terra_lab.soilbin import files, metrics
 from wheel_terra_lab.soilbin.case import EARTH_GRAVITY, Case
@@ -27,6 +28,7 @@ WHEELS_PAPER_SPEED = (8, 1, 5, 4, 7, 3, 6, 9)  # of table 7 beside wheel 2, the 
 WHEELS = range(1, 10)
 SLOPES_TABLE6 = (0.0, 5.0, 10.0, 15.0)
 TABLE7_SLOPE = 25.0  # [deg]
+FULL_LOAD = 19.6  # [N], of `wheel_case`
 MOON = EARTH_GRAVITY / 6
 MOON_LOAD = 14.7  # [N]
 MOON_PULLS = (0.0, 0.1, 0.2, 0.3)  # P/W on the level
@@ -55,20 +57,27 @@ def wheel_case(wheel: int, slope_deg: float, seed: int, grain_scale: float) -> C
     )
 
 
-def _job(case: Case, part: str, wheel: int | str, slope_deg: float, **labels: object) -> Job:
-    base: dict[str, object] = {
+def _job(
+    part: str, wheel: int, slope_deg: float, seed: int, scale: float, name: str = '', **changes: Any
+) -> Job:
+    """Return a case of a part; ``name`` says what is changed in it, ``changes`` what it is."""
+    case = wheel_case(wheel, slope_deg, seed, scale)
+    case = case.replace(name=f'{name}, bed {seed}' if name else case.name, **changes)
+    width = changes.get('wheel__width')
+    pull = case.operation.hitch_pull / case.operation.vertical_load
+    labels: dict[str, object] = {
         'name': case.name,
         'part': part,
-        'wheel': wheel,
+        'wheel': wider(wheel, width) if width else wheel,
         'slope_deg': slope_deg,
         'load': case.operation.vertical_load,
         'gravity': round(case.operation.gravity, 4),
-        'pull_ratio': 0.0,
+        'pull_ratio': round(pull, 6),
         'grain_scale': case.bed.grain_scale,
         'seed': case.bed.seed,
         'speed_factor': case.operation.speed_factor,
     }
-    return Job(case, base | labels)
+    return Job(case, labels)
 
 
 def jobs(arguments: argparse.Namespace) -> list[Job]:
@@ -77,55 +86,44 @@ def jobs(arguments: argparse.Namespace) -> list[Job]:
     scale = arguments.grain_scale or 1.0
     found: list[Job] = []
     for seed in range(1, 1 + (arguments.seeds or 3)):
+        bed = seed, scale
         if 'table7' in parts:
-            found += [_job(wheel_case(w, 25.0, seed, scale), 'table7', w, 25.0) for w in WHEELS]
+            found += [_job('table7', wheel, TABLE7_SLOPE, *bed) for wheel in WHEELS]
         if 'table6' in parts:
-            found += [
-                _job(wheel_case(w, slope, seed, scale), 'table6', w, slope)
-                for slope in SLOPES_TABLE6
-                for w in WHEELS
-            ]
+            found += [_job('table6', w, slope, *bed) for slope in SLOPES_TABLE6 for w in WHEELS]
             # Wheel 2 also where the paper's slips 20 %, and between its two steep slopes.
-            found += [
-                _job(wheel_case(2, slope, seed, scale), 'table6', 2, slope) for slope in (7.1, 20.0)
-            ]
+            found += [_job('table6', 2, slope, *bed) for slope in (7.1, 20.0)]
         if 'loads' in parts:
-            for load in OTHER_LOADS:
-                for slope in (0.0, 15.0, 25.0):
-                    case = wheel_case(2, slope, seed, scale).replace(
-                        name=f'wheel 2, {load:g} N, {slope:g} deg, bed {seed}',
-                        operation__vertical_load=load,
-                    )
-                    found.append(_job(case, 'loads', 2, slope))
+            found += [
+                _loaded('loads', 2, load, slope, *bed)
+                for load in OTHER_LOADS
+                for slope in (0.0, 15.0, TABLE7_SLOPE)
+            ]
         if 'moon' in parts:
             found += _moon(seed, scale)
         if 'high_lugs' in parts:
-            found += _high_lugs(seed, scale)
+            found += _high_lugs(seed, max(scale, HIGH_LUG_GRAINS))
         if PAPER_SPEED in parts:
             found += _paper_speed(seed, scale)
     return found
+
+
+def _loaded(part: str, wheel: int, load: float, slope: float, seed: int, scale: float) -> Job:
+    name = f'wheel {wheel}, {load:g} N, {slope:g} deg'
+    return _job(part, wheel, slope, seed, scale, name, operation__vertical_load=load)
 
 
 def _high_lugs(seed: int, scale: float) -> list[Job]:
     """Figures 8, 12(b), 13(b): lugs of 20 mm under three loads and on wheels of other widths."""
     found = []
     for slope in HIGH_LUG_SLOPES:
-        base = wheel_case(HIGH_LUGS, slope, seed, max(scale, HIGH_LUG_GRAINS))
-        for load in (*OTHER_LOADS, base.operation.vertical_load):
-            name = f'wheel {HIGH_LUGS}, {load:g} N, {slope:g} deg, bed {seed}'
-            case = base.replace(name=name, operation__vertical_load=load)
-            found.append(_job(case, 'high_lugs', HIGH_LUGS, slope))
+        for load in (*OTHER_LOADS, FULL_LOAD):
+            found.append(_loaded('high_lugs', HIGH_LUGS, load, slope, seed, scale))
         for width in OTHER_WIDTHS:
-            wheel = wider(HIGH_LUGS, width)
-            name = f'wheel {wheel}, {slope:g} deg, bed {seed}'
-            case = base.replace(name=name, wheel__width=width)
-            found.append(_job(case, 'high_lugs', wheel, slope))
+            name = f'wheel {wider(HIGH_LUGS, width)}, {slope:g} deg'
+            found.append(_job('high_lugs', HIGH_LUGS, slope, seed, scale, name, wheel__width=width))
     for slope in PATH_SLOPES:
-        case = wheel_case(HIGH_LUGS, slope, seed, max(scale, HIGH_LUG_GRAINS)).replace(
-            name=f'wheel {HIGH_LUGS}, {PATH_LOAD:g} N, {slope:g} deg, bed {seed}',
-            operation__vertical_load=PATH_LOAD,
-        )
-        found.append(_job(case, 'high_lugs', HIGH_LUGS, slope))
+        found.append(_loaded('high_lugs', HIGH_LUGS, PATH_LOAD, slope, seed, scale))
     return found
 
 
@@ -141,16 +139,11 @@ def _paper_speed(seed: int, scale: float) -> list[Job]:
         cases += [(wheel, TABLE7_SLOPE) for wheel in WHEELS_PAPER_SPEED]
     return [
         _job(
-            wheel_case(wheel, slope, seed, scale).replace(
-                name=f"wheel {wheel}, {slope:g} deg, bed {seed}, paper's speed",
-                operation__speed_factor=1.0,
-            ),
-            PAPER_SPEED,
-            wheel,
-            slope,
+            PAPER_SPEED, wheel, slope, seed, scale,
+            f"wheel {wheel}, {slope:g} deg, paper's speed", operation__speed_factor=1.0,
         )
         for wheel, slope in cases
-    ]
+    ]  # fmt: skip
 
 
 def _moon(seed: int, scale: float) -> list[Job]:
@@ -160,31 +153,18 @@ def _moon(seed: int, scale: float) -> list[Job]:
     extended soil bin condition".
     """
     found = []
+    deep: dict[str, Any] = {'operation__vertical_load': MOON_LOAD, 'bed__rows': 40}
     for gravity, place in ((MOON, 'Moon'), (EARTH_GRAVITY, 'Earth')):
-        flat = wheel_case(5, 0.0, seed, scale).replace(
-            operation__gravity=gravity, operation__vertical_load=MOON_LOAD, bed__rows=40
-        )
         for ratio in MOON_PULLS:
-            case = flat.replace(
-                name=f'{place}, level, P/W {ratio:g}, bed {seed}',
-                operation__hitch_pull=ratio * MOON_LOAD,
-            )
-            found.append(_job(case, 'moon', 5, 0.0, pull_ratio=ratio))
+            pull = {'operation__gravity': gravity, 'operation__hitch_pull': ratio * MOON_LOAD}
+            name = f'{place}, level, P/W {ratio:g}'
+            found.append(_job('moon', 5, 0.0, seed, scale, name, **deep, **pull))
+    long = {'operation__gravity': MOON, 'operation__start': 0.7, 'bed__length': 1.6}
     for slope in MOON_SLOPES:
-        case = wheel_case(5, slope, seed, scale).replace(
-            name=f'Moon, {slope:g} deg, bed {seed}',
-            operation__gravity=MOON,
-            operation__vertical_load=MOON_LOAD,
-            operation__start=0.7,
-            bed__length=1.6,
-            bed__rows=40,
-        )
-        found.append(_job(case, 'moon', 5, slope))
+        found.append(_job('moon', 5, slope, seed, scale, f'Moon, {slope:g} deg', **deep, **long))
     for slope in EARTH_SLOPES:
-        case = wheel_case(5, slope, seed, scale).replace(
-            name=f'Earth, {slope:g} deg, bed {seed}', operation__vertical_load=MOON_LOAD
-        )
-        found.append(_job(case, 'moon', 5, slope))
+        name = f'Earth, {slope:g} deg'
+        found.append(_job('moon', 5, slope, seed, scale, name, operation__vertical_load=MOON_LOAD))
     return found
 
 

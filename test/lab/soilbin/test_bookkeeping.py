@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from wheel_terra_lab.soilbin import metrics, output
-from wheel_terra_lab.soilbin.bookkeeping import SERIES, WheelContacts, sums
+from wheel_terra_lab.soilbin.bookkeeping import SERIES, WheelContacts, summary, sums
 from wheel_terra_lab.soilbin.case import Case
-from wheel_terra_lab.soilbin.results import summary
 
 
 def test_sums_of_three_contacts():
