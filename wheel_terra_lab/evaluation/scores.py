@@ -310,17 +310,14 @@ def ratio_to_better_baseline(drives: Sequence[Samples]) -> Ratio:
     return Ratio(value, float(low), float(high), float(np.std(ratios)))
 
 
-def three_class_accuracy(data: Samples, near_border: bool = False) -> float:
-    """Return the share of right classes low, moderate, high and above, by place of the truth."""
-    return _accuracy(data, (0.3, 0.6), near_border)
+THREE_CLASSES, TWO_CLASSES = (0.3, 0.6), (0.6,)
+"""Borders of slip between low, moderate, and high or above."""
 
 
-def two_class_accuracy(data: Samples) -> float:
-    """Return the share of right calls below or above 0.6."""
-    return _accuracy(data, (0.6,), near_border=False)
-
-
-def _accuracy(data: Samples, borders: Sequence[float], near_border: bool) -> float:
+def accuracy(
+    data: Samples, borders: Sequence[float] = THREE_CLASSES, near_border: bool = False
+) -> float:
+    """Return the share of right classes where the truth is near a border, or where it is not."""
     magnitude = np.abs(data.true_slip)
     distance = np.min(np.abs(magnitude[:, None] - np.array(borders)), axis=1)
     chosen = (distance <= NEAR_BORDER) == near_border

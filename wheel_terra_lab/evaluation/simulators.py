@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
 from typing import Protocol
 
 import numpy as np
@@ -99,27 +101,21 @@ def _simulate_a(kind: str, seed: int, duration: float | None, rover: str | None)
     return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
 
 
-def _simulate_b(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
+def _simulated(
+    letter: str, kind: str, seed: int, duration: float | None, rover: str | None
+) -> BenchDrive:
     if rover is not None:
-        raise UserError('simulator B has rovers of its own: another rover needs simulator A')
-    from wheel_terra_lab.evaluation.simulator_b.drive import simulate
-
-    drive = simulate(kind, seed, duration)
-    return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
-
-
-def _simulate_c(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
-    if rover is not None:
-        raise UserError('simulator C draws its rovers itself: another rover needs simulator A')
-    from wheel_terra_lab.evaluation.simulator_c.drive import simulate
-
-    drive = simulate(kind, seed, duration)
+        raise UserError(
+            f'simulator {letter} has rovers of its own: another rover needs simulator A'
+        )
+    module = import_module(f'wheel_terra_lab.evaluation.simulator_{letter.lower()}.drive')
+    drive = module.simulate(kind, seed, duration)
     return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
 
 
 SIMULATORS = {
     'A': Simulator('A', tuple(kinds_a.KINDS), ('firm',), kinds_a.ENTRAPMENTS, _simulate_a, True),
-    'B': Simulator('B', tuple(kinds_b.KINDS), (), kinds_b.ENTRAPMENTS, _simulate_b),
-    'C': Simulator('C', tuple(plans_c.KINDS), (), plans_c.ENTRAPMENTS, _simulate_c),
+    'B': Simulator('B', tuple(kinds_b.KINDS), (), kinds_b.ENTRAPMENTS, partial(_simulated, 'B')),
+    'C': Simulator('C', tuple(plans_c.KINDS), (), plans_c.ENTRAPMENTS, partial(_simulated, 'C')),
 }
 """A: that of the package; B, C: written apart from it and from one another by other hands."""

@@ -246,9 +246,9 @@ def _error_row(name: str, data: Samples) -> tuple[str, ...]:
         f'{100 * scores.rms(data.pull_error):.2f}',
         f'{scores.coverage(data.pull_error, data.pull_std):.1%}',
         f'{100 * scores.rms(data.shared_pull_error):.2f}',
-        _share(scores.three_class_accuracy(data)),
-        _share(scores.two_class_accuracy(data)),
-        _share(scores.three_class_accuracy(data, near_border=True)),
+        _share(scores.accuracy(data)),
+        _share(scores.accuracy(data, scores.TWO_CLASSES)),
+        _share(scores.accuracy(data, near_border=True)),
     )
 
 

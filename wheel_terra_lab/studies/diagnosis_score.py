@@ -203,24 +203,14 @@ def _calibration(records: list[Record]) -> str:
     sure, right = _names(records)
     if not sure.size:
         return '-'
-    error = _calibration_error(sure, right)
+    error = scoring.calibration_error(sure, right)
     rng = np.random.default_rng(_SEED)
-    drawn = [_calibration_error(sure, rng.random(sure.size) < sure) for _ in range(_DRAWS)]
+    drawn = [scoring.calibration_error(sure, rng.random(sure.size) < sure) for _ in range(_DRAWS)]
     beyond = math.sqrt(max(error**2 - float(np.mean(np.square(drawn))), 0.0))
     return (
         f'{error:.3f} (n {sure.size}; stated {sure.mean():.2f}, right {right.mean():.2f}; names '
         f'that are right as often as stated: {np.mean(drawn):.3f}, up to '
         f'{np.quantile(drawn, 0.95):.3f}; beyond that scatter {beyond:.3f})'
-    )
-
-
-def _calibration_error(sure: np.ndarray, right: np.ndarray) -> float:
-    place = np.minimum((sure * 10).astype(int), 9)
-    return float(
-        sum(
-            abs(sure[place == k].mean() - right[place == k].mean()) * np.mean(place == k)
-            for k in np.unique(place)
-        )
     )
 
 

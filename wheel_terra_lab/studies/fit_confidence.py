@@ -90,17 +90,6 @@ def logistic(features: np.ndarray, right: np.ndarray, centre: np.ndarray) -> np.
     return weights
 
 
-def calibration_error(p: np.ndarray, right: np.ndarray) -> float:
-    """Return the mean distance of stated and found frequency over ten bins of equal width."""
-    place = np.minimum((p * 10).astype(int), 9)
-    return float(
-        sum(
-            np.abs(p[place == b].mean() - right[place == b].mean()) * np.mean(place == b)
-            for b in np.unique(place)
-        )
-    )
-
-
 def fit(file: Path, around: Path | None) -> None:
     """Fit the map, print its errors on designs left out, write it.
 
@@ -130,7 +119,7 @@ def fit(file: Path, around: Path | None) -> None:
         sure = left_out > 0.9
         print(
             f'{key}: {len(right)} names, {right.mean():.3f} right; calibration error '
-            f'{calibration_error(left_out, right):.3f}; said above 0.9: {sure.mean():.2f}, '
+            f'{scoring.calibration_error(left_out, right):.3f}; said above 0.9: {sure.mean():.2f}, '
             f'of these right: {right[sure].mean():.3f}'
         )
         out = np.array([record['left_out'] for record in records])

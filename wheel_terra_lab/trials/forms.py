@@ -15,6 +15,8 @@ import numpy as np
 from wheel_terra_lab.trials.hidden import (
     Change,
     Kind,
+    adding,
+    fixed,
     layer_depth,
     mean_load,
     mean_radius,
@@ -22,19 +24,9 @@ from wheel_terra_lab.trials.hidden import (
 )
 from wheel_terra_lab.trials.truth import FloatArray, Hidden, Rows, Setup, TrueSoil
 
-Adds = Callable[[Rows, Setup, Rows], FloatArray]
 REFERENCE_PRESSURE = 3e3  # W/(b r) at which laws of the load are neutral [Pa]
 FREE_HEIGHT = 0.005  # lugs up to this height carry nothing [m]
 RING_HEIGHT = 0.003  # lugs of this height begin to hold a ring of soil [m]
-
-
-def _adding(name: str, key: str, add: Adds, **second: float) -> Hidden:
-    """Return an effect that adds to one output."""
-
-    def finish(out: Rows, setup: Setup, rows: Rows) -> None:
-        out[key] = out[key] + add(out, setup, rows)
-
-    return Change(name, None, finish, **second)
 
 
 def _pressure(rows: Rows) -> FloatArray:
@@ -68,14 +60,14 @@ def _saturating(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hi
     def dug(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         return np.asarray(size * rows['lug_height'] * (1 - np.exp(-_driving(rows) / span)))
 
-    return _adding('lug_digging', 'sinkage', dug, range=span)
+    return adding('lug_digging', 'sinkage', dug, range=span)
 
 
 def _by_height(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def saved(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         return np.asarray(-size * np.clip(rows['lug_height'] - FREE_HEIGHT, 0.0, None))
 
-    return _adding('lug_support', 'sinkage', saved, free_height=FREE_HEIGHT)
+    return adding('lug_support', 'sinkage', saved, free_height=FREE_HEIGHT)
 
 
 def _terzaghi(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
@@ -94,7 +86,7 @@ def _terzaghi(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidd
         weight = setup.density * rows['gravity'] * z
         return np.asarray(-size * setup.width * edge * z * (2 * setup.cohesion * kc + weight * kg))
 
-    return _adding('bulldozing', 'drawbar_pull', drag)
+    return adding('bulldozing', 'drawbar_pull', drag)
 
 
 def _rut(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
@@ -130,14 +122,14 @@ def _proportional(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> 
     def lost(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         return np.asarray(size * np.abs(out['torque']) * np.sign(rows['angular_velocity']))
 
-    return _adding('drivetrain_friction', 'torque', lost)
+    return adding('drivetrain_friction', 'torque', lost)
 
 
 def _viscous(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     def lost(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         return np.asarray(size * rows['angular_velocity'])
 
-    return _adding('drivetrain_friction', 'torque', lost)
+    return adding('drivetrain_friction', 'torque', lost)
 
 
 def _thrust(textbook: bool) -> Callable[[float, float, Rows, TrueSoil], Hidden]:
@@ -220,10 +212,6 @@ def _shear_by_pressure(size: float, secondary: float, rows: Rows, soil: TrueSoil
     return Change('shear_deformation', prepare)
 
 
-def _one(value: float) -> Callable[[Rows, TrueSoil], float]:
-    return lambda rows, soil: value
-
-
 def _friction_unit(rows: Rows, soil: TrueSoil) -> float:
     """Damping that takes 4 % of load times radius at the mean rate."""
     return 0.04 * mean_load(rows) * mean_radius(rows) / float(np.mean(rows['angular_velocity']))
@@ -235,34 +223,39 @@ def _flexible_unit(rows: Rows, soil: TrueSoil) -> float:
 
 
 FORMS = {
-    'slip_sinkage_exponent:lyasko': Kind(_lyasko, _one(0.7), 6),
+    'slip_sinkage_exponent:lyasko': Kind(_lyasko, fixed(0.7), 6),
     'slip_sinkage_exponent:load': Kind(
-        _exponent_by_load, _one(0.05), 5, signed=True, needs=('normal_load',)
+        _exponent_by_load, fixed(0.05), 5, signed=True, needs=('normal_load',)
     ),
     'lug_digging:saturating': Kind(
-        _saturating, _one(0.4), 5, needs=('lug_height',), requires='sinkage', two_parameters=True
+        _saturating,
+        fixed(0.4),
+        5,
+        needs=('lug_height',),
+        requires='sinkage',
+        two_parameters=True,
     ),
     'lug_support:by_height': Kind(
-        _by_height, _one(0.3), 5, needs=('lug_height', 'tall_lugs'), requires='sinkage'
+        _by_height, fixed(0.3), 5, needs=('lug_height', 'tall_lugs'), requires='sinkage'
     ),
-    'bulldozing:terzaghi': Kind(_terzaghi, _one(0.3), 6, requires='drawbar_pull'),
+    'bulldozing:terzaghi': Kind(_terzaghi, fixed(0.3), 6, requires='drawbar_pull'),
     'multipass:rut': Kind(_rut, lambda r, s: 0.02 * mean_radius(r), 5, needs=('pass_number',)),
     'hard_layer:bearing': Kind(_bearing_layer, stiffness_near, 20, two_parameters=True),
-    'stress_peak_shift:backward': Kind(_backward, _one(0.1), 2.5),
-    'drivetrain_friction:proportional': Kind(_proportional, _one(0.08), 6, requires='torque'),
+    'stress_peak_shift:backward': Kind(_backward, fixed(0.1), 2.5),
+    'drivetrain_friction:proportional': Kind(_proportional, fixed(0.08), 6, requires='torque'),
     'drivetrain_friction:viscous': Kind(
         _viscous, _friction_unit, 5, needs=('angular_velocity',), requires='torque'
     ),
-    'grouser_thrust': Kind(_thrust(textbook=False), _one(0.15), 6, needs=('lug_height',)),
-    'grouser_thrust:textbook': Kind(_thrust(textbook=True), _one(0.1), 6, needs=('lug_height',)),
-    'rim_friction': Kind(_smooth_rim, _one(0.2), 4, needs=('bare_rim',)),
+    'grouser_thrust': Kind(_thrust(textbook=False), fixed(0.15), 6, needs=('lug_height',)),
+    'grouser_thrust:textbook': Kind(_thrust(textbook=True), fixed(0.1), 6, needs=('lug_height',)),
+    'rim_friction': Kind(_smooth_rim, fixed(0.2), 4, needs=('bare_rim',)),
     'wheel_flexibility': Kind(_flexible, _flexible_unit, 8),
     'soil_adhesion': Kind(_coat, lambda r, s: 0.015 * mean_radius(r), 5),
-    'soil_adhesion:tension': Kind(_tension, _one(500.0), 10),
+    'soil_adhesion:tension': Kind(_tension, fixed(500.0), 10),
     'soil_transport': Kind(
-        _carried, _one(0.4), 4, needs=('lug_height', 'slip'), requires='sinkage'
+        _carried, fixed(0.4), 4, needs=('lug_height', 'slip'), requires='sinkage'
     ),
     'shear_deformation:pressure': Kind(
-        _shear_by_pressure, _one(0.4), 3.5, signed=True, needs=('normal_load',)
+        _shear_by_pressure, fixed(0.4), 3.5, signed=True, needs=('normal_load',)
     ),
 }

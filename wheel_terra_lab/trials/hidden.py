@@ -28,6 +28,7 @@ from wheel_terra_lab.trials.truth import (
 
 Prepare = Callable[[Setup, Rows], None]
 Finish = Callable[[Rows, Setup, Rows], None]
+Adds = Callable[[Rows, Setup, Rows], FloatArray]
 REFERENCE_SPEED = 0.05  # rim speed [m/s] at which rate effects are zero
 TINY = 1e-9  # keeps divisions finite
 
@@ -72,25 +73,15 @@ class Kind:
     all_or_nothing: bool = False  # a claim with no amplitude: half of the cases keep size 1
 
 
-def _sinkage(add: Callable[[Rows, Setup, Rows], FloatArray]) -> Finish:
+def adding(
+    name: str, key: str, add: Adds, prepare: Prepare | None = None, **second: float
+) -> Hidden:
+    """Return an effect that adds to one output."""
+
     def finish(out: Rows, setup: Setup, rows: Rows) -> None:
-        out['sinkage'] = out['sinkage'] + add(out, setup, rows)
+        out[key] = out[key] + add(out, setup, rows)
 
-    return finish
-
-
-def _pull(add: Callable[[Rows, Setup, Rows], FloatArray]) -> Finish:
-    def finish(out: Rows, setup: Setup, rows: Rows) -> None:
-        out['drawbar_pull'] = out['drawbar_pull'] + add(out, setup, rows)
-
-    return finish
-
-
-def _torque(add: Callable[[Rows, Setup, Rows], FloatArray]) -> Finish:
-    def finish(out: Rows, setup: Setup, rows: Rows) -> None:
-        out['torque'] = out['torque'] + add(out, setup, rows)
-
-    return finish
+    return Change(name, prepare, finish, **second)
 
 
 def _exponent(size: float, power: float) -> Hidden:
@@ -142,11 +133,10 @@ def _slope_gravity(size: float, only_pull: bool) -> Hidden:
         if not only_pull:
             setup.load = setup.load * (1 - size * (1 - np.cos(rows['slope'])))
 
-    return Change(
-        'slope_gravity',
-        prepare,
-        _pull(lambda out, setup, rows: -size * rows['normal_load'] * np.sin(rows['slope'])),
-    )
+    def weight(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
+        return -size * rows['normal_load'] * np.sin(rows['slope'])
+
+    return adding('slope_gravity', 'drawbar_pull', weight, prepare)
 
 
 def _bulldozing(size: float, soil: TrueSoil, rankine: bool) -> Hidden:
@@ -166,7 +156,7 @@ def _bulldozing(size: float, soil: TrueSoil, rankine: bool) -> Hidden:
         d2 = cot + cot**2 * np.tan(phi)
         return -size * setup.width * d1 * (setup.cohesion * z + d2 * weight * z**2 / 2)
 
-    return Change('bulldozing', None, _pull(drag))
+    return adding('bulldozing', 'drawbar_pull', drag)
 
 
 def _cohesion(size: float, sliding: float) -> Hidden:
@@ -217,7 +207,7 @@ def _friction(size: float, with_load: float) -> Hidden:
         load = rows['normal_load'] / np.mean(rows['normal_load'])
         return size * (1 - with_load + with_load * load) * np.sign(rows['angular_velocity'])
 
-    return Change('drivetrain_friction', None, _torque(more))
+    return adding('drivetrain_friction', 'torque', more)
 
 
 def _radius(size: float, whole_wheel: bool) -> Hidden:
@@ -269,7 +259,7 @@ def _pull_zero(size: float, with_load: float) -> Hidden:
     def shift(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         return size * (1 + with_load * (rows['normal_load'] / mean_load(rows) - 1))
 
-    return Change('pull_zero', None, _pull(shift))
+    return adding('pull_zero', 'drawbar_pull', shift)
 
 
 def _lug(rows: Rows) -> float:
@@ -287,13 +277,10 @@ def mean_radius(rows: Rows) -> float:
 
 
 def _digging(size: float, power: float) -> Hidden:
-    return Change(
-        'lug_digging',
-        None,
-        _sinkage(
-            lambda out, setup, rows: size * rows['lug_height'] * np.abs(rows['slip']) ** power
-        ),
-    )
+    def dug(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
+        return size * rows['lug_height'] * np.abs(rows['slip']) ** power
+
+    return adding('lug_digging', 'sinkage', dug)
 
 
 def _support(size: float, proportional: float) -> Hidden:
@@ -304,7 +291,7 @@ def _support(size: float, proportional: float) -> Hidden:
         share = h / max(float(np.max(h)), TINY)
         return -size * np.where(h > 0, 1 - proportional + proportional * share, 0.0)
 
-    return Change('lug_support', None, _sinkage(less))
+    return adding('lug_support', 'sinkage', less)
 
 
 def _shear_radius(size: float, sliding: float) -> Hidden:
@@ -316,11 +303,10 @@ def _shear_radius(size: float, sliding: float) -> Hidden:
 
 
 def _offset(size: float, gain: float) -> Hidden:
-    return Change(
-        'sinkage_offset',
-        None,
-        _sinkage(lambda out, setup, rows: size + gain * size / 0.01 * out['sinkage']),
-    )
+    def off(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
+        return size + gain * size / 0.01 * out['sinkage']
+
+    return adding('sinkage_offset', 'sinkage', off)
 
 
 def _layer_kind(power: float) -> Callable[[float, float, Rows, TrueSoil], Hidden]:
@@ -334,15 +320,19 @@ def stiffness_near(rows: Rows, soil: TrueSoil) -> float:
     return k * soil.sinkage_exponent * z ** (soil.sinkage_exponent - 1)
 
 
+def fixed(value: float) -> Callable[[Rows, TrueSoil], float]:
+    """Return a typical size that is the same for all rows and soils."""
+    return lambda rows, soil: value
+
+
 def _kinds(other: bool) -> dict[str, Kind]:
     p = 1.5 if other else 1.0
     o = 0.3 if other else 0.0
-    one = lambda value: lambda rows, soil: value  # noqa: E731
     return {
-        'slip_sinkage_exponent': Kind(lambda a, k, r, s: _exponent(a, p), one(0.2), 4),
+        'slip_sinkage_exponent': Kind(lambda a, k, r, s: _exponent(a, p), fixed(0.2), 4),
         'lug_digging': Kind(
             lambda a, k, r, s: _digging(a, p),
-            one(0.6),
+            fixed(0.6),
             4,
             needs=('lug_height',),
             requires='sinkage',
@@ -355,27 +345,27 @@ def _kinds(other: bool) -> dict[str, Kind]:
             requires='sinkage',
         ),
         'lug_shear_radius': Kind(
-            lambda a, k, r, s: _shear_radius(a, o), one(0.4), 2.5, needs=('lug_height',)
+            lambda a, k, r, s: _shear_radius(a, o), fixed(0.4), 2.5, needs=('lug_height',)
         ),
         'soil_mound': Kind(
             (lambda a, k, r, s: _other_mound(a, k))
             if other
             else (lambda a, k, r, s: _mound(a, 0.3 + 0.25 * k, 'ramp')),
-            one(1.0),
+            fixed(1.0),
             5,
             two_parameters=True,
         ),
-        'stress_peak_shift': Kind(lambda a, k, r, s: _peak_shift(a, p), one(0.15), 2.5),
+        'stress_peak_shift': Kind(lambda a, k, r, s: _peak_shift(a, p), fixed(0.15), 2.5),
         'slope_gravity': Kind(
             lambda a, k, r, s: _slope_gravity(a, other),
-            one(1.0),
+            fixed(1.0),
             1,
             needs=('slope',),
             all_or_nothing=True,
         ),
         'bulldozing': Kind(
             lambda a, k, r, s: _bulldozing(a, s, other),
-            one(0.6),
+            fixed(0.6),
             4,
             requires='drawbar_pull',
         ),
@@ -383,11 +373,11 @@ def _kinds(other: bool) -> dict[str, Kind]:
             lambda a, k, r, s: _cohesion(a, o), lambda r, s: 0.8 * s.cohesion, 5, signed=True
         ),
         'multipass': Kind(
-            lambda a, k, r, s: _multipass(a, other), one(0.3), 4, needs=('pass_number',)
+            lambda a, k, r, s: _multipass(a, other), fixed(0.3), 4, needs=('pass_number',)
         ),
         'rate_dependence': Kind(
             lambda a, k, r, s: _rate(a, other),
-            one(0.1),
+            fixed(0.1),
             3,
             signed=True,
             needs=('angular_velocity',),
@@ -399,7 +389,9 @@ def _kinds(other: bool) -> dict[str, Kind]:
             5,
             requires='torque',
         ),
-        'wheel_radius_bias': Kind(lambda a, k, r, s: _radius(a, other), one(0.03), 3, signed=True),
+        'wheel_radius_bias': Kind(
+            lambda a, k, r, s: _radius(a, other), fixed(0.03), 3, signed=True
+        ),
         'sinkage_offset': Kind(
             lambda a, k, r, s: _offset(a, 0.02 if other else 0.0),
             lambda r, s: 0.012 * mean_radius(r),
@@ -419,7 +411,7 @@ def _kinds(other: bool) -> dict[str, Kind]:
         'sinkage_gain': _gain_kind('sinkage_gain', 'sinkage', other),
         'pitch_bias': Kind(
             lambda a, k, r, s: _pitch(a, other),
-            one(0.02),
+            fixed(0.02),
             4,
             signed=True,
             requires='drawbar_pull',
@@ -432,21 +424,16 @@ OTHER = _kinds(other=True)
 
 
 def _hump(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    centre = 0.2 + 0.4 * secondary
-    return Change(
-        'hump',
-        None,
-        _pull(
-            lambda out, setup, rows: (
-                size * rows['normal_load'] * np.exp(-(((rows['slip'] - centre) / 0.1) ** 2))
-            )
-        ),
-    )
+    def hump(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
+        centre = 0.2 + 0.4 * secondary
+        return size * rows['normal_load'] * np.exp(-(((rows['slip'] - centre) / 0.1) ** 2))
+
+    return adding('hump', 'drawbar_pull', hump)
 
 
 def _crosstalk(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    return Change(
-        'crosstalk', None, _pull(lambda out, setup, rows: size * out['torque'] / setup.radius)
+    return adding(
+        'crosstalk', 'drawbar_pull', lambda out, setup, rows: size * out['torque'] / setup.radius
     )
 
 
@@ -461,15 +448,10 @@ def _softening(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hid
 
 
 def _ripple(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    return Change(
-        'ripple',
-        None,
-        _pull(
-            lambda out, setup, rows: (
-                size * rows['normal_load'] * np.sin(2 * np.pi * (rows['slip'] / 0.25 + secondary))
-            )
-        ),
-    )
+    def ripple(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
+        return size * rows['normal_load'] * np.sin(2 * np.pi * (rows['slip'] / 0.25 + secondary))
+
+    return adding('ripple', 'drawbar_pull', ripple)
 
 
 def _saturation(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
@@ -503,16 +485,12 @@ def _side_drag_unit(rows: Rows, soil: TrueSoil) -> float:
     return float(0.01 * mean_load(rows) / rub)
 
 
-def _const(value: float) -> Callable[[Rows, TrueSoil], float]:
-    return lambda rows, soil: value
-
-
 OUTSIDE = {
-    'hump': Kind(_hump, _const(0.05), 10, signed=True),
-    'crosstalk': Kind(_crosstalk, _const(0.05), 10, signed=True),
-    'friction_softening': Kind(_softening, _const(0.1), 6),
-    'ripple': Kind(_ripple, _const(0.03), 12, signed=True),
-    'torque_saturation': Kind(_saturation, _const(0.1), 6),
+    'hump': Kind(_hump, fixed(0.05), 10, signed=True),
+    'crosstalk': Kind(_crosstalk, fixed(0.05), 10, signed=True),
+    'friction_softening': Kind(_softening, fixed(0.1), 6),
+    'ripple': Kind(_ripple, fixed(0.03), 12, signed=True),
+    'torque_saturation': Kind(_saturation, fixed(0.1), 6),
     'side_drag': Kind(_side_drag, _side_drag_unit, 30),
 }
 

@@ -4,11 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from wheel_terra_lab.trials.hidden import Change, Kind, mean_load
+from wheel_terra_lab.trials.hidden import Change, Kind, fixed, mean_load
 from wheel_terra_lab.trials.truth import Hidden, Rows, Setup, TrueSoil
 
 
@@ -73,15 +71,11 @@ def _bulge(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change('side_bulge', prepare)
 
 
-def _constant(value: float) -> Callable[[Rows, TrueSoil], float]:
-    return lambda rows, soil: value
-
-
 SCORED = {
-    'binding_carriage': Kind(_carriage, _constant(0.1), 6, signed=True),
-    'curved_envelope': Kind(_curved_envelope, _constant(0.1), 5, needs=('normal_load',)),
-    'collapse': Kind(_collapse, _constant(0.2), 4),
-    'sinkage_stop': Kind(_sinkage_stop, _constant(0.3), 5),
-    'lagging_pull': Kind(_hysteresis, _constant(0.05), 10, signed=True),
-    'side_bulge': Kind(_bulge, _constant(0.15), 8),
+    'binding_carriage': Kind(_carriage, fixed(0.1), 6, signed=True),
+    'curved_envelope': Kind(_curved_envelope, fixed(0.1), 5, needs=('normal_load',)),
+    'collapse': Kind(_collapse, fixed(0.2), 4),
+    'sinkage_stop': Kind(_sinkage_stop, fixed(0.3), 5),
+    'lagging_pull': Kind(_hysteresis, fixed(0.05), 10, signed=True),
+    'side_bulge': Kind(_bulge, fixed(0.15), 8),
 }

@@ -140,8 +140,8 @@ def test_class_accuracy_counts_away_from_borders():
     wrong[200:300] = 2  # wrong, but 0.02 from the border
     wrong[350:] = 1  # wrong and away from it
     data = take(true, Record(**{**vars(record), 'slip_class': wrong}))
-    assert scores.three_class_accuracy(data) == pytest.approx(149 / 199, abs=0.01)
-    assert scores.three_class_accuracy(data, near_border=True) == 0.0
+    assert scores.accuracy(data) == pytest.approx(149 / 199, abs=0.01)
+    assert scores.accuracy(data, near_border=True) == 0.0
     counts = scores.confusion(data)
     assert counts[0, 0] == 99 * 4
     assert counts[2, 1] == 50 * 4

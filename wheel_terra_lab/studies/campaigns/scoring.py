@@ -95,3 +95,14 @@ def _held_out(campaign: Campaign, diagnosis: Any) -> Record:
         'excess_after': excess(added),
         'worse_z': float(np.mean(gain) / spread) if spread > 0 else 0.0,
     }
+
+
+def calibration_error(p: np.ndarray, right: np.ndarray) -> float:
+    """Return the mean distance of stated and found frequency over ten bins of equal width."""
+    place = np.minimum((p * 10).astype(int), 9)
+    return float(
+        sum(
+            np.abs(p[place == b].mean() - right[place == b].mean()) * np.mean(place == b)
+            for b in np.unique(place)
+        )
+    )
