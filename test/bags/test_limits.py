@@ -10,16 +10,17 @@ from typing import Any
 
 import pytest
 
-from wheel_terra_estimator.bags import limits, storage
+from wheel_terra_estimator.bags import storage
 from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits, in_words
+from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
 
 
 def parsed(*options: str) -> Limits:
     parser = argparse.ArgumentParser()
-    limits.add_arguments(parser)
-    return limits.from_arguments(parser.parse_args(options))
+    bag_arguments.add_limits(parser)
+    return bag_arguments.limits_of(parser.parse_args(options))
 
 
 def test_without_options_the_limits_are_the_usual_ones() -> None:

@@ -12,8 +12,7 @@ import pytest
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.drives import windows
-from wheel_terra_estimator.discrepancy.drives.series import collect
-from wheel_terra_estimator.discrepancy.drives.smoothed_speed import SpeedSmoother
+from wheel_terra_estimator.discrepancy.drives.series import SpeedSmoother, collect
 from wheel_terra_estimator.discrepancy.drives.windows import (
     GOOD,
     SMOOTHED,

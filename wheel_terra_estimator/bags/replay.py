@@ -14,13 +14,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wheel_terra_estimator.bags.history import EstimateHistory, HistoryRecorder
 from wheel_terra_estimator.bags.reader import MeasurementReader
-from wheel_terra_estimator.bags.smoothing import Event, smoothed
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import MOST_ROWS
 from wheel_terra_estimator.bags.track import Track, TrackRecorder, read_odometry
@@ -28,10 +27,12 @@ from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.input_file import read_text
 from wheel_terra_estimator.messages.convert import ODOMETRY, stamp_of
+from wheel_terra_estimator.messages.diagnostics import Diagnostics, Status
 from wheel_terra_estimator.messages.pipeline import Pipeline
 
 LONG_DRIVE = 20_000
@@ -47,6 +48,14 @@ TRUTH_TOPICS = ('/ground_truth/', '/truth/')
 SMOOTHED = 'smoothed: each estimate knows the whole drive; warnings stay as they were given live'
 RESET = 'reset'
 """Line of an arrival log for a call of ``~/reset``."""
+
+
+class Event(NamedTuple):
+    """A set at its log time [ns]; without one, a start or a reset: no warning runs."""
+
+    log_time: int
+    estimates: EstimateSet | None = None
+    statuses: list[Status] | None = None  # what diagnostics said of it; None: not asked yet
 
 
 @dataclass(frozen=True)
@@ -207,6 +216,40 @@ def events(
             return
     for estimates in pipeline.flush():
         yield Event(log_time, estimates)
+
+
+def smoothed(
+    events: Iterator[Event],
+    smoother: DriveSmoother,
+    live: HistoryRecorder,
+    diagnostics: Diagnostics,
+) -> Iterator[Event]:
+    """Yield the events of a drive with the sets of its smoother, once all have come.
+
+    Parameters
+    ----------
+    events : iterator of Event
+        Of the forward pass, whose estimator is that of the smoother.
+    smoother : DriveSmoother
+        Keeps them.
+    live : HistoryRecorder
+        Gets the sets of the filter.
+    diagnostics : Diagnostics
+        Asked set by set, as the live node asks it.
+    """
+    starts: list[Event] = []
+    for event in events:
+        if event.estimates is None:
+            starts.append(event)
+            continue
+        live.add(event.estimates)
+        statuses = diagnostics.due(event.estimates)
+        smoother.keep(event.estimates, (tuple(starts), event.log_time, statuses))
+        starts = []
+    for estimates, (before, log_time, statuses) in smoother.sets():
+        yield from before
+        yield Event(log_time, estimates, statuses)
+    yield from starts
 
 
 def _notes(

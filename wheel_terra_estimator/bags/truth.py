@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,17 +75,11 @@ def read_truth(bag: Bag, remaps: Mapping[str, str], configuration: Configuration
     From a body velocity (``/truth/odometry``) the true slip of each wheel follows with the wheel
     rates and the yaw rate of the IMU.
     """
-    simulated = read_simulated_truth(bag, configuration.wheels.names)
-    if simulated is not None and simulated.source != BODY_VELOCITY:
-        return simulated
-    if BODY_VELOCITY in bag.topics:
-        velocity = _body_velocity(bag)
-        if velocity.stamp.size:
-            slip_truth = _slip_from_velocity(
-                velocity, MeasurementReader(bag, remaps, configuration), configuration
-            )
-            return Truth(BODY_VELOCITY, velocity, slip_truth, None, None)
-    return None
+    truth = read_simulated_truth(bag, configuration.wheels.names)
+    if truth is None or truth.source != BODY_VELOCITY:
+        return truth
+    reader = MeasurementReader(bag, remaps, configuration)
+    return replace(truth, slip=_slip_from_velocity(truth.velocity, reader, configuration))
 
 
 def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
@@ -120,7 +114,7 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
             lateral_force=WheelTruth(aside.stamp, aside.value[:, wheels:]).known(),
         )
     if BODY_VELOCITY in bag.topics:
-        velocity = _body_velocity(bag)
+        velocity = _thinned(bag, {BODY_VELOCITY: _Values(_forward, 1)})[BODY_VELOCITY].known()
         return Truth(BODY_VELOCITY, velocity, None, None, None) if velocity.stamp.size else None
     return None
 
@@ -133,10 +127,6 @@ def _of_turning_wheels(slip: WheelTruth, classes: WheelTruth) -> WheelTruth:
         if stamp in row:
             value[i, classes.value[row[stamp]] == SlipClass.UNKNOWN] = np.nan
     return WheelTruth(slip.stamp, value)
-
-
-def _body_velocity(bag: Bag) -> WheelTruth:
-    return _thinned(bag, {BODY_VELOCITY: _Values(_forward, 1)})[BODY_VELOCITY].known()
 
 
 def _slip_from_velocity(

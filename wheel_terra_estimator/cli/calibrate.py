@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
@@ -50,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     configuration = configuration_reader.from_arguments(arguments)
     check_file(arguments.output, arguments.overwrite)
-    with open_bag(arguments.bag, bag_limits.from_arguments(arguments)) as bag:
+    with open_bag(arguments.bag, bag_arguments.limits_of(arguments)) as bag:
         name = arguments.bag.resolve().name
         remaps = parse_remaps(arguments.remap)
         recording = read_series(bag, remaps, name)

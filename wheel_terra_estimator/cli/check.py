@@ -9,7 +9,6 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
@@ -53,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     given = bool(arguments.config or arguments.parameters)
     configuration = configuration_reader.from_arguments(arguments) if given else None
     remaps = parse_remaps(arguments.remap)
-    with open_bag(arguments.bag, bag_limits.from_arguments(arguments)) as bag:
+    with open_bag(arguments.bag, bag_arguments.limits_of(arguments)) as bag:
         recording = read_series(bag, remaps, arguments.bag.resolve().name)
         if recording.joints is None and recording.wheel_odometry is None:
             listed = ', '.join(f'{name} ({kind})' for name, kind, _ in recording.topics)

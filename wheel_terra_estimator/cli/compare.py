@@ -9,7 +9,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
@@ -78,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.report:
         check_page(arguments.report)
         check_file(arguments.report, arguments.overwrite)
-    limits = bag_limits.from_arguments(arguments)
+    limits = bag_arguments.limits_of(arguments)
     histories = []
     notes: list[str] = []
     for path in inputs:
@@ -135,6 +134,6 @@ def _of_drive(arguments: argparse.Namespace) -> tuple[list[Any], str]:
     from wheel_terra_estimator.bags.storage import open_bag
 
     configuration = configuration_reader.from_arguments(arguments)
-    with open_bag(arguments.laws, bag_limits.from_arguments(arguments)) as bag:
+    with open_bag(arguments.laws, bag_arguments.limits_of(arguments)) as bag:
         laws = rank_laws(bag, configuration, parse_remaps(arguments.remap))
         return laws, '\n'.join([as_text(laws), *(f'note: {note}' for note in bag.notes)])

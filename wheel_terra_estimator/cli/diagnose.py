@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.outputs import Output, file_or_entry
 from wheel_terra_estimator.errors import UserError
@@ -301,7 +300,7 @@ def _read(path: Path, arguments: argparse.Namespace, configuration: Configuratio
         from wheel_terra_estimator.bags.reader import parse_remaps
         from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
-        remaps, limits = parse_remaps(arguments.remap), bag_limits.from_arguments(arguments)
+        remaps, limits = parse_remaps(arguments.remap), bag_arguments.limits_of(arguments)
         return rows_from_bag(
             path, configuration, remaps, limits=limits, smooth=arguments.smooth
         ).table()

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wheel_terra_estimator.bags import limits as bag_limits
+from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
 
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, unit, meaning in _MEASURES:
         parser.add_argument(f'--{name}', type=_positive, metavar=unit, help=meaning)
     parser.add_argument('--name', default='', metavar='TEXT', help='name of the rover, for reports')
-    bag_limits.add_arguments(parser)
+    bag_arguments.add_limits(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 
 
@@ -116,7 +116,7 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
     if described is not None:
         return replace(described, name=arguments.name or described.name)
     if arguments.bag:
-        wheels = wheels or _wheels_of(arguments.bag, bag_limits.from_arguments(arguments))
+        wheels = wheels or _wheels_of(arguments.bag, bag_arguments.limits_of(arguments))
     elif not wheels:
         wheels = _ask_wheels()
     return _from_measures(arguments, wheels)
@@ -127,7 +127,7 @@ def _description_of(arguments: argparse.Namespace) -> RoverSketch | None:
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.configuration.urdf import read_urdf
 
-    with open_bag(arguments.bag, bag_limits.from_arguments(arguments)) as bag:
+    with open_bag(arguments.bag, bag_arguments.limits_of(arguments)) as bag:
         if DESCRIPTION not in bag.topics:
             return None
         messages = bag.messages([DESCRIPTION])

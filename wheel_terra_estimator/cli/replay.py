@@ -10,7 +10,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
@@ -155,7 +154,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
         overwrite=arguments.overwrite,
         arrival=arguments.arrival,
         every_set=bool(arguments.table),
-        limits=bag_limits.from_arguments(arguments),
+        limits=bag_arguments.limits_of(arguments),
         smooth=arguments.smooth,
         odometry=arguments.track_odometry,
         manoeuvres=arguments.manoeuvres,
@@ -175,14 +174,14 @@ def _run_one(arguments: argparse.Namespace) -> int:
 def _check_outputs(arguments: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written, before hours of work."""
     from wheel_terra_estimator.output_folder import check_file, check_folder
-    from wheel_terra_estimator.reporting import estimates_table, slope_table, track_table
+    from wheel_terra_estimator.reporting import estimates_table, track_table
     from wheel_terra_estimator.reporting.html import check_page
 
     for path, check_kind in (
         (arguments.report, check_page),
         (arguments.table, estimates_table.check_table),
         (arguments.track, track_table.check_track),
-        (arguments.slip_on_slope, slope_table.check_slopes),
+        (arguments.slip_on_slope, estimates_table.check_slopes),
     ):
         if path:
             check_kind(path)
@@ -276,7 +275,7 @@ def _run_several(arguments: argparse.Namespace) -> int:
         arguments.output,
         _plain_name('--report', arguments.report),
         _plain_name('--table', arguments.table),
-        bag_limits.from_arguments(arguments),
+        bag_arguments.limits_of(arguments),
         smooth=arguments.smooth,
         track=_plain_name('--track', arguments.track),
         odometry=arguments.track_odometry,

@@ -19,7 +19,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import (
     estimates_table,
-    slope_table,
     track_table,
     truth_scores,
 )
@@ -58,7 +57,7 @@ class Drive:
         if slopes is None:
             raise UserError(f'{self.summary.title}: no estimates, so nothing for {path}')
         with new_file(path, overwrite) as fresh:
-            slope_table.write_slopes(slopes, fresh)
+            estimates_table.write_slopes(slopes, fresh)
 
     def write_report(self, path: Path, overwrite: bool) -> None:
         """Write the page with pictures."""

@@ -7,12 +7,14 @@ from __future__ import annotations
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
-from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.estimates import SLOPES, SlipClass, SlipOnSlope
 from wheel_terra_estimator.reporting.drive_style import BAND, CLASS_COLOURS, Border, known
 from wheel_terra_estimator.reporting.drive_summary import short_names
-from wheel_terra_estimator.reporting.style import LINE_COLOURS, RIM_COLOUR
+from wheel_terra_estimator.reporting.style import LINE_COLOURS, RIM_COLOUR, WARNING_COLOUR
 from wheel_terra_estimator.reporting.time_figure import Panel, Switch, TimeFigure, limits
 
+WITHIN = 1.96
+"""Deviations that hold 95 % of a Gaussian."""
 SLIP_RANGE = (-0.05, 1.0)
 """What the slip panel shows at least [-]."""
 VELOCITY, SLIP, CLASSES, SINKAGE, PULL = range(5)
@@ -93,6 +95,20 @@ def way_figure(track: Track, strengths: tuple[tuple[str, float, float, str], ...
     for words, low, high, colour in strengths:
         member = ((values['soil_strength'] >= low) & (values['soil_strength'] < high))[:, None]
         figure.strips(1, way, member, words, colour)
+    return figure
+
+
+def slopes_figure(found: SlipOnSlope) -> TimeFigure:
+    """Return slip over slope uphill with its band of 95 %, and the probability of entrapment."""
+    uphill = SLOPES >= 0.0
+    slopes, half = SLOPES[uphill], WITHIN * found.std[uphill]
+    panels = Panel('slip ratio [-]', 0.25, (-0.05, 1.05)), Panel('entrapment [-]', 0.12, (0.0, 1.0))
+    switches = (Switch('band', 'band of 95 %'),)
+    figure = TimeFigure(panels, switches, float(slopes[-1]), 'slope, uphill [deg]')
+    slip = found.slip[uphill]
+    figure.band(0, slopes, slip, half, LINE_COLOURS[0])
+    figure.line(0, slopes, slip, 'slip expected', LINE_COLOURS[0])
+    figure.line(1, slopes, found.entrapment[uphill], 'probability', WARNING_COLOUR)
     return figure
 
 

@@ -17,7 +17,7 @@ from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import track_picture, truth_scores
-from wheel_terra_estimator.reporting.drive_figure import drive_figure, way_figure
+from wheel_terra_estimator.reporting.drive_figure import drive_figure, slopes_figure, way_figure
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, Border
 from wheel_terra_estimator.reporting.drive_summary import (
     DriveSummary,
@@ -28,7 +28,6 @@ from wheel_terra_estimator.reporting.drive_summary import (
     spread,
 )
 from wheel_terra_estimator.reporting.html import render, write_page
-from wheel_terra_estimator.reporting.slope_table import slopes_figure
 from wheel_terra_estimator.reporting.truth_scores import QuantityError, TruthErrors
 
 

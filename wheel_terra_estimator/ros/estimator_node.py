@@ -5,21 +5,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from typing import Any
 
 from wheel_terra_estimator.ros.process import run_node
 
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return run_node(_node, args)
-
-
-def _node() -> Callable[[], Any]:
-    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
-
-    return EstimatorNode
+    return run_node('lifecycle_node', 'EstimatorNode', args)
 
 
 if __name__ == '__main__':

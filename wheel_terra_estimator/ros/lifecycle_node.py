@@ -33,6 +33,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import SetBool, Trigger
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet
@@ -122,7 +123,7 @@ class EstimatorNode(LifecycleNode):
         super().__init__(NODE, automatically_declare_parameters_from_overrides=True, **options)
         self._given = parameters.overrides(self)
         self._files = parameters.files([*sys.argv, *(options.get('cli_args') or ())])
-        self._known = parameters.known()
+        self._known = declared()
         self._full_name = self.get_fully_qualified_name().lstrip('/')
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._pipeline: Pipeline | None = None

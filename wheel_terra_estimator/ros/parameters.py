@@ -26,11 +26,6 @@ def is_tuning(key: str) -> bool:
     return key in TUNING or key.startswith('filter.')
 
 
-def known() -> Mapping[str, Parameter]:
-    """Return the parameters of the estimator by key."""
-    return declared()
-
-
 def overrides(node: Node) -> dict[str, Any]:
     """Return what the user gave a node.
 

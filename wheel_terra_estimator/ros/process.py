@@ -13,11 +13,9 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from importlib import import_module
 from types import FrameType
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from rclpy.node import Node
+from typing import Any
 
 LONGEST_END = 0.8  # [s] for saving and closing, then the process ends anyway
 LOOK_UP = 0.1  # [s] between two looks at the signals
@@ -42,14 +40,17 @@ class _Signals:
             end.start()
 
 
-def run_node(make: Callable[[], Callable[[], Node]], args: list[str] | None = None) -> int:
-    """Make a node and serve it until it is told to stop; return the exit status.
+def run_node(module: str, name: str, args: list[str] | None = None) -> int:
+    """Make the node of a class in a module of `ros` and serve it until it is told to stop.
 
-    ``make`` imports what is needed and returns what makes the node.
+    Returns
+    -------
+    int
+        The exit status.
     """
     gc.disable()  # until the node stands: what is made so far lives as long as it does
     signals = _Signals() if threading.current_thread() is threading.main_thread() else None
-    factory = make()
+    factory = getattr(import_module(f'{__package__}.{module}'), name)
     import rclpy
     from rclpy.exceptions import ParameterException
     from rclpy.executors import ExternalShutdownException

@@ -38,8 +38,12 @@ from scipy.optimize import brentq
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.discrepancy.drives.series import Channel, DriveSeries, collect
-from wheel_terra_estimator.discrepancy.drives.smoothed_speed import SpeedSmoother
+from wheel_terra_estimator.discrepancy.drives.series import (
+    Channel,
+    DriveSeries,
+    SpeedSmoother,
+    collect,
+)
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.errors import UserError
@@ -142,7 +146,7 @@ def rows_from_bag(
         Wheels, mass and load model.
     remaps : mapping, optional
         Estimator's topic -> the bag's.
-    limits : bags.limits.Limits, optional
+    limits : bags.salvage.limits.Limits, optional
         What of the recording is unpacked and held.
     smooth : bool
         Whether the slip comes from the fixed-interval smoother in place of the references alone;
