@@ -242,17 +242,16 @@ def _folder_names(data: list[str]) -> list[str]:
 
 def _tell(diagnosis: Diagnosis, output: Path) -> None:
     """Print the verdict, the gaps, what to do next and what was written."""
-    from wheel_terra_estimator.discrepancy.numbers import number
+    from wheel_terra_estimator.discrepancy.numbers import SHOWN, number
     from wheel_terra_estimator.discrepancy.report.words import law_line, soil_line, worth
     from wheel_terra_estimator.discrepancy.result import OPEN
-    from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS
 
     print(diagnosis.sentence)
     print(f'  {soil_line(diagnosis)}')
     if diagnosis.contact_laws:
         print(f'  {law_line(diagnosis)}')
     for quantity, gap in diagnosis.gap.items():
-        scale, unit = (1e3, 'mm') if quantity == 'sinkage' else (1.0, UNITS[quantity])
+        scale, unit = SHOWN[quantity]
         noise = '' if gap.noise is None else f', noise {number(scale * gap.noise)}'
         print(
             f'  {quantity} [{unit}]: error on unseen rows {number(scale * gap.before)} '

@@ -16,6 +16,7 @@ from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
+from wheel_terra_estimator.discrepancy.numbers import SHOWN
 from wheel_terra_estimator.discrepancy.result import Diagnosis, OtherLaw
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.discrepancy.workflow import nuisance_coordinates, operating_points
@@ -219,10 +220,9 @@ def _wheels(points: OperatingPoints) -> list[Rows]:
 
 def as_text(laws: list[RankedLaw]) -> str:
     """Return the ranking as a Markdown table."""
-    units = {'sinkage': ('mm', 1e3), 'drawbar_pull': ('N', 1.0), 'torque': ('N m', 1.0)}
 
     def cells(errors: dict[str, float]) -> str:
-        parts = (f'{units[q][1] * v:.2f} {units[q][0]}' for q, v in errors.items())
+        parts = (f'{SHOWN[q][0] * v:.2f} {SHOWN[q][1]}' for q, v in errors.items())
         return ', '.join(parts) or '-'
 
     lines = [

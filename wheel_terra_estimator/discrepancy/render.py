@@ -204,13 +204,6 @@ def _nearest(decision: Decision) -> tuple[str, ...]:
     return tuple(dict.fromkeys(map(effect_of, keys)))[:_NEAREST]
 
 
-def _distance_to_nothing(findings: Findings, fitted: Fit) -> float:
-    change = findings.setting.problem.rotate(
-        findings.setting.problem.flat(fitted.outputs - findings.nothing.outputs)
-    )
-    return float(np.sqrt((change**2 / fitted.variance).sum()))
-
-
 def _candidates(decision: Decision) -> tuple[Candidate, ...]:
     """Return the best explanations, nothing among them, each with why it was not the one."""
     findings, verdict = decision.findings, decision.verdict
@@ -229,6 +222,8 @@ def _candidates(decision: Decision) -> tuple[Candidate, ...]:
     for h in sorted(gains, key=lambda h: -totals[h]):
         explanation = selection.explanations[h]
         fitted = explanation.fitted
+        change = setting.problem.flat(fitted.outputs - findings.nothing.outputs)
+        distance = np.sqrt((setting.problem.rotate(change) ** 2 / fitted.variance).sum())
         found.append(
             Candidate(
                 explanation.names,
@@ -238,7 +233,7 @@ def _candidates(decision: Decision) -> tuple[Candidate, ...]:
                 float((fitted.residual**2).sum()),
                 float(setting.problem.size - len(fitted.u)),
                 _parameters(fitted, explanation.posterior.covariance[decision.floor_index]),
-                _distance_to_nothing(findings, fitted) if explanation.names else 0.0,
+                float(distance) if explanation.names else 0.0,
                 '' if h == verdict.index else words.why_not(findings, verdict, h, totals, chosen),
             )
         )

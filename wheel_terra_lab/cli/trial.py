@@ -103,10 +103,10 @@ def _many(folder: Path, seed: int, effect: str | None, count: int) -> None:
 
 
 def _print_gap(outcome: Outcome) -> None:
-    from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS
+    from wheel_terra_estimator.discrepancy.numbers import SHOWN
 
     for quantity, (noise, before, refit, after) in outcome.gap.items():
-        scale, unit = (1e3, 'mm') if quantity == 'sinkage' else (1.0, UNITS[quantity])
+        scale, unit = SHOWN[quantity]
         print(
             f'  {quantity} [{unit}]: gap {scale * before:.3g} as configured, '
             f'{scale * refit:.3g} refitted, {scale * after:.3g} after; noise {scale * noise:.3g}'

@@ -25,10 +25,11 @@ from pathlib import Path
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.discrepancy.numbers import SHOWN
 from wheel_terra_estimator.discrepancy.report.model_file import write_files
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
-from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 from wheel_terra_estimator.errors import UserError
 
@@ -339,7 +340,7 @@ def case_rows(name: str, diagnosis: Diagnosis) -> str:
     gaps = diagnosis.gap if proposal is None else proposal.gap
     rows, before_all, after_all = [], 0.0, 0.0
     for quantity, gap in gaps.items():
-        scale, unit = (1e3, 'mm') if UNITS[quantity] == 'm' else (1.0, UNITS[quantity])
+        scale, unit = SHOWN[quantity]
         noise = gap.noise or 1e-12
         before, refit, after = (
             math.sqrt(max((value / noise) ** 2 - 1.0, 0.0))

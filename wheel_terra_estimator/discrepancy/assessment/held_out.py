@@ -34,7 +34,9 @@ def log_scores(
     Around the fit everything is Gaussian, so that blocks of the inverse covariance suffice.
     """
     problem = setting.problem
-    parts = _parts(problem, groups)
+    cell_group = groups[problem.row]
+    parts = [np.flatnonzero(cell_group == label) for label in np.unique(groups[groups >= 0])]
+    parts = [out for out in parts if out.size]
     plain = _inverse(problem, variance)
     blocks = [plain[np.ix_(out, out)] for out in parts]
     scores = []
@@ -64,7 +66,7 @@ def hold_out(
     predictions are those of the full model.
     """
     problem = setting.problem
-    labels = _labels(groups)
+    labels = np.unique(groups[groups >= 0])
     cell_group = groups[problem.row]
     inverse = _inverse(problem, variance)
     tasks = []
@@ -88,17 +90,6 @@ def hold_out(
             outputs[rows] = state.outputs[index * len(labels) + k][rows]
         results.append(outputs)
     return results
-
-
-def _labels(groups: IndexArray) -> IndexArray:
-    return np.unique(groups[groups >= 0])
-
-
-def _parts(problem: Problem, groups: IndexArray) -> list[IndexArray]:
-    """Return the cells of each group that has some."""
-    cell_group = groups[problem.row]
-    parts = [np.flatnonzero(cell_group == label) for label in _labels(groups)]
-    return [out for out in parts if out.size]
 
 
 def _inverse(problem: Problem, variance: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.soil_deviations import Deviation
 from wheel_terra_estimator.terramechanics.effects import by_variant
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect
 from wheel_terra_estimator.terramechanics.soil import Soil
 
 # Stated uncertainties are often optimistic: the coordinates are this many times wider, and the
@@ -136,30 +136,23 @@ def narrowed(coordinates: Sequence[Coordinate], factor: float) -> tuple[Coordina
 
 def effect_coordinates(effect: Effect) -> tuple[Coordinate, ...]:
     """Return the free parameters of an effect with the priors of the catalogue."""
-    return tuple(_of_parameter(effect, p) for p in effect.parameters if p.free)
-
-
-def _of_parameter(effect: Effect, p: EffectParameter) -> Coordinate:
-    lower, upper = (
-        (p.lower - p.prior_mean) / p.prior_scale,
-        (p.upper - p.prior_mean) / p.prior_scale,
-    )
-    if p.prior == 'half_normal':
-        lower, upper = (
-            (max(lower, 0.0), upper) if p.default >= p.prior_mean else (lower, min(upper, 0.0))
-        )
-    return Coordinate(
-        effect.name,
-        p.name,
-        p.prior_mean,
-        p.prior_scale,
-        lower,
-        upper,
-        role='strength' if p.neutral == p.prior_mean or p is effect.parameters[0] else 'shape',
-        neutral=p.neutral,
-        unit=p.unit,
-        meaning=p.meaning,
-    )
+    found = []
+    for p in effect.parameters:
+        if not p.free:
+            continue
+        lower, upper = ((end - p.prior_mean) / p.prior_scale for end in (p.lower, p.upper))
+        if p.prior == 'half_normal':
+            up = p.default >= p.prior_mean
+            lower, upper = (max(lower, 0.0), upper) if up else (lower, min(upper, 0.0))
+        strength = p.neutral == p.prior_mean or p is effect.parameters[0]
+        found.append(
+            Coordinate(
+                effect.name, p.name, p.prior_mean, p.prior_scale, lower, upper,
+                role='strength' if strength else 'shape',
+                neutral=p.neutral, unit=p.unit, meaning=p.meaning,
+            )
+        )  # fmt: skip
+    return tuple(found)
 
 
 def base_coordinates(

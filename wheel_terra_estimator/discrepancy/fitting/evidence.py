@@ -82,12 +82,13 @@ def evidence(
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u
+    amplitude = np.array([floor.amplitude for floor in floors])
     factor = np.ones((len(floors), len(noise_freedom)))
     unknown = np.isfinite(noise_freedom)
     for _ in range(3 if unknown.any() else 0):
-        variance = _variances(problem, floors, factor)
+        variance = problem.variance(amplitude, factor)
         factor = _noise_factor(problem, fitted, target, variance, factor, noise_freedom)
-    variance = _variances(problem, floors, factor)
+    variance = problem.variance(amplitude, factor)
     weighted = jacobian[None] / variance[:, :, None]
     information = np.swapaxes(weighted, 1, 2) @ jacobian  # (F, P, P)
     right = (target / variance) @ jacobian
@@ -119,10 +120,6 @@ def evidence(
         covariance[best, rows],
         factor,
     )
-
-
-def _variances(problem: Problem, floors: tuple[Floor, ...], factor: FloatArray) -> FloatArray:
-    return problem.variance(np.array([floor.amplitude for floor in floors]), factor)
 
 
 def _prior_precisions(

@@ -121,7 +121,6 @@ def propose(
         plain = setting.fit([()], [np.zeros(len(plain.u))], findings.nothing.angle)[0]
     nothing = setting.explain(plain)
     refit = setting.fit([()], [plain.u], plain.angle, variance)[0]
-    groupings = _groupings(table, len(setting.forward.points))
     best, most = None, _CLOSED
     begun: list[str] = []  # first terms of laws that did not predict what was left out
     while best is None and len(begun) < _BRANCHES:
@@ -134,10 +133,7 @@ def propose(
             fits = [refit, fitted]
             if hold_soil and not _can_be_believed(fitted, findings):
                 continue
-            judged = {
-                name: _left_out(setting, fits, variance, groups, findings, table)
-                for name, groups in groupings.items()
-            }
+            judged = _judged(setting, fits, variance, findings, table)
             closed = _closed(judged, gap)
             if closed > most:
                 best, most = (fits, judged), closed
@@ -159,12 +155,7 @@ def closed_by(
     """Return the share of the refit's gap on left-out levels that a set of effects closes."""
     setting, nothing = findings.setting, findings.nothing
     fits = [setting.fit([f.names], [f.u], f.angle, variance)[0] for f in (nothing, fitted)]
-    groupings = _groupings(table, len(setting.forward.points))
-    judged = {
-        name: _left_out(setting, fits, variance, groups, findings, table)
-        for name, groups in groupings.items()
-    }
-    return _closed(judged, gap)
+    return _closed(_judged(setting, fits, variance, findings, table), gap)
 
 
 def effects_said(law: Proposal) -> frozenset[str]:
@@ -282,6 +273,21 @@ def _groupings(table: SteadyTable, count: int) -> dict[str, IndexArray]:
     return {name: groups.astype(np.intp) for name, groups in found.items()}
 
 
+def _judged(
+    setting: Setting,
+    fits: Sequence[Fit],
+    variance: FloatArray,
+    findings: Findings,
+    table: SteadyTable,
+) -> dict[str, dict[str, LeftOut]]:
+    """Return input -> errors of soil refit and law on whole levels of it."""
+    groupings = _groupings(table, len(setting.forward.points))
+    return {
+        name: _left_out(setting, fits, variance, groups, findings, table)
+        for name, groups in groupings.items()
+    }
+
+
 def _left_out(
     setting: Setting,
     fits: Sequence[Fit],
@@ -375,7 +381,7 @@ def _proposal(
         gaps,
         _resembling(findings, fits),
         limits_of_trust(table),
-        {name: dict(quantities) for name, quantities in judged.items()},
+        judged,
         fit=law,
     )
 

@@ -132,7 +132,8 @@ _CLASS = 'class of source: '
 def soil_line(diagnosis: Diagnosis) -> str:
     """Return which number the fit shifts farthest, and how well those of the soil were known."""
     sources = ', '.join(dict.fromkeys(s.source.removeprefix(_CLASS) for s in diagnosis.soil))
-    return f'{_farthest(diagnosis.moved)}; deviations of the soil from: {sources}.'
+    farthest = max(diagnosis.moved, key=lambda shift: abs(shift.z_score))
+    return f'Number that moved most: {moved(farthest)}; deviations of the soil from: {sources}.'
 
 
 def law_line(diagnosis: Diagnosis) -> str:
@@ -142,10 +143,6 @@ def law_line(diagnosis: Diagnosis) -> str:
         for name, law in diagnosis.contact_laws.items()
     ]
     return f'Contact law, soil refitted and no effect added: {", ".join(found)}' if found else ''
-
-
-def _farthest(shifts: Iterable[SoilShift]) -> str:
-    return f'Number that moved most: {moved(max(shifts, key=lambda shift: abs(shift.z_score)))}'
 
 
 def far(shifts: Iterable[SoilShift]) -> list[str]:

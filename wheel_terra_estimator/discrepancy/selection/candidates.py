@@ -139,7 +139,9 @@ def linear_starts(
         target = reduced.residual + reduced.jacobian @ reduced.u
         mean = np.linalg.solve(precision, reduced.jacobian.T @ (target / base.variance))
         strength = np.clip(mean[-1], own[0].lower, own[0].upper)
-        score = _linear_gain(precision, mean, strength, reduced)
+        # Fall of the objective that the linear signature promises inside the bounds.
+        fall = (mean[-1] - reduced.u[-1]) ** 2 - (mean[-1] - strength) ** 2
+        score = 0.5 * fall / np.linalg.inv(precision)[-1, -1]
         neutral = own[0].coordinate(own[0].neutral)
         away = strength - neutral
         size = np.clip(abs(away), _WEAKEST_START, _STRONGEST_START)
@@ -194,11 +196,3 @@ def _strength_responses(
         answers = zip(state.outputs, state.angle, state.jacobian, strict=True)
         found.update(zip(places, answers, strict=True))
     return [found[k] for k in range(len(trials))]
-
-
-def _linear_gain(precision: FloatArray, mean: FloatArray, strength: float, reduced: Fit) -> float:
-    """Fall of the objective that the linear signature promises at a strength inside its bounds."""
-    covariance = np.linalg.inv(precision)
-    start = reduced.u[-1]
-    spread = covariance[-1, -1]
-    return 0.5 * ((mean[-1] - start) ** 2 - (mean[-1] - strength) ** 2) / spread
