@@ -128,14 +128,10 @@ manoeuvres
             manoeuvres=manoeuvres,
         )
         truth = read_truth(bag, remaps, configuration)
-    # A truth that the estimator was given as its reference is none to judge it by.
-    judged = truth if truth and truth.source not in result.topics.values() else None
-    errors = filter_errors = None
-    if judged:
-        thresholds = configuration.filter.class_thresholds
-        errors = truth_scores.truth_errors(result.history, judged, thresholds)
-        if result.filtered:
-            filter_errors = truth_scores.truth_errors(result.filtered, judged, thresholds)
+    errors, filter_errors = (
+        truth_scores.judged(history, truth, result.topics, configuration) if history else None
+        for history in (result.history, result.filtered)
+    )
     title = path.resolve().name
     notes = list(result.notes)
     if not any(key.startswith('soil.') for key in configuration.stated):

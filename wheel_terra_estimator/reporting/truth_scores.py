@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
+from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.judgement.entrapment import (
     FORESIGHT,
@@ -109,6 +111,18 @@ def truth_errors(
         entrapped=entrapped,
         lead=None if entrapped is None else lead_of(entrapped, _spans(history)),
     )
+
+
+def judged(
+    history: EstimateHistory,
+    truth: Truth | None,
+    heard: Mapping[str, str],
+    configuration: Configuration,
+) -> TruthErrors | None:
+    """Compare estimates with a truth, unless it is a topic ``heard``: a reference cannot judge."""
+    if truth is None or truth.source in heard.values():
+        return None
+    return truth_errors(history, truth, configuration.filter.class_thresholds)
 
 
 def at_stamps(truth: WheelTruth, stamps: IntArray) -> FloatArray:

@@ -380,10 +380,7 @@ def _run(arguments: argparse.Namespace) -> None:
     title = f'{arguments.bag.resolve().name}, live'
     border = Border.of(configuration)
     summary = summarise(title, history, reader.topics, counts, {}, reader.notes, border)
-    # A truth that the node was given as its reference is none to judge it by.
-    judged = truth if truth and truth.source not in reader.topics.values() else None
-    thresholds = configuration.filter.class_thresholds
-    errors = truth_scores.truth_errors(history, judged, thresholds) if judged else None
+    errors = truth_scores.judged(history, truth, reader.topics, configuration)
     print('\n'.join([as_text(summary), *(truth_scores.as_lines(errors) if errors else ())]))
     print(f'estimates: {arguments.output}')
     if arguments.report:
