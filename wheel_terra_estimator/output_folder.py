@@ -195,7 +195,6 @@ def new_folder(
 def new_file(
     path: Path,
     overwrite: bool = False,
-    inputs: Iterable[Path] = (),
     foreign: Callable[[Path], str] = lambda path: '',
 ) -> Iterator[Path]:
     """Yield the path of a file to be written; at the end of the block it is at ``path``.
@@ -208,7 +207,7 @@ def new_file(
     UserError
         See `check_target`; the disk is full or fails.
     """
-    check_target(path, overwrite, inputs, foreign=foreign)
+    check_target(path, overwrite, foreign=foreign)
     path = _absolute(path)
     try:
         with _beside(path) as beside:

@@ -98,7 +98,7 @@ class MessageFactory:
             twist=self.twist_with_covariance(forward, yaw_rate, covariance),
         )
 
-    def odometry(self, header: Any, twist: Any, child_frame: str = BASE_FRAME) -> Any:
+    def odometry(self, header: Any, twist: Any) -> Any:
         """Return an Odometry that states a twist only (pose at the origin, placeholder 0.1)."""
         position = self.make('geometry_msgs/msg/Point', x=0.0, y=0.0, z=0.0)
         pose = self.make(
@@ -109,7 +109,7 @@ class MessageFactory:
         return self.make(
             'nav_msgs/msg/Odometry',
             header=header,
-            child_frame_id=child_frame,
+            child_frame_id=BASE_FRAME,
             pose=self.make(
                 'geometry_msgs/msg/PoseWithCovariance',
                 pose=pose,

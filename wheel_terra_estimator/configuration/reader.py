@@ -95,7 +95,6 @@ def from_parameters(
     *,
     source: str = 'parameters',
     complete: bool = True,
-    allow_effect_files: bool = True,
 ) -> Configuration:
     """Check parameters that came without a file (the node's overrides, a caller's mapping).
 
@@ -105,14 +104,14 @@ def from_parameters(
         Key -> scalar or sequence; arrays of any kind will do.
     source : str
         What messages name in place of the file.
-    complete, allow_effect_files : bool
-        As for ``load``; a mapping that a program makes is trusted unless told otherwise.
+    complete : bool
+        As for ``load``. An effect file may be run: a program that makes a mapping is trusted.
     """
     sourced = [
         (key, source, value.tolist() if hasattr(value, 'tolist') else value)
         for key, value in parameters.items()
     ]
-    return _checked(sourced, complete, allow_effect_files)
+    return _checked(sourced, complete, True)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

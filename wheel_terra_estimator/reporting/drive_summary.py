@@ -203,9 +203,9 @@ def _percentiles(values: FloatArray) -> tuple[float, float] | None:
     return float(low), float(high)
 
 
-def shown(value: float | None, spec: str, scale: float = 1.0) -> str:
+def shown(value: float | None, spec: str) -> str:
     """Return a figure in words; "not known" where there is none."""
-    return NOT_KNOWN if value is None else format(scale * value, spec)
+    return NOT_KNOWN if value is None else format(value, spec)
 
 
 def spread(ends: tuple[float, float] | None, spec: str, scale: float = 1.0) -> str:

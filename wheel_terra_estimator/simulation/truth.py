@@ -165,13 +165,10 @@ def slip_classes(slip: FloatArray, thresholds: FloatArray) -> NDArray[np.uint8]:
     return np.where(np.isnan(slip), 255, classes).astype(np.uint8)
 
 
-def entrapped(
-    stamp: IntArray,
-    slip: FloatArray,
-    below: float = 0.6,
-    clear: float = 3.0,
-) -> BoolArray:
+def entrapped(stamp: IntArray, slip: FloatArray) -> BoolArray:
     """Return where the rover is entrapped, from an entrapment until it is free again.
+
+    It is free once the median abs(slip) has been below 0.6 for 3 s.
 
     Parameters
     ----------
@@ -179,8 +176,6 @@ def entrapped(
         (k,) [ns].
     slip : numpy.ndarray
         (k, n) slip ratio, nan at rest.
-    below, clear : float
-        Free once the median abs(slip) has been below ``below`` for ``clear`` [s].
     """
     turning: BoolArray = np.asarray(~np.isnan(slip).all(axis=1))
     median = np.zeros(len(stamp))
@@ -190,9 +185,9 @@ def entrapped(
     result[entrapments(time, slip).there] = True
     since_low, stuck = None, False
     for i, now in enumerate(time):
-        low = median[i] < below
+        low = median[i] < 0.6
         since_low = (now if since_low is None else since_low) if low else None
-        free = since_low is not None and now - since_low >= clear
+        free = since_low is not None and now - since_low >= 3.0
         stuck = result[i] or (stuck and not free)
         result[i] = stuck
     return result

@@ -21,6 +21,7 @@ from wheel_terra_lab.soilbin.case import from_dict
 from wheel_terra_lab.soilbin.stages import InterruptedRunError, NotSettledError, Run
 
 REPORT_EVERY = 0.5  # [s]
+CHECKPOINT_EVERY = 120.0  # [s]
 
 
 def tell(**message: object) -> None:
@@ -52,9 +53,7 @@ def run(folder: Path) -> None:
     cache = Path(job['cache']) if job['cache'] else None
     clock = time.monotonic
     begun = clock()
-    session = Run(
-        case, folder, cache, report, lambda: bool(asked['stop']), job['checkpoint_every'], clock
-    )
+    session = Run(case, folder, cache, report, lambda: bool(asked['stop']), CHECKPOINT_EVERY, clock)
     resumed = session.restart()
     series: list[list[float]] = []
     if resumed is None:

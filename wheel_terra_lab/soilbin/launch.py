@@ -37,7 +37,6 @@ def run_case(
     folder: Path,
     cache: Path | None,
     progress: Progress | None = None,
-    checkpoint_every: float = 120.0,
 ) -> dict[str, object]:
     """Run (or go on with) a case in a working folder; return its summary.
 
@@ -55,7 +54,7 @@ def run_case(
             shutil.rmtree(folder / name, ignore_errors=True)
         (folder / 'outcome.json').unlink(missing_ok=True)
     if not (folder / 'outcome.json').exists():
-        _write(job_file, json.dumps(job | {'checkpoint_every': checkpoint_every}))
+        _write(job_file, json.dumps(job))
         _engine(folder, case.name, progress)
     outcome = json.loads((folder / 'outcome.json').read_text())
     series = np.load(folder / 'series.npy')

@@ -122,7 +122,7 @@ def table7_spread(rows: Sequence[Row]) -> dict[str, tuple[float, float]]:
     return {name: spread(number(row, name) for row in rows) for name in TABLE7}
 
 
-def rank_sums(metrics: Mapping[int, Mapping[str, float]], limit: float = 10.0) -> dict[int, int]:
+def rank_sums(metrics: Mapping[int, Mapping[str, float]]) -> dict[int, int]:
     """Return the sum of ranks of table 6: a steep slope at 20 % slip and small power numbers win.
 
     Equal values share a rank and the next one follows on, as in the paper, whose slope at 20 %
@@ -135,7 +135,7 @@ def rank_sums(metrics: Mapping[int, Mapping[str, float]], limit: float = 10.0) -
         for wheel, values in metrics.items():
             value = values[name]
             if name == TABLE6[0]:
-                value = -min(value, limit) if math.isfinite(value) else -limit
+                value = -min(value, 10.0) if math.isfinite(value) else -10.0
             cost[wheel] = value if math.isfinite(value) else math.inf
         for wheel, value in cost.items():
             total[wheel] += 1 + len({other for other in cost.values() if other < value})

@@ -110,8 +110,9 @@ class Hidden:
         """Change the outcome (`OUTPUTS` and ``geometric_sinkage``) in place."""
 
 
-def _tanh_sinh(step: float = 0.14, reach: float = 2.94) -> tuple[FloatArray, FloatArray]:
+def _tanh_sinh() -> tuple[FloatArray, FloatArray]:
     """Nodes and weights of the double-exponential rule on [0, 1]."""
+    step, reach = 0.14, 2.94
     t = np.arange(-reach, reach + step / 2, step)
     inner = np.pi / 2 * np.sinh(t)
     nodes = 1.0 / (1.0 + np.exp(-2 * inner))

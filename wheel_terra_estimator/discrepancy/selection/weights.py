@@ -127,8 +127,8 @@ class Selection:
                 return h
         raise KeyError(names)
 
-    def single_weights(self, temperature: float = 1.0) -> dict[str, float]:
-        """Return effect -> share of the tempered probability among the single effects."""
+    def single_weights(self) -> dict[str, float]:
+        """Return effect -> share of the probability among the single effects."""
         singles = [
             (e.names[0], float(log_sum(self.log_joint[h])))
             for h, e in enumerate(self.explanations)
@@ -136,7 +136,7 @@ class Selection:
         ]
         if not singles:
             return {}
-        logs = np.array([value for _, value in singles]) / temperature
+        logs = np.array([value for _, value in singles])
         shares = np.exp(logs - log_sum(logs))
         return {name: float(s) for (name, _), s in zip(singles, shares, strict=True)}
 

@@ -151,9 +151,8 @@ def _smooth(u: FloatArray) -> FloatArray:
 class RandomField:
     """A Gaussian field of unit variance: a sum of plane waves of random length and direction."""
 
-    def __init__(
-        self, rng: np.random.Generator, shortest: float, longest: float, waves: int = 24
-    ) -> None:
+    def __init__(self, rng: np.random.Generator, shortest: float, longest: float) -> None:
+        waves = 24
         length = np.exp(rng.uniform(np.log(shortest), np.log(longest), waves))
         heading = rng.uniform(0.0, 2.0 * np.pi, waves)
         self._kx = 2.0 * np.pi / length * np.cos(heading)

@@ -252,10 +252,10 @@ def _read(path: Path) -> tuple[Counter[Any], list[str]]:
         return Counter(), [str(error)]
 
 
-def _samples(dice: random.Random, count: int = 120) -> list[Sample]:
+def _samples(dice: random.Random) -> list[Sample]:
     """Make messages that differ, some of them easily compressed."""
     time, found = START, []
-    for number in range(count):
+    for number in range(120):
         time += dice.randrange(1, 10**8)
         body = dice.choice((bytes(60), dice.randbytes(60), dice.randbytes(300)))
         data = b'\0\1\0\0' + number.to_bytes(4, 'little') + body

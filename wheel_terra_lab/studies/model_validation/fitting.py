@@ -56,12 +56,14 @@ class Model:
         return model.steady_state(points).outputs()
 
 
+PRIOR_WEIGHT = 0.3  # of an expected value against a row, at the scale of the parameter
+
+
 def fit(
     model: Model,
     data: Sequence[tuple[OperatingPoints, FloatArray]],
     sigma: Sequence[float],
     free: Sequence[Free],
-    prior_weight: float = 0.3,
 ) -> tuple[Model, dict[str, float]]:
     """Fit parameters to rows; a weak pull towards the expected values settles what rows do not.
 
@@ -78,7 +80,7 @@ def fit(
 
     def residual(x: Any) -> FloatArray:
         trial = model.with_values(dict(zip(names, x, strict=True)))
-        parts = [prior_weight * (x - expected) / scale]
+        parts = [PRIOR_WEIGHT * (x - expected) / scale]
         for points, measured in data:
             error = (trial.predict(points) - measured) / np.asarray(sigma)
             parts.append(np.where(np.isnan(error), 0.0, error).ravel())
@@ -124,7 +126,6 @@ def deviations(
     data: Sequence[tuple[OperatingPoints, FloatArray]],
     sigma: Sequence[float],
     free: Sequence[Free],
-    prior_weight: float = 0.3,
 ) -> dict[str, float]:
     """Return standard deviations of fitted parameters.
 
@@ -152,7 +153,7 @@ def deviations(
     freedom = max(int(np.count_nonzero(misfit)) - len(names), 1)
     factor = max(1.0, float(misfit @ misfit) / freedom)
     normal = slopes @ slopes.T / factor
-    normal += np.diag([(prior_weight / item.scale) ** 2 for item in free])
+    normal += np.diag([(PRIOR_WEIGHT / item.scale) ** 2 for item in free])
     variance = np.diag(np.linalg.inv(normal))
     return {name: float(np.sqrt(v)) for name, v in zip(names, variance, strict=True)}
 
