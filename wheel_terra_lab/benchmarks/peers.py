@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.terramechanics.soil import Soil
 
-FloatArray = NDArray[np.float64]
 STEEPEST_ENTRANCE = 1.4
 """Greatest entrance angle [rad] that the load balance looks at."""
 

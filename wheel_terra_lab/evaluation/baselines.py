@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -17,11 +17,9 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 
-FloatArray = NDArray[np.float64]
-
 
 def held_speed(
-    configuration: Configuration, measurements: Iterable[Measurement], stamps: NDArray[np.int64]
+    configuration: Configuration, measurements: Iterable[Measurement], stamps: IntArray
 ) -> FloatArray:
     """Return the last reference velocity that had arrived at each stamp (k,) [m/s].
 
@@ -32,7 +30,7 @@ def held_speed(
 
 
 def dead_reckoned_speed(
-    configuration: Configuration, measurements: Iterable[Measurement], stamps: NDArray[np.int64]
+    configuration: Configuration, measurements: Iterable[Measurement], stamps: IntArray
 ) -> FloatArray:
     """Return the speed from the accelerometer (k,) [m/s].
 
@@ -45,7 +43,7 @@ def dead_reckoned_speed(
 def _run(
     configuration: Configuration,
     measurements: Iterable[Measurement],
-    stamps: NDArray[np.int64],
+    stamps: IntArray,
     *,
     inertial: bool,
 ) -> FloatArray:

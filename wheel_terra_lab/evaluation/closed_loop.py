@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
@@ -33,7 +33,6 @@ from wheel_terra_estimator.simulation.sensors import START, Arrival
 from wheel_terra_lab.evaluation.kinds import LIMITER
 from wheel_terra_lab.evaluation.tables import table
 
-FloatArray = NDArray[np.float64]
 DEFAULTS = LimiterTuning()
 _FRONT = 0.5  # [m] from the middle of the rover to beyond its front wheels
 

@@ -14,14 +14,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.judgement.entrapment import entrapments
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_lab.evaluation.runner import Record
 from wheel_terra_lab.evaluation.simulators import Truth
-
-FloatArray = NDArray[np.float64]
 
 SPACING = 0.5
 """Between two rows that are scored [s]."""

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
@@ -24,7 +24,6 @@ from wheel_terra_estimator.estimation.measurements import (
 )
 from wheel_terra_lab.evaluation.runner import Record, record, run_estimator
 
-FloatArray = NDArray[np.float64]
 _WHEELS = ('fl', 'fr', 'rl', 'rr')
 _START = 1_000_000_000
 LONGEST_LEAD = 20.0
@@ -36,7 +35,7 @@ class SnowEvent:
     """One recorded immobilisation, rows at 10 Hz; indices count from 0."""
 
     name: str
-    stamp: NDArray[np.int64]
+    stamp: IntArray
     measurements: list[Measurement]
     speed: FloatArray  # truth [m/s]
     rim: FloatArray  # (k, 4) [m/s]

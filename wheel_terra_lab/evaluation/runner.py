@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
 from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
@@ -22,8 +23,6 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_lab.evaluation.simulators import TimedMeasurement
-
-FloatArray = NDArray[np.float64]
 
 LATE = 'reference_2s_late'
 LATE_BY = 2_000_000_000  # [ns], in place of what the sensor file says
@@ -47,7 +46,7 @@ SMOOTHED = 'smoothed'
 class Record:
     """Estimates of a drive: k sets, n wheels."""
 
-    stamp: NDArray[np.int64]
+    stamp: IntArray
     slip: FloatArray
     slip_std: FloatArray
     sinkage: FloatArray
@@ -56,7 +55,7 @@ class Record:
     drawbar_pull_std: FloatArray
     normal_load: FloatArray
     slip_class: NDArray[np.uint8]
-    stuck: NDArray[np.bool_]
+    stuck: BoolArray
     rim_travel_left: FloatArray
     stuck_probability: FloatArray
     speed: FloatArray  # (k,)

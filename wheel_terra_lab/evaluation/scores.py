@@ -14,6 +14,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
 from wheel_terra_estimator.estimation.judgement.entrapment import (
     Outcome,
     Span,
@@ -24,8 +25,6 @@ from wheel_terra_estimator.estimation.judgement.entrapment import (
 from wheel_terra_lab.evaluation.runner import Record
 from wheel_terra_lab.evaluation.simulators import Truth
 from wheel_terra_lab.evaluation.two_state_filters import SlipCourse
-
-FloatArray = NDArray[np.float64]
 
 LEAST_SPEED, FIRST_SECONDS, NEAR_BORDER = 0.005, 10.0, 0.05
 SCORING_PERIOD = 0.1
@@ -75,7 +74,7 @@ class Samples:
         parts = list(parts)
         return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
 
-    def where(self, mask: NDArray[np.bool_]) -> Samples:
+    def where(self, mask: BoolArray) -> Samples:
         """Return a part of the samples."""
         return Samples(*(getattr(self, f.name)[mask] for f in fields(self)))
 
@@ -154,7 +153,7 @@ def samples(
 
 def scored_rows(
     truth: Truth, record: Record, slip_radius: FloatArray
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+) -> tuple[IntArray, BoolArray]:
     """Return (k,) the set of each row of the truth, and (k, n) which wheels of it are scored."""
     position = np.clip(np.searchsorted(record.stamp, truth.stamp), 0, len(record.stamp) - 1)
     matched = record.stamp[position] == truth.stamp
@@ -166,7 +165,7 @@ def scored_rows(
     return position, scored
 
 
-def _since_start(stamp: NDArray[np.int64], rim: FloatArray) -> FloatArray:
+def _since_start(stamp: IntArray, rim: FloatArray) -> FloatArray:
     """Return (k,) the time since the wheels last stood, or since the first row [s]."""
     time = (stamp - stamp[0]) * 1e-9
     standing = np.where((rim < LEAST_SPEED).all(axis=1), time, 0.0)
@@ -178,7 +177,7 @@ def after_start(data: Samples) -> Samples:
     return data.where(data.since_start < START_TIME)
 
 
-def _one_per_period(stamp: NDArray[np.int64], matched: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _one_per_period(stamp: IntArray, matched: BoolArray) -> BoolArray:
     """Return the first matched row of each scoring period (k,)."""
     # Half a period off, so that stamps at 10 Hz with some jitter all count.
     period = np.floor((stamp - stamp[0]) * 1e-9 / SCORING_PERIOD + 0.5)
@@ -189,9 +188,7 @@ def _one_per_period(stamp: NDArray[np.int64], matched: NDArray[np.bool_]) -> NDA
     return found
 
 
-def _block_means(
-    stamp: NDArray[np.int64], error: FloatArray, scored: NDArray[np.bool_]
-) -> FloatArray:
+def _block_means(stamp: IntArray, error: FloatArray, scored: BoolArray) -> FloatArray:
     """Return (k, n) the mean of the scored errors over the block of time of each row."""
     block = np.floor((stamp - stamp[0]) * 1e-9 / SLOW_TIME).astype(int)
     count, total = (np.zeros((block[-1] + 1, error.shape[1])) for _ in range(2))
@@ -331,7 +328,7 @@ def accuracy(
     return float(right[chosen].mean())
 
 
-def confusion(data: Samples) -> NDArray[np.int64]:
+def confusion(data: Samples) -> IntArray:
     """Return counts (4, 5): true class low .. stuck against said class low .. stuck, unknown."""
     counts = np.zeros((4, 5), dtype=np.int64)
     said = np.where(data.said_class == 255, 4, data.said_class)

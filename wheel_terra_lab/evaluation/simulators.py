@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.configuration import shipped
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
@@ -21,7 +22,6 @@ from wheel_terra_lab.evaluation import kinds as kinds_a
 from wheel_terra_lab.evaluation.simulator_b import kinds as kinds_b
 from wheel_terra_lab.evaluation.simulator_c import plans as plans_c
 
-FloatArray = NDArray[np.float64]
 SCENARIO = 'scenarios/'
 """Begins the name of a kind that is a shipped scenario."""
 
@@ -40,7 +40,7 @@ class Truth(Protocol):
     """Ground truth of a drive, k stamps and n wheels; slip is nan at rest."""
 
     @property
-    def stamp(self) -> NDArray[np.int64]: ...  # noqa: D102
+    def stamp(self) -> IntArray: ...  # noqa: D102
     @property
     def slip(self) -> FloatArray: ...  # noqa: D102
     @property

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -28,7 +28,6 @@ from wheel_terra_estimator.estimation.measurements import (
 )
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
-FloatArray = NDArray[np.float64]
 Demand = Literal['torque', 'pitch', 'curve']
 """Two states over the torque, two over the slope, three over the torque."""
 
@@ -254,7 +253,7 @@ class ThreeStateFilter(TwoStateFilter):
 def slip_course(
     configuration: Configuration,
     measurements: Iterable[Measurement],
-    stamps: NDArray[np.int64],
+    stamps: IntArray,
     demand: Demand,
     tuning: TwoStateTuning | None = None,
 ) -> SlipCourse:

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -21,7 +21,7 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.reproduction.ding_curves import SUPPORT
 from wheel_terra_lab.reproduction.statement import Statement
 from wheel_terra_lab.studies.model_validation import hit_wheels
-from wheel_terra_lab.studies.model_validation.fitting import FloatArray, Free, Model, fit
+from wheel_terra_lab.studies.model_validation.fitting import Free, Model, fit
 from wheel_terra_lab.studies.model_validation.hit_wheels import BASE, read
 from wheel_terra_lab.terramechanics.equivalent_contact import equivalent_contact
 
@@ -73,14 +73,14 @@ def statements() -> list[Statement]:
     return [*_models(), *_pulls(), *_high_slip(), *_definitions()]
 
 
-def _judged(points: OperatingPoints, measured: FloatArray) -> NDArray[np.bool_]:
+def _judged(points: OperatingPoints, measured: FloatArray) -> BoolArray:
     """Return the rows of the stated slips whose pull is large enough for a relative error."""
     low, high = STATED
     there = np.isfinite(measured).all(axis=1) & (points.slip >= low) & (points.slip <= high)
     return there & (np.abs(measured[:, 1]) > LEAST_PULL * points.normal_load)
 
 
-def _worst(pull: FloatArray, measured: FloatArray, rows: NDArray[np.bool_]) -> float:
+def _worst(pull: FloatArray, measured: FloatArray, rows: BoolArray) -> float:
     return float(np.max(np.abs(pull[rows] / measured[rows, 1] - 1.0)))
 
 
@@ -185,9 +185,7 @@ def _pulls() -> list[Statement]:
     return found
 
 
-def _fitted(
-    points: OperatingPoints, measured: FloatArray, rows: NDArray[np.bool_], rig: bool
-) -> float:
+def _fitted(points: OperatingPoints, measured: FloatArray, rows: BoolArray, rig: bool) -> float:
     """Return the worst error with c1 and c2 (and the friction of a rig's drive) fitted to it."""
 
     def worst(x: FloatArray) -> float:

@@ -18,8 +18,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import IntArray
 from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.checks.calibration import calibrate
 from wheel_terra_estimator.checks.run import check_recording
@@ -130,9 +130,7 @@ def message_of(make: MessageFactory, one: Measurement, rover: Configuration) -> 
     return 'reference_odom', make.odometry(header, twist)
 
 
-def replayed(
-    drive: BenchDrive, file: Configuration, order: NDArray[np.int64]
-) -> tuple[float, float]:
+def replayed(drive: BenchDrive, file: Configuration, order: IntArray) -> tuple[float, float]:
     """Return slip error and share of right classes of a drive with a rover file."""
     pipeline, make, sets = Pipeline(file), MessageFactory(), []
     for timed in drive.arrivals:
@@ -148,7 +146,7 @@ def replayed(
     return rms(error[scored]), float(np.mean(right[scored]))
 
 
-def _nearest(stamp: NDArray[np.int64], of: NDArray[np.int64]) -> NDArray[np.int64]:
+def _nearest(stamp: IntArray, of: IntArray) -> IntArray:
     """Return the nearest stamps of the truth: a file with other offsets publishes others."""
     after = np.clip(np.searchsorted(of, stamp), 1, of.size - 1)
     before = stamp - of[after - 1] < of[after] - stamp

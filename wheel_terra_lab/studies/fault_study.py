@@ -25,9 +25,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.bags.series_reader import read_series
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.checks.finding import CheckReport, Finding
@@ -49,7 +49,6 @@ from wheel_terra_estimator.estimation.measurements import (
 )
 from wheel_terra_lab.evaluation.simulators import SIMULATORS, BenchDrive
 
-FloatArray = NDArray[np.float64]
 SURE = 0.6
 """Confidence from which a finding counts as said [-]."""
 NEAR = 0.03
@@ -226,7 +225,7 @@ def _in_file(key: str, low: float, high: float) -> Put:
     return put
 
 
-def _stretch(seconds: FloatArray, random: Random, least: float) -> NDArray[np.bool_]:
+def _stretch(seconds: FloatArray, random: Random, least: float) -> BoolArray:
     """Return the messages of a stretch of the drive."""
     length = max(least, float(random.uniform(0.15, 0.4)) * seconds[-1])
     start = float(random.uniform(0.2, 0.55)) * seconds[-1]

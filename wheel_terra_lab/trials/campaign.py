@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import BoolArray
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
 from wheel_terra_lab.trials.designs import random_rows, random_soil
 from wheel_terra_lab.trials.detectability import Ruler, listed_kinds, size_for
@@ -22,7 +23,6 @@ from wheel_terra_lab.trials.strangers import SCORED
 from wheel_terra_lab.trials.truth import (
     OUTPUTS,
     SOIL_SD,
-    BoolArray,
     Hidden,
     Rows,
     TrueSoil,

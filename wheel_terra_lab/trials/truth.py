@@ -18,10 +18,9 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from wheel_terra_estimator.arrays import FloatArray
+
 Rows = dict[str, FloatArray]
 
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')

@@ -9,15 +9,14 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.studies.model_validation.fitting import (
     HEADER,
-    FloatArray,
     Free,
     Misfit,
     Model,
@@ -101,7 +100,7 @@ def rows(shared: Path) -> tuple[Soil, OperatingPoints, FloatArray]:
     return soil, OperatingPoints(slip, column('vertical_load_N'), WHEEL), measured
 
 
-def chosen(points: OperatingPoints, selected: NDArray[np.bool_]) -> OperatingPoints:
+def chosen(points: OperatingPoints, selected: BoolArray) -> OperatingPoints:
     """Return some of the rows."""
     return OperatingPoints(points.slip[selected], points.normal_load[selected], WHEEL)
 
@@ -112,7 +111,7 @@ def section(shared: Path, figures: Path) -> str:
     _, rms, plate_values = plates(shared / 'measured' / 'cmu_single_wheel' / 'pressure_sinkage.csv')
     slip = everything.slip
 
-    def points(selected: NDArray[np.bool_]) -> OperatingPoints:
+    def points(selected: BoolArray) -> OperatingPoints:
         return chosen(everything, selected)
 
     base = Model(soil, EFFECTS)

@@ -9,14 +9,13 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 
-FloatArray = NDArray[np.float64]
 Effects = dict[str, dict[str, float]]
 
 
@@ -93,7 +92,7 @@ def fit(
 
 
 def rows_of(
-    data: tuple[OperatingPoints, FloatArray], chosen: NDArray[np.bool_]
+    data: tuple[OperatingPoints, FloatArray], chosen: BoolArray
 ) -> tuple[OperatingPoints, FloatArray]:
     """Return some of the rows."""
     points, measured = data

@@ -8,12 +8,12 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
-from wheel_terra_lab.studies.model_validation.fitting import FloatArray, Free, Model, fit, listed
+from wheel_terra_lab.studies.model_validation.fitting import Free, Model, fit, listed
 from wheel_terra_lab.studies.model_validation.pictures import compare
 
 LOAD = 17.5 * 9.80665
@@ -66,7 +66,7 @@ def section(shared: Path, figures: Path) -> str:
     even = np.arange(slip.size) % 2 == 0
     low = slip < 0.45
 
-    def line(label: str, mound: str, values: str, model: Model, judged: NDArray[np.bool_]) -> str:
+    def line(label: str, mound: str, values: str, model: Model, judged: BoolArray) -> str:
         error = (model.predict(points_at(slip[judged]))[:, 1] - pull[judged]) / span
         high = error[slip[judged] > 0.55]
         return (

@@ -8,11 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 
-FloatArray = NDArray[np.float64]
 LABELS = (('sinkage [mm]', 1e3), ('drawbar pull [N]', 1.0), ('torque [N m]', 1.0))
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import FloatArray
 
 RADIUS, WIDTH = 0.058, 0.050  # [m]
 STIFFNESS, COHESION, SHEAR_MODULUS = 8e6, 1000.0, 0.021  # [Pa/m^N], [Pa], [m]
