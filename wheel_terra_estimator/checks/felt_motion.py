@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.statistics import Estimate, moving_mean, without_drift
-
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.checks.statistics import DRIFT, Estimate, moving_mean, without_drift
 
 LEAST_YAW = math.radians(25.0)
 """Yaw of the mounting below which starts, stops and slopes do not tell it [rad]."""
@@ -21,32 +19,23 @@ FELT_BLOCKS = 10
 """Parts of a drive that a deviation comes from."""
 
 
-def felt_motion(evidence: Evidence) -> tuple[NDArray[np.complex128], float] | None:
-    """Return how a recording's motion is felt; see `felt`."""
-    if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
-        return None
-    return felt(evidence.rim, evidence.gyro[:, 2], evidence.force[:, :2], evidence.period)
-
-
-def felt(
-    rim: FloatArray, yaw_rate: FloatArray, force: FloatArray, period: float
-) -> tuple[NDArray[np.complex128], float]:
+def felt_motion(
+    evidence: Evidence, drift: float = DRIFT
+) -> tuple[NDArray[np.complex128], float] | None:
     """Return sums over blocks of acceleration felt times that of the wheels, and their energy.
 
-    Along x the acceleration of starts and stops, along y that of curves, as complex numbers.
+    Along x the acceleration of starts and stops, along y that of curves, as complex numbers; what
+    changes more slowly than over ``drift`` [s] is the slope. None without an IMU.
     """
+    if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
+        return None
+    period = evidence.period
     width = max(round(0.4 / period), 1)
-    speed = moving_mean(rim, width)
-    curve = speed * moving_mean(yaw_rate, width)
-    motion = without_drift(np.gradient(speed, period) + 1j * curve, period)
-    along, across = (moving_mean(column, width) for column in force.T)
-    return felt_blocks(motion, without_drift(along + 1j * across, period))
-
-
-def felt_blocks(
-    motion: NDArray[np.complex128], seen: NDArray[np.complex128]
-) -> tuple[NDArray[np.complex128], float]:
-    """Return what blocks of equal energy of a motion say of how it is felt, and the energy."""
+    speed = moving_mean(evidence.rim, width)
+    curve = speed * moving_mean(evidence.gyro[:, 2], width)
+    motion = without_drift(np.gradient(speed, period) + 1j * curve, period, drift)
+    along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
+    seen = without_drift(along + 1j * across, period, drift)
     energy = np.cumsum(np.abs(motion) ** 2)
     edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], FELT_BLOCKS + 1)[1:-1])
     parts = np.array(

@@ -201,7 +201,11 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
             f'soft ground (sinkage {depth:.2f} of the radius): a ratio of speeds may be slip; '
             'drive ten metres over firm ground',
         )
-    both = block_fit(np.column_stack([rim, rim * traction]), speeds.forward)
+    both = block_fit(
+        np.column_stack([rim, rim * traction]),
+        speeds.forward,
+        np.column_stack([rim, rim * demand]),  # noise of the torques is not that of the slopes
+    )
     # What firm ground does elsewhere is one more observation of the slope.
     seen = Estimate(-both[1].value / both[0].value, both[1].std)
     weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + seen.std**2)
@@ -276,7 +280,7 @@ def _depth(evidence: Evidence) -> Estimate:
     if series is None or not series.stamp.size:
         return FIRM_DEPTH
     straight = evidence.rim_at(series.stamp, evidence.straight.astype(float), AROUND) > 0.99
-    _, rows = without_stated_errors(configuration, series)
+    _, rows = without_stated_errors(evidence.facts, series)
     if np.isfinite(rows[straight]).sum() < LEAST_DEPTHS:
         return FIRM_DEPTH
     sensors, radius = configuration.sensors, float(np.mean(configuration.wheels.radius))
@@ -301,7 +305,8 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not trial.falls:
         reason = 'its halves of the drive say another: drive longer, over firm ground'
         return [NotChecked('radius', reason)], evidence
-    rims = facts.radius * ratio.value - (facts.radius - facts.configuration.wheels.radius)
+    wheels = facts.configuration.wheels
+    rims = facts.radius * ratio.value - (wheels.slip_radius - wheels.radius)  # lugs stay
     share, sure = _share_of_radius(evidence, ratio), confidence(sigmas)
     alone = max(share, 1.0 - share) > SURE
     words: dict[str, Any] = {

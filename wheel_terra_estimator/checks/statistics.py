@@ -63,13 +63,18 @@ def robust_std(values: FloatArray) -> float:
     return float(MAD_TO_STD * np.median(np.abs(values - np.median(values))))
 
 
-def block_fit(design: FloatArray, target: FloatArray) -> list[Estimate]:
+def block_fit(
+    design: FloatArray, target: FloatArray, instruments: FloatArray | None = None
+) -> list[Estimate]:
     """Return a robust fit whose deviations come from leaving out one block of time at a time.
 
     The delete-one-block jackknife (Kuensch 1989) allows for residuals that hang together in time.
+    Noise of a column makes its coefficient too small, unless ``instruments`` has in its place
+    another reading of the same (Wald 1940).
     """
-    whole, weight = _huber(design, target)
-    weighted = design * weight[:, None]
+    instruments = design if instruments is None else instruments
+    whole, weight = _huber(design, target, instruments)
+    weighted = instruments * weight[:, None]
     edges = np.linspace(0, target.size, BLOCKS + 1).astype(int)[:-1]
     normals = np.add.reduceat(weighted[:, :, None] * design[:, None, :], edges, axis=0)
     rights = np.add.reduceat(weighted * target[:, None], edges, axis=0)
@@ -84,12 +89,14 @@ def block_fit(design: FloatArray, target: FloatArray) -> list[Estimate]:
     return [Estimate(float(v), float(s)) for v, s in zip(whole, std, strict=True)]
 
 
-def _huber(design: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _huber(
+    design: FloatArray, target: FloatArray, instruments: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return coefficients and the weights of the rows."""
     weight: FloatArray = np.ones(target.shape)
     coefficients: FloatArray = np.zeros(design.shape[1])
     for _ in range(ROUNDS):
-        weighted = design * weight[:, None]
+        weighted = instruments * weight[:, None]
         coefficients = _solve(weighted.T @ design, weighted.T @ target)
         residual = target - design @ coefficients
         scale = max(robust_std(residual), 1e-12)
@@ -99,7 +106,7 @@ def _huber(design: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArr
 
 def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
     """Solve normal equations after scaling; a column of nothing gets coefficient 0."""
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    size = np.sqrt(np.maximum(np.abs(np.diag(normal)), 1e-300))
     scaled = normal / np.outer(size, size) + 1e-12 * np.eye(size.size)
     return np.asarray(np.linalg.solve(scaled, right / size) / size)
 
@@ -115,9 +122,9 @@ def moving_mean(values: NDArray[Any], width: int) -> NDArray[Any]:
     return np.asarray(uniform_filter1d(values, width, mode='constant'))
 
 
-def without_drift(values: NDArray[Any], period: float) -> NDArray[Any]:
-    """Return values less their mean over 6 s: slopes change more slowly than speeds."""
-    return np.asarray(values - moving_mean(values, max(round(DRIFT / period), 3)))
+def without_drift(values: NDArray[Any], period: float, drift: float = DRIFT) -> NDArray[Any]:
+    """Return values less their mean over so many seconds: slopes change more slowly than speeds."""
+    return np.asarray(values - moving_mean(values, max(round(drift / period), 3)))
 
 
 def bend_noise(values: FloatArray) -> float:

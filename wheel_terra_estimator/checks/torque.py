@@ -88,7 +88,8 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [evidence.found('torque_placeholder', 0.99)], blank
     unsigned = [] if evidence.force is None else _unsigned(evidence)
     if unsigned:
-        return [*unsigned, *_not_told('a torque without a sign')], evidence
+        blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
+        return [*unsigned, *_not_told('a torque without a sign')], blank
     outcomes, evidence = _signs(evidence)
     if not evidence.facts.known or evidence.force is None:
         return outcomes, evidence
