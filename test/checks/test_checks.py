@@ -15,7 +15,6 @@ from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.checks.clocks import as_smooth
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.imu import ImuState, check_imu
-from wheel_terra_estimator.checks.rover_facts import from_configuration
 from wheel_terra_estimator.checks.run import check_recording
 
 WHOLE = rolling.recording()
@@ -452,9 +451,7 @@ def test_orientations_tell_which_axis_of_the_gyro_is_reversed(axis):
         recording = replace(
             WHOLE, imu=replace(WHOLE.imu, rate=factor * rate, orientation=orientation)
         )
-        told, mended = check_imu(
-            ImuState(recording, np.eye(3)), from_configuration(rolling.rover())
-        )
+        told, mended = check_imu(ImuState(recording, np.eye(3), 9.80665))
         told = {finding.fault: finding for finding in told if isinstance(finding, Finding)}
         assert ('gyro_reversed' in told) == (factor < 0.0)
         assert ('gyro_degrees' in told) == (abs(factor) > 1.0)

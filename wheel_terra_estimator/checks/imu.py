@@ -24,9 +24,9 @@ from wheel_terra_estimator.checks.felt_motion import (
     yaw_of_motion,
 )
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
-from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
+    DRIFT,
     Estimate,
     block_fit,
     confidence,
@@ -36,7 +36,7 @@ from wheel_terra_estimator.checks.statistics import (
     runs,
 )
 from wheel_terra_estimator.checks.torque import heading_of_torque, slope_on_the_level
-from wheel_terra_estimator.checks.trial import Trial, halves
+from wheel_terra_estimator.checks.trial import Trial
 from wheel_terra_estimator.checks.turning import ordinary_track, track_ratio
 from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
 
@@ -59,6 +59,8 @@ LEAST_MOUNTING = math.radians(1.5)
 """Mounting errors below this [rad] are left to calibration."""
 LEAST_PITCH = math.radians(3.0)
 """The same of a pitch that the torques tell [rad]."""
+LONGEST_GAP = 1.0
+"""Time without IMU in which a turn may pass unseen [s]."""
 LEAST_TURN = 4.5
 """Heading that a drive has to cover for the mounting to be told from a slope [rad]."""
 FLAT_TURN_STD = math.radians(0.1)
@@ -78,6 +80,7 @@ PERHAPS_DEGREES = 0.15
 BIAS_FACTOR = 6.0
 """A bias above so many stated deviations is a finding."""
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
+BIAS_SIGMAS = 5.0
 TILT_IS_MOUNTING = 0.95
 """Probability that a tilt seen in circles is the mounting and not the accelerometer's zero [-]."""
 LEAST_TURNING = 10.0
@@ -106,6 +109,7 @@ class ImuState:
 
     recording: Recording
     rotation: FloatArray
+    gravity: float
     usable_force: bool = True
     usable_gyro: bool = True
 
@@ -131,7 +135,7 @@ class ImuState:
 Judged = tuple[list[Outcome], ImuState]
 
 
-def check_imu(state: ImuState, facts: RoverFacts) -> Judged:
+def check_imu(state: ImuState) -> Judged:
     """Return what the IMU says against itself, and the recording with that mended."""
     if state.recording.imu is None or state.imu.stamp.size < LEAST_MESSAGES:
         none: list[Outcome] = [
@@ -140,11 +144,13 @@ def check_imu(state: ImuState, facts: RoverFacts) -> Judged:
         return none, replace(state, usable_force=False, usable_gyro=False)
     outcomes, state = _placeholders(state)
     if state.usable_force and state.usable_gyro:
-        for check in (_frozen, _wild):
-            told, state = check(state)
-            outcomes += told
+        told, state = _frozen(state)
+        outcomes += told
     if state.usable_force:
-        told, state = _gravity(facts, state)
+        told, state = _gravity(state)
+        outcomes += told
+    if state.usable_force and state.usable_gyro:
+        told, state = _wild(state)
         outcomes += told
     if state.usable_gyro:
         told, state = _against_orientation(state)
@@ -201,8 +207,8 @@ def _wild(state: ImuState) -> Judged:
     return [state.found('imu_wild', 0.97, **told)], state.with_imu(rows_of(state.imu, ~wild))
 
 
-def _gravity(facts: RoverFacts, state: ImuState) -> Judged:
-    imu, gravity = state.imu, facts.gravity
+def _gravity(state: ImuState) -> Judged:
+    imu, gravity = state.imu, state.gravity
     middle = np.median(imu.force, axis=0)
     size = float(np.linalg.norm(middle))
     if abs(size - gravity) <= max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):
@@ -223,7 +229,7 @@ def _gravity(facts: RoverFacts, state: ImuState) -> Judged:
             )
     for place, there in GRAVITIES.items():
         if abs(size / there - 1.0) <= GRAVITY_TOLERANCE:
-            return told('planet', there, place=place), state
+            return told('planet', there, place=place), replace(state, gravity=there)
     gain = gravity / size
     return told('force_scale', gain), state.with_values(force=imu.force * gain)
 
@@ -342,8 +348,11 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     On a plane the specific force at low speed is ``g (m + R(-psi) s)``: the mounting m stays with
     the rover, the slope s turns with the heading psi.
     """
-    if evidence.force is None or evidence.gyro is None:
+    imu = evidence.recording.imu
+    if imu is None or evidence.force is None or evidence.gyro is None:
         return None
+    if np.diff(evidence.seconds(imu)).max(initial=0.0) > LONGEST_GAP:
+        return None  # in which the heading is lost
     track = track_ratio(evidence)
     if track is None or (evidence.facts.known and not ordinary_track(track)):
         return None  # the wheels see no such turns: a bias, or another unit
@@ -377,7 +386,7 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
 
 
 def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
-    """Return the yaw of the IMU in ``base_link`` [rad] and its trial, angles off by half."""
+    """Return the yaw of the IMU in ``base_link`` [rad] and its trial, angles off."""
     felt = felt_motion(evidence)
     by_motion = yaw_of_motion(*felt) if felt is not None else None
     by_torque = heading_of_torque(evidence)
@@ -388,13 +397,16 @@ def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
     if len(told) > 1:
         second = told[1].value  # slopes and starts are each other's trial
     elif felt is not None and by_motion is not None:
-        parts = (felt[0][half].sum() for half in halves(np.ones(felt[0].size)))
-        first, second = (float(np.angle(part)) for part in parts)
+        # Slopes at the places of starts and stops fall off faster than these: a rover that goes
+        # to and fro feels the same ones each time.
+        quick = felt_motion(evidence, 0.5 * DRIFT)
+        assert quick is not None
+        first, second = (float(np.angle(parts.sum())) for parts, _ in (felt, quick))
     else:
-        both = [heading_of_torque(evidence, half) for half in (0, 1)]
-        if both[0] is None or both[1] is None:
+        one, other = (heading_of_torque(evidence, half) for half in (0, 1))
+        if one is None or other is None:
             return None
-        first, second = both[0].value, both[1].value
+        first, second = one.value, other.value
         told = [Estimate(told[0].value, math.hypot(told[0].std, SLOPES_STD, first - second))]
     apart = abs(math.remainder(first - second, 2.0 * math.pi))
     return told[0], Trial(abs(math.remainder(second, 2.0 * math.pi)), apart)
@@ -531,24 +543,26 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         stated = getattr(sensors, key)
         evidence.figures[f'imu.{key}'] = float(f'{noise:.3g}')
         in_degrees = math.radians(noise) / stated if by_noise and values is imu.rate else 0.0
-        if DEGREES[0] < in_degrees < DEGREES[1]:
-            told = {'times': noise / stated, 'how': 'noise of a gyro'}
-            return [*outcomes, evidence.found('gyro_degrees', 0.8, value=math.radians(1), **told)]
+        told: dict[str, Any] = {'noise': noise, 'stated': stated, 'unit': unit}
+        told |= {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}'}
+        if DEGREES[0] < in_degrees < DEGREES[1]:  # which of both, a turn would tell
+            perhaps = {'times': noise / stated, 'how': 'noise of a gyro'}
+            unit_of_gyro = evidence.found('gyro_degrees', 0.55, value=math.radians(1.0), **perhaps)
+            return [*outcomes, unit_of_gyro, evidence.found('imu_noise', 0.4, **told)]
         if PERHAPS_DEGREES < in_degrees < DEGREES[0]:
             reason = f'gyro: noise of {noise:.2g}: vibration, or degrees per second; drive a circle'
             outcomes += [NotChecked(kind, reason) for kind in ('unit', 'noise')]
         elif noise > NOISE_FACTOR * stated:
             by_noise = False  # vibration, which a gyro has as well
-            told = {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}', 'unit': unit}
-            sure = confidence(noise / stated)
-            outcomes.append(evidence.found('imu_noise', sure, noise=noise, stated=stated, **told))
+            outcomes.append(evidence.found('imu_noise', confidence(noise / stated), **told))
     bias, std, where = gyro_bias(evidence)
     if not np.isfinite(std).all():
         reason = 'IMU: no standstill of 3 s in it; stand still for 10 s'
         return [*outcomes, NotChecked('zero', reason)]
     evidence.figures['imu.gyro_bias_rad_s'] = [float(f'{b:.3g}') for b in bias]
     worst = int(np.argmax(np.abs(bias)))
-    if abs(bias[worst]) > max(BIAS_FACTOR * sensors.angular_rate_bias_std, LEAST_GYRO_BIAS):
+    least = max(BIAS_FACTOR * sensors.angular_rate_bias_std, LEAST_GYRO_BIAS)
+    if abs(bias[worst]) > max(least, BIAS_SIGMAS * std[worst]):
         whole = bias + sensors.angular_rate_bias
         outcomes.append(
             evidence.found(

@@ -179,8 +179,10 @@ def against_each_other(
     recording: Recording, facts: RoverFacts, checks: Sequence[Check], mended: Mended
 ) -> Evidence | None:
     """Hold one channel against another; None where hardly any wheel rates are."""
-    state = imu.ImuState(recording, configured_mounting(facts.configuration))
-    state = mended('gravity', state, lambda: imu.check_imu(state, facts), 'check_imu')
+    rotation = configured_mounting(facts.configuration)
+    state = imu.ImuState(recording, rotation, facts.gravity)
+    state = mended('gravity', state, lambda: imu.check_imu(state), 'check_imu')
+    facts = replace(facts, gravity=state.gravity)
     evidence = gather(state.recording, facts, state.rotation, mended.report.figures)
     if evidence is None or np.isfinite(evidence.rate).any(axis=1).sum() < LEAST_MOVING_ROWS:
         return None
