@@ -12,7 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks import turning
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
+from wheel_terra_estimator.checks.evidence import (
+    LEAST_MOVING_ROWS,
+    Evidence,
+    Mask,
+    row_medians,
+)
 from wheel_terra_estimator.checks.faults import RATE_UNITS, listed
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.reference import (
@@ -65,12 +70,18 @@ FROZEN_TIME = 5.0
 """A rate that does not change in the last digit for this long [s] while the others do."""
 LIVELY = 0.3
 """Rate of the other wheels beside which a wheel does not stand, over the working rate [-]."""
+GOES_ON = 0.75
+"""Speed over that of the rims of the other side of a rover that does not turn about one [-]."""
 SAME_SPEED = 0.05
 """Speed of a side against the middle, as a share of it, in which all wheels roll alike [-]."""
 LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0
 """Speed of an odd wheel over that of the others [ln]: least, most of a radius; over scatter [-]."""
 LONG_FROZEN_TIME = 10.0
 """Time of driving in which an encoder that repeats itself is told from a coarse one [s]."""
+LEAST_CHANGES = 20.0
+"""Changes that a rate would have had meanwhile by those of the other wheels, at least [-]."""
+LEAST_STEPS = 3.0
+"""Range of these over a usual step of theirs: a coarse rate near a step goes to and fro [-]."""
 HELD_TORQUE = 1.5
 """Torque of a standing wheel over that of the others meanwhile, above which it is held [-]."""
 CLEAR_SPEED = 5.0
@@ -103,11 +114,20 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if moving.sum() < LEAST_MOVING_ROWS or evidence.rate.shape[1] < 2:
         return [], evidence
     outcomes: list[Outcome] = []
+    whole = stays(evidence, evidence.time, evidence.rate)
+    if whole is not None and whole.longest > LONG_FROZEN_TIME:
+        names, how = (
+            ', '.join(evidence.facts.names),
+            f'do not change for up to {whole.longest:.1f} s',
+        )
+        outcomes.append(evidence.found('rate_frozen', 0.97, wheel=names, how=how))
+        evidence = evidence.with_rate(np.where(whole.rows[:, None], np.nan, evidence.rate))
     for look in (_stands, _stays):  # beside a dead one none is frozen
         mended = evidence.rate.copy()
         for index, name in enumerate(evidence.facts.names):
             how = look(evidence, index)
             if how:
+                how += ' while the other wheels change'
                 outcomes.append(evidence.found('rate_frozen', 0.97, wheel=name, how=how))
                 mended[:, index] = np.nan
         evidence = evidence.with_rate(mended) if np.isnan(mended).any() else evidence
@@ -118,6 +138,7 @@ def _stands(evidence: Evidence, index: int) -> str:
     """Return how long a rate is 0 while the others turn and no torque holds the wheel."""
     own, others = evidence.rate[:, index], np.delete(evidence.rate, index, axis=1)
     busy = row_medians(np.abs(others)) > LIVELY * evidence.working_rate
+    busy &= ~_about_a_side(evidence, index)
     longest = 0.0
     for start, end in runs(own == 0.0):
         rows = np.flatnonzero(busy[start:end]) + start
@@ -126,17 +147,43 @@ def _stands(evidence: Evidence, index: int) -> str:
     return f'does not change for up to {longest:.1f} s' if longest else ''
 
 
+def _about_a_side(evidence: Evidence, index: int) -> Mask:
+    """Return where the whole side of a wheel stands, and no reference says that the rover goes on.
+
+    It may turn about that side, or try to.
+    """
+    side = evidence.facts.side == evidence.facts.side[index]
+    if not evidence.facts.has_sides() or side.sum() < 2:
+        return np.zeros(evidence.time.size, dtype=bool)
+    live = row_medians(np.abs(evidence.speed[:, ~side]))
+    speed = evidence.reference_speed
+    stands = (evidence.rate[:, side] == 0.0).all(axis=1)
+    return np.asarray(stands if speed is None else stands & (speed < GOES_ON * live))
+
+
 def _stays(evidence: Evidence, index: int) -> str:
-    """Return how a rate is the same for longer than it ever is, or repeats itself, elsewhere."""
+    """Return how a rate stays the same while the others change, or repeats itself."""
     rate, moving = evidence.rate, evidence.moving
-    dead = stays(evidence, evidence.time, rate[:, index : index + 1])
-    if dead is not None and dead.value != 0.0 and dead.longest > LONG_FROZEN_TIME:
-        return f'does not change for up to {dead.longest:.1f} s'
-    own, others = _repeats(rate[moving, index]), _repeats(np.delete(rate, index, axis=1)[moving])
+    known = np.flatnonzero(np.isfinite(rate[:, index]))
+    own = np.diff(rate[known, index]) != 0.0
+    others = row_medians(np.delete(rate, index, axis=1))[known]
+    change = np.abs(np.diff(others)) * moving[known][1:]
+    total, longest = np.concatenate([[0.0], np.cumsum(change != 0.0)]), 0.0
+    for first, last in runs(~own):
+        meanwhile, steps = total[last] - total[first], change[first:last]
+        usual = own.sum() / max(total[-1] - meanwhile, 1.0) if own.any() else 1.0
+        if not rate[known[first], index] or meanwhile * usual < LEAST_CHANGES:
+            continue
+        low, high = np.quantile(others[first:last], (0.05, 0.95))
+        if high - low > LEAST_STEPS * np.median(steps[steps > 0.0]):  # more than to and fro
+            longest = max(longest, float(moving[known[first : last + 1]].sum()) * evidence.period)
+    if longest > LONG_FROZEN_TIME:
+        return f'does not change for up to {longest:.1f} s'
+    again, usual = _repeats(rate[moving, index]), _repeats(np.delete(rate, index, axis=1)[moving])
     lasts = moving.sum() * evidence.period > LONG_FROZEN_TIME
-    if not lasts or own < 0.6 or others > 0.2 or _held(evidence, index, moving):
+    if not lasts or again < 0.6 or usual > 0.2 or _held(evidence, index, moving):
         return ''
-    return f'repeats its last value in {100 * own:.0f} % of the messages'
+    return f'repeats its last value in {100 * again:.0f} % of the messages'
 
 
 def _repeats(rate: FloatArray) -> float:
