@@ -295,7 +295,12 @@ def test_a_rover_that_starts_and_stops_between_references_scatters_no_reference(
 def test_sinkage():
     sinkage = WHOLE.sinkage
     only(checked(sinkage=replace(sinkage, sinkage=1000.0 * sinkage.sinkage)), 'unit')
-    only(checked(sinkage=replace(sinkage, sinkage=-sinkage.sinkage)), 'sign')
+    deep = sinkage.sinkage * (1.0 + 3.0 * (np.arange(sinkage.stamp.size) % 100 < 25))[:, None]
+    only(checked(sinkage=replace(sinkage, sinkage=-deep)), 'sign')
+    for even in (-sinkage.sinkage, sinkage.sinkage - 0.02):  # no deep spell: which, nothing tells
+        told = checked(sinkage=replace(sinkage, sinkage=even)).findings
+        assert [finding.kind for finding in told] == ['sign', 'zero']
+        assert max(finding.confidence for finding in told) <= 0.5
     off = sinkage.sinkage + np.array([0.0, 0.04, 0.0, 0.0])
     assert only(checked(sinkage=replace(sinkage, sinkage=off)), 'zero', 'front_right').value == (
         pytest.approx(0.04, abs=0.002)

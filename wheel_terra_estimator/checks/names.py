@@ -79,10 +79,10 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
     if renamed:
         names = [renamed.get(name, name) for name in facts.names]
         listed = ', '.join(names)
-        for own, other in renamed.items():
-            outcomes.append(
-                found('joint_name', joints.topic, 0.95, wheel=own, other=other, names=listed)
-            )
+        own, other = ', '.join(renamed), ', '.join(renamed.values())
+        outcomes.append(
+            found('joint_name', joints.topic, 0.95, wheel=own, other=other, names=listed)
+        )
     gone = [name for name in absent if name not in renamed]
     if gone:
         outcomes.append(_missing(joints.topic, gone, 'in no message'))

@@ -212,7 +212,11 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     fitting = near or fitting
     for unit, factor in fitting.items():
         told = {'value': 1.0 / factor, 'ratio': ratio, 'unit': unit}
-        mended = evidence.with_channel('reference', velocity=reference.velocity / factor)
+        mended = evidence.with_channel(
+            'reference',
+            velocity=reference.velocity / factor,
+            variance=reference.variance / factor**2,
+        )
         track = turning.track_ratio(evidence)
         either = [] if track and turning.ordinary_track(track) else either_unit(evidence, ratio)
         return either or [evidence.found('reference_unit', 0.9, **told)], mended

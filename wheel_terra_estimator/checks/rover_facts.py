@@ -44,10 +44,6 @@ class RoverFacts:
         """Whether there is a rover file."""
         return self.configuration is not None
 
-    def stated(self, key: str) -> bool:
-        """Return whether the rover file states a key."""
-        return self.configuration is not None and key in self.configuration.stated
-
     def has_sides(self) -> bool:
         """Return whether wheels on both sides are known."""
         return bool((self.side > 0).any() and (self.side < 0).any())

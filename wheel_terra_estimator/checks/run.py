@@ -254,7 +254,7 @@ def configured_mounting(configuration: Configuration | None) -> NDArray[np.float
 
 def _with_names_in(facts: RoverFacts, report: CheckReport) -> RoverFacts:
     """Go on with the names that the recording has."""
-    renamed = [f for f in report.findings if f.kind == 'unknown_name' and f.wheel in facts.names]
+    renamed = [f for f in report.findings if f.fault == 'joint_name']
     if not renamed or not facts.known:
         return facts
     listed = renamed[0].cure.partition('[')[2].rstrip(']')

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,10 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import SinkageSeries
 from wheel_terra_estimator.checks.statistics import bend_noise, correlation
 from wheel_terra_estimator.checks.trial import halves
-from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorErrors
 
 FloatArray = NDArray[np.float64]
@@ -29,6 +30,8 @@ BELOW_ZERO = 0.006
 """A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
 BURIED = 0.5
 """Depth over radius that no drive has all the time [-]."""
+SKEWED = 0.2
+"""Skewness of readings with deep spells, at least [-]."""
 LIKE_OTHERS = 0.2
 """Correlation with the other wheels of one that counts downwards as they do [-]."""
 ALIKE_SHARE = 0.4
@@ -57,11 +60,10 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if sinkage is None:
         return [NotChecked('zero', 'no sinkage in the recording')], evidence
     outcomes: list[Outcome] = [ORDER, STAMPS]
-    stated = configuration.wheels.names if configuration else ()
-    mute = [name for name in stated if name not in sinkage.names]
+    mute = [name for name in _own_names(evidence.facts, sinkage) if name not in sinkage.names]
     if mute:
         outcomes.append(evidence.found('sinkage_missing', 0.9, wheel=', '.join(mute)))
-    names, table = without_stated_errors(configuration, sinkage)
+    names, table = without_stated_errors(evidence.facts, sinkage)
     if not names or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS:
         return [*outcomes, NotChecked('zero', 'hardly any sinkage readings')], evidence
     unit, table = _unit(evidence, table)
@@ -88,16 +90,24 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 
 def without_stated_errors(
-    configuration: Configuration | None, sinkage: SinkageSeries
+    facts: RoverFacts, sinkage: SinkageSeries
 ) -> tuple[list[str], FloatArray]:
     """Return wheels and their readings (k, p) without the errors that the rover file states."""
-    if configuration is None:
+    if facts.configuration is None:
         return list(sinkage.names), sinkage.sinkage
-    own, errors = configuration.wheels.names, SensorErrors(configuration).sinkage
+    own, errors = _own_names(facts, sinkage), SensorErrors(facts.configuration).sinkage
     names = [name for name in sinkage.names if name in own]
     rows = [own.index(name) for name in names]
     table = sinkage.sinkage[:, [sinkage.names.index(name) for name in names]]
     return names, LinearErrors(errors.zero[rows], errors.gain[rows]).true(table)
+
+
+def _own_names(facts: RoverFacts, sinkage: SinkageSeries) -> list[str]:
+    """Return the wheels as the sinkage names them: as the joints do, or the rover file."""
+    if facts.configuration is None:
+        return []
+    pairs = zip(facts.names, facts.configuration.wheels.names, strict=True)
+    return [now if now in sinkage.names else stated for now, stated in pairs]
 
 
 def _median(column: FloatArray) -> float:
@@ -111,13 +121,11 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
     stated = configuration.sensors.sinkage_std if configuration else 0.002
     noise = _reading_noise(table)
     level = float(np.nanmedian(np.abs(table)))
-    if not (level > DEEPEST * radius or noise > 0.2 * radius):
-        return [], table
     off = {}
     for unit, factor in (('millimetres', 1e-3), ('centimetres', 1e-2)):
         # Both the depth and the noise have to fit the unit.
         ratio = noise * factor / max(stated, 1e-4)
-        if 0.1 < ratio < 10.0 and level * factor < 0.8 * radius:
+        if level > DEEPEST * radius and 0.1 < ratio < 10.0 and level * factor < 0.8 * radius:
             off[unit, factor] = abs(math.log(ratio))
     if off:
         unit, factor = min(off, key=lambda entry: off[entry])
@@ -143,11 +151,17 @@ def _sign_and_zero(
     limit, usual = BELOW_ZERO + lugs, float(np.nanmedian(middle))
     if usual < -limit:  # a reversed sign (deep spells go down) or a zero (deep spells go up)
         top = float(np.nanmedian(np.nanquantile(table, 0.98, axis=0)))
-        if top < 0.004 and float(np.median([_skew(column) for column in table.T])) < 0.3:
-            told: dict[str, Any] = {'reading': 1000 * usual, 'others': '', 'of': ''}
-            return [evidence.found('sinkage_sign', 0.9, value=-1.0, **told)]
+        skew = float(np.median([_skew(column) for column in table.T]))
+        told: dict[str, Any] = {'reading': 1000 * usual, 'others': '', 'of': ''}
         how = f'median sinkage {1000 * usual:.0f} mm: the wheels would float'
-        return [_zero(evidence, names, usual, DEEP_STD, how)]
+        zero = _zero(evidence, names, usual, DEEP_STD, how)
+        if top > 0.004 or skew > SKEWED:
+            return [zero]
+        if skew < -SKEWED:
+            return [evidence.found('sinkage_sign', 0.9, value=-1.0, **told)]
+        told['others'] = ' without a deep spell (or its zero is off)'
+        either = evidence.found('sinkage_sign', 0.5, value=-1.0, **told)
+        return [either, replace(zero, confidence=0.45)]
     outcomes: list[Outcome] = []
     if np.nanmedian(np.abs(middle)) < limit:
         outcomes.append(NotChecked('sign', 'sinkage: hardly any in it; drive where it is soft'))

@@ -1,0 +1,157 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Faults beside which another cure lies near: what is named is right, or named with its rival."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+
+from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.statistics import block_fit
+
+WHOLE = rolling.recording()
+
+
+def checked(configuration=None, whole=WHOLE, **changes):
+    return check_recording(replace(whole, **changes), configuration or rolling.rover())
+
+
+def faults(report):
+    return [finding.fault for finding in report.findings]
+
+
+def test_torques_are_judged_by_the_gravity_that_is_there():
+    report = checked(rolling.rover(**{'rover.gravity': 3.71}))
+    assert faults(report) == ['planet'] and report.findings[0].value == 9.81
+
+
+def test_vibration_in_another_unit_is_not_wild():
+    force = WHOLE.imu.force * 1000.0 / rolling.GRAVITY
+    assert faults(checked(imu=replace(WHOLE.imu, force=force))) == ['force_unit']
+
+
+def test_a_noisy_gyro_may_be_one_in_degrees_where_nothing_turns():
+    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
+    noise = 0.15 * np.random.default_rng(1).standard_normal(straight.imu.rate.shape)
+    report = checked(whole=straight, imu=replace(straight.imu, rate=straight.imu.rate + noise))
+    assert faults(report) == ['gyro_degrees', 'imu_noise']
+    assert max(finding.confidence for finding in report.findings) < 0.6
+
+
+def test_a_radius_beside_an_odd_wheel_keeps_the_odd_one():
+    """The truth: all wheels are 8 % larger than stated, one of them 20 % smaller than that."""
+    true = 1.08 * rolling.RADIUS * np.array([1.0, 1.0, 0.8, 1.0])
+    joints = replace(WHOLE.joints, rate=WHOLE.joints.rate * rolling.RADIUS / true)
+    told = [f for f in checked(joints=joints).findings if f.fault == 'radius']
+    radii = told[0].cure.partition('[')[2].partition(']')[0].split(',')
+    np.testing.assert_allclose([float(radius) for radius in radii], true, rtol=0.03)
+
+
+def test_noise_of_a_regressor_does_not_flatten_the_slope():
+    """y = 1 - 0.5 m; two readings of m, each with noise as large as m varies."""
+    random = np.random.default_rng(2)
+    m = 0.1 * np.sin(np.arange(4000) / 300.0)
+    first, second = (m + 0.1 * random.standard_normal(m.size) for _ in range(2))
+    one, target = np.ones(m.size), 1.0 - 0.5 * m
+    columns = [np.column_stack([one, reading]) for reading in (first, second)]
+    flat, whole = block_fit(columns[0], target)[1], block_fit(*columns[:1], target, columns[1])[1]
+    assert flat.value == pytest.approx(-0.5 / 3.0, abs=0.03)  # m varies by half of 0.1 squared
+    assert abs(whole.value + 0.5) < 2.0 * whole.std < 0.1
+
+
+def test_to_and_fro_over_the_same_cross_slope_turns_no_imu():
+    """Starts forward are all at one place and starts back at another, which leans to the left."""
+    time = np.arange(0.0, 240.0, 1.0 / rolling.RATE)
+    phase = time % 20.0
+    speed = np.interp(phase, [0, 1, 8, 9, 10, 11, 18, 19, 20], [0, 1, 1, 0, 0, -1, -1, 0, 0]) * 0.15
+    motion = rolling.Motion(time, speed, 0.0 * time, 0.0 * time)
+    whole = rolling.recording(motion)
+    way = np.interp(whole.imu.seconds, time, np.cumsum(speed) / rolling.RATE)
+    lean = np.column_stack([0.0 * way, 0.35 * way, 0.0 * way])
+    assert faults(checked(whole=whole)) == []
+    assert faults(checked(whole=whole, imu=replace(whole.imu, force=whole.imu.force + lean))) == []
+
+
+@pytest.mark.parametrize('goes_on', [True, False])
+def test_a_side_that_reads_zero_is_dead_where_the_reference_goes_on(goes_on):
+    """The right side stands for 25 s: the rover turns about it, or its encoders are dead."""
+    motion = rolling.ten_minute_drive()
+    rows = (motion.time > 25.0) & (motion.time < 50.0)
+    rate = WHOLE.joints.rate.copy()
+    rate[np.ix_(rows, [1, 3])] = 0.0
+    velocity = WHOLE.reference.velocity.copy()
+    if not goes_on:
+        velocity[rows[::5]] *= 0.5
+    report = checked(
+        joints=replace(WHOLE.joints, rate=rate),
+        reference=replace(WHOLE.reference, velocity=velocity),
+    )
+    assert ('rate_frozen' in faults(report)) == goes_on
+
+
+def test_a_dead_encoder_among_coarse_ones():
+    """Rates in steps, so that each repeats itself; one of them never changes."""
+    rate = 0.05 * np.round(WHOLE.joints.rate / 0.05)
+    rate[:, 2] = 0.7
+    told = checked(joints=replace(WHOLE.joints, rate=rate)).findings
+    frozen = [finding.wheel for finding in told if finding.fault == 'rate_frozen']
+    assert frozen == ['rear_left'] and 'gain' not in {finding.kind for finding in told}
+
+
+def test_all_rates_that_stay_are_one_finding():
+    rate, seconds = WHOLE.joints.rate.copy(), WHOLE.joints.seconds
+    rows = (seconds > 20.0) & (seconds < 50.0)
+    rate[rows] = rate[np.argmax(rows)]
+    told = checked(joints=replace(WHOLE.joints, rate=rate)).findings
+    assert [(f.fault, f.wheel) for f in told] == [('rate_frozen', ', '.join(rolling.NAMES))]
+
+
+def test_names_of_all_wheels_are_one_finding():
+    other = tuple(f'{name}_wheel' for name in rolling.NAMES)
+    report = checked(
+        joints=replace(WHOLE.joints, names=other), sinkage=replace(WHOLE.sinkage, names=other)
+    )
+    assert faults(report) == ['joint_name']
+    assert report.findings[0].cure == f'wheels.names: [{", ".join(other)}]'
+
+
+def test_noise_of_the_sinkage_is_no_unit_and_a_height_no_depth():
+    depth = WHOLE.sinkage.sinkage
+    noise = 0.06 * np.random.default_rng(3).standard_normal(depth.shape)
+    assert 'sinkage_unit' not in faults(
+        checked(sinkage=replace(WHOLE.sinkage, sinkage=depth + noise))
+    )
+    height = replace(WHOLE.sinkage, sinkage=rolling.RADIUS - depth)
+    assert faults(checked(sinkage=height)) == ['sinkage_height']
+
+
+def test_a_covariance_is_in_the_unit_of_its_velocity():
+    reference = WHOLE.reference
+    scaled = replace(
+        reference, velocity=1000.0 * reference.velocity, variance=1e6 * reference.variance
+    )
+    assert faults(checked(reference=scaled)) == ['reference_unit']
+
+
+def test_a_circle_with_a_gap_of_the_imu_tells_no_tilt():
+    """Ninety degrees of a circle on a slope pass unseen: the slope looks like a tilt behind it."""
+    motion = rolling.ten_minute_drive()
+    psi = np.cumsum(motion.yaw_rate) / rolling.RATE
+    at = np.interp(WHOLE.imu.seconds, motion.time, psi)
+    slope = 0.1 * rolling.GRAVITY * np.column_stack([np.cos(at), -np.sin(at), 0.0 * at])
+    turn = np.radians(90.0) / 0.2
+    seconds = WHOLE.imu.seconds
+    kept = ~((seconds > 170.0) & (seconds < 170.0 + turn))
+    imu = replace(
+        WHOLE.imu,
+        force=(WHOLE.imu.force + slope)[kept],
+        rate=WHOLE.imu.rate[kept],
+        stamp=WHOLE.imu.stamp[kept],
+        log_time=WHOLE.imu.log_time[kept],
+        orientation=WHOLE.imu.orientation[kept],
+    )
+    assert 'imu_tilt' not in faults(checked(imu=imu))
+    assert math.isclose(turn, 7.85, abs_tol=0.01)
