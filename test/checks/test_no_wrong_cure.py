@@ -28,6 +28,20 @@ def test_torques_are_judged_by_the_gravity_that_is_there():
     assert faults(report) == ['planet'] and report.findings[0].value == 9.81
 
 
+def test_a_dead_imu_is_the_only_thing_that_is_told_of_it():
+    """All readings are one, and far from what gravity is."""
+    force, rate = np.tile([2.6, 2.0, 2.4], (WHOLE.imu.stamp.size, 1)), 0.0 * WHOLE.imu.rate + 0.01
+    assert faults(checked(imu=replace(WHOLE.imu, force=force, rate=rate))) == ['sensor_frozen']
+
+
+def test_without_slopes_a_ratio_of_speeds_below_one_is_no_radius():
+    """Gravity is taken off the accelerometer; the radius in the file is 12 % too large."""
+    lean = replace(WHOLE.imu, force=WHOLE.imu.force - [0.0, 0.0, rolling.GRAVITY])
+    report = checked(rolling.rover(**{'wheels.radius': [1.12 * rolling.RADIUS] * 4}), imu=lean)
+    assert faults(report) == ['gravity_off']
+    assert any('no slopes' in e.reason for e in report.not_checked if e.kind == 'radius')
+
+
 def test_vibration_in_another_unit_is_not_wild():
     force = WHOLE.imu.force * 1000.0 / rolling.GRAVITY
     assert faults(checked(imu=replace(WHOLE.imu, force=force))) == ['force_unit']

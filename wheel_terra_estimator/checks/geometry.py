@@ -68,6 +68,8 @@ FIRM_SLIP = 0.12
 """Slip at the usual traction above which the ground is too soft to tell the radius [-]."""
 SLOPE_OF_SLIP = Estimate(0.2, 0.2)
 """Slip over traction of firm ground where the drive does not tell it: mean, deviation [-]."""
+NOT_SEEN = Estimate(0.0, 1e3)
+"""The same where there are no slopes."""
 LEAST_SEEN = 0.5
 """Weight of the drive beside what firm ground does elsewhere from which it tells its slip [-]."""
 FIRM_DEPTH = Estimate(0.02, 0.015)
@@ -201,13 +203,15 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
             f'soft ground (sinkage {depth:.2f} of the radius): a ratio of speeds may be slip; '
             'drive ten metres over firm ground',
         )
-    both = block_fit(
-        np.column_stack([rim, rim * traction]),
-        speeds.forward,
-        np.column_stack([rim, rim * demand]),  # noise of the torques is not that of the slopes
-    )
+    seen = NOT_SEEN
+    if demand.any():
+        both = block_fit(
+            np.column_stack([rim, rim * traction]),
+            speeds.forward,
+            np.column_stack([rim, rim * demand]),  # noise of the torques is not that of the slopes
+        )
+        seen = Estimate(-both[1].value / both[0].value, both[1].std)
     # What firm ground does elsewhere is one more observation of the slope.
-    seen = Estimate(-both[1].value / both[0].value, both[1].std)
     weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + seen.std**2)
     slope = max(weight * seen.value + (1.0 - weight) * SLOPE_OF_SLIP.value, 0.0)
     if as_slip and weight < LEAST_SEEN:

@@ -193,6 +193,8 @@ def _frozen(state: ImuState) -> Judged:
     alive = ~np.concatenate([[False], same])
     if alive.sum() >= LEAST_MESSAGES:
         state = state.with_imu(rows_of(imu, alive))
+    else:
+        state = replace(state, usable_force=False, usable_gyro=False)
     return [state.found('sensor_frozen', 0.99, how=how)], state
 
 
