@@ -178,6 +178,8 @@ def contacts_as_built(wheel: Wheel, soil: Soil, gravity: float) -> Contact[Any]:
     radius, width, height, count, thickness = np.broadcast_arrays(
         *(np.atleast_1d(np.asarray(value, float)) for value in astuple(wheel))
     )
+    for column in (radius, width, height, count, thickness):
+        column.flags.writeable = False  # a term changes its own contact, never these
     contact: Contact[Any] = Contact(**dict.fromkeys(Contact.__dataclass_fields__, 0.0))
     contact.radius = contact.shear_radius = contact.rim_radius = radius
     contact.width = width
