@@ -28,7 +28,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     SLIP_SINKAGE,
     SPEED,
 )
-from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate, together_and_apart
+from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
 from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
@@ -420,38 +420,6 @@ def test_torques_are_rows_of_turning_wheels_that_were_read(parts, ekf):
     assert rows[0].variance == pytest.approx(noise, rel=1e-3)
     many, _ = torque_rows(parts, ekf, 0.3, repeats=30.0)
     assert many[0].variance == pytest.approx(30.0 * noise, rel=1e-3)
-
-
-def test_wrong_loads_of_single_wheels_say_nothing_of_the_slip(parts, ekf):
-    """Front wheels carry less than the file says, rear ones more: fused one by one they say 0.193.
-
-    The torques are those of slip 0.2, where the filter begins; no reference velocity is known.
-    """
-    rim = FORWARD[0]
-    ekf.set(SPEED, 0.8 * rim, (0.1 * rim) ** 2)
-    level = np.array(WheelLoads(parts.rover).state.load)
-    loads = tuple((level * np.repeat([0.85, 1.0, 1.15], 2)).tolist())
-    torque = tuple(linearised(parts, ekf.mean, loads).torque.tolist())
-    update = TorqueUpdate(parts.configuration, parts.rover, parts.layout)
-    considered = considered_entries(
-        parts.layout, reference_known=False, settled=True, opposes_rims=False, unread=[]
-    )
-    for _ in range(100):
-        rows = update.update(
-            ekf,
-            linearised(parts, ekf.mean, tuple(level.tolist())),
-            torque=torque,
-            variance=parts.sensors.torque_std**2,
-            turning=(True,) * 6,
-            model_variance=(0.0,) * 6,
-            repeats=10.0,
-        )
-        together, apart = together_and_apart(rows)
-        before = ekf.mean
-        ekf.fuse(together, considered)
-        change = ekf.mean - before
-        ekf.fuse([row.after(change) for row in apart], [*considered, SPEED])
-    assert 1.0 - ekf.mean[SPEED] / rim == pytest.approx(0.2, abs=0.002)
 
 
 def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ekf):

@@ -67,7 +67,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_STRENGTH,
     SPEED,
 )
-from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate, together_and_apart
+from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
 from wheel_terra_estimator.estimation.inputs.contact_sensors import (
     LeavingAngleInput,
@@ -111,10 +111,6 @@ _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
 _SHARP_TURN = 0.3
 """Lateral motion above which slip comes from turning and says nothing of an entrapment [-]."""
-_ALIKE = 0.2
-"""Spread of the rim speeds, over the fastest, within which wheels roll alike [-]: a wheel that
-turns faster or slower tells another point of the traction curve, and so of the slip. Tuned on
-wheel faults of simulator A, seeds 1001 and 1004."""
 
 
 class Part(Protocol):
@@ -167,16 +163,6 @@ class _Cycle(NamedTuple):
     """Wheels for which the contact models hold: they turn under a load."""
     reference_known: bool  # of late, before this cycle
     demand_change: float  # by how much more the ground asks than at the last cycle [-]
-
-
-def _roll_alike(cycle: _Cycle) -> bool:
-    """Whether the wheels that turn see the same point of the traction curve, near enough."""
-    rims = [
-        abs(rim)
-        for rim, turns in zip(cycle.yaw_compensated.each, cycle.turns, strict=True)
-        if turns
-    ]
-    return bool(rims) and max(rims) - min(rims) <= _ALIKE * max(rims)
 
 
 class WheelSoilEstimator:
@@ -416,27 +402,20 @@ class WheelSoilEstimator:
         )
         self._find_unloaded(cycle)
         forces, total = None, None
-        apart: list[Row] = []
-        reference_known = self._reference.known(time)
         if cycle.still:
             self._forget_contacts()
         else:
-            forces, total, torques, balance = self._force_rows(cycle)
+            forces, total, force_rows = self._force_rows(cycle)
             if self._contact_age.settled or cycle.reference_known:
-                if not reference_known and _roll_alike(cycle):
-                    torques, apart = together_and_apart(torques)
-                rows += [*torques, *balance]
+                rows += force_rows
         considered = considered_entries(
             layout,
-            reference_known=reference_known,
+            reference_known=self._reference.known(time),
             settled=self._contact_age.settled,
             opposes_rims=cycle.yaw_compensated.oppose(float(ekf.mean[SPEED])),
             unread=self._sinkage.unread(time),
         )
-        before = ekf.mean
         ekf.fuse(rows, considered)
-        change = ekf.mean - before
-        ekf.fuse([row.after(change) for row in apart], [*considered, SPEED])
 
         self._speed.end_cycle(time, ekf, cycle.yaw_compensated, settled=self._contact_age.settled)
         self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
@@ -627,10 +606,8 @@ class WheelSoilEstimator:
         self._sinkage_process.forget_slopes()
         self._pulls.forget_stationary()
 
-    def _force_rows(
-        self, cycle: _Cycle
-    ) -> tuple[ContactForces, SumOfPulls | None, list[Row], list[Row]]:
-        """Return forces, what is known of their sum, rows of torques, row of the balance."""
+    def _force_rows(self, cycle: _Cycle) -> tuple[ContactForces, SumOfPulls | None, list[Row]]:
+        """Return forces, what is known of their sum, and the rows of torques and balance."""
         ekf, loads = self._ekf, cycle.loads.load
         forces = self._linearisation.update(
             ekf.mean,
@@ -657,7 +634,7 @@ class WheelSoilEstimator:
         )
         self._speed.follow_contacts(self._contact_age.state.travel)
         if not cycle.window.readings:
-            return forces, None, rows, []
+            return forces, None, rows
         curvature = self._turning.curvature(float(ekf.mean[SPEED]))
         total = self._balance.sum_of_pulls(cycle.window, loads, curvature)
         balance = self._balance.update(
@@ -670,7 +647,7 @@ class WheelSoilEstimator:
             model_variance=model_variance,
             repeats=repeats,
         )
-        return forces, total, rows, [balance]
+        return forces, total, [*rows, balance]
 
     def _stationary_pulls(self, cycle: _Cycle) -> list[StationaryPull | None]:
         """Return what to expect of the wheels that do not turn under a load; None = it turns."""

@@ -35,10 +35,6 @@ class Row(NamedTuple):
     jacobian: FloatArray
     variance: float
 
-    def after(self, change: FloatArray) -> Row:
-        """Return the same measurement once the state has moved by a `change` (n,)."""
-        return self._replace(residual=self.residual - float(self.jacobian @ change))
-
 
 class FilterMemory(NamedTuple):
     """What `GatedFilter.restore` needs."""

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isnan
 
 import numpy as np
@@ -43,24 +42,6 @@ class ForceRows(Component['float | None']):
         self.state = mean = smoothed_nis(self.state, residual * residual / total)
         gate = chi_square_gate(residual, total, self._gate)
         return Row(residual, jacobian, distrusted(variance, mean) + gate)
-
-
-def together_and_apart(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
-    """Return the mean of the rows of several wheels, and what each differs from it.
-
-    The differences are those of loads and places. What all wheels may have wrong alike, such as the
-    strength, cancels in them but for small differences of the slopes: without a reference velocity
-    a slip inferred from them would follow errors of the load distribution. The mean weighs rows by
-    their inverse variances, so that a wheel beyond its gate counts little.
-    """
-    if len(rows) < 2:
-        return list(rows), []
-    residuals, jacobians, variances = map(np.array, zip(*rows, strict=True))
-    weights = 1.0 / variances
-    variance = 1.0 / float(weights.sum())
-    weights *= variance
-    mean = Row(float(weights @ residuals), weights @ jacobians, variance)
-    return [mean], [Row(r - mean.residual, h - mean.jacobian, v) for r, h, v in rows]
 
 
 class TorqueUpdate(ForceRows):
