@@ -63,6 +63,7 @@ def fit(
     data: Sequence[tuple[OperatingPoints, FloatArray]],
     sigma: Sequence[float],
     free: Sequence[Free],
+    prior_weight: float = PRIOR_WEIGHT,
 ) -> tuple[Model, dict[str, float]]:
     """Fit parameters to rows; a weak pull towards the expected values settles what rows do not.
 
@@ -79,7 +80,7 @@ def fit(
 
     def residual(x: Any) -> FloatArray:
         trial = model.with_values(dict(zip(names, x, strict=True)))
-        parts = [PRIOR_WEIGHT * (x - expected) / scale]
+        parts = [prior_weight * (x - expected) / scale]
         for points, measured in data:
             error = (trial.predict(points) - measured) / np.asarray(sigma)
             parts.append(np.where(np.isnan(error), 0.0, error).ravel())
