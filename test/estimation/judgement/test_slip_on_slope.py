@@ -8,14 +8,19 @@ import numpy as np
 import pytest
 from fake_estimator import make_core, odometry, play
 
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.estimates import SLOPE_NAMES, SLOPES, SlipOnSlope
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import (
+    CurveTuning,
     Instant,
     OncePerSecond,
     SlopeCurve,
     slips_at,
 )
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 RIM, PERIOD = 0.05, 0.1  # [m/s], [s]
 
@@ -60,6 +65,44 @@ def test_a_climb_tells_what_steeper_ground_costs(seed):
     # At 30 degrees more is asked than this soil gives.
     assert math.tan(math.radians(30.0)) > 0.5
     assert at(found, 30.0)[2] > 0.5
+
+
+@pytest.mark.parametrize('soil', ['dry_sand_ding2015', 'lunar_soil_ding2015'])
+def test_a_climb_tells_what_going_down_costs(soil):
+    """A wheel on the quadrature: downhill its rolling resistance still asks for thrust."""
+    rover = reader.load(['generic_six_wheel', soil])
+    one = rover.wheels.wheel
+    wheel = Wheel(*(float(getattr(one, name)[0]) for name in ('radius', 'width', 'lug_height')))
+    slips = np.linspace(-0.5, 0.6, 111)
+    found = WheelSoilModel(rover.soil).steady_state(OperatingPoints(slips, 100.0, wheel))
+    pulls = found.drawbar_pull / 100.0
+    assert (np.diff(pulls) > 0.0).all()
+    curve = SlopeCurve()
+    for i, demand in enumerate(np.linspace(0.0, 0.6 * pulls.max(), 2000)):
+        slip = float(np.interp(demand, pulls, slips))
+        curve.update(Instant(i * PERIOD, float(demand), slip, 0.02, RIM * PERIOD, 1.0))
+    for slope, most in ((-15.0, 0.25), (-10.0, 0.1), (-5.0, 0.05)):
+        slip, std, _ = at(curve.state.told, slope)
+        true = float(np.interp(math.tan(math.radians(slope)), pulls, slips))
+        assert abs(slip - true) < min(most, 1.96 * std), slope
+
+
+def test_how_well_the_soil_brakes_is_unknown_to_who_never_drove_downhill():
+    up, both = learned((0.0, 5.0, 10.0)).state, learned((-10.0, 0.0, 10.0)).state
+    assert at(up.told, -15.0)[1] > 1.5 * at(both.told, -15.0)[1]
+
+
+@pytest.mark.parametrize('offset', [-0.1, 0.2])
+@pytest.mark.parametrize('demand', [-0.4, -0.1, 0.2])
+def test_a_slip_that_fits_the_curve_moves_nothing(offset, demand):
+    """Driving and braking, the curve that teaches is the one that is told."""
+    mean = np.array([offset, math.log(0.4), math.log(0.6)])
+    curve = SlopeCurve(CurveTuning(mean=tuple(mean), std=(1e-3, 1e-3, 1e-3), walk=0.0))
+    told = slips_at(mean, 1e-12 * np.eye(3), 1e-9).slip
+    slip = float(np.interp(demand, np.tan(np.radians(SLOPES)), told))
+    for i in range(100):
+        curve.update(Instant(i * PERIOD, demand, slip, 0.01, RIM * PERIOD, 1.0))
+    np.testing.assert_allclose(curve.state.mean, mean, atol=1e-4)
 
 
 def test_it_is_less_sure_the_farther_it_looks():

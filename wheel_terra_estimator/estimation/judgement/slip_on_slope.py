@@ -5,13 +5,19 @@
 With the demand p, the pull that the ground asks over the load (tan of the slope at constant speed),
 the shear law of Janosi and Hanamoto (1961) turned round gives the slip that it costs:
 
-    s = a - s_0 sign(p) ln(1 - |p| / p_max)
+    s = a - s_0 ln(1 - p / p_max)
 
-a: what the curve does not know (rolling resistance, another soil, a wrong radius) [-]; s_0: slip
-that mobilises the soil [-]; p_max: the greatest pull over the load [-]. An extended Kalman filter
-of (a, ln s_0, ln p_max) is corrected by the published slip. It needs nothing else of the estimator.
-Beyond the demands that were driven nothing says that the law goes on, nor that the soil does: there
-p_max is less known, in proportion to how far beyond.
+a: what level ground costs (rolling resistance), and what the curve does not know (another soil, a
+wrong radius) [-]; s_0: slip that mobilises the soil [-]; p_max: greatest pull over the load [-].
+The thrust of the soil is what is asked and the rolling resistance. It is zero at s = 0 where level
+ground costs slip (a > 0); where less is asked, the soil brakes by the same law:
+
+    s = s_0 ln(2 - (1 - p / p_max) e^(-a/s_0))
+
+Where a is negative no rolling resistance is seen: s = a + s_0 ln(1 + p / p_max) for p < 0.
+An extended Kalman filter of (a, ln s_0, ln p_max) is corrected by the published slip. It needs
+nothing else of the estimator. Beyond the demands that were driven nothing says that the law goes
+on, nor that the soil does: there p_max is less known, in proportion to how far beyond.
 """
 
 from __future__ import annotations
@@ -34,6 +40,7 @@ FloatArray = NDArray[np.float64]
 _DEMANDS = np.tan(np.radians(SLOPES))
 _DRAWS = 64
 _BASES = 2, 3, 5, 7  # of the Halton sequence
+_LEAST = 1e-12  # share of a thrust: its logarithm is beyond any slip
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,7 @@ class CurveTuning:
     correlation: float = 1.0  # rim travel within which slips are one piece of information [m]
     most_std: float = 0.4  # of a slip that teaches
     beyond_std: float = 1.5  # of ln p_max, per unit of demand beyond those driven
+    level: float = 0.05  # demand within which nothing is seen of braking [-]; assumed
 
 
 class Instant(NamedTuple):
@@ -101,26 +109,45 @@ class SlopeCurve(Component[CurveState]):
                 state = self._corrected(state, now, reversed_)
         second = int(now.time)
         if second != state.told_second:
-            beyond = np.maximum(_DEMANDS - state.driven[1], state.driven[0] - _DEMANDS)
             told = slips_at(
-                state.mean,
-                state.covariance,
-                tuning.scatter,
-                tuning.beyond_std * np.maximum(beyond, 0.0),
+                state.mean, state.covariance, tuning.scatter, self._beyond(state.driven)
             )
             state = state._replace(told=told, told_second=second)
         self.state = state
+
+    def _beyond(self, driven: tuple[float, float]) -> FloatArray:
+        """Return the deviation of ln p_max at the slopes (11,) for demands that were not driven."""
+        tuning, (least, greatest) = self._tuning, driven
+        beyond = np.maximum(np.maximum(_DEMANDS - greatest, least - _DEMANDS), 0.0)
+        # Where nobody drove downhill, how well the soil brakes is as unknown as at the start.
+        unseen = (_DEMANDS < 0.0) & (least > -tuning.level)
+        return np.hypot(tuning.beyond_std * beyond, tuning.std[2] * unseen)
 
     def _corrected(self, state: CurveState, now: Instant, reversed_: bool) -> CurveState:
         tuning, mean = self._tuning, state.mean
         covariance = state.covariance.copy()
         covariance[0, 0] += tuning.walk**2 * now.travel + (tuning.reversal_std * reversed_) ** 2
-        scale, greatest = math.exp(mean[1]), math.exp(mean[2])
-        share = min(abs(state.demand) / greatest, tuning.most_share)
-        mobilised = math.copysign(math.log1p(-share), state.demand)
-        by_greatest = -math.copysign(scale * share / (1.0 - share), state.demand)
-        gradient = np.array([1.0, scale * mobilised, by_greatest])
-        residual = now.slip - (mean[0] + scale * mobilised)
+        offset, scale, greatest = mean[0], math.exp(mean[1]), math.exp(mean[2])
+        rolling = max(offset, 0.0)
+        share = min(state.demand / greatest, tuning.most_share)
+        unused = 1.0 - share  # of the greatest pull
+        eased = math.exp(-rolling / scale)
+        if unused * eased <= 1.0:
+            slip = offset - scale * math.log(unused)
+            gradient = np.array([1.0, slip - offset, -scale * share / unused])
+        else:
+            left = max(2.0 - unused * eased, 1.0 - tuning.most_share)
+            braking = scale * math.log(left)
+            slip = offset - rolling + braking
+            by_rolling = unused * eased / left
+            gradient = np.array(
+                [
+                    by_rolling if rolling > 0.0 else 1.0,
+                    braking - rolling * by_rolling,
+                    -scale * share * eased / left,
+                ]
+            )
+        residual = now.slip - slip
         repeats = tuning.correlation / min(now.travel, tuning.correlation)
         noise = (now.slip_std**2 + tuning.scatter**2) * repeats
         column = covariance @ gradient
@@ -172,10 +199,13 @@ def slips_at(
     """
     lower = np.linalg.cholesky(covariance + 1e-12 * np.eye(3))
     offset, scale, greatest = (mean + _STANDARD[:, :3] @ lower.T).T[:, :, None]
-    share = np.abs(_DEMANDS) / np.exp(greatest + _STANDARD[:, 3:] * beyond)
-    carried = share < 1.0
-    mobilised = -np.sign(_DEMANDS) * np.log1p(-np.where(carried, share, 0.0))
-    slip = np.where(carried, offset + np.exp(scale) * mobilised, np.sign(_DEMANDS))
+    scale = np.exp(scale)
+    unused = 1.0 - _DEMANDS / np.exp(greatest + _STANDARD[:, 3:] * beyond)
+    rolling = np.maximum(offset, 0.0)
+    braked = unused * np.exp(-rolling / scale)  # over 1: the soil brakes
+    driving = offset - scale * np.log(np.maximum(unused, _LEAST))
+    braking = offset - rolling + scale * np.log(np.maximum(2.0 - braked, _LEAST))
+    slip = np.where(braked <= 1.0, driving, braking)
     slip = np.clip(slip, -1.0, 1.0)
     beyond = (slip - ENTRAPPED_SLIP) / scatter
     return SlipOnSlope(
