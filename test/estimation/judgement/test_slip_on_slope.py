@@ -92,6 +92,14 @@ def test_how_well_the_soil_brakes_is_unknown_to_who_never_drove_downhill():
     assert at(up.told, -15.0)[1] > 1.5 * at(both.told, -15.0)[1]
 
 
+def test_ground_far_beyond_the_soil_leaves_finite_numbers():
+    curve = SlopeCurve()
+    for i in range(200):
+        demand = -5.0 if i % 2 else 5.0
+        curve.update(Instant(i * PERIOD, demand, 0.2, 0.02, RIM * PERIOD, 1.0))
+    assert np.isfinite(curve.state.mean).all() and np.isfinite(curve.state.told).all()
+
+
 @pytest.mark.parametrize('offset', [-0.1, 0.2])
 @pytest.mark.parametrize('demand', [-0.4, -0.1, 0.2])
 def test_a_slip_that_fits_the_curve_moves_nothing(offset, demand):

@@ -123,30 +123,37 @@ class SlopeCurve(Component[CurveState]):
         unseen = (_DEMANDS < 0.0) & (least > -tuning.level)
         return np.hypot(tuning.beyond_std * beyond, tuning.std[2] * unseen)
 
-    def _corrected(self, state: CurveState, now: Instant, reversed_: bool) -> CurveState:
-        tuning, mean = self._tuning, state.mean
-        covariance = state.covariance.copy()
-        covariance[0, 0] += tuning.walk**2 * now.travel + (tuning.reversal_std * reversed_) ** 2
+    def _linearised(self, mean: FloatArray, demand: float) -> tuple[float, FloatArray]:
+        """Return the slip that the curve has for a demand, and its gradient by the curve, (3,)."""
+        tuning = self._tuning
         offset, scale, greatest = mean[0], math.exp(mean[1]), math.exp(mean[2])
         rolling = max(offset, 0.0)
-        share = min(state.demand / greatest, tuning.most_share)
+        share = min(demand / greatest, tuning.most_share)
         unused = 1.0 - share  # of the greatest pull
         eased = math.exp(-rolling / scale)
-        if unused * eased <= 1.0:
+        braked = min(unused * eased, 1.0 + tuning.most_share)  # over 1: the soil brakes
+        if braked <= 1.0:
             slip = offset - scale * math.log(unused)
             gradient = np.array([1.0, slip - offset, -scale * share / unused])
         else:
-            left = max(2.0 - unused * eased, 1.0 - tuning.most_share)
+            left = 2.0 - braked
             braking = scale * math.log(left)
             slip = offset - rolling + braking
-            by_rolling = unused * eased / left
+            by_rolling = braked / left
             gradient = np.array(
                 [
                     by_rolling if rolling > 0.0 else 1.0,
                     braking - rolling * by_rolling,
-                    -scale * share * eased / left,
+                    scale * (braked - eased) / left,
                 ]
             )
+        return slip, gradient
+
+    def _corrected(self, state: CurveState, now: Instant, reversed_: bool) -> CurveState:
+        tuning, mean = self._tuning, state.mean
+        covariance = state.covariance.copy()
+        covariance[0, 0] += tuning.walk**2 * now.travel + (tuning.reversal_std * reversed_) ** 2
+        slip, gradient = self._linearised(mean, state.demand)
         residual = now.slip - slip
         repeats = tuning.correlation / min(now.travel, tuning.correlation)
         noise = (now.slip_std**2 + tuning.scatter**2) * repeats
