@@ -14,8 +14,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import of_offset
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
@@ -31,8 +31,6 @@ from wheel_terra_estimator.checks.statistics import (
 from wheel_terra_estimator.checks.transport import FUTURE
 from wheel_terra_estimator.checks.trial import Trial, halves, worst
 from wheel_terra_estimator.configuration.configuration import Configuration
-
-FloatArray = NDArray[np.float64]
 
 STEP = 0.05
 """Time between the values that are compared [s]."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.faults import FAULTS, found
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
@@ -19,8 +20,7 @@ from wheel_terra_estimator.checks.series import Channel, JointSeries, Recording
 from wheel_terra_estimator.checks.statistics import averaged, bend_noise, moving_mean
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
-FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+Mask = BoolArray
 
 REST_RATE = 0.02
 """Wheel rate below which a wheel stands, as a share of its working rate [-]."""

@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, listed
@@ -27,8 +27,6 @@ from wheel_terra_estimator.checks.statistics import (
 from wheel_terra_estimator.checks.torque import SOFT_TRACTION, thrust
 from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.checks.wheel_rates import rounding
-
-FloatArray = NDArray[np.float64]
 
 LEAST_RADIUS_ERROR = 0.025
 """Share by which a radius is wrong before it is a finding [-]."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
 from wheel_terra_estimator.checks.felt_motion import (
@@ -39,8 +39,6 @@ from wheel_terra_estimator.checks.torque import heading_of_torque, slope_on_the_
 from wheel_terra_estimator.checks.trial import Trial
 from wheel_terra_estimator.checks.turning import ordinary_track, track_ratio
 from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
-
-FloatArray = NDArray[np.float64]
 
 GRAVITY_TOLERANCE = 0.1
 """Share by which the mean specific force may differ from gravity (slopes, bias, vibration)."""

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import (
     clocks,
     imu,
@@ -48,7 +48,6 @@ from wheel_terra_estimator.estimation.measurements import StepInputs
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 Floats = tuple[float, ...]
-FloatArray = NDArray[np.float64]
 
 BIN = 100_000_000
 """Means are over this [ns of stamps]."""

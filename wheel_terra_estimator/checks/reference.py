@@ -8,8 +8,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
@@ -20,8 +20,6 @@ from wheel_terra_estimator.checks.statistics import (
     moving_mean,
     robust_std,
 )
-
-FloatArray = NDArray[np.float64]
 
 LEAST_REFERENCES = 10
 ALIKE_BOTH_WAYS = 0.5

@@ -12,14 +12,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.series import SinkageSeries, rows_of
 from wheel_terra_estimator.checks.statistics import runs
-
-FloatArray = NDArray[np.float64]
 
 LEAST_TIME = 5.0
 """Time of driving in which a reading that stays is frozen [s]."""

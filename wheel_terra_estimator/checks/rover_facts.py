@@ -9,11 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
-
-FloatArray = NDArray[np.float64]
 
 _LEFT = re.compile(r'(^|[^a-z])(left|l|fl|ml|rl|lf|lm|lr|bl|lb)([^a-z]|$)')
 _RIGHT = re.compile(r'(^|[^a-z])(right|r|fr|mr|rr|rf|rm|br|rb)([^a-z]|$)')

@@ -13,7 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
+
 IntArray = NDArray[np.int64]
 
 
@@ -34,7 +35,7 @@ class Channel:
 Series = TypeVar('Series', bound=Channel)
 
 
-def rows_of(series: Series, kept: NDArray[np.bool_]) -> Series:
+def rows_of(series: Series, kept: BoolArray) -> Series:
     """Return some messages (k,) of a channel."""
     values = {f.name: getattr(series, f.name) for f in fields(series)}
     arrays: dict[str, Any] = {k: v[kept] for k, v in values.items() if isinstance(v, np.ndarray)}

@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
@@ -19,8 +19,6 @@ from wheel_terra_estimator.checks.series import SinkageSeries
 from wheel_terra_estimator.checks.statistics import bend_noise, correlation
 from wheel_terra_estimator.checks.trial import halves
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorErrors
-
-FloatArray = NDArray[np.float64]
 
 DEEPEST = 1.2
 """Sinkage over radius that no wheel gets out of [-]."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 
 MAD_TO_STD = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution."""
@@ -132,7 +132,7 @@ def bend_noise(values: FloatArray) -> float:
     return robust_std(np.diff(values, 2, axis=0).ravel()) / math.sqrt(6.0)
 
 
-def runs(same: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs(same: BoolArray) -> list[tuple[int, int]]:
     """Return (first, last) row of each stretch in which none of (k - 1,) steps is a change."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
     SETTLING,
@@ -29,8 +29,6 @@ from wheel_terra_estimator.checks.statistics import (
 )
 from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
-
-FloatArray = NDArray[np.float64]
 
 UPHILL_ENOUGH = -0.02
 """Specific force along the drive, in g, above which a driven wheel takes power."""

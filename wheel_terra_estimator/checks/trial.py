@@ -11,9 +11,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import FloatArray
 
 LEAST_ROWS = 12
 """Rows of a half that something is found on, at least."""

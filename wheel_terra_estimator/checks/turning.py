@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
 from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS
 from wheel_terra_estimator.checks.felt_motion import felt_motion, yaw_of_motion
@@ -34,8 +35,7 @@ from wheel_terra_estimator.checks.statistics import (
 from wheel_terra_estimator.checks.torque import heading_of_torque
 from wheel_terra_estimator.checks.trial import Trial, halves, worst
 
-FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+Mask = BoolArray
 
 TRIAL_ROWS = 1000
 """Rows, spread over the drive, that hypotheses are compared on."""

@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
@@ -33,8 +33,6 @@ from wheel_terra_estimator.checks.statistics import (
     robust_std,
     runs,
 )
-
-FloatArray = NDArray[np.float64]
 
 MOST_COUNT = 0.07
 """Speed over rim speed below which wheels that fit no unit are in counts (90 in a turn) [-]."""

@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.sideways import Sideways
-
-FloatArray = NDArray[np.float64]
 
 NO_ENTRAPMENT_IN_SIGHT = 10.0
 """Rim travel left [m] that ``~/mobility`` states when nothing points to an entrapment."""

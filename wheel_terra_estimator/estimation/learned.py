@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.steepest_climb import Climbed
@@ -27,7 +27,6 @@ from wheel_terra_estimator.estimation.filter.state import (
 from wheel_terra_estimator.estimation.inputs.inertial import GyroZero
 from wheel_terra_estimator.estimation.rover import Rover
 
-FloatArray = NDArray[np.float64]
 _LEVEL = Climbed()
 NamedSoil = Callable[[FloatArray, FloatArray], tuple[tuple[str, ...], FloatArray, FloatArray]]
 

@@ -12,10 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import FloatArray
 
 
 @dataclass(frozen=True)

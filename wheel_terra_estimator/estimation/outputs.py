@@ -9,8 +9,8 @@ from math import isnan
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.pulls import PullState
@@ -39,7 +39,6 @@ from wheel_terra_estimator.estimation.words import (
     reasons_in_words,
 )
 
-FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
 _LEAST_VARIANCE = 1e-12  # of a speed [(m/s)^2]
 _UNKNOWN_STD = 1.0  # of a slip velocity [m/s]

@@ -16,9 +16,9 @@ from functools import cached_property
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
-    FloatArray,
     InertialReading,
     Measurement,
     ReferenceVelocity,

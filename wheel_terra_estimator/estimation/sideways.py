@@ -21,12 +21,11 @@ from math import isnan
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 
-FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
 
 _NO_LOAD = 1e-3  # of all wheels [N]

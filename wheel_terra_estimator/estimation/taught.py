@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     GRAVITY_BIAS,
@@ -29,8 +29,6 @@ from wheel_terra_estimator.estimation.filter.state import (
     SLIP_SINKAGE,
     StateLayout,
 )
-
-FloatArray = NDArray[np.float64]
 
 LEARNED, ASSUMED, CONFOUNDED = 'learned', 'assumed', 'confounded'
 LEARNED_SHARE = 0.7

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
@@ -37,7 +38,7 @@ from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWh
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
-from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, FloatArray, Row
+from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
     ForceBalance,
     SumOfPulls,

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration import reader, ros_yaml, shipped
 from wheel_terra_estimator.configuration.configuration import Configuration, Section
@@ -24,7 +23,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.simulation.commands import DriveProfile
 from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Patch
 
-FloatArray = NDArray[np.float64]
 DEFAULT = 'climb_soft_patch'
 
 DECLARED = {

@@ -11,13 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.quantity import Quantity
-
-FloatArray = NDArray[np.float64]
 
 # Sinkage equal to the radius: the stress laws end here.
 LARGEST_ANGLE = np.pi / 2
@@ -40,7 +38,7 @@ def explicit_entrance_angle(contact: Contact[Quantity]) -> FloatArray:
 
 def balance(
     form: BranchForces, load: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Solve the closed form's load balance: entrance angle [rad], pull [N], torque [N m].
 
     The forces at three angles (small angles, a step with the exponent 2 N + 1, the secant)
@@ -103,7 +101,7 @@ def solve_entrance_angle(
     carried: Callable[[FloatArray], FloatArray],
     load: FloatArray,
     start: FloatArray,
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+) -> tuple[FloatArray, BoolArray]:
     """Solve carried(t1) = load for each point.
 
     Load grows nearly like a power of the angle, so Newton runs on logarithms; a bracket catches
@@ -155,8 +153,8 @@ def _first_crossing(
     carried: Callable[[FloatArray], FloatArray],
     load: FloatArray,
     angle: FloatArray,
-    done: NDArray[np.bool_],
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+    done: BoolArray,
+) -> tuple[FloatArray, BoolArray]:
     """Scan all points coarsely, then bisect those not done; the smallest crossing counts."""
     grid = np.geomspace(1e-3, LARGEST_ANGLE, 80)
     force = np.concatenate(

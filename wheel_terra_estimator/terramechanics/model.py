@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.terramechanics import closed_form, quadrature
 from wheel_terra_estimator.terramechanics.checks import check_range, common_length
 from wheel_terra_estimator.terramechanics.contact import Contact
@@ -31,7 +32,6 @@ from wheel_terra_estimator.terramechanics.terms import (
     set_angles,
 )
 
-FloatArray = NDArray[np.float64]
 METHODS = ('quadrature', 'closed_form', 'triangles')
 
 # Scale of finite steps for soil parameters that may be zero.
@@ -226,7 +226,7 @@ class WheelSoilModel:
 
     def _entrance_angle(
         self, contact: Contact[Quantity], load: FloatArray, points: OperatingPoints, terms: Terms
-    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+    ) -> tuple[FloatArray, BoolArray]:
         start = explicit_entrance_angle(contact)
 
         def carried(angle: FloatArray) -> FloatArray:
@@ -277,7 +277,7 @@ class WheelSoilModel:
         contact: Contact[Quantity],
         points: OperatingPoints,
         angle: FloatArray,
-        carries: NDArray[np.bool_],
+        carries: BoolArray,
         outputs: Sequence[Quantity],
     ) -> SteadyState:
         flags = np.where(carries, 0, OVERLOADED)

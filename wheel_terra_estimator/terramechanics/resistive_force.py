@@ -12,15 +12,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 from wheel_terra_estimator.terramechanics.load_balance import solve_entrance_angle
 from wheel_terra_estimator.terramechanics.model import OUTSIDE_VALIDITY, OVERLOADED, SteadyState
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-
-FloatArray = NDArray[np.float64]
 
 # Generic Fourier coefficients of the stress per depth [N/cm^3] (the paper's supplement, table S3).
 _A00, _A10, _B11, _B01, _B_11 = 0.206, 0.169, 0.212, 0.358, 0.055

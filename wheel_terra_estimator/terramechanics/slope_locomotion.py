@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.model import OVERLOADED, SteadyState, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import (
@@ -22,7 +23,6 @@ from wheel_terra_estimator.terramechanics.operating_points import (
 )
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
-FloatArray = NDArray[np.float64]
 LARGEST_SLIP = 0.98
 
 

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.resistive_table import RimForces, rim_forces
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
     LEAST_SINKAGE,
     MOST_RATIO,
     Bearing,
-    FloatArray,
     WheelModels,
     WheelStates,
 )

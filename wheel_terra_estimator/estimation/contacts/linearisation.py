@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
@@ -31,7 +31,6 @@ from wheel_terra_estimator.estimation.filter.state import (
 )
 from wheel_terra_estimator.estimation.rover import Rover
 
-FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
 
 
@@ -184,7 +183,7 @@ class Linearisation(Component[FloatArray]):
         return ContactForces(x.copy(), pull, torque, rows[0], rows[1], pull_noise, torque_noise)
 
     def _noise_of_angle(
-        self, states: WheelStates, forces: WheelForces, turning: NDArray[np.bool_]
+        self, states: WheelStates, forces: WheelForces, turning: BoolArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return what one deviation of the leaving angles makes of torques and pulls, (n,) each."""
         nothing = np.zeros(len(turning))
@@ -198,9 +197,7 @@ class Linearisation(Component[FloatArray]):
             np.where(told, np.abs(pull - forces.pull), 0.0),
         )
 
-    def smoothed(
-        self, forces: WheelForces, moment: FloatArray, turning: NDArray[np.bool_]
-    ) -> FloatArray:
+    def smoothed(self, forces: WheelForces, moment: FloatArray, turning: BoolArray) -> FloatArray:
         """Return the smoothed derivatives; `moment`: load times radius of each wheel [N m]."""
         old, new = self.state, np.stack([forces.d_torque, forces.d_pull])
         slopes = smoothed_slopes(old, new, self._tuning.slope_keep)

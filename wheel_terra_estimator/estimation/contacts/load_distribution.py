@@ -20,9 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import FloatArray
+
 Vector = Sequence[float] | FloatArray
 
 

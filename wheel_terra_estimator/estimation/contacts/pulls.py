@@ -14,8 +14,8 @@ from math import isnan
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.contacts.loads import LoadState
@@ -25,7 +25,6 @@ from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, clipped
 
-FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
 
 

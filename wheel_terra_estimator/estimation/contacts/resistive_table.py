@@ -14,15 +14,14 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.resistive_force import rim_integrals
 
 if TYPE_CHECKING:
     from scipy.interpolate import RectBivariateSpline
 
-FloatArray = NDArray[np.float64]
 
 _MOTION_CELLS, _ANGLE_CELLS = 96, 24
 _DEEPEST = 0.5 * math.pi  # entrance angle [rad]

@@ -9,8 +9,8 @@ from math import isnan
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
     STRENGTH,
@@ -25,8 +25,6 @@ from wheel_terra_estimator.estimation.filter.state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

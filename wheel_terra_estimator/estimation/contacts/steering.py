@@ -26,8 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.measurements import FloatArray
 from wheel_terra_estimator.estimation.rover import Rover
 
 Floats = tuple[float, ...]

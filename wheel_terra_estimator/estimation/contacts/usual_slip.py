@@ -8,15 +8,13 @@ from bisect import bisect_left
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
-
-FloatArray = NDArray[np.float64]
 
 _SLIPS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9)
 """Slips of the curve, close together where it is steep."""

@@ -16,8 +16,8 @@ from copy import copy
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.terramechanics.closed_form import coefficients, peak_stresses
 from wheel_terra_estimator.terramechanics.conditioned import (
@@ -32,7 +32,6 @@ from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 
-FloatArray = NDArray[np.float64]
 # Effects of a table or of an instrument that the filter must not apply: loads are terrain-normal
 # already, and the pull comes from specific force, not from an attitude.
 _NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias', 'pull_zero', 'pull_gain'})

@@ -16,13 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.filter.likelihood import Likelihood
 from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 
-FloatArray = NDArray[np.float64]
 _LEAST_VARIANCE = 1e-30  # of an innovation, in its own unit squared
 _LEAST_SHARE = 1e-9  # of the reading's own variance in that of its innovation
 _LEAST_DIAGONAL = 1e-14  # of the covariance

@@ -10,11 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
 from wheel_terra_estimator.estimation.contacts.steering import Headings
-from wheel_terra_estimator.estimation.filter.ekf import FloatArray, GatedFilter, Row
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.filter.torque import ForceRows
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow

@@ -8,8 +8,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.usual_slip import steady_sinkage
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
@@ -29,7 +29,6 @@ from wheel_terra_estimator.estimation.filter.state import (
 )
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
-FloatArray = NDArray[np.float64]
 _BY_SLIP = 'slip_sinkage_exponent'
 
 

@@ -8,11 +8,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
 
-FloatArray = NDArray[np.float64]
 _LN_TWO_PI = math.log(2.0 * math.pi)
 
 

@@ -7,9 +7,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import FloatArray
 
 
 class Prediction(NamedTuple):

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.linearisation import smoothed_slopes
 from wheel_terra_estimator.estimation.contacts.steering import Headings
@@ -27,7 +27,6 @@ from wheel_terra_estimator.estimation.filter.state import (
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 
-FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
 
 
@@ -176,7 +175,7 @@ class SinkageProcess(Component[SinkageState]):
         prediction: Prediction,
         states: WheelStates,
         motion: _Motion,
-        relaxes: NDArray[np.bool_],
+        relaxes: BoolArray,
     ) -> None:
         """Relax the sinkages of turning wheels under a load."""
         tuning, layout, z = self._tuning, self._layout, np.asarray(states.sinkage)

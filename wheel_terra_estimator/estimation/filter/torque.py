@@ -8,16 +8,12 @@ from math import isnan
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.filter.consistency import distrusted, smoothed_nis
-from wheel_terra_estimator.estimation.filter.ekf import (
-    FloatArray,
-    GatedFilter,
-    Row,
-    chi_square_gate,
-)
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 
 ENTRAPPED_SLIP = 0.9
 """Median driving slip above which a rover makes no way that matters: class *stuck*."""
@@ -34,7 +34,7 @@ class Entrapments(NamedTuple):
 
     begins: NDArray[np.int64]  # the slip passes 0.9
     there: NDArray[np.int64]  # it has been above for the second: the rover is entrapped
-    under_way: NDArray[np.bool_]
+    under_way: BoolArray
 
 
 class Outcome(Enum):

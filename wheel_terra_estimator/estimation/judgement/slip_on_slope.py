@@ -27,15 +27,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.estimates import SLOPES, SlipOnSlope
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.scalars import gain_of
-
-FloatArray = NDArray[np.float64]
 
 _DEMANDS = np.tan(np.radians(SLOPES))
 _DRAWS = 64

@@ -14,15 +14,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.smoothing.history_buffer import (
     Gaussian,
     HistoryBuffer,
     Transition,
 )
 
-FloatArray = NDArray[np.float64]
 _LEAST_PIVOT = 1e-7
 """Square root of the least share of a variance that the other entries leave open: below it the
 inverse of a covariance is rounding."""

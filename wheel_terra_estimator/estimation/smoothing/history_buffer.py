@@ -18,11 +18,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.smoothing.disk_buffer import DiskBuffer
-
-FloatArray = NDArray[np.float64]
 
 
 class Gaussian(NamedTuple):

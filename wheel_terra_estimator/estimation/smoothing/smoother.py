@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
@@ -49,8 +49,6 @@ from wheel_terra_estimator.estimation.smoothing.history_buffer import (
 from wheel_terra_estimator.estimation.smoothing.window import Moment, centred
 from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant, WheelSoilEstimator
 from wheel_terra_estimator.estimation.words import MissingInputs
-
-FloatArray = NDArray[np.float64]
 
 _OF_THE_FILTER = (
     'stuck',

@@ -15,12 +15,11 @@ from collections.abc import Iterable, Iterator
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian
 from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant
 
-FloatArray = NDArray[np.float64]
 Companion = TypeVar('Companion')
 
 HALF_WIDTH = 0.5

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.measurements import (
-    FloatArray,
     InertialReading,
     InertialVariance,
     Measurement,

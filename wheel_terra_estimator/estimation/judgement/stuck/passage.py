@@ -20,13 +20,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.scalars import clipped, median
-
-FloatArray = NDArray[np.float64]
 
 _LOWEST = -0.5
 """Lower end of the grid: what comes below stays in its last cell [-]."""
