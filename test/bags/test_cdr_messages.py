@@ -14,6 +14,7 @@ from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.messages import cdr
 from wheel_terra_estimator.messages.cdr import (
     TWIST,
+    ClassPacker,
     DamagedMessageError,
     JointStatePacker,
     TopicMessages,
@@ -128,6 +129,11 @@ def test_a_stamped_twist(factory):
 def test_packed_messages_are_the_bytes_of_rosbags(frame, names, factory):
     dice = random.Random(7)
     joint_states, twists = JointStatePacker(frame), TwistPacker(frame)
+    for classes in ([], [0, 255], [3, 2, 1]):
+        theirs = factory.store.serialize_cdr(
+            factory.slip_class(classes), 'std_msgs/msg/UInt8MultiArray'
+        )
+        assert ClassPacker(len(classes)).packed(classes) == bytes(theirs)
     for lengths in ((0, 0, 0), (3, 0, 1), (1, 2, 3), (0, 4, 0), (1, 2, 3)):
         stamp = dice.randrange(2**60)
         values = [[dice.gauss(0, 1) for _ in range(length)] for length in lengths]

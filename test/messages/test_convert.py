@@ -18,9 +18,8 @@ from wheel_terra_estimator.messages.convert import (
     InputConverter,
     input_layout,
     joint_fields,
-    planar_velocity,
     stamp_of,
-    twist_covariance,
+    twist_fields,
 )
 
 
@@ -319,12 +318,14 @@ def test_slips_on_slopes_go_out_where_a_set_has_them():
 
 def test_twist_covariance_is_row_major_and_positive():
     e = some_estimates()
-    assert planar_velocity(e) == (e.forward_velocity, 0.0)
-    unknown = np.array(twist_covariance(e)).reshape(6, 6)
-    assert unknown[1, 1] == 1.0
+    twist = twist_fields(e)
+    assert twist.velocity == (e.forward_velocity, 0.0)
+    assert np.array(twist.covariance).reshape(6, 6)[1, 1] == 1.0
     e = some_estimates(sideways=Sideways(*((0.0, 0.0),) * 4, 0.02, 1e-4))
-    assert planar_velocity(e) == (e.forward_velocity, 0.02)
-    matrix = np.array(twist_covariance(e)).reshape(6, 6)
+    twist = twist_fields(e)
+    assert twist.velocity == (e.forward_velocity, 0.02)
+    assert twist.yaw_rate == e.yaw_rate
+    matrix = np.array(twist.covariance).reshape(6, 6)
     assert matrix[1, 1] == 1e-4
     assert matrix[0, 0] == e.forward_velocity_variance
     assert matrix[5, 5] == e.yaw_rate_variance

@@ -33,7 +33,7 @@ from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.input_file import read_text
 from wheel_terra_estimator.messages.convert import ODOMETRY, stamp_of
 from wheel_terra_estimator.messages.diagnostics import Diagnostics, Status
-from wheel_terra_estimator.messages.pipeline import Pipeline
+from wheel_terra_estimator.messages.pipeline import RESET, Pipeline
 
 LONG_DRIVE = 20_000
 """Number of messages from which a progress bar is shown."""
@@ -46,8 +46,6 @@ TRUTH_TOPICS = ('/ground_truth/', '/truth/')
 """Topics that are compared with the estimates, never heard."""
 
 SMOOTHED = 'smoothed: each estimate knows the whole drive; warnings stay as they were given live'
-RESET = 'reset'
-"""Line of an arrival log for a call of ``~/reset``."""
 
 
 class Event(NamedTuple):

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.bags.message_types import topic_messages
+from wheel_terra_estimator.bags.reader import NO_INPUTS
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.checks.series import (
     ImuSeries,
@@ -31,7 +32,6 @@ MOST_JOINTS = 64
 _REFERENCE_WORDS = ('reference', 'truth', 'visual', 'vio', 'gps', 'gnss', 'rtk', 'mocap', 'vo')
 _JOINT_WORDS = ('joint_states', 'wheel', 'joint')
 _IMU_WORDS = ('imu/data', 'imu')
-_OWN_TOPICS = ('/wheel_terra_estimator/', '/ground_truth/')
 
 
 def choose_topics(bag: Bag, remaps: Mapping[str, str]) -> dict[str, str]:
@@ -40,7 +40,7 @@ def choose_topics(bag: Bag, remaps: Mapping[str, str]) -> dict[str, str]:
     there = [
         topic
         for topic in bag.topics.values()
-        if topic.message_count and not topic.name.startswith(_OWN_TOPICS)
+        if topic.message_count and not topic.name.startswith(NO_INPUTS)
     ]
     # A slip-free velocity first: what is left may be wheel odometry.
     for name in sorted(INPUT_TYPES, key=lambda name: name == 'odom'):

@@ -16,14 +16,8 @@ from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages import diagnostics
-from wheel_terra_estimator.messages.cdr import JointStatePacker, TwistPacker
-from wheel_terra_estimator.messages.convert import (
-    BASE_FRAME,
-    OUTPUT_TYPES,
-    joint_fields,
-    planar_velocity,
-    twist_covariance,
-)
+from wheel_terra_estimator.messages.cdr import EstimatePacker
+from wheel_terra_estimator.messages.convert import OUTPUT_TYPES
 
 NAMESPACE = f'/{diagnostics.NODE}'
 STUCK = f'{NAMESPACE}/stuck'
@@ -109,11 +103,9 @@ class EstimateBagWriter(BagFile):
         inputs: Iterable[Path] = (),
     ) -> None:
         super().__init__(path, TOPICS, latched=LATCHED, overwrite=overwrite, inputs=inputs)
-        self.names = names
+        self._packer = EstimatePacker(names)
         self._diagnostics = statuses or diagnostics.Diagnostics(names)
         self._stuck: tuple[bool, int] | None = None
-        self._joint_states = JointStatePacker(BASE_FRAME)
-        self._twists = TwistPacker(BASE_FRAME)
 
     def state_origin(self, configuration: Configuration, recording: str) -> None:
         """State version, settings and recording in the metadata of the bag."""
@@ -135,24 +127,12 @@ class EstimateBagWriter(BagFile):
 
         `statuses` are what diagnostics said live, empty for nothing; None: it is asked now.
         """
-        stamp = estimates.stamp
-        for topic, fields in joint_fields(estimates, self.names).items():
-            data = self._joint_states.packed(stamp, *fields)
+        for topic, data in self._packer.packed(estimates):
             self.write_raw(f'{NAMESPACE}/{topic}', data, log_time)
-            if topic == 'slip':
-                classes = self.messages.slip_class(estimates.slip_class)
-                self.write(f'{NAMESPACE}/slip_class', classes, log_time)
-        twist = self._twists.packed(
-            stamp,
-            planar_velocity(estimates),
-            estimates.yaw_rate,
-            twist_covariance(estimates),
-        )
-        self.write_raw(f'{NAMESPACE}/twist', twist, log_time)
         self._write_stuck(estimates.stuck, estimates.stuck_direction, log_time)
         found = self._diagnostics.due(estimates) if statuses is None else statuses
         if found:
-            header = self.messages.header(stamp)
+            header = self.messages.header(estimates.stamp)
             array = self.messages.diagnostic_array(header, list(found))
             self.write(DIAGNOSTICS, array, log_time)
 

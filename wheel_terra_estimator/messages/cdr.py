@@ -13,16 +13,28 @@ from __future__ import annotations
 
 import struct
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IntArray
-from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, stamp_of
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages.convert import (
+    BASE_FRAME,
+    JOINT_OUTPUTS,
+    JOINT_STATE,
+    ODOMETRY,
+    joint_fields,
+    stamp_of,
+    twist_fields,
+)
 
 IMU = 'sensor_msgs/msg/Imu'
 TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+
+SET_TOPICS = (*JOINT_OUTPUTS, 'slip_class', 'twist')
+"""Private topics that have a message of each set (``slip_on_slope``: once a second)."""
 
 _LITTLE_ENDIAN = b'\x00\x01'
 _HEAD = _LITTLE_ENDIAN + bytes(2)
@@ -456,6 +468,43 @@ class TwistPacker:
         seconds, nanoseconds = divmod(stamp, 1_000_000_000)
         twist = (*velocity, 0.0, 0.0, 0.0, yaw_rate)
         return self._form.pack(_HEAD, seconds, nanoseconds, self._beginning, *twist, *covariance)
+
+
+class ClassPacker:
+    """Packs the slip classes of wheels as a ``std_msgs/msg/UInt8MultiArray``."""
+
+    def __init__(self, wheels: int) -> None:
+        one_dimension = _COUNT.pack(1) + _string('wheel')
+        aligned = one_dimension + bytes(-len(one_dimension) % 4)
+        no_offset = 0
+        self._beginning = _HEAD + aligned + struct.pack('<4I', wheels, wheels, no_offset, wheels)
+
+    def packed(self, classes: Sequence[int]) -> bytes:
+        """Return the CDR bytes of a message."""
+        return self._beginning + bytes(classes)
+
+
+class EstimatePacker:
+    """Packs estimate sets as the node and a recording send them; names of the wheels."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names = names
+        self._joint_states = JointStatePacker(BASE_FRAME)
+        self._classes = ClassPacker(len(names))
+        self._twists = TwistPacker(BASE_FRAME)
+
+    def packed(
+        self, estimates: EstimateSet, wanted: Container[str] = SET_TOPICS
+    ) -> Iterator[tuple[str, bytes]]:
+        """Yield private topic and CDR bytes of the messages of a set on the topics wanted."""
+        stamp = estimates.stamp
+        for topic, fields in joint_fields(estimates, self._names).items():
+            if topic in wanted:
+                yield topic, self._joint_states.packed(stamp, *fields)
+            if topic == 'slip' and 'slip_class' in wanted:
+                yield 'slip_class', self._classes.packed(estimates.slip_class.tolist())
+        if 'twist' in wanted:
+            yield 'twist', self._twists.packed(stamp, *twist_fields(estimates))
 
 
 def _string(text: str) -> bytes:

@@ -54,6 +54,14 @@ class JointFields(NamedTuple):
     effort: list[float]
 
 
+class TwistFields(NamedTuple):
+    """Fields of the output twist, in ``base_link``."""
+
+    velocity: tuple[float, float]  # along x and y [m/s]
+    yaw_rate: float  # [rad/s]
+    covariance: list[float]  # 6 x 6, row by row (x, y, z, then rotations; REP 103)
+
+
 JOINT_OUTPUTS = {
     'slip': ('slip', 'slip_velocity', 'drawbar_pull'),
     'sinkage': ('sinkage', 'sinkage_rate', 'normal_load'),
@@ -369,17 +377,13 @@ def joint_fields(estimates: EstimateSet, names: tuple[str, ...]) -> dict[str, Jo
     return made
 
 
-def planar_velocity(estimates: EstimateSet) -> tuple[float, float]:
-    """Return the velocity of ``base_link`` along x and y [m/s]."""
-    return estimates.forward_velocity, estimates.sideways_known.velocity
-
-
-def twist_covariance(estimates: EstimateSet) -> list[float]:
-    """Return the 6 x 6 covariance of ``twist``, row by row (x, y, z, then rotations; REP 103)."""
+def twist_fields(estimates: EstimateSet) -> TwistFields:
+    """Return the fields of ``twist``, as published."""
+    aside = estimates.sideways_known
     diagonal = [UNKNOWN_VARIANCE] * 6
     diagonal[0] = estimates.forward_velocity_variance
-    diagonal[1] = estimates.sideways_known.velocity_variance
+    diagonal[1] = aside.velocity_variance
     diagonal[5] = estimates.yaw_rate_variance
     covariance = [0.0] * 36
     covariance[::7] = diagonal
-    return covariance
+    return TwistFields((estimates.forward_velocity, aside.velocity), estimates.yaw_rate, covariance)

@@ -21,6 +21,9 @@ from wheel_terra_estimator.estimation.timing.input_log import Estimator
 from wheel_terra_estimator.messages.convert import InputConverter, input_layout
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
 
+RESET = 'reset'
+"""Line of an arrival log for a call of ``~/reset``."""
+
 
 class Pipeline:
     """The estimator core with a converter before it.

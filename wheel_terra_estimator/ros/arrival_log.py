@@ -11,10 +11,10 @@ from typing import TextIO
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
+from wheel_terra_estimator.messages.pipeline import RESET
 from wheel_terra_estimator.output_folder import check_target
 from wheel_terra_estimator.ros.file_claim import FileClaim
 
-RESET = 'reset'  # line
 LONGEST_LINE = 100  # [byte]
 
 

@@ -46,13 +46,13 @@ from wheel_terra_estimator.messages.diagnostics import (
     STALE,
     Status,
 )
-from wheel_terra_estimator.messages.pipeline import Pipeline
+from wheel_terra_estimator.messages.pipeline import RESET, Pipeline
 from wheel_terra_estimator.ros import parameters
-from wheel_terra_estimator.ros.arrival_log import RESET, ArrivalLog
+from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
 from wheel_terra_estimator.ros.outputs import EstimatePublisher, time_message
-from wheel_terra_estimator.ros.qos import OVERRIDABLE, input_profile
+from wheel_terra_estimator.ros.qos import FREQUENT, OVERRIDABLE, input_profile
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.ros.live_views import LiveViews
@@ -66,9 +66,6 @@ def _message_class(name: str) -> Any:
 
 MESSAGE_TYPES = {topic: _message_class(name) for topic, name in INPUT_TYPES.items()}
 
-FREQUENT = ('joint_states', 'odom', 'imu/data')
-"""Topics that come many times between two sets; what else comes, often late, is run through at once
-and not when a set is due, which is then there sooner."""
 WATCH_PERIOD = 0.25  # [s]
 DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
 SILENCE = 1.5  # [s] of the steady clock without a set
@@ -326,7 +323,7 @@ class EstimatorNode(LifecycleNode):
         self._incompatible.pop(topic, None)
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)
-        if topic not in FREQUENT:
+        if topic not in FREQUENT:  # often late: run through now, the next set is there sooner
             pipeline.process_pending()
 
     def _take(self, estimates: EstimateSet, now: float) -> None:

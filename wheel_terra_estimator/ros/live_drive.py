@@ -27,7 +27,6 @@ from typing import Any, BinaryIO, NamedTuple
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import TwistWithCovarianceStamped
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -35,7 +34,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Int8, UInt8MultiArray
+from std_msgs.msg import Bool, Int8
 
 from wheel_terra_estimator.bags import check_before
 from wheel_terra_estimator.bags.bag_file import BagFile
@@ -55,13 +54,14 @@ from wheel_terra_estimator.bags.writer import (
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, stamp_of
+from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.output_folder import check_file, check_folder
 from wheel_terra_estimator.reporting import truth_scores
 from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
 from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
+from wheel_terra_estimator.ros.outputs import SET_MESSAGES
 
 QUEUE = 5000
 PATIENCE = 5.0  # [s] until the next message is sent though the node has not heard the last one
@@ -70,9 +70,7 @@ NOT_FOUND, INTERRUPTED = 4, 130  # exit statuses
 QUIET, PAUSE = 2.0, 0.2  # [s] without an output, looked for so often: the node is done
 
 OUTPUT_MESSAGES = {
-    **{f'{NAMESPACE}/{topic}': JointState for topic in JOINT_OUTPUTS},
-    f'{NAMESPACE}/slip_class': UInt8MultiArray,
-    f'{NAMESPACE}/twist': TwistWithCovarianceStamped,
+    **{f'{NAMESPACE}/{topic}': kind for topic, kind in SET_MESSAGES.items()},
     STUCK: Bool,
     STUCK_DIRECTION: Int8,
     DIAGNOSTICS: DiagnosticArray,  # the last: `_Player.wait_for_partners` relies on it

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Point, WrenchStamped
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import ColorRGBA
@@ -22,8 +21,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.messages.convert import BASE_FRAME
-from wheel_terra_estimator.ros.outputs import time_message
-from wheel_terra_estimator.ros.qos import OVERRIDABLE, output_profile
+from wheel_terra_estimator.ros.outputs import make_publisher, time_message
 
 MARKER_PERIOD = 200_000_000
 """Least time between two sets of markers [ns of stamps]: an eye sees no more."""
@@ -70,26 +68,17 @@ class LiveViews:
     def __init__(self, node: Node, configuration: Configuration) -> None:
         self._node = node
         wheels = configuration.wheels
-
-        def publisher(kind: type, topic: str) -> Publisher:
-            return node.create_publisher(
-                kind,
-                topic,
-                output_profile(),
-                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
-                qos_overriding_options=OVERRIDABLE,
-            )
-
         self._wrenches: list[tuple[int, Publisher, WrenchStamped]] = []
         frames, topics = wheels.wrench_frame, topic_names(wheels.names)
         for i, (topic, frame) in enumerate(zip(topics, frames, strict=True)):
             if frame:
                 message = WrenchStamped()
                 message.header.frame_id = frame
-                self._wrenches.append((i, publisher(WrenchStamped, f'~/wrench/{topic}'), message))
+                publisher = make_publisher(node, WrenchStamped, f'~/wrench/{topic}')
+                self._wrenches.append((i, publisher, message))
         self._markers: Publisher | None = None
         if configuration.flat()['publish_markers']:
-            self._markers = publisher(MarkerArray, '~/markers')
+            self._markers = make_publisher(node, MarkerArray, '~/markers')
         self._hubs = list(zip(*(a.tolist() for a in (wheels.x, wheels.y, wheels.z)), strict=True))
         self._radius, self._width = wheels.radius.tolist(), wheels.width.tolist()
         self._wheels = [_WheelMarkers(i, *self._shape(i)) for i in range(wheels.count)]

@@ -21,14 +21,15 @@ OVERRIDABLE = QoSOverridingOptions(
 FAST_DEPTH = 250
 """Queue of topics that may come at 1000 Hz: a quarter of a second in which the node is held up."""
 
-_FAST = ('joint_states', 'odom', 'imu/data')
+FREQUENT = ('joint_states', 'odom', 'imu/data')
+"""These topics, which come many times between two sets."""
 
 
 def input_profile(topic: str = '') -> QoSProfile:
     """Best effort hears both kinds of publishers; a late sensor value is better not resent."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=FAST_DEPTH if topic in _FAST else 10,
+        depth=FAST_DEPTH if topic in FREQUENT else 10,
         reliability=ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.VOLATILE,
     )
