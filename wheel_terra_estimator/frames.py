@@ -83,6 +83,28 @@ def to_frame(columns: Mapping[str, NDArray[Any]], stamp: IntArray | None = None)
     return frame
 
 
+def arrays_of(table: Any, name: str, dtype: type | None = None) -> dict[str, NDArray[Any]]:
+    """Return the columns of a DataFrame or mapping as arrays of one length and one type.
+
+    Raises
+    ------
+    UserError
+        For a column that is no list, does not hold that type, or is of another length.
+    """
+    columns: dict[str, NDArray[Any]] = {}
+    for key in table:
+        try:
+            column = columns[key] = np.asarray(table[key], dtype=dtype)
+        except (TypeError, ValueError):
+            raise UserError(f'{name}: column {key!r} does not hold numbers; convert it') from None
+        if column.ndim != 1:
+            raise UserError(f'{name}: column {key!r} is not one-dimensional')
+    lengths = {len(column) for column in columns.values()}
+    if len(lengths) > 1:
+        raise UserError(f'{name}: columns are of different lengths {sorted(lengths)}')
+    return columns
+
+
 def columns_of(table: Any, name: str) -> dict[str, FloatArray]:
     """Return the columns of a DataFrame or mapping as arrays of one length.
 
@@ -105,22 +127,13 @@ def columns_of(table: Any, name: str) -> dict[str, FloatArray]:
 
     units = units_in(table)
     columns: dict[str, FloatArray] = {}
-    for key in table:
-        try:
-            column = np.asarray(table[key], dtype=np.float64)
-        except (TypeError, ValueError):
-            raise UserError(f'{name}: column {key!r} does not hold numbers; convert it') from None
-        if column.ndim != 1:
-            raise UserError(f'{name}: column {key!r} is not one-dimensional')
+    for key, column in arrays_of(table, name, np.float64).items():
         si = unit_of(str(key))
         given = units.get(key, si)
         times = 1.0 if given == si else factor(si, given) if si in UNITS else None
         if times is None:
             raise UserError(f'{name}: column {key!r} is in {given!r} (attrs); give it in {si}')
         columns[str(key)] = times * column
-    lengths = {len(column) for column in columns.values()}
-    if len(lengths) > 1:
-        raise UserError(f'{name}: columns are of different lengths {sorted(lengths)}')
     index = np.asarray(getattr(table, 'index', ()))
     if 'time' not in columns and index.dtype.kind in 'mM':
         columns['time'] = (index - index[:1]).astype('timedelta64[ns]').astype(np.float64) * 1e-9

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.api.models import Curve
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, WARNING_COLOUR, picture_style
 
@@ -19,11 +20,7 @@ if TYPE_CHECKING:
 
     from wheel_terra_estimator.discrepancy.result import Diagnosis
 
-QUANTITIES = {
-    'sinkage': ('sinkage [mm]', 1e3),
-    'drawbar_pull': ('drawbar pull [N]', 1.0),
-    'torque': ('torque [N m]', 1.0),
-}
+QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
 UNKNOWN_CLASS = 255
 
 
@@ -47,7 +44,8 @@ def plot_curve(
     named = {'': curves} if isinstance(curves, Curve) else dict(curves)
     with picture_style():
         panels = _panels(len(QUANTITIES), (10.5, 3.2), columns=True) if axes is None else axes
-        for panel, (quantity, (label, scale)) in zip(panels, QUANTITIES.items(), strict=True):
+        for panel, quantity in zip(panels, QUANTITIES, strict=True):
+            scale = SHOWN[quantity][0]
             for i, (name, curve) in enumerate(named.items()):
                 order = np.argsort(curve.slip, kind='stable')
                 panel.plot(
@@ -57,7 +55,7 @@ def plot_curve(
                     label=name or None,
                 )
             panel.set_xlabel('slip ratio [-]')
-            panel.set_ylabel(label)
+            panel.set_ylabel(axis_label(quantity))
         if any(named):
             panels[0].legend()
     return panels

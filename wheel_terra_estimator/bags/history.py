@@ -170,6 +170,15 @@ class EstimateHistory:
         return (self.stamp - self.stamp[0]) * 1e-9 if self.stamp.size else np.empty(0)
 
     @property
+    def warning_times(self) -> list[tuple[float, float | None]]:
+        """Start and end of each stuck warning since the first set [s]; None: until the end."""
+        begin = int(self.stamp[0]) if self.stamp.size else 0
+        return [
+            ((w.start - begin) * 1e-9, None if w.end is None else (w.end - begin) * 1e-9)
+            for w in self.warnings
+        ]
+
+    @property
     def stuck(self) -> BoolArray:
         """Whether a stuck warning ran, per set."""
         running = np.zeros(self.stamp.size, dtype=bool)

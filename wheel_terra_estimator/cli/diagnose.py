@@ -190,7 +190,7 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
     )
     diagnosis = with_other_laws(diagnose(table, configuration, reference, options))
     diagnosis = _with_effect_file(diagnosis, own)
-    if not any(key.startswith('soil.') for key in configuration.stated):
+    if not configuration.soil_stated:
         note = 'no soil was stated (--config): the default sand was taken for the model believed in'
         diagnosis = replace(diagnosis, notes=(*diagnosis.notes, note))
     return diagnosis

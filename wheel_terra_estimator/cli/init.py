@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _sketch(arguments: argparse.Namespace) -> RoverSketch:
-    wheels = [n.strip() for n in (arguments.wheels or '').split(',') if n.strip()]
+    wheels = _names(arguments.wheels)
     if arguments.urdf:
         from wheel_terra_estimator.configuration.urdf import read_urdf
 
@@ -122,6 +122,10 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
     return _from_measures(arguments, wheels)
 
 
+def _names(text: str | None) -> list[str]:
+    return [name.strip() for name in (text or '').split(',') if name.strip()]
+
+
 def _description_of(arguments: argparse.Namespace) -> RoverSketch | None:
     """Return the rover of /robot_description; None where the recording has none."""
     from wheel_terra_estimator.bags.storage import open_bag
@@ -133,8 +137,7 @@ def _description_of(arguments: argparse.Namespace) -> RoverSketch | None:
         messages = bag.messages([DESCRIPTION])
         data = next((bytes(data) for _, _, data in messages if len(data) > TEXT_AT), b'')
     text = data[TEXT_AT:].rstrip(b'\0')  # std_msgs/String in CDR
-    wheels = [n.strip() for n in (arguments.wheels or '').split(',') if n.strip()]
-    return read_urdf(Path(f'{arguments.bag}:{DESCRIPTION}'), wheels, text)
+    return read_urdf(Path(f'{arguments.bag}:{DESCRIPTION}'), _names(arguments.wheels), text)
 
 
 def _wheels_of(path: Path, limits: Limits) -> list[str]:
@@ -192,8 +195,8 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
 
 
 def _ask_wheels() -> list[str]:
-    text = _ask('names of the wheel joints, comma between, front to rear, left before right: ')
-    wheels = [name.strip() for name in text.split(',') if name.strip()]
+    question = 'names of the wheel joints, comma between, front to rear, left before right: '
+    wheels = _names(_ask(question))
     if not wheels:
         raise UserError('no wheels named; give --wheels, --bag or --urdf')
     return wheels

@@ -21,6 +21,7 @@ from wheel_terra_estimator.cli.climb import WHO, climb
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.readings import Readings
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
@@ -453,11 +454,7 @@ def _draw(columns: Mapping[str, FloatArray], path: Path, title: str) -> None:
 
     from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 
-    labels = [('sinkage [mm]', 1e3), ('drawbar pull [N]', 1.0), ('torque [N m]', 1.0)]
-    names = [*OUTPUTS]
-    if SIDEWAYS in columns:
-        labels.append(('lateral force [N]', 1.0))
-        names.append(SIDEWAYS)
+    names = [*OUTPUTS, *([SIDEWAYS] if SIDEWAYS in columns else [])]
     # Over the slip or, where there is but one, over what else varies.
     varied = [
         name
@@ -471,12 +468,12 @@ def _draw(columns: Mapping[str, FloatArray], path: Path, title: str) -> None:
         for index, (label, rows) in enumerate(_groups(columns, across)):
             order = np.argsort(rows[across], kind='stable')
             colour, marker = LINE_COLOURS[index % len(LINE_COLOURS)], '' if len(order) > 1 else 'o'
-            for axis, name, (_, scale) in zip(axes, names, labels, strict=True):
-                x, y = rows[across][order], scale * rows[name][order]
+            for axis, name in zip(axes, names, strict=True):
+                x, y = rows[across][order], SHOWN[name][0] * rows[name][order]
                 axis.plot(x, y, marker=marker, color=colour, label=label)
-        for axis, (text, _) in zip(axes, labels, strict=True):
+        for axis, name in zip(axes, names, strict=True):
             axis.set_xlabel(f'{across.replace("_", " ")} [{unit_of(across)}]')
-            axis.set_ylabel(text)
+            axis.set_ylabel(axis_label(name))
         axes[0].invert_yaxis()
         axes[0].legend()
         figure.suptitle(title, fontsize=9)

@@ -177,35 +177,27 @@ def _origin(element: ElementTree.Element | None, path: Path) -> Pose:
 def _link_pose(
     link: str, joints: dict[str, ElementTree.Element], base: str, path: Path
 ) -> Pose | None:
-    """Return the pose of a link in the base; None if it does not hang on it."""
+    """Return the pose of a link in the base; None if they hang on nothing in common."""
+    top, pose = _climbed(link, base, joints, path)
+    if top == base:
+        return pose
+    root, to_base = _climbed(base, top, joints, path)  # both below a root, such as a footprint
+    return np.asarray(np.linalg.inv(to_base) @ pose) if root == top else None
+
+
+def _climbed(
+    link: str, end: str, joints: dict[str, ElementTree.Element], path: Path
+) -> tuple[str, Pose]:
+    """Go up from a link as far as `end`, else to its root; return where that is, and the pose."""
     above = {_child(joint): joint for joint in joints.values()}
-    pose = np.eye(4)
+    start, pose = link, np.eye(4)
     for _ in range(DEEPEST_CHAIN):
-        if link == base:
-            return pose
         joint = above.get(link)
-        if joint is None:
-            return _seen_from(base, link, joints, path, pose)
+        if link == end or joint is None:
+            return link, pose
         pose = _origin(joint, path) @ pose
         link = _parent(joint)
-    raise UserError(f'{path}: the joints of link {link} form a loop')
-
-
-def _seen_from(
-    base: str, root: str, joints: dict[str, ElementTree.Element], path: Path, pose: Pose
-) -> Pose | None:
-    """Return a pose in the base where both hang on the same root above the base."""
-    above = {_child(joint): joint for joint in joints.values()}
-    to_base, link = np.eye(4), base
-    for _ in range(DEEPEST_CHAIN):
-        if link == root:
-            return np.asarray(np.linalg.inv(to_base) @ pose)
-        joint = above.get(link)
-        if joint is None:
-            return None
-        to_base = _origin(joint, path) @ to_base
-        link = _parent(joint)
-    return None
+    raise UserError(f'{path}: the joints of link {start} form a loop')
 
 
 def _pose(

@@ -15,6 +15,11 @@ SHOWN = {
 }
 
 
+def axis_label(quantity: str) -> str:
+    """Return what stands at the axis of a quantity: its name, and the unit in which it is shown."""
+    return f'{quantity.replace("_", " ")} [{SHOWN[quantity][1]}]'
+
+
 def number(value: float, digits: int = 3) -> str:
     """Return significant digits, without an exponent but for what is tiny."""
     if not math.isfinite(value):

@@ -134,7 +134,7 @@ manoeuvres
     )
     title = path.resolve().name
     notes = list(result.notes)
-    if not any(key.startswith('soil.') for key in configuration.stated):
+    if not configuration.soil_stated:
         notes.append(NO_SOIL)
     summary = summarise(
         title, result.history, result.topics, result.heard, result.rejected, notes,

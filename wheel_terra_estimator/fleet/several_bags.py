@@ -148,8 +148,7 @@ def _replay_into(
     told = [replace(rows[i], bag=str(bag)) for i, bag in enumerate(bags)]
     with new_file(output / SUMMARY_TABLE, overwrite=True) as path:
         write_table(told, path)
-    with new_file(output / SUMMARY_PAGE, overwrite=True) as path:
-        write_summary_page(told, path, settings.report)
+    write_summary_page(told, output / SUMMARY_PAGE, settings.report)
     return told
 
 

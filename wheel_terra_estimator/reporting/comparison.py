@@ -19,7 +19,6 @@ from wheel_terra_estimator.bags.writer import Origin
 from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
-from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import truth_scores
 from wheel_terra_estimator.reporting.drive_figure import SLIP_RANGE
 from wheel_terra_estimator.reporting.drive_style import Border, known
@@ -111,7 +110,10 @@ def compare(
         sets=(first.stamp.size, second.stamp.size),
         differences=differences,
         same_class=float(np.mean(first.slip_class[a] == second.slip_class[b])),
-        warnings=(_starts(first), _starts(second)),
+        warnings=(
+            tuple(round(start, 3) for start, _ in first.warning_times),
+            tuple(round(start, 3) for start, _ in second.warning_times),
+        ),
         errors=(
             truth_scores.truth_errors(first, truth, thresholds) if truth else None,
             truth_scores.truth_errors(second, truth, thresholds) if truth else None,
@@ -150,11 +152,6 @@ def _difference(
         greatest=float(change[row, wheel]),
         where=f'{first.names[int(wheel)]} at {first.seconds[a[int(row)]]:.1f} s',
     )
-
-
-def _starts(history: EstimateHistory) -> tuple[float, ...]:
-    begin = int(history.stamp[0]) if history.stamp.size else 0
-    return tuple(round((w.start - begin) * 1e-9, 3) for w in history.warnings)
 
 
 def as_text(comparison: Comparison) -> str:
@@ -248,8 +245,7 @@ def write_comparison(
         figure=_figure(histories, truth),
         truth_source=truth.source if truth else '',
     )
-    with new_file(path, overwrite) as target:
-        write_page(target, page)
+    write_page(path, page, overwrite)
 
 
 def _cards(comparison: Comparison) -> list[tuple[str, str]]:

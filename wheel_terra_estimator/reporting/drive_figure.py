@@ -68,12 +68,8 @@ def drive_figure(
             colour,
             slender=slip_class is SlipClass.UNKNOWN,
         )
-    for warning in history.warnings:
-        begin, last = (
-            end if stamp is None else (stamp - history.stamp[0]) * 1e-9
-            for stamp in (warning.start, warning.end)
-        )
-        figure.shade(begin, last)
+    for begin, last in history.warning_times:
+        figure.shade(begin, end if last is None else last)
     return figure
 
 

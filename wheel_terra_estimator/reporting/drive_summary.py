@@ -116,21 +116,18 @@ def summarise(
     """Sum a drive up; ``topics`` and ``counts`` go by input topic, ``rejected`` by reason, too."""
     border = border or Border()
     figures = history.figures()
-    begin = int(history.stamp[0]) if history.stamp.size else 0
     return DriveSummary(
         title=title,
         duration=figures.duration,
         sets=figures.sets,
         wheels=_wheels(history, border) if figures.sets else (),
         warnings=tuple(
-            WarningSpan(
-                (w.start - begin) * 1e-9,
-                None if w.end is None else (w.end - begin) * 1e-9,
-                w.reason,
-                later,
-            )
-            for w, later in zip(
-                history.warnings, truth_scores.seen_later(history, border), strict=True
+            WarningSpan(*times, warning.reason, later)
+            for times, warning, later in zip(
+                history.warning_times,
+                history.warnings,
+                truth_scores.seen_later(history, border),
+                strict=True,
             )
         ),
         messages=tuple(

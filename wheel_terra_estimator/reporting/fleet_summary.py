@@ -130,4 +130,4 @@ def write_summary_page(rows: Sequence[DriveRow], path: Path, report: str = '') -
         classes=[(c.name.lower(), colour) for c, colour in CLASS_COLOURS.items()],
         report=report,
     )
-    write_page(path, page)
+    write_page(path, page, overwrite=True)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.glossary import used_in
+from wheel_terra_estimator.output_folder import new_file
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -65,9 +66,10 @@ def _environment(folder: Path) -> Environment:
     return made
 
 
-def write_page(path: Path, page: str) -> None:
-    """Write a page."""
-    path.write_text(page, encoding='utf-8')
+def write_page(path: Path, page: str, overwrite: bool) -> None:
+    """Write a page, whole or not at all."""
+    with new_file(path, overwrite) as fresh:
+        fresh.write_text(page, encoding='utf-8')
 
 
 def check_page(path: Path) -> None:

@@ -15,7 +15,6 @@ from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.taught import Taught
-from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import track_picture, truth_scores
 from wheel_terra_estimator.reporting.drive_figure import drive_figure, slopes_figure, way_figure
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, Border
@@ -78,8 +77,7 @@ def write_replay_report(
         parameters=[(key, values[key]) for key in values if key in configuration.stated],
         sources=[(name, effects[name].source) for name in configuration.effects],
     )
-    with new_file(path, overwrite) as fresh:
-        write_page(fresh, page)
+    write_page(path, page, overwrite)
 
 
 def _taught_row(row: Taught) -> dict[str, str]:

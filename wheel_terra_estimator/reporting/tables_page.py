@@ -11,7 +11,6 @@ from typing import Any
 
 from wheel_terra_estimator.checks.finding import CheckReport
 from wheel_terra_estimator.checks.series import Recording
-from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting.html import render, write_page
 
 
@@ -30,8 +29,7 @@ def write_tables(
     """Write the page; ``tone``: ``good``, ``warn`` or ``bad``; tables without rows are left out."""
     shown = [table for table in tables if table.rows]
     page = render('tables.html', title=title, verdict=verdict, tone=tone, tables=shown)
-    with new_file(path, overwrite) as fresh:
-        write_page(fresh, page)
+    write_page(path, page, overwrite)
 
 
 def write_check(path: Path, recording: Recording, report: CheckReport, overwrite: bool) -> None:

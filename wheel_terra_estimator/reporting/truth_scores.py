@@ -160,11 +160,7 @@ def _matrix(slip: FloatArray, seen: NDArray[np.uint8], thresholds: FloatArray) -
 
 
 def _spans(history: EstimateHistory) -> list[Span]:
-    begin = int(history.stamp[0])
-    return [
-        Span((w.start - begin) * 1e-9, np.inf if w.end is None else (w.end - begin) * 1e-9)
-        for w in history.warnings
-    ]
+    return [Span(start, np.inf if end is None else end) for start, end in history.warning_times]
 
 
 def _entrapped(history: EstimateHistory, slip: FloatArray) -> float | None:

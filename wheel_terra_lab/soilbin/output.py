@@ -184,7 +184,7 @@ def write_report(folder: Path, series: np.ndarray, case: Case, figures: Mapping[
     figures : mapping
         Words of a figure -> its value with unit.
     """
-    from wheel_terra_estimator.reporting.html import render, write_page
+    from wheel_terra_estimator.reporting.html import render
 
     def image(name: str) -> str:
         path = folder / name
@@ -206,7 +206,7 @@ def write_report(folder: Path, series: np.ndarray, case: Case, figures: Mapping[
         between=case.operation.duration / max(case.numerics.frames, 1),
     )
     part = folder / 'report.part'
-    write_page(part, page)
+    part.write_text(page, encoding='utf-8')
     part.replace(folder / 'report.html')
 
 

@@ -15,7 +15,7 @@ from wheel_terra_estimator.discrepancy.report.model_file import corrected
 from wheel_terra_estimator.discrepancy.report.words import in_words, law_line, soil_line
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
 from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE
-from wheel_terra_estimator.reporting.html import picture, render, write_page
+from wheel_terra_estimator.reporting.html import picture, render
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         proposed=_proposed,
     )
     path = folder / 'report.html'
-    write_page(path, page)
+    path.write_text(page, encoding='utf-8')
     return path
 
 

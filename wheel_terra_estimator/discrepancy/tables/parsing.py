@@ -26,7 +26,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     SteadyTable,
 )
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.frames import units_in
+from wheel_terra_estimator.frames import arrays_of, units_in
 from wheel_terra_estimator.input_file import LARGEST_TABLE
 
 Rows = Iterable[tuple[int, Sequence[Any]]]
@@ -100,14 +100,9 @@ def table_of(data: Any, name: str, choice: Choice | None = None) -> SteadyTable:
     """
     units = units_in(data)
     columns = {
-        with_unit(str(key).strip(), units.get(key, '')): np.asarray(data[key]) for key in data
+        with_unit(str(key).strip(), units.get(key, '')): column
+        for key, column in arrays_of(data, name).items()
     }
-    for title, column in columns.items():
-        if column.ndim != 1:
-            raise UserError(f'{name}: column {title!r} is not one-dimensional')
-    if len({len(column) for column in columns.values()}) > 1:
-        lengths = sorted({len(column) for column in columns.values()})
-        raise UserError(f'{name}: columns are of different lengths {lengths}')
     header = Header(name, list(columns), choice or Choice())
     header.check(REQUIRED, ONE_OF)
     rows = enumerate(zip(*columns.values(), strict=True), start=2)
