@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.bags.replay import Options
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.shipped import demo_recording
 from wheel_terra_estimator.estimation.estimates import SlipClass
@@ -37,7 +38,11 @@ CLASSES = (SlipClass.LOW, SlipClass.MODERATE, SlipClass.HIGH, SlipClass.STUCK)
 def main() -> None:
     """Replay, draw, write."""
     drive = replay_drive(
-        demo_recording('entrapment'), reader.load(list(CONFIGURATION)), {}, None, progress=False
+        demo_recording('entrapment'),
+        reader.load(list(CONFIGURATION)),
+        {},
+        None,
+        Options(progress=False),
     )
     IMAGE.write_text(picture(drive), encoding='utf-8')
     print(f'{IMAGE}: {IMAGE.stat().st_size / 1e3:.0f} kB')

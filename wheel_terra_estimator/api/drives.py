@@ -268,11 +268,11 @@ def _rover(
 def _replayed(
     path: Path, configuration: Configuration, remaps: Mapping[str, str], **options: Any
 ) -> Any:
-    from wheel_terra_estimator.bags.replay import replay
+    from wheel_terra_estimator.bags.replay import Options, replay
     from wheel_terra_estimator.bags.storage import open_bag
 
     with open_bag(path) as bag:
-        return replay(bag, configuration, remaps, **options)
+        return replay(bag, configuration, remaps, options=Options(**options))
 
 
 def _estimated(

@@ -73,32 +73,12 @@ class Replay:
     filtered: EstimateHistory | None = None  # what the filter said, where ``history`` is smoothed
 
 
-def replay(
-    bag: Bag,
-    configuration: Configuration,
-    remaps: Mapping[str, str],
-    output: Path | None = None,
-    *,
-    overwrite: bool = False,
-    arrival: Path | None = None,
-    every_set: bool = False,
-    progress: bool = True,
-    smooth: bool = False,
-    odometry: str = '',
-    manoeuvres: bool = False,
-) -> Replay:
-    """Run the estimator over an open bag.
+@dataclass(frozen=True)
+class Options:
+    """Choices of a replay.
 
-    Parameters
+    Attributes
     ----------
-    bag : Bag
-        The recording.
-    configuration : Configuration
-        Rover, soil, sensors, filter.
-    remaps : mapping of str to str
-        Estimator's topic to the bag's.
-    output : Path, optional
-        Folder of the bag that gets the estimates; closed and readable whatever happens.
     overwrite : bool
         Whether an earlier output is replaced.
     arrival : Path, optional
@@ -113,28 +93,66 @@ def replay(
         Topic of the bag whose positions the track has; empty: it is reckoned.
     manoeuvres : bool
         Whether the manoeuvres that would teach more are looked for: ten seconds.
+    """
+
+    overwrite: bool = False
+    arrival: Path | None = None
+    every_set: bool = False
+    progress: bool = True
+    smooth: bool = False
+    odometry: str = ''
+    manoeuvres: bool = False
+
+
+DEFAULT = Options()
+
+
+def replay(
+    bag: Bag,
+    configuration: Configuration,
+    remaps: Mapping[str, str],
+    output: Path | None = None,
+    options: Options = DEFAULT,
+) -> Replay:
+    """Run the estimator over an open bag.
+
+    Parameters
+    ----------
+    bag : Bag
+        The recording.
+    configuration : Configuration
+        Rover, soil, sensors, filter.
+    remaps : mapping of str to str
+        Estimator's topic to the bag's.
+    output : Path, optional
+        Folder of the bag that gets the estimates; closed and readable whatever happens.
+    options : Options, optional
+        Further choices.
 
     Raises
     ------
     UserError
         Input that cannot be used, an output path that is taken.
     """
-    places = read_odometry(bag, odometry) if odometry else None
+    arrival, smooth = options.arrival, options.smooth
+    places = read_odometry(bag, options.odometry) if options.odometry else None
     reader = MeasurementReader(bag, remaps, configuration)
     tracker = TrackRecorder(configuration)
     smoother = DriveSmoother(configuration) if smooth else None
     pipeline = Pipeline(configuration, estimator=smoother.estimator if smoother else None)
     pipeline.on_measurement = tracker.hear
-    most = None if every_set else MOST_ROWS
+    most = None if options.every_set else MOST_ROWS
     messages = _in_order_of(arrival, reader) if arrival else reader.messages()
-    if progress:
+    if options.progress:
         messages = _progress(messages, reader)
     with ExitStack() as stack:
         writer = None
         if output is not None:
             inputs = (bag.path, *([arrival] if arrival else []))
             writer = stack.enter_context(
-                EstimateBagWriter(output, pipeline.names, overwrite, pipeline.diagnostics, inputs)
+                EstimateBagWriter(
+                    output, pipeline.names, options.overwrite, pipeline.diagnostics, inputs
+                )
             )
             writer.state_origin(configuration, bag.path.resolve().name)
         interrupted = stack.enter_context(_until_interrupted())
@@ -168,7 +186,7 @@ def replay(
         ),
         interrupted=interrupted.is_set(),
         learned=core.learned(),
-        taught=further(core, configuration, history) if manoeuvres else core.taught(),
+        taught=further(core, configuration, history) if options.manoeuvres else core.taught(),
         filtered=filtered() if filtered is not None else None,
         track=tracker.track(places),
     )

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument, add_scheduler_argument
 
 if TYPE_CHECKING:
+    from wheel_terra_estimator.bags.replay import Options
     from wheel_terra_estimator.fleet.drive import Drive
 
 SOME_FAILED = 1
@@ -151,14 +153,9 @@ def _run_one(arguments: argparse.Namespace) -> int:
         configuration,
         remaps,
         arguments.output,
-        overwrite=arguments.overwrite,
-        arrival=arguments.arrival,
-        every_set=bool(arguments.table),
-        limits=bag_arguments.limits_of(arguments),
-        smooth=arguments.smooth,
-        odometry=arguments.track_odometry,
-        manoeuvres=arguments.manoeuvres,
-        on_checked=print_findings,
+        _options(arguments),
+        bag_arguments.limits_of(arguments),
+        print_findings,
     )
     if arguments.json:
         print(json.dumps(_as_dict(drive, arguments.smooth), indent=2))
@@ -171,21 +168,42 @@ def _run_one(arguments: argparse.Namespace) -> int:
     return INTERRUPTED if drive.result.interrupted else 0
 
 
-def _check_outputs(arguments: argparse.Namespace) -> None:
-    """Refuse outputs that cannot be written, before hours of work."""
-    from wheel_terra_estimator.output_folder import check_file, check_folder
+def _options(arguments: argparse.Namespace) -> Options:
+    from wheel_terra_estimator.bags.replay import Options
+
+    return Options(
+        overwrite=arguments.overwrite,
+        arrival=arguments.arrival,
+        every_set=bool(arguments.table),
+        smooth=arguments.smooth,
+        odometry=arguments.track_odometry,
+        manoeuvres=arguments.manoeuvres,
+    )
+
+
+def _check_kinds(arguments: argparse.Namespace) -> list[Path]:
+    """Refuse files whose names promise another format; return all that are to be written."""
     from wheel_terra_estimator.reporting import estimates_table, track_table
     from wheel_terra_estimator.reporting.html import check_page
 
-    for path, check_kind in (
-        (arguments.report, check_page),
-        (arguments.table, estimates_table.check_table),
-        (arguments.track, track_table.check_track),
-        (arguments.slip_on_slope, estimates_table.check_slopes),
-    ):
+    kinds: dict[Path | None, Callable[[Path], None]] = {
+        arguments.report: check_page,
+        arguments.table: estimates_table.check_table,
+        arguments.track: track_table.check_track,
+        arguments.slip_on_slope: estimates_table.check_slopes,
+    }
+    for path, check in kinds.items():
         if path:
-            check_kind(path)
-            check_file(path, arguments.overwrite)
+            check(path)
+    return [path for path in kinds if path]
+
+
+def _check_outputs(arguments: argparse.Namespace) -> None:
+    """Refuse outputs that cannot be written, before hours of work."""
+    from wheel_terra_estimator.output_folder import check_file, check_folder
+
+    for path in _check_kinds(arguments):
+        check_file(path, arguments.overwrite)
     if arguments.save_soil:
         check_file(arguments.save_soil, arguments.overwrite, foreign=soil_file.why_foreign)
     if arguments.output:
@@ -249,8 +267,7 @@ def _write_outputs(
 def _run_several(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.fleet.several_bags import SUMMARY_PAGE, Settings, replay_bags
-    from wheel_terra_estimator.reporting import estimates_table, track_table
-    from wheel_terra_estimator.reporting.html import check_page
+    from wheel_terra_estimator.reporting import track_table
 
     if not arguments.output:
         raise UserError('several recordings need a folder for their outputs: add -o DIR')
@@ -263,12 +280,7 @@ def _run_several(arguments: argparse.Namespace) -> int:
     ):
         if given:
             raise UserError(f'{option}: belongs to one recording; replay that one by itself')
-    if arguments.report:
-        check_page(arguments.report)
-    if arguments.table:
-        estimates_table.check_table(arguments.table)
-    if arguments.track:
-        track_table.check_track(arguments.track)
+    _check_kinds(arguments)
     settings = Settings(
         configuration_reader.from_arguments(arguments),
         parse_remaps(arguments.remap),
@@ -276,9 +288,8 @@ def _run_several(arguments: argparse.Namespace) -> int:
         _plain_name('--report', arguments.report),
         _plain_name('--table', arguments.table),
         bag_arguments.limits_of(arguments),
-        smooth=arguments.smooth,
+        _options(arguments),
         track=_plain_name('--track', arguments.track),
-        odometry=arguments.track_odometry,
         origin=track_table.parse_origin(arguments.track_origin),
     )
     rows = replay_bags(

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wheel_terra_estimator.bags.check_before import check_before
-from wheel_terra_estimator.bags.replay import Replay, replay
+from wheel_terra_estimator.bags.replay import DEFAULT, Options, Replay, replay
 from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import Truth, read_truth
@@ -81,15 +81,8 @@ def replay_drive(
     configuration: Configuration,
     remaps: Mapping[str, str],
     output: Path | None,
-    *,
-    overwrite: bool = False,
-    arrival: Path | None = None,
-    every_set: bool = False,
-    progress: bool = True,
+    options: Options = DEFAULT,
     limits: Limits = LIMITS,
-    smooth: bool = False,
-    odometry: str = '',
-    manoeuvres: bool = False,
     on_checked: Callable[[CheckReport], None] = lambda checked: None,
 ) -> Drive:
     """Check a recording, run the estimator over it and sum it up.
@@ -98,8 +91,7 @@ def replay_drive(
     ----------
     path : Path
         rosbag2 folder or file.
-    configuration, remaps, output, overwrite, arrival, every_set, progress, smooth, odometry, \
-manoeuvres
+    configuration, remaps, output, options
         See `bags.replay.replay`.
     limits : Limits
         What of the recording is unpacked and held.
@@ -114,19 +106,7 @@ manoeuvres
     with open_bag(path, limits) as bag:
         checked = check_before(bag, configuration, remaps)
         on_checked(checked)
-        result = replay(
-            bag,
-            configuration,
-            remaps,
-            output,
-            overwrite=overwrite,
-            arrival=arrival,
-            every_set=every_set,
-            progress=progress,
-            smooth=smooth,
-            odometry=odometry,
-            manoeuvres=manoeuvres,
-        )
+        result = replay(bag, configuration, remaps, output, options)
         truth = read_truth(bag, remaps, configuration)
     errors, filter_errors = (
         truth_scores.judged(history, truth, result.topics, configuration) if history else None

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator import __version__
+from wheel_terra_estimator.bags.replay import DEFAULT, Options
 from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError, outside_cause
@@ -58,8 +59,7 @@ class Settings:
     """What is the same for all recordings.
 
     ``report``, ``table`` and ``track`` are names of files in the folder of each recording, empty
-    for none; ``smooth``: estimates of the fixed-interval smoother; ``odometry``, ``origin``: of
-    the track.
+    for none; ``origin``: of the track.
     """
 
     configuration: Configuration
@@ -68,9 +68,8 @@ class Settings:
     report: str = ''
     table: str = ''
     limits: Limits = LIMITS
-    smooth: bool = False
+    options: Options = DEFAULT
     track: str = ''
-    odometry: str = ''
     origin: tuple[float, float] = (0.0, 0.0)
 
 
@@ -216,8 +215,8 @@ def _digest(settings: Settings, path: Path) -> str:
         'remaps': dict(settings.remaps),
         'files': [settings.report, settings.table],
         'limits': asdict(settings.limits),
-        'smooth': settings.smooth,
-        'track': [settings.track, settings.odometry, *settings.origin],
+        'smooth': settings.options.smooth,
+        'track': [settings.track, settings.options.odometry, *settings.origin],
     }
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     digest.update(json.dumps(stated, sort_keys=True, default=str).encode())
@@ -249,17 +248,9 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
     if effect_file := configuration.flat().get('effect_file'):
         load_file(str(effect_file))  # its reader has allowed it; this may be another machine
     output = settings.output / task.folder
+    options = replace(settings.options, overwrite=True, progress=False)
     drive = replay_drive(
-        task.path,
-        configuration,
-        settings.remaps,
-        output,
-        overwrite=True,
-        every_set=bool(settings.table),
-        limits=settings.limits,
-        progress=False,
-        smooth=settings.smooth,
-        odometry=settings.odometry,
+        task.path, configuration, settings.remaps, output, options, settings.limits
     )
     if settings.table:
         drive.write_table(output / settings.table, overwrite=True)

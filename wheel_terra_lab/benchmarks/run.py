@@ -72,7 +72,7 @@ def figures(size: Size) -> Iterator[Figure]:
 
 def _replay(folder: Path, size: Size) -> Iterator[Figure]:
     from wheel_terra_estimator.bags.reader import MeasurementReader
-    from wheel_terra_estimator.bags.replay import replay
+    from wheel_terra_estimator.bags.replay import Options, replay
     from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.simulation import scenario
@@ -99,7 +99,7 @@ def _replay(folder: Path, size: Size) -> Iterator[Figure]:
 
         def run(configuration: object = configuration) -> None:
             with open_bag(path) as bag:
-                replay(bag, configuration, {}, progress=False)  # type: ignore[arg-type]
+                replay(bag, configuration, {}, options=Options(progress=False))  # type: ignore[arg-type]
 
         yield timed_pairs(
             f'replay of {size.drive:.0f} s, {rate}', (run, 1),
