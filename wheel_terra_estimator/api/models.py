@@ -223,16 +223,11 @@ class Model:
             pass_number=np.asarray(pass_number),
         )
         state = self._model.steady_state(points)
-        carried = (state.flags & OVERLOADED) == 0
-        answers = {
-            name: np.where(carried, getattr(state, name), np.nan)
-            for name in (f.name for f in fields(Curve)[3:])
-        }
+        answers = {name: getattr(state, name) for name in (f.name for f in fields(Curve)[3:])}
         # As the sensors of the wheel would read them (``sensors.*`` of the configuration).
-        read = Readings.of(self.configuration).read(
-            np.column_stack([answers[name] for name in OUTPUTS])
-        )
-        answers |= dict(zip(OUTPUTS, read.T, strict=True))
+        answers |= Readings.of(self.configuration).of_answer(state)
+        carried = (state.flags & OVERLOADED) == 0
+        answers = {name: np.where(carried, values, np.nan) for name, values in answers.items()}
         inputs = (np.array(values) for values in (points.slip, points.normal_load, points.slope))
         return Curve(*inputs, **answers)
 

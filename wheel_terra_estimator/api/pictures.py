@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.api.models import Curve
-from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label, plain
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, WARNING_COLOUR, picture_style
+from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from wheel_terra_estimator.discrepancy.result import Diagnosis
 
-QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
 UNKNOWN_CLASS = 255
 
 
@@ -43,8 +43,8 @@ def plot_curve(
     """
     named = {'': curves} if isinstance(curves, Curve) else dict(curves)
     with picture_style():
-        panels = _panels(len(QUANTITIES), (10.5, 3.2), columns=True) if axes is None else axes
-        for panel, quantity in zip(panels, QUANTITIES, strict=True):
+        panels = _panels(len(OUTPUTS), (10.5, 3.2), columns=True) if axes is None else axes
+        for panel, quantity in zip(panels, OUTPUTS, strict=True):
             scale = SHOWN[quantity][0]
             for i, (name, curve) in enumerate(named.items()):
                 order = np.argsort(curve.slip, kind='stable')
@@ -97,7 +97,7 @@ def plot_estimates(estimates: Any, quantity: str = 'slip', axes: Axes | None = N
             last = time[min(end, time.size - 1)]
             panel.axvspan(time[start], last, color=WARNING_COLOUR, alpha=0.1, linewidth=0)
         panel.set_xlabel('time [s]')
-        panel.set_ylabel(quantity.replace('_', ' '))
+        panel.set_ylabel(plain(quantity))
         panel.legend(ncols=3)
     return panel
 
@@ -141,7 +141,7 @@ def plot_diagnosis(diagnosis: Diagnosis, axes: Axes | None = None) -> Axes:
                     label='noise' if row == 0 else '_',
                 )
             panel.annotate(
-                quantity.replace('_', ' '),
+                plain(quantity),
                 (row, 0.0),
                 (0, -14),
                 ha='center',

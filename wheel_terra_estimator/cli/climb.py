@@ -11,6 +11,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.slope_locomotion import rover_climb
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.configuration import Configuration
 
 WHO = ('wheel', 'rover')
-OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
 STEEPEST = np.radians(60.0)  # [rad]
 
 

@@ -33,6 +33,7 @@ from wheel_terra_estimator.terramechanics.contact_law import (
     ContactLaw,
     contact_law,
 )
+from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
 from wheel_terra_estimator.terramechanics.model import METHODS, OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel
@@ -53,7 +54,6 @@ MOST_POINTS = 100_000
 
 # Columns of the result, in the layout of the tables of steady measurements.
 INPUTS = (*INPUT_UNITS, 'leaving_angle')
-OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
 SIDEWAYS = 'lateral_force'  # beside them where a wheel slides sideways
 CURVES = {
     'normal_load': '{:g} N',
@@ -203,9 +203,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.angles:
         result.pop('leaving_angle', None)
     # As the sensors of the wheel would read them, like the tables of measurements.
-    readings = Readings.of(configuration, _wheel_index(arguments, configuration))
-    read = readings.read(np.column_stack([getattr(state, name) for name in OUTPUTS]))
-    answers = dict(zip(OUTPUTS, read.T, strict=True))
+    answers = Readings.of(configuration, _wheel_index(arguments, configuration)).of_answer(state)
     answers |= {SIDEWAYS: state.lateral_force} if sideways else {}
     answers |= {name: getattr(state, name) for name in ANGLES if arguments.angles}
     result |= {name: np.where(overloaded, np.nan, values) for name, values in answers.items()}

@@ -10,6 +10,8 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
+from wheel_terra_estimator.terramechanics.model import SteadyState
 
 
 @dataclass(frozen=True)
@@ -42,3 +44,8 @@ class Readings:
     def read(self, true: FloatArray) -> FloatArray:
         """Return the readings of true values; quantities on the last axis."""
         return true * self.gain + self.zero
+
+    def of_answer(self, state: SteadyState) -> dict[str, FloatArray]:
+        """Return the readings (N,) of each of `OUTPUTS` where the model gives an answer."""
+        true = np.column_stack([getattr(state, name) for name in OUTPUTS])
+        return dict(zip(OUTPUTS, self.read(true).T, strict=True))

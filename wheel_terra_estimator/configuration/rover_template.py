@@ -53,9 +53,10 @@ def rover_file(sketch: RoverSketch) -> str:
         'wheels.y': [float(v) for v in sketch.y],
         'wheels.z': [float(v) for v in sketch.z],
         'wheels.direction': [int(v) for v in sketch.direction] or [1] * count,
-        **({'wheels.steering_joints': list(sketch.steering_joints)} if _steers(sketch) else {}),
-        'wheels.passes': passes(sketch.x, sketch.y),
     }
+    if any(sketch.steering_joints):
+        values['wheels.steering_joints'] = list(sketch.steering_joints)
+    values['wheels.passes'] = passes(sketch.x, sketch.y)
     table = declared()
     lines = [f'# {sketch.name}: made by `wheel-terra init`', '#']
     lines += [f'# Source: {sketch.source}.'] if sketch.source else []
@@ -77,10 +78,6 @@ def rover_file(sketch: RoverSketch) -> str:
         unit = f' [{parameter.unit}]' if parameter.unit not in ('', '-') else ''
         lines.append(f'    # {key}: {format_value(shown)}  # {parameter.meaning}{unit}')
     return '\n'.join(lines) + '\n'
-
-
-def _steers(sketch: RoverSketch) -> bool:
-    return any(sketch.steering_joints)
 
 
 _WORTH_STATING = (

@@ -229,16 +229,17 @@ def _predicted(
 def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
     """Return the named effects with their confidence; first the one that alone explains more."""
     findings, fitted, known = decision.findings, decision.after, catalogue()
+    selection = findings.selection
     shown = _what_rows_show(findings, fitted, decision.gap)
     expected_gain = gain_on_top(table, findings.setting, fitted)
     shown['law'] = float(np.log1p(max(expected_gain, 0.0)))
     found = []
     for place, key in enumerate(fitted.names):
-        values = confidences.features(findings.selection, decision.verdict, place) | shown
+        values = confidences.features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
         alike = known_alike(key, findings, known)
         values['alike'] = float(len(alike))
-        alone = float(np.logaddexp.reduce(findings.selection.joint_of((key,))))
+        alone = float(np.logaddexp.reduce(selection.log_joint[selection.index((key,))]))
         competitors = decision.verdict.ambiguity_groups[place]
         sure = confidences.confidence(values, len(alike))
         found.append((alone, Naming(key, competitors, sure, values)))

@@ -18,11 +18,12 @@ from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.discrepancy.numbers import SHOWN
 from wheel_terra_estimator.discrepancy.result import Diagnosis, OtherLaw
-from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.discrepancy.workflow import nuisance_coordinates, operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.contact_law import LAWS, RESISTIVE_FORCE, contact_law
 from wheel_terra_estimator.terramechanics.effects import by_variant, catalogue
+from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
 Rows = BoolArray
@@ -35,7 +36,6 @@ _LOAD_GROUPS = 3  # by load, where the greatest is more than `_LOADS_DIFFER` tim
 _LOADS_DIFFER = 1.2
 _FEWEST_ROWS = 4
 _ROUNDS = 6  # of fit and misfit in turn; the misfit settles to some per cent in three
-_OUTPUTS = QUANTITIES[:3]
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class _Fit:
         self.configuration = configuration
         self.points = operating_points(table, configuration)
         self.readings = Readings.of(configuration).true_on(table.true_rows)
-        self.measured = table.measured[:, : len(_OUTPUTS)]
+        self.measured = table.measured[:, : len(OUTPUTS)]
         spread = [np.ptp(v[np.isfinite(v)]) if np.isfinite(v).any() else 0 for v in self.measured.T]
         self.usual = USUAL_MISFIT * np.where(np.array(spread) > 0.0, spread, 1.0)
         self.width = float(np.median(self.points.wheel.width))
@@ -175,7 +175,7 @@ class _Fit:
             left[rows] = (self.measured - self.outputs(fit(rows)))[rows]
         return {
             quantity: float(np.sqrt(np.nanmean(left[:, q] ** 2)))
-            for q, quantity in enumerate(_OUTPUTS)
+            for q, quantity in enumerate(OUTPUTS)
             if np.isfinite(left[:, q]).any()
         }
 

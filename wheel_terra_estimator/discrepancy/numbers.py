@@ -5,6 +5,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+
+from wheel_terra_estimator.terramechanics.effects.base import effect_of
 
 # How quantities are shown: factor and unit.
 SHOWN = {
@@ -15,9 +18,24 @@ SHOWN = {
 }
 
 
+def plain(name: str) -> str:
+    """Return the name of a quantity, an input or an effect as it is said."""
+    return name.replace('_', ' ')
+
+
+def joined(keys: Iterable[str]) -> str:
+    """Return the effects of a set, whatever their forms, in words."""
+    return ' + '.join(map(effect_of, keys)) or 'nothing'
+
+
 def axis_label(quantity: str) -> str:
     """Return what stands at the axis of a quantity: its name, and the unit in which it is shown."""
-    return f'{quantity.replace("_", " ")} [{SHOWN[quantity][1]}]'
+    return f'{plain(quantity)} [{SHOWN[quantity][1]}]'
+
+
+def with_unit(text: str, unit: str) -> str:
+    """Return a number with its unit; a ratio has none."""
+    return text if unit in ('', '-') else f'{text} {unit}'
 
 
 def number(value: float, digits: int = 3) -> str:

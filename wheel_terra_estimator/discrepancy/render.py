@@ -128,9 +128,9 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
     for naming in decision.names:
         key, name = naming.key, effect_of(naming.key)
         forms = {
-            e.names[0]: float(log_sum(selection.joint_of(e.names)))
-            for e in selection.explanations
-            if len(e.names) == 1 and effect_of(e.names[0]) == name
+            e.names[0]: float(log_sum(selection.log_joint[h]))
+            for h, e in enumerate(selection.explanations)
+            if len(e.names) == 1 and e.effects == {name}
         }
         competitors = tuple(map(effect_of, naming.competitors))
         found.append(
@@ -208,7 +208,7 @@ def _candidates(decision: Decision) -> tuple[Candidate, ...]:
     """Return the best explanations, nothing among them, each with why it was not the one."""
     findings, verdict = decision.findings, decision.verdict
     selection, setting = findings.selection, findings.setting
-    nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
+    nothing = selection.nothing
     shown = [h for h, e in enumerate(selection.explanations) if e.names][:_CANDIDATES_SHOWN]
     if verdict.index not in (nothing, *shown):
         shown.append(verdict.index)
@@ -257,16 +257,16 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
     findings, verdict, after = decision.findings, decision.verdict, decision.after
     selection = findings.selection
     competitors: list[Fit] = []
-    for place, names in enumerate(verdict.ambiguity_groups):
-        others = set(after.names) - {after.names[place]}
+    for member, names in enumerate(verdict.ambiguity_groups):
+        others = set(after.names) - {after.names[member]}
         for competitor in names:
             with suppress(KeyError):
-                competitors.append(selection.find((*others, competitor)).fitted)
+                place = selection.index((*others, competitor))
+                competitors.append(selection.explanations[place].fitted)
     if not competitors:
         by_effects: dict[frozenset[str], Fit] = {}
         for explanation in selection.explanations:  # each set of effects in its best forms
-            effects = frozenset(map(effect_of, explanation.names))
-            by_effects.setdefault(effects, explanation.fitted)
+            by_effects.setdefault(explanation.effects, explanation.fitted)
         best = list(by_effects.values())
         if verdict.status in OPEN:  # the two names that come nearest, and nothing
             after, *competitors = [f for f in best if f.names][:2] or [after]

@@ -4,16 +4,15 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
+from wheel_terra_estimator.discrepancy.numbers import joined
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK, effect_of
 
@@ -83,7 +82,7 @@ class Candidate:
     @property
     def label(self) -> str:
         """Names joined for people."""
-        return ' + '.join(effect_of(key) for key in self.names) or 'nothing'
+        return joined(self.names)
 
     @property
     def full_label(self) -> str:
@@ -367,11 +366,6 @@ class Diagnosis:
         if shift.name == 'tan_friction':
             return 'friction_angle_deg', math.degrees(shift.prior_std / (1.0 + shift.before**2))
         return shift.name, shift.prior_std
-
-    def write_json(self, path: str | Path) -> None:
-        """Write ``report.json``."""
-        text = json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
-        Path(path).write_text(text + '\n', encoding='utf-8')
 
 
 def as_json(value: Any) -> Any:

@@ -15,7 +15,7 @@ from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.clock import Clock
@@ -32,9 +32,10 @@ from wheel_terra_estimator.estimation import traction_limiter as limiter
 from wheel_terra_estimator.estimation.traction_law import LimiterTuning
 from wheel_terra_estimator.estimation.traction_limiter import Interlock, LimiterState, Velocity
 from wheel_terra_estimator.messages.convert import stamp_of
-from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN
+from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN, Status
 from wheel_terra_estimator.output_folder import cannot_write, check_file
 from wheel_terra_estimator.ros.file_claim import FileClaim
+from wheel_terra_estimator.ros.outputs import diagnostic_array
 from wheel_terra_estimator.ros.qos import input_profile, output_profile
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
@@ -199,16 +200,8 @@ class TractionLimiter(Node):
             'estimate_age_s': f'{age:.2f}' if math.isfinite(age) else 'never received',
             'clock_offset_s': f'{state.clock_offset or 0.0:.2f}',
         }
-        status = DiagnosticStatus(
-            level=bytes([level]),
-            name=f'{name}: limiter',
-            message=words,
-            hardware_id=name,
-            values=[KeyValue(key=key, value=value) for key, value in values.items()],
-        )
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
+        status = Status(level, f'{name}: limiter', words, name, list(values.items()))
+        self._diagnostics.publish(diagnostic_array(self.get_clock().now().to_msg(), [status]))
 
     # -- What is kept over a restart ------------------------------------------------------------
 

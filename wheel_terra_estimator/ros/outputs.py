@@ -85,20 +85,25 @@ class EstimatePublisher:
 
     def publish_diagnostics(self, stamp: Time, statuses: Sequence[Status]) -> None:
         """Publish statuses on ``/diagnostics``."""
-        message = DiagnosticArray()
-        message.header.stamp = stamp
-        message.header.frame_id = BASE_FRAME
-        message.status = [
-            DiagnosticStatus(
-                level=bytes([status.level]),
-                name=status.name,
-                message=status.message,
-                hardware_id=status.hardware_id,
-                values=[KeyValue(key=key, value=value) for key, value in status.values],
-            )
-            for status in statuses
-        ]
-        self._diagnostics_publisher.publish(message)
+        self._diagnostics_publisher.publish(diagnostic_array(stamp, statuses))
+
+
+def diagnostic_array(stamp: Time, statuses: Sequence[Status]) -> DiagnosticArray:
+    """Return statuses as a message."""
+    message = DiagnosticArray()
+    message.header.stamp = stamp
+    message.header.frame_id = BASE_FRAME
+    message.status = [
+        DiagnosticStatus(
+            level=bytes([status.level]),
+            name=status.name,
+            message=status.message,
+            hardware_id=status.hardware_id,
+            values=[KeyValue(key=key, value=value) for key, value in status.values],
+        )
+        for status in statuses
+    ]
+    return message
 
 
 def time_message(stamp: int) -> Time:

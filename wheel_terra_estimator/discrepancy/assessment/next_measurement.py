@@ -13,6 +13,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.numbers import joined
 from wheel_terra_estimator.discrepancy.result import NextMeasurement
 from wheel_terra_estimator.discrepancy.selection.candidates import Setting
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
@@ -50,7 +51,7 @@ def propose(
     menu = _menu(setting) if competitors else []
     predicted = _predicted(setting, [chosen, *competitors], [points for _, points in menu])
     for place, competitor in enumerate(competitors, 1):
-        names = (_label(chosen), _label(competitor))
+        names = (joined(chosen.names), joined(competitor.names))
         if names[0] == names[1]:  # two forms of the same
             names = (' + '.join(chosen.names), ' + '.join(competitor.names))
         now = _distance(setting, chosen, competitor, None, std)
@@ -78,10 +79,6 @@ def propose(
         blocks.sort(key=lambda block: -block.distance_then)
         found.extend(blocks[:_KEPT])
     return tuple(found)
-
-
-def _label(fitted: Fit) -> str:
-    return ' + '.join(effect_of(key) for key in fitted.names) or 'nothing'
 
 
 def _menu(setting: Setting) -> list[tuple[str, OperatingPoints]]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.discrepancy.numbers import number
+from wheel_terra_estimator.discrepancy.numbers import number, plain
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
     ORDER_COLUMNS,
@@ -44,7 +44,7 @@ class Change:
         chance = (
             f'chance {number(self.p_value, 1)}' if self.p_value >= 1e-3 else 'chance below 0.001'
         )
-        name, column = self.quantity.replace('_', ' '), self.column.replace('_', ' ')
+        name, column = plain(self.quantity), plain(self.column)
         if self.column in _SEQUENCES:
             how = f'neighbours correlate with {number(self.strength, 2)}'
         else:

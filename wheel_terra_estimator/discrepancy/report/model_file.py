@@ -9,6 +9,7 @@ and the effect stays off, so that nothing corrects the same error twice.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -35,7 +36,8 @@ _SINKAGE_ZERO, _TORQUE_ZERO = 'sinkage_offset', 'drivetrain_friction'
 
 def write_files(diagnosis: Diagnosis, folder: Path, *, pictures: bool) -> None:
     """Write ``report.json``, ``model.yaml``, ``proposal.yaml`` and, with pictures, the page."""
-    diagnosis.write_json(folder / 'report.json')
+    report = json.dumps(diagnosis.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+    (folder / 'report.json').write_text(f'{report}\n', encoding='utf-8')
     write_model(diagnosis, folder / 'model.yaml')
     if diagnosis.proposal:
         write_proposal(diagnosis, diagnosis.proposal, folder / 'proposal.yaml')

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, percent
+from wheel_terra_estimator.discrepancy.numbers import (
+    SHOWN,
+    amount,
+    number,
+    percent,
+    plain,
+    with_unit,
+)
 from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
 from wheel_terra_estimator.discrepancy.report.words import in_words, law_line, soil_line
@@ -56,7 +63,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
             for key in keys
             if key in new and shown(old.get(key)) != shown(new[key])
         ],
-        sources=[(pictures.words(name), known[name].source) for name in used if name in known],
+        sources=[(plain(name), known[name].source) for name in used if name in known],
         sentence=diagnosis.sentence.replace('+-', '±'),
         soil_line=soil_line(diagnosis),
         law_line=law_line(diagnosis),
@@ -64,12 +71,12 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         soil_words=SOIL_WORDS,
         far=LARGEST_Z_SCORE,
         # How things are written
-        words=pictures.words,
+        words=plain,
         number=number,
         percent=percent,
         amount=amount,
         unit_of=lambda quantity: SHOWN[quantity][1],
-        with_unit=_with_unit,
+        with_unit=with_unit,
         parameter=_parameter,
         share=_share,
         proposed=_proposed,
@@ -77,10 +84,6 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     path = folder / 'report.html'
     path.write_text(page, encoding='utf-8')
     return path
-
-
-def _with_unit(text: str, unit: str) -> str:
-    return text if unit in ('', '-') else f'{text} {unit}'
 
 
 def shown(value: Any) -> str:
@@ -106,7 +109,7 @@ def _where(diagnosis: Diagnosis) -> str:
     """Return the sentence of where the gap is, as one."""
     text = diagnosis.where.sentence
     for name in diagnosis.table.columns:
-        text = text.replace(name, pictures.words(name))
+        text = text.replace(name, plain(name))
     return text[:1].upper() + text[1:].rstrip('.') + '.'
 
 
@@ -143,8 +146,7 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
         cards.append(
             {
                 'value': f'{values} {unit}',
-                'label': f'rms error of {pictures.words(name)} on unseen rows: '
-                + ', '.join(stages),
+                'label': f'rms error of {plain(name)} on unseen rows: ' + ', '.join(stages),
             }
         )
     closed = {name: g.shrink for name, g in diagnosis.gap.items() if g.shrink is not None}
@@ -153,8 +155,7 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
         cards.append(
             {
                 'value': ' to '.join(dict.fromkeys((ends[0], ends[-1]))) + ' %',
-                'label': 'of the gap above the noise closed '
-                f'({", ".join(map(pictures.words, closed))})',
+                'label': f'of the gap above the noise closed ({", ".join(map(plain, closed))})',
             }
         )
     cards.append({'value': str(len(diagnosis.table)), 'label': 'rows'})
@@ -174,7 +175,7 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
     proposed = next((m for m in diagnosis.next_measurement if m.rows is not None), None)
     residuals = [
         (
-            pictures.words(name),
+            plain(name),
             keep(f'residuals_by_{name}', pictures.residuals(diagnosis, name)),
         )
         for name in pictures.colour_inputs(diagnosis)
@@ -193,7 +194,7 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _parameter(name: str, item: FittedParameter) -> str:
-    value = _with_unit(f'{number(item.value)} ± {number(item.std, 2)}', item.unit)
+    value = with_unit(f'{number(item.value)} ± {number(item.std, 2)}', item.unit)
     reach = item.upper - item.lower
     end = np.isfinite(reach) and min(item.value - item.lower, item.upper - item.value)
     return f'{name} = {value}{" (at its bound)" if end is not False and end < 1e-3 * reach else ""}'
@@ -214,5 +215,5 @@ def _proposed(item: NextMeasurement) -> str:
         factor, unit = pictures.shown_input(name)
         ends = factor * np.min(column), factor * np.max(column)
         text = ' to '.join(map(number, ends)) if not np.isclose(*ends) else number(ends[0])
-        ranges.append(_with_unit(f'{pictures.words(name)} {text}', unit))
+        ranges.append(with_unit(f'{plain(name)} {text}', unit))
     return f'{len(item.rows["slip"])} rows: ' + ', '.join(ranges)

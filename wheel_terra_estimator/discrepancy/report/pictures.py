@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
-from wheel_terra_estimator.discrepancy.numbers import SHOWN
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label, plain, with_unit
 from wheel_terra_estimator.discrepancy.result import Diagnosis, NextMeasurement
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, QUANTITIES
 from wheel_terra_estimator.reporting.style import INK, LINE_COLOURS, NOISE_COLOUR, picture_style
@@ -41,11 +41,6 @@ _LEFT = 0.72  # room for the labels of an axis [inch]
 _BETWEEN_ROWS = 0.28  # of panels [inch]
 
 
-def words(name: str) -> str:
-    """Name of a quantity or input for people."""
-    return name.replace('_', ' ')
-
-
 def shown_input(name: str) -> tuple[float, str]:
     """Return factor and unit in which an input is shown."""
     return SHOWN_INPUT.get(name, (1.0, INPUT_UNITS.get(name, '-')))
@@ -53,7 +48,7 @@ def shown_input(name: str) -> tuple[float, str]:
 
 def label(name: str, unit: str) -> str:
     """Axis label."""
-    return words(name) if unit == '-' else f'{words(name)} [{unit}]'
+    return plain(name) if unit == '-' else f'{plain(name)} [{unit}]'
 
 
 def measured_against_model(diagnosis: Diagnosis) -> Figure:
@@ -95,7 +90,7 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
     if not groups:
         return None
     slip = table.columns['slip']
-    others = [words(name) for name in table.varying() if name != 'slip']
+    others = [plain(name) for name in table.varying() if name != 'slip']
     texts = [*([f'{", ".join(others)}:'] if others else []), *(text for text, _ in groups)]
     models = ['model as configured', f'model {_last(diagnosis)}']
     with _style():
@@ -147,8 +142,7 @@ def _sweeps(diagnosis: Diagnosis) -> list[tuple[str, IndexArray]]:
         text = []
         for name in others:
             factor, unit = shown_input(name)
-            shown = f'{factor * table.columns[name][rows[0]]:.3g}'
-            text.append(shown if unit == '-' else f'{shown} {unit}')
+            text.append(with_unit(f'{factor * table.columns[name][rows[0]]:.3g}', unit))
         ordered = rows[np.argsort(table.columns['slip'][rows], kind='stable')]
         found.append((', '.join(text) or 'measured', ordered))
     covered = sum(len(rows) for _, rows in found)
@@ -172,7 +166,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     slip, colour = table.columns['slip'], factor * table.columns[colour_by]
     few = np.unique(np.round(colour[np.isfinite(colour)], 9))
     discrete = len(few) <= 5
-    texts = [f'{words(colour_by)} {value:.3g} {unit}'.removesuffix(' -') for value in few]
+    texts = [with_unit(f'{plain(colour_by)} {value:.3g}', unit) for value in few]
     lines = _legend_lines(texts, stages) if discrete else 0
     with _style():
         figure, axes = _panels(
@@ -185,7 +179,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
         )
         drawn = None
         for row, name in zip(axes, table.quantities, strict=True):
-            q, (scale, quantity_unit) = QUANTITIES.index(name), SHOWN[name]
+            q, scale = QUANTITIES.index(name), SHOWN[name][0]
             outside = _rejected_cells(diagnosis, q)
             error = [scale * (table.measured[:, q] - values[:, q]) for _, values in stages]
             reach = 1.12 * max(float(np.nanmax(np.abs(e[~outside]))) for e in error)
@@ -211,7 +205,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
                 if name == table.quantities[-1]:
                     axis.set_xlabel('slip')
                 if axis is row[0]:
-                    axis.set_ylabel(f'{words(name)} [{quantity_unit}]')
+                    axis.set_ylabel(axis_label(name))
             row[0].set_ylim(-reach, reach)
         if discrete:
             from matplotlib.lines import Line2D
@@ -252,7 +246,7 @@ def where_map(diagnosis: Diagnosis) -> Figure:
             )
             share = where.shares.get(name)
             share_text = '' if share is None else f', {100 * share:.0f} % of the misfit'
-            axis.set(title=words(name) + share_text, xlabel='slip')
+            axis.set(title=plain(name) + share_text, xlabel='slip')
             if name == where.quantity:
                 _box(axis, diagnosis, second)
         axes[0][0].set_ylabel(label(second, unit))
@@ -298,7 +292,7 @@ def competitors(item: NextMeasurement) -> Figure | None:
     x = factor * np.asarray(item.rows[x_name], dtype=float)
     order = np.argsort(x, kind='stable')
     with _style():
-        names = [words(competitor) for competitor in item.predictions]
+        names = [plain(competitor) for competitor in item.predictions]
         aside = any(np.asarray(values)[:, -1].any() for values in item.predictions.values())
         shown = QUANTITIES if aside else QUANTITIES[:-1]
         lines = _legend_lines(names, shown)
@@ -314,7 +308,7 @@ def competitors(item: NextMeasurement) -> Figure | None:
                     ms=4.5,
                     color=colour,
                     mfc='none' if marker != 'o' else colour,
-                    label=words(competitor),
+                    label=plain(competitor),
                 )
         handles, labels = axes[0][0].get_legend_handles_labels()
         _legend(figure, handles, labels, lines=lines)
@@ -336,7 +330,7 @@ def _each(
     for axis, name in zip(axes[0], quantities, strict=True):
         scale, unit = SHOWN[name]
         yield axis, QUANTITIES.index(name), scale
-        axis.set(xlabel=x.format(unit), title=words(name))
+        axis.set(xlabel=x.format(unit), title=plain(name))
         axis.set_ylabel(y.format(unit))
 
 
@@ -440,7 +434,7 @@ def _band(axis: Axes, slip: FloatArray, half: FloatArray) -> None:
 
 
 def _last(diagnosis: Diagnosis) -> str:
-    names = [words(effect.name) for effect in diagnosis.effects]
+    names = [plain(effect.name) for effect in diagnosis.effects]
     return f'with {" and ".join(names)}' if names else 'soil refitted'
 
 

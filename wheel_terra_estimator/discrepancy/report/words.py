@@ -13,7 +13,15 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, percent
+from wheel_terra_estimator.discrepancy.numbers import (
+    SHOWN,
+    amount,
+    joined,
+    number,
+    percent,
+    plain,
+    with_unit,
+)
 from wheel_terra_estimator.discrepancy.result import (
     OPEN,
     Diagnosis,
@@ -52,17 +60,17 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
             stages['with the proposed law'] = diagnosis.proposal.gap[name].after
         said = ', '.join(f'{amount(name, value)} {stage}' for stage, value in stages.items())
         noise = f'; its noise is {amount(name, item.noise)}' if item.noise else ''
-        shrank.append(f'{_plain(name)} [{SHOWN[name][1]}]: off by {said}{noise}.')
+        shrank.append(f'{plain(name)} [{SHOWN[name][1]}]: off by {said}{noise}.')
     left = [
-        f'{_plain(name)} is still off by more than noise and the allowed model error.'
+        f'{plain(name)} is still off by more than noise and the allowed model error.'
         for name in still_off
     ]
     if any(effect.remainder for effect in diagnosis.effects):
         left.append('Something is left that the named effect does not explain.')
     for effect in diagnosis.effects:
         if effect.confounded_with:
-            competitors = ', '.join(map(_plain, effect.confounded_with))
-            left.append(f'These rows cannot tell {_plain(effect.name)} from {competitors}.')
+            competitors = ', '.join(map(plain, effect.confounded_with))
+            left.append(f'These rows cannot tell {plain(effect.name)} from {competitors}.')
     if diagnosis.verdict in OPEN and not still_off:
         left.append('Why these rows need another soil, or more scatter, than was stated.')
     if not left:
@@ -94,14 +102,14 @@ def _to_settle(diagnosis: Diagnosis) -> list[str]:
     for name in names:
         separates = next(iter(known[name].confounded_with.values()), '')
         if separates:
-            found.append(f'To settle whether it is {_plain(name)}, measure: {separates}.')
+            found.append(f'To settle whether it is {plain(name)}, measure: {separates}.')
     if diagnosis.proposal:
         columns = [c for f in diagnosis.proposal.features for c in FEATURES[f].columns]
-        levels = ' and '.join(_plain(name) for name in dict.fromkeys(columns))
+        levels = ' and '.join(plain(name) for name in dict.fromkeys(columns))
         if levels:
             found.append(f'More levels of {levels} would confirm the proposed law or refute it.')
     varied = set(diagnosis.table.varying())
-    constant = [_plain(name) for name in _WORTH_VARYING if name not in varied]
+    constant = [plain(name) for name in _WORTH_VARYING if name not in varied]
     if constant:
         found.append(f'Rows at another {" or ".join(constant)} would say more than further slips.')
     return found
@@ -109,7 +117,7 @@ def _to_settle(diagnosis: Diagnosis) -> list[str]:
 
 def worth(item: NextMeasurement) -> str:
     """Return a measurement with what it is worth."""
-    names = ['no effect' if name == 'nothing' else _plain(name) for name in item.separates]
+    names = ['no effect' if name == 'nothing' else plain(name) for name in item.separates]
     competitors = ' from '.join(names)
     if not np.isfinite(item.distance_then):
         return f'{item.what} (separates {competitors})'
@@ -150,10 +158,6 @@ def far(shifts: Iterable[SoilShift]) -> list[str]:
     return [moved(shift) for shift in shifts if abs(shift.z_score) > LARGEST_Z_SCORE]
 
 
-def _plain(name: str) -> str:
-    return name.replace('_', ' ')
-
-
 def why_not(
     findings: Findings, verdict: Verdict, index: int, totals: FloatArray, chosen: set[str]
 ) -> str:
@@ -164,7 +168,7 @@ def why_not(
     if {effect_of(key) for key in names} == {effect_of(key) for key in chosen}:
         return f'another form of the same: {behind:.1f} nats behind'
     if not names:
-        return f'leaves a gap: {behind:.1f} nats behind {_label(chosen)}'
+        return f'leaves a gap: {behind:.1f} nats behind {joined(sorted(chosen))}'
     open_names = {name for competitors in verdict.ambiguity_groups for name in competitors}
     if len(names) == len(chosen) and set(names) - chosen <= open_names:
         return f'cannot be told apart on these rows ({behind:.1f} nats behind)'
@@ -173,11 +177,11 @@ def why_not(
     if verdict.status == 'unexplained':
         return 'leaves a smooth misfit that it does not explain'
     if chosen < set(names):
-        extra = _label(set(names) - chosen)
+        extra = joined(sorted(set(names) - chosen))
         return f'{extra} adds nothing that the data ask for ({behind:.1f} nats behind)'
     if set(names) < chosen:
-        return f'leaves what {_label(chosen - set(names))} explains ({behind:.1f} nats)'
-    return f'fits worse: {behind:.1f} nats behind {_label(chosen)}'
+        return f'leaves what {joined(sorted(chosen - set(names)))} explains ({behind:.1f} nats)'
+    return f'fits worse: {behind:.1f} nats behind {joined(sorted(chosen))}'
 
 
 def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
@@ -186,16 +190,12 @@ def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
     for name in channels_off(gap):
         item = gap[name]
         parts.append(
-            f'{_plain(name)} is off by {amount(name, item.after)} {SHOWN[name][1]} on unseen rows '
+            f'{plain(name)} is off by {amount(name, item.after)} {SHOWN[name][1]} on unseen rows '
             f'(noise and allowed model error permit {amount(name, item.limit)})'
         )
     off = ' and '.join(parts)
     text = f'Not decided: {off}, but these rows favour neither the refitted soil nor an effect'
     return f'{text}; nearest: {", ".join(nearest)}.' if nearest else f'{text}.'
-
-
-def _label(names: set[str]) -> str:
-    return ' + '.join(sorted(effect_of(key) for key in names)) or 'nothing'
 
 
 def notes(
@@ -234,7 +234,7 @@ def _repeatability(noise: Noise) -> list[str]:
         chance = float(chdtrc(count, count * (pooled / stated) ** 2))
         if noise.origin[name] == 'given' and not _CHANCE < chance < 1.0 - _CHANCE:
             found.append(
-                f'{_plain(name)}: rows that repeat one another scatter by '
+                f'{plain(name)}: rows that repeat one another scatter by '
                 f'{amount(name, pooled, 2)} {SHOWN[name][1]}, its stated noise is '
                 f'{amount(name, stated, 2)}; one of them is wrong'
             )
@@ -299,11 +299,10 @@ def sentence(
     parts = []
     for effect in effects:
         values = ', '.join(
-            f'{name} = {number(p.value)} +- {number(p.std, 2)}'
-            f'{"" if p.unit == "-" else " " + p.unit}'
+            with_unit(f'{name} = {number(p.value)} +- {number(p.std, 2)}', p.unit)
             for name, p in effect.parameters.items()
         )
-        form = f' in the form {_plain(effect.form)}' if effect.form else ''
+        form = f' in the form {plain(effect.form)}' if effect.form else ''
         text = f'{effect.name}{form} ({values}; confidence {percent(effect.confidence)})'
         if effect.confounded_with:
             competitors = ' or '.join(effect.confounded_with)

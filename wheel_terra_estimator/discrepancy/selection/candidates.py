@@ -24,7 +24,7 @@ from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.selection.signatures import shapes
-from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 # Floor during the fits [share of the range]; the evidence then weighs all floors.
 FIT_FLOOR = 0.01
@@ -41,8 +41,13 @@ class Explanation:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects in it."""
+        """The effects in it, by their keys: each in a form."""
         return self.fitted.names
+
+    @property
+    def effects(self) -> frozenset[str]:
+        """The same whatever their forms."""
+        return frozenset(map(effect_of, self.fitted.names))
 
 
 @dataclass(frozen=True)

@@ -59,10 +59,9 @@ def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, fl
     """Return the features of the name at ``place`` in the named set."""
     total = np.array([log_sum(row) for row in selection.log_joint])
     name = selection.explanations[verdict.index].names[place]
-    effects = [{effect_of(key) for key in e.names} for e in selection.explanations]
-    has = np.array([effect_of(name) in mine for mine in effects])
+    has = np.array([effect_of(name) in e.effects for e in selection.explanations])
     inside = {effect_of(key) for key in (name, *verdict.ambiguity_groups[place])}
-    covered = np.array([bool(inside & mine) for mine in effects])
+    covered = np.array([bool(inside & e.effects) for e in selection.explanations])
 
     def margin(mine: np.ndarray) -> float:
         against = total[~mine]
@@ -70,9 +69,8 @@ def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, fl
             return 20.0
         return float(log_sum(total[mine]) - log_sum(against))
 
-    nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
     alone = _squash(margin(has))
-    gain = float(np.log1p(max(total[verdict.index] - total[nothing], 0.0)))
+    gain = float(np.log1p(max(total[verdict.index] - total[selection.nothing], 0.0)))
     two = float(len(selection.explanations[verdict.index].names) > 1)
     return {
         'one': 1.0,

@@ -224,7 +224,7 @@ def _seeds(selection: Selection, size: int) -> list[Explanation]:
         if weight < leaders[0][0] - _BEHIND:
             break
         if len(explanation.names) == size:
-            found.setdefault(_effects(explanation), explanation)
+            found.setdefault(explanation.effects, explanation)
     return list(found.values())[:_SEEDS]
 
 
@@ -232,15 +232,11 @@ def _with_swaps(setting: Setting, selection: Selection, done: set[frozenset[str]
     """Put others in the place of each effect of the best set, or of one near it."""
     leaders = selection.without_misfit(_SEEDS)
     near = [e for weight, e in leaders if weight > leaders[0][0] - _NEAR and len(e.names) > 1]
-    best = next((e for e in near if _effects(e) not in done), None)
+    best = next((e for e in near if e.effects not in done), None)
     if best is None:
         return selection
-    done.add(_effects(best))
+    done.add(best.effects)
     return _joined_by(setting, selection, explain_swaps(setting, best))
-
-
-def _effects(explanation: Explanation) -> frozenset[str]:
-    return frozenset(effect_of(key) for key in explanation.names)
 
 
 def _joined_by(setting: Setting, selection: Selection, more: list[Explanation]) -> Selection:

@@ -75,7 +75,7 @@ def choose(
     """
     joint, unexplained = selection.log_joint, selection.unexplained
     total = np.asarray(log_sum(joint, axis=1))
-    nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
+    nothing = selection.nothing
     left = remainder(selection, nothing, variance_of)
     agrees = float(log_sum(joint[nothing][~unexplained]))
     rest = float(log_sum(joint[nothing][unexplained]))
@@ -112,8 +112,7 @@ def _best_set(selection: Selection, weight: FloatArray, named: list[int]) -> int
     """Return the best form of the best set of effects: the forms of an effect add up."""
     sets: dict[frozenset[str], list[int]] = {}
     for h in named:
-        effects = frozenset(effect_of(key) for key in selection.explanations[h].names)
-        sets.setdefault(effects, []).append(h)
+        sets.setdefault(selection.explanations[h].effects, []).append(h)
     forms = max(sets.values(), key=lambda mine: float(log_sum(weight[mine])))
     return max(forms, key=lambda h: float(weight[h]))
 

@@ -103,6 +103,11 @@ class Selection:
         return np.array([floor.unexplained for floor in self.floors])
 
     @property
+    def nothing(self) -> int:
+        """Place of the explanation without an effect."""
+        return self.index(())
+
+    @property
     def misfit(self) -> float:
         """Posterior probability that a misfit is left that asks for a name."""
         return float(self.probability[:, self.unexplained].sum())
@@ -113,15 +118,8 @@ class Selection:
         order = np.argsort(-weights)[:count]
         return [(float(weights[h]), self.explanations[h]) for h in order]
 
-    def find(self, names: Sequence[str]) -> Explanation:
-        """Return the explanation with exactly these effects."""
-        return self.explanations[self._index(names)]
-
-    def joint_of(self, names: Sequence[str]) -> FloatArray:
-        """(F,) log of prior times evidence of the explanation with exactly these effects."""
-        return self.log_joint[self._index(names)]
-
-    def _index(self, names: Sequence[str]) -> int:
+    def index(self, names: Sequence[str]) -> int:
+        """Return the place of the explanation with exactly these effects."""
         for h, explanation in enumerate(self.explanations):
             if set(explanation.names) == set(names):
                 return h

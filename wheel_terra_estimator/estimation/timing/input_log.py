@@ -21,7 +21,7 @@ from wheel_terra_estimator.estimation.timing.input_checks import (
     REFERENCE,
     WHEEL_ODOMETRY,
 )
-from wheel_terra_estimator.estimation.timing.merging import StepMerger, merge_wheels, same
+from wheel_terra_estimator.estimation.timing.merging import Heard, merge_step, merge_wheels, same
 from wheel_terra_estimator.estimation.timing.step_grid import LONGEST_STEP, StepGrid
 
 KEPT_STATE_SPACING = 50_000_000
@@ -67,7 +67,7 @@ class _Walk(NamedTuple):
     next_reference: int  # a reference velocity is used again from this stamp on
     step_index: int  # of the last wheel odometry; -1: none yet
     end: int  # stamp of the last step
-    heard: Any  # of ``StepMerger``
+    heard: Heard
     steps: int  # since the start of the run
 
 
@@ -135,7 +135,6 @@ class InputLog:
         self.repeated = [0] * len(CHANNELS)
         self.contradicted = [0] * len(CHANNELS)
         self._reference_period = reference_period
-        self._merger = StepMerger()
         self._pristine = self._snapshot()
         self._charged: _Charged
         self._settled: bool  # since the last run
@@ -313,9 +312,9 @@ class InputLog:
         return after if ends else None
 
     def _step(self, stamp: int, pending: list[list[Any]], after: _Walk) -> None:
-        inputs = self._merger.merged(stamp, pending)
+        inputs, heard = merge_step(stamp, pending, self._walk.heard)
         self.counts['steps'] += 1
-        self._walk = after._replace(end=stamp, heard=self._merger.heard, steps=after.steps + 1)
+        self._walk = after._replace(end=stamp, heard=heard, steps=after.steps + 1)
         for runner in self._runners:
             runner.step(stamp, inputs)
 
@@ -368,7 +367,6 @@ class InputLog:
         if self._position >= 0:
             self.counts['reruns'] += self._position != self._ran
             self.counts['steps_repeated'] += max(steps - self._walk.steps, 0)
-        self._merger.heard = self._walk.heard
         self._last_kept = self._walk.end
         self._position = self._ran = index + 1
         self._astray = False

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isnan, nan
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     InertialVariance,
     Measurement,
-    ReferenceVelocity,
     StepInputs,
     WheelOdometry,
 )
@@ -58,65 +57,67 @@ def _newer(before: FloatArray, after: FloatArray) -> tuple[FloatArray, bool]:
     return np.where(given, after, before), bool(np.any(given & ~np.isnan(before)))
 
 
-class StepMerger:
-    """Merges what came between two steps; plain floats, which beat numpy for a few readings.
+Heard: TypeAlias = 'tuple[int, ...] | None'
+"""Stamp of the last rate of each wheel [ns], None = none yet; a rate is the mean since then."""
 
-    Attributes
+
+def merge_step(stamp: int, parts: Sequence[list[Any]], heard: Heard) -> tuple[StepInputs, Heard]:
+    """Merge what came between two steps; plain floats, which beat numpy for a few readings.
+
+    Parameters
     ----------
+    stamp : int
+        Time of the step [ns].
+    parts : sequence of list
+        Entries in the order of stamps, each with one measurement or None per channel.
     heard : tuple of int or None
-        Stamp of the last rate of each wheel [ns], None = none yet; a rate is the mean since then.
+        Before the step.
+
+    Returns
+    -------
+    tuple
+        The inputs of the step; what was heard after it.
     """
+    odometry, inertial, *wheels, references = (
+        [measurement for measurement in channel if measurement is not None]
+        for channel in zip(*parts, strict=True)
+    )
+    rates, heard = _odometry(stamp, odometry, heard)
+    merged: list[Any] = [
+        rates,
+        inertial[0] if len(inertial) == 1 else _inertial(stamp, inertial),
+        *[some[0] if len(some) == 1 else _mean_reading(stamp, some) for some in wheels],
+        references[-1] if references else None,
+    ]
+    return StepInputs(*merged), heard
 
-    def __init__(self) -> None:
-        self.heard: tuple[int, ...] | None = None
 
-    def merged(self, stamp: int, parts: Sequence[list[Any]]) -> StepInputs:
-        """Return the inputs of a step.
-
-        Parameters
-        ----------
-        stamp : int
-            Time of the step [ns].
-        parts : sequence of list
-            Entries in the order of stamps, each with one measurement or None per channel.
-        """
-        odometry, inertial, *wheels, references = (
-            [measurement for measurement in channel if measurement is not None]
-            for channel in zip(*parts, strict=True)
-        )
-        reference: ReferenceVelocity | None = references[-1] if references else None
-        merged: list[Any] = [
-            self._odometry(stamp, odometry),
-            inertial[0] if len(inertial) == 1 else _inertial(stamp, inertial),
-            *[some[0] if len(some) == 1 else _mean_reading(stamp, some) for some in wheels],
-            reference,
-        ]
-        return StepInputs(*merged)
-
-    def _odometry(self, stamp: int, readings: list[WheelOdometry]) -> WheelOdometry | None:
-        if not readings:
-            return None
-        count = len(readings[0].rate)
-        heard = list(self.heard or (0,) * count)
-        total, weighted = [0] * count, [0.0] * count
-        for reading in readings:
-            now = reading.stamp
-            for i, rate in enumerate(reading.rate.tolist()):
-                if not isnan(rate):
-                    weight = min(max(now - heard[i], 1), LONGEST_INTERVAL)
-                    total[i] += weight
-                    weighted[i] += weight * rate
-                    heard[i] = now
-        self.heard = tuple(heard)
-        if len(readings) == 1:
-            return readings[0]
-        mean = [w / t if t else nan for w, t in zip(weighted, total, strict=True)]
-        return WheelOdometry(
-            stamp,
-            np.array(mean),
-            _mean([reading.torque for reading in readings]),
-            _newest([reading.steering for reading in readings]),
-        )
+def _odometry(
+    stamp: int, readings: list[WheelOdometry], before: Heard
+) -> tuple[WheelOdometry | None, Heard]:
+    if not readings:
+        return None, before
+    count = len(readings[0].rate)
+    heard = list(before or (0,) * count)
+    total, weighted = [0] * count, [0.0] * count
+    for reading in readings:
+        now = reading.stamp
+        for i, rate in enumerate(reading.rate.tolist()):
+            if not isnan(rate):
+                weight = min(max(now - heard[i], 1), LONGEST_INTERVAL)
+                total[i] += weight
+                weighted[i] += weight * rate
+                heard[i] = now
+    if len(readings) == 1:
+        return readings[0], tuple(heard)
+    mean = [w / t if t else nan for w, t in zip(weighted, total, strict=True)]
+    merged = WheelOdometry(
+        stamp,
+        np.array(mean),
+        _mean([reading.torque for reading in readings]),
+        _newest([reading.steering for reading in readings]),
+    )
+    return merged, tuple(heard)
 
 
 def _newest(rows: list[FloatArray | None]) -> FloatArray | None:
@@ -141,20 +142,14 @@ def _inertial(stamp: int, readings: list[InertialReading]) -> InertialReading | 
     if not readings:
         return None
     orientations = [r.orientation for r in readings if r.orientation is not None]
+    stated = [next(filter(None, c), 0.0) for c in zip(*(r.variance for r in readings), strict=True)]
     return InertialReading(
         stamp,
         _mean([reading.specific_force for reading in readings]),
         _mean([reading.angular_rate for reading in readings]),
         orientations[-1] if orientations else None,
-        _first_stated([reading.variance for reading in readings]),
+        InertialVariance(*stated),
     )
-
-
-def _first_stated(variances: list[InertialVariance]) -> InertialVariance:
-    if not any(map(any, variances)):
-        return variances[0]
-    columns = zip(*variances, strict=True)
-    return InertialVariance(*[next(filter(None, column), 0.0) for column in columns])
 
 
 def _mean(rows: list[FloatArray]) -> FloatArray:

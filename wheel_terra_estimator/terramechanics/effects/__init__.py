@@ -16,7 +16,6 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from numbers import Real
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from wheel_terra_estimator.errors import EFFECT_FILE_MODULE
@@ -47,13 +46,13 @@ _registered: dict[str, Effect] = {}
 
 
 @lru_cache(maxsize=1)
-def _built_in() -> Mapping[str, Effect]:
+def _built_in() -> Catalogue:
     found: dict[str, Effect] = {}
     for listed in pkgutil.iter_modules(__path__):
         module = importlib.import_module(f'{__name__}.{listed.name}')
         effects = (getattr(module, 'EFFECT', None), *getattr(module, 'EFFECTS', ()))
         found |= {effect.name: effect for effect in effects if isinstance(effect, Effect)}
-    return MappingProxyType(dict(sorted(found.items())))
+    return Catalogue(dict(sorted(found.items())))
 
 
 class Catalogue(Mapping[str, Effect]):
