@@ -14,7 +14,8 @@ from wheel_terra_estimator.discrepancy import decision
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
-from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
+from wheel_terra_estimator.discrepancy.tables.points import operating_points
+from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -26,7 +27,7 @@ def with_effect(design, seed, name, **parameters):
     """Return a table to which the catalogue's own effect was added, and the settings."""
     table, values, soil, _ = make(design, seed=seed)
     points = operating_points(
-        check_table('t.csv', table), reader.from_parameters(values, complete=False)
+        check_table('t.csv', table).columns, reader.from_parameters(values, complete=False), 't'
     )
     true_soil = reader.from_parameters(
         {
@@ -93,7 +94,7 @@ def test_an_uncertain_leaving_angle_counts_as_noise():
     """Angles 2 degrees off: a finding where they are called exact, none where they are not."""
     table, values, *_ = make('lugs48')
     points = operating_points(
-        check_table('t.csv', table), reader.from_parameters(values, complete=False)
+        check_table('t.csv', table).columns, reader.from_parameters(values, complete=False), 't'
     )
     model = WheelSoilModel(reader.from_parameters(values, complete=False).soil, {})
     state = model.steady_state(points)

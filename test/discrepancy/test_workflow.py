@@ -19,8 +19,9 @@ from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.selection.weights import log_prior
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
+from wheel_terra_estimator.discrepancy.tables.points import operating_points
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
-from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
+from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_lab.studies.campaigns.groups import GROUPS
@@ -394,7 +395,7 @@ def test_model_file_is_a_configuration_that_predicts_the_table(tmp_path):
     assert both.effects['slip_sinkage_exponent']['n1'] > 0.0
     assert both.effects_std['slip_sinkage_exponent']['n1'] > 0.0
     assert 'slip_sinkage_exponent' in both.provenance
-    points = operating_points(diagnosis.table, both)
+    points = operating_points(diagnosis.table.columns, both, diagnosis.table.name)
     state = WheelSoilModel(both.soil, both.effects).steady_state(points)
     after = diagnosis.curves.after[:, :3]
     error = (state.outputs() - after) / np.ptp(after, axis=0)

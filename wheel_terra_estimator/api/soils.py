@@ -284,14 +284,13 @@ def _nearest(
     rest: tuple[EffectSettings, str, float],
 ) -> Soil:
     """Return the soil of Bekker's law whose plain model is nearest to the measured rows."""
+    from wheel_terra_estimator.discrepancy.tables.points import operating_points
     from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
-    from wheel_terra_estimator.discrepancy.workflow import operating_points
 
     def distance(soil: Soil) -> float:
         effects, slip_radius, gravity = rest
-        points = operating_points(
-            table, configuration_of(wheel, soil, effects, slip_radius, gravity)
-        )
+        believed = configuration_of(wheel, soil, effects, slip_radius, gravity)
+        points = operating_points(table.columns, believed, table.name)
         answer = WheelSoilModel(soil, effects, 'closed_form', strict=False).steady_state(points)
         total = 10.0 * float(np.mean(answer.flags & 1))  # rows that the soil does not carry
         for quantity in QUANTITIES:

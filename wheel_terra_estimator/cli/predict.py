@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import math
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,6 +21,7 @@ from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label
+from wheel_terra_estimator.discrepancy.tables.points import WHEEL, operating_points
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
@@ -36,7 +36,6 @@ from wheel_terra_estimator.terramechanics.contact_law import (
 from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
 from wheel_terra_estimator.terramechanics.model import METHODS, OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.configuration import Configuration
@@ -155,27 +154,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.climb:
         _write(_climb(arguments, configuration), arguments, configuration)
         return 0
-    columns = _points(arguments, configuration)
+    points = _points(arguments, configuration)
+    columns = {n: getattr(points.wheel if n in WHEEL else points, WHEEL.get(n, n)) for n in INPUTS}
     try:
         model = _model(arguments, configuration, float(columns['wheel_width'][0]))
-        points = OperatingPoints(
-            slip=columns['slip'],
-            normal_load=columns['normal_load'],
-            wheel=Wheel(
-                columns['wheel_radius'],
-                columns['wheel_width'],
-                columns['lug_height'],
-                columns['lug_count'],
-                float(configuration.wheels.lug_thickness[_wheel_index(arguments, configuration)]),
-            ),
-            slope=columns['slope'],
-            slip_radius=configuration.slip_radius,
-            gravity=columns['gravity'],
-            angular_velocity=columns['angular_velocity'],
-            pass_number=columns['pass_number'],
-            leaving_angle=columns['leaving_angle'],
-            slip_angle=columns['slip_angle'],
-        )
         state = model.steady_state(points)
     except ValueError as error:
         raise UserError(str(error)) from None
@@ -322,24 +304,9 @@ def _check_output(output: Path, overwrite: bool) -> None:
     check_file(output, overwrite)
 
 
-def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict[str, FloatArray]:
-    """Return all input columns, (N,) each, from the arguments, the table and the configuration."""
-    wheels, wheel = configuration.wheels, _wheel_index(arguments, configuration)
-    rover = configuration.rover
-    defaults = {
-        'slope': 0.0,
-        'slip_angle': 0.0,
-        'wheel_radius': float(wheels.radius[wheel]),
-        'wheel_width': float(wheels.width[wheel]),
-        'lug_height': float(wheels.lug_height[wheel]),
-        'lug_count': float(wheels.lug_count[wheel]),
-        'gravity': float(rover.gravity),
-        'angular_velocity': math.nan,
-        'pass_number': float(wheels.passes[wheel]),
-        'leaving_angle': math.nan,
-    }
-    if arguments.angular_velocity is not None:
-        defaults['angular_velocity'] = arguments.angular_velocity
+def _points(arguments: argparse.Namespace, configuration: Configuration) -> OperatingPoints:
+    """Return the points that the arguments, the table and the configuration ask for."""
+    wheel = _wheel_index(arguments, configuration)
     if arguments.points is not None:
         if arguments.slip or arguments.load or arguments.slope or arguments.slip_angle:
             raise UserError(
@@ -347,7 +314,6 @@ def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict
                 '--slip-angle'
             )
         columns = _read_points(arguments.points)
-        count = columns['slip'].size
     else:
         slips = _numbers('--slip', arguments.slip or DEFAULT_SLIP)
         loads = (
@@ -362,19 +328,15 @@ def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict
         rows = np.array(list(product(loads, slopes, angles, slips)))
         names = ('normal_load', 'slope', 'slip_angle', 'slip')
         columns = dict(zip(names, rows.T, strict=True))
-        count = len(rows)
-    full = {name: np.full(count, value) for name, value in defaults.items()}
-    for name, values in columns.items():
-        default = full.get(name)
-        full[name] = values if default is None else np.where(np.isnan(values), default, values)
-    for field in ('radius', 'width'):
-        brought = columns.get(f'wheel_{field}', np.full(1, np.nan))
-        if f'wheels.{field}' not in configuration.stated and np.isnan(brought).any():
-            raise UserError(
-                f'wheels.{field} not stated; give a rover file (--config), or the column '
-                f'wheel_{field} in the table of --points'
-            )
-    return {name: full[name] for name in INPUTS}
+    for name, default in (
+        ('angular_velocity', arguments.angular_velocity),
+        ('pass_number', configuration.wheels.passes[wheel]),
+    ):
+        if default is not None:
+            given = columns.get(name, np.full(columns['slip'].size, np.nan))
+            columns[name] = np.where(np.isnan(given), default, given)
+    source = arguments.points or 'operating points'
+    return operating_points(columns, configuration, str(source), wheel)
 
 
 def _wheel_index(arguments: argparse.Namespace, configuration: Configuration) -> int:

@@ -113,7 +113,7 @@ class _Fit:
     def __init__(self, name: str, table: SteadyTable, configuration: Configuration) -> None:
         self.name = name
         self.configuration = configuration
-        self.points = operating_points(table, configuration)
+        self.points = operating_points(table.columns, configuration, table.name)
         self.readings = Readings.of(configuration).true_on(table.true_rows)
         self.measured = table.measured[:, : len(OUTPUTS)]
         spread = [np.ptp(v[np.isfinite(v)]) if np.isfinite(v).any() else 0 for v in self.measured.T]

@@ -31,12 +31,11 @@ from wheel_terra_estimator.discrepancy.tables.checks import (
     check_pull_against_model,
     check_wheel_of_model,
 )
+from wheel_terra_estimator.discrepancy.tables.points import operating_points
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
-from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 
 @dataclass(frozen=True)
@@ -90,7 +89,7 @@ def diagnose(
     started = time.perf_counter()
     chosen = options or Options()
     both, active = (table, None) if reference is None else join(table, reference)
-    points = operating_points(both, configuration)
+    points = operating_points(both.columns, configuration, both.name)
     wheels, stated = configuration.wheels, configuration.stated
     check_wheel_of_model(
         both,
@@ -139,59 +138,6 @@ def diagnose(
     seconds = time.perf_counter() - started
     notes = (*notes, *diagnosis.notes)
     return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
-
-
-def operating_points(table: SteadyTable, configuration: Configuration) -> OperatingPoints:
-    """Return the table's rows as operating points; what it does not state comes from the model.
-
-    Raises
-    ------
-    UserError
-        If neither the table nor the configuration states the wheel.
-    """
-    wheels, columns = configuration.wheels, table.columns
-    stated = configuration.stated
-    values = {}
-    for name, field in (
-        ('wheel_radius', 'radius'),
-        ('wheel_width', 'width'),
-        ('lug_height', 'lug_height'),
-        ('lug_count', 'lug_count'),
-    ):
-        first = getattr(wheels, field)
-        default = float(first[0]) if len(first) else float('nan')
-        if name in columns:
-            values[field] = np.where(np.isfinite(columns[name]), columns[name], default)
-        else:
-            if field in ('radius', 'width') and f'wheels.{field}' not in stated:
-                raise UserError(
-                    f'{table.name}: no column {name}, and no wheel in the configuration; '
-                    f'add the column, or -p wheels.{field}:=[0.15] with your number [m]'
-                )
-            values[field] = np.full(len(table), default)
-    thickness = float(wheels.lug_thickness[0]) if len(wheels.lug_thickness) else 0.0
-
-    def column(name: str, default: float) -> FloatArray:
-        if name not in columns:
-            return np.full(len(table), default)
-        return np.where(np.isnan(columns[name]), default, columns[name])
-
-    wheel = Wheel(**values, lug_thickness=thickness)
-    try:
-        return OperatingPoints(
-            columns['slip'],
-            columns['normal_load'],
-            wheel,
-            column('slope', 0.0),
-            configuration.slip_radius,
-            column('gravity', float(configuration.rover.gravity)),
-            column('angular_velocity', np.nan),
-            column('pass_number', 1.0),
-            column('leaving_angle', np.nan),
-            column('slip_angle', 0.0),
-        )
-    except ValueError as error:
-        raise UserError(f'{table.name}: {error}') from None
 
 
 def nuisance_coordinates(
