@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
-from typing import Any
+from typing import Any, TypeVar
 
 from wheel_terra_estimator.configuration import bounded_yaml
 from wheel_terra_estimator.errors import UserError
@@ -22,6 +22,7 @@ MOST_VALUES = 200_000
 """Keys and values; a topic has about a hundred."""
 
 _LONGEST_NUMBER = 19  # digits
+Kind = TypeVar('Kind')
 
 
 @dataclass(frozen=True)
@@ -42,14 +43,16 @@ def read(folder: Path) -> Metadata:
     try:
         # All values as text: no merge keys, no numbers of thousands of digits.
         document = bounded_yaml.load_texts(read_text(path, LARGEST), MOST_VALUES)
-        information = _mapping(document)['rosbag2_bagfile_information']
-        topics = _list(_mapping(information)['topics_with_message_count'])
+        information = _a(dict, _a(dict, document)['rosbag2_bagfile_information'])
         counts: Counter[str] = Counter()
-        for entry in topics:
-            name = _mapping(_mapping(entry)['topic_metadata'])['name']
-            counts[_text(name)] += _number(_mapping(entry)['message_count'])
-        files = _list(_mapping(information)['relative_file_paths'])
-        names = tuple(PurePath(_text(file)).name for file in files)
+        for entry in _a(list, information['topics_with_message_count']):
+            name = _a(dict, _a(dict, entry)['topic_metadata'])['name']
+            number = _a(str, entry['message_count'])
+            if len(number) > _LONGEST_NUMBER:
+                raise ValueError
+            counts[_a(str, name)] += int(number)
+        files = _a(list, information['relative_file_paths'])
+        names = tuple(PurePath(_a(str, file)).name for file in files)
         return Metadata(names, dict(counts), notes=_notes(information))
     except KeyError as error:
         return Metadata(fault=f'{NAME} was set aside (it has no {error.args[0]})')
@@ -67,25 +70,8 @@ def _notes(information: Any) -> dict[str, str]:
     return {k: v for k, v in custom.items() if isinstance(k, str) and isinstance(v, str)}
 
 
-def _mapping(value: Any) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
+def _a(kind: type[Kind], value: Any) -> Kind:
+    """Return a value that is of a kind."""
+    if not isinstance(value, kind):
         raise TypeError
     return value
-
-
-def _list(value: Any) -> list[Any]:
-    if not isinstance(value, list):
-        raise TypeError
-    return value
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise TypeError
-    return value
-
-
-def _number(value: Any) -> int:
-    if len(_text(value)) > _LONGEST_NUMBER:
-        raise ValueError
-    return int(value)

@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
-from wheel_terra_estimator.bags.message_types import topic_messages
+from wheel_terra_estimator.bags.message_types import messages_of
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.bags.writer import DIAGNOSTICS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, SlipOnSlope
-from wheel_terra_estimator.messages.cdr import DamagedMessageError
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, OUTPUT_TYPES, stamp_of
 from wheel_terra_estimator.messages.diagnostics import NODE
 
@@ -271,12 +270,7 @@ def read_estimates(bag: Bag) -> EstimateHistory:
             + ', '.join(bag.topics)
         )
     found = _EstimateMessages()
-    unpack = {topic: topic_messages(kind).unpack for topic, kind in types.items()}
-    for log_time, topic, data in bag.messages(tuple(types)):
-        try:
-            message = unpack[topic](data)
-        except DamagedMessageError:
-            continue
+    for log_time, topic, message in messages_of(bag, types):
         found.add(topic.removeprefix(f'/{NODE}/'), message, log_time)
     return found.history()
 

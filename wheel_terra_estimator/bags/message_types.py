@@ -1,13 +1,17 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The message types of ROS 2 Jazzy, as rosbags ships them."""
+"""The message types of ROS 2 Jazzy, as rosbags ships them, and messages of a bag unpacked."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from wheel_terra_estimator.messages.cdr import TopicMessages
+from wheel_terra_estimator.messages.cdr import DamagedMessageError, TopicMessages
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.bags.storage import Bag
 
 
 @cache
@@ -16,6 +20,17 @@ def jazzy_types() -> Any:
     from rosbags.typesys import Stores, get_typestore
 
     return get_typestore(Stores.ROS2_JAZZY)
+
+
+def messages_of(bag: Bag, types: Mapping[str, str]) -> Iterator[tuple[int, str, Any]]:
+    """Yield log time [ns], topic and message of topics with their types; damaged ones left out."""
+    unpack = {topic: topic_messages(kind).unpack for topic, kind in types.items()}
+    for log_time, topic, data in bag.messages(tuple(types)):
+        try:
+            message = unpack[topic](data)
+        except DamagedMessageError:
+            continue
+        yield log_time, topic, message
 
 
 def topic_messages(kind: str) -> TopicMessages:

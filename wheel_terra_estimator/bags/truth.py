@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IntArray
-from wheel_terra_estimator.bags.message_types import topic_messages
+from wheel_terra_estimator.bags.message_types import messages_of
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.series_reader import credible
 from wheel_terra_estimator.bags.storage import Bag
@@ -21,7 +21,7 @@ from wheel_terra_estimator.estimation.contacts.steering import headings
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading, WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover
-from wheel_terra_estimator.messages.cdr import TWIST, DamagedMessageError
+from wheel_terra_estimator.messages.cdr import TWIST
 from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, OUTPUT_TYPES, stamp_of
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
@@ -183,13 +183,8 @@ def _ordered(message: Any, values: Any, names: tuple[str, ...]) -> list[float]:
 def _thinned(bag: Bag, wanted: Mapping[str, _Values]) -> dict[str, WheelTruth]:
     """Return what the messages of some topics say, sorted by stamp; one pass over the bag."""
     rows = {topic: ThinnedRows() for topic in wanted}
-    unpack = {topic: topic_messages(_TYPES[topic]).unpack for topic in wanted}
-    there = [t for t in wanted if t in bag.topics and bag.topics[t].type == _TYPES[t]]
-    for time, topic, data in bag.messages(there):
-        try:
-            message = unpack[topic](data)
-        except DamagedMessageError:
-            continue
+    there = {t: _TYPES[t] for t in wanted if t in bag.topics and bag.topics[t].type == _TYPES[t]}
+    for time, topic, message in messages_of(bag, there):
         # A message without a header was logged at the stamp that it belongs to.
         stamp = stamp_of(message) if hasattr(message, 'header') else time
         rows[topic].add(stamp, wanted[topic].of(message))

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -164,18 +165,18 @@ class InputConverter:
         squares = np.square(self._rotation)
         self._shares = squares[0].tolist(), squares[2].tolist()
         """Of the variances along the sensor's axes in those along x and z of ``base_link``."""
-        self._methods = {
-            'joint_states': self.joint_states,
-            'odom': self.odom,
-            'imu/data': self.imu,
-            'sinkage': self.sinkage,
-            'leaving_angle': self.leaving_angle,
-            'reference_odom': self.reference_odom,
+        self._readers: dict[str, Callable[[Any], Any]] = {
+            'joint_states': self._joint_states,
+            'odom': self._odom,
+            'imu/data': self._imu,
+            'sinkage': partial(self._per_wheel, SinkageReading, 'sinkage'),
+            'leaving_angle': partial(self._per_wheel, LeavingAngleReading, 'leaving_angle'),
+            'reference_odom': self._reference_odom,
         }
 
     def convert(self, topic: str, message: Any) -> Measurement | None:
         """Return the measurement in a message of an input topic; None when it does not fit."""
-        return self._methods[topic](message)
+        return self._readers[topic](message)
 
     def in_words(self, topic: str, reason: str) -> str:
         """Return a reason for a rejection, with the names where these are the reason."""
@@ -184,7 +185,7 @@ class InputConverter:
         there = ', '.join(self._unknown_names[topic]) or 'no name'
         return f'{reason} but {there}; wheels.names: {", ".join(self.layout.names)}'
 
-    def joint_states(self, message: Any) -> WheelOdometry | None:
+    def _joint_states(self, message: Any) -> WheelOdometry | None:
         """Wheel rates, torques and steering angles; what the message does not hold is nan."""
         steering = self._steering(message) if self.layout.steering else None
         if steering is not None and not self._columns_of(message.name)[0]:
@@ -222,7 +223,7 @@ class InputConverter:
             angles[joints[message.name[k]]] = message.position[k]
         return angles
 
-    def odom(self, message: Any) -> WheelOdometry:
+    def _odom(self, message: Any) -> WheelOdometry:
         """Wheel rates of a rover that publishes no joint states, from its wheel odometry."""
         twist = message.twist.twist
         with np.errstate(all='ignore'):  # absurd values are judged later, number by number
@@ -232,7 +233,7 @@ class InputConverter:
             self.rejected['odom', 'velocity is nan (taken as unknown)'] += 1
         return WheelOdometry(stamp_of(message), rate, np.full_like(rim_speed, math.nan))
 
-    def imu(self, message: Any) -> InertialReading | None:
+    def _imu(self, message: Any) -> InertialReading | None:
         """Specific force, angular rate and attitude in ``base_link``; nan where not told."""
         told = [getattr(message, field)[0] != -1.0 for field in _INERTIAL_FIELDS]  # REP 145
         for words, there in zip(_INERTIAL_FIELDS.values(), told, strict=True):
@@ -269,17 +270,12 @@ class InputConverter:
         along, about = self._shares
         return InertialVariance(_weighted(along, force), _weighted(about, rate), max(x, y))
 
-    def sinkage(self, message: Any) -> SinkageReading | None:
-        """Measured sinkage of the wheels."""
-        values = self._wheel_values('sinkage', message.name, message.position, 'position')
-        return None if values is None else SinkageReading(stamp_of(message), values)
+    def _per_wheel(self, kind: Any, topic: str, message: Any) -> Any:
+        """Return what a sensor at each wheel measured, a reading of a kind."""
+        values = self._wheel_values(topic, message.name, message.position, 'position')
+        return None if values is None else kind(stamp_of(message), values)
 
-    def leaving_angle(self, message: Any) -> LeavingAngleReading | None:
-        """Measured leaving angle of the wheels."""
-        values = self._wheel_values('leaving_angle', message.name, message.position, 'position')
-        return None if values is None else LeavingAngleReading(stamp_of(message), values)
-
-    def reference_odom(self, message: Any) -> ReferenceVelocity:
+    def _reference_odom(self, message: Any) -> ReferenceVelocity:
         """Body velocity from a slip-free source."""
         twist = message.twist
         lateral, variance = float(twist.twist.linear.y), float(twist.covariance[7])
