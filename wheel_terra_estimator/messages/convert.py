@@ -194,13 +194,11 @@ class InputConverter:
         values = self._wheel_values('joint_states', message.name, message.velocity, 'velocity')
         if values is None:
             return None
-        effort = message.effort
-        if len(effort) == len(message.name):
-            torque = self._sorted(message.name, effort)
-        else:
+        torque = None
+        if len(message.effort):
+            torque = self._wheel_values('joint_states', message.name, message.effort, 'effort')
+        if torque is None:
             torque = np.full(len(self.layout.names), math.nan)
-            if len(effort):
-                self.rejected['joint_states', 'effort and name differ in length'] += 1
         unknown = np.count_nonzero(np.isnan(values))
         if unknown and unknown > len(values) - len(set(self._columns_of(message.name)[1])):
             self.rejected['joint_states', 'velocity of a wheel is nan (taken as unknown)'] += 1
@@ -296,15 +294,11 @@ class InputConverter:
         if len(values) != len(names):
             self.rejected[topic, f'{label} and name differ in length'] += 1
             return None
-        if not self._columns_of(names)[0]:
+        source, target = self._columns_of(names)
+        if not source:
             self.rejected[topic, _NO_WHEEL] += 1
             self._unknown_names[topic] = names
             return None
-        return self._sorted(names, values)
-
-    def _sorted(self, names: Sequence[str], values: Any) -> FloatArray:
-        """Return the values of a message in the order of the wheels, nan where there is none."""
-        source, target = self._columns_of(names)
         given = np.array(values, dtype=np.float64)
         if target == self._all and len(given) == len(target):
             return given

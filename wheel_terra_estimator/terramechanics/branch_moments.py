@@ -35,8 +35,8 @@ _NODES = tuple(
 )
 
 
-def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Any, Any]:
-    """Area and centroid of the stress on one side of its peak, both as shares.
+def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Any, Any, Any]:
+    """Area, centroid and spread of the stress on one side of its peak, as shares.
 
     For small angles the stress is [v (1 + q (1 - v))]^N of its peak, with v = 0 at the edge of
     the contact, 1 at the peak, and q = (t1 - tm)/(t1 + tm); its moments, as a series in q
@@ -53,17 +53,14 @@ def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Any, Any]:
         Integral over v.
     centroid : float or numpy.ndarray
         Mean v; 2/3 for a triangle.
+    spread : float or numpy.ndarray
+        Variance of v, without skew: (N + 1)/((N + 2)^2 (N + 3)).
     """
     n, q = exponent, skew
     area = (1.0 + n * q / (n + 2.0) * (1.0 + (n - 1.0) * q / (n + 3.0))) / (n + 1.0)
     first = (1.0 + n * q / (n + 3.0) * (1.0 + (n - 1.0) * q / (n + 4.0))) / (n + 2.0)
-    return area, first / area
-
-
-def moment_spread(exponent: Quantity) -> Any:
-    """Variance of v under the stress v^N: (N + 1)/((N + 2)^2 (N + 3))."""
-    second = exponent + 2.0
-    return (exponent + 1.0) / (second * second * (exponent + 3.0))
+    second = n + 2.0
+    return area, first / area, (n + 1.0) / (second * second * (n + 3.0))
 
 
 class BranchForces:
@@ -95,8 +92,7 @@ class BranchForces:
     ) -> None:
         self._exponent = n = contact.sinkage_exponent
         front, rear = 1.0 - peak_share, peak_share - leaving_share
-        area, centroid = branch_moments(n, front / (1.0 + peak_share))
-        spread = 0.5 * moment_spread(n)
+        area, centroid, spread = branch_moments(n, front / (1.0 + peak_share))
         self._place_front = place_front = 1.0 - front * centroid
         self._place_rear = place_rear = leaving_share + rear * centroid
         self._middle_front = 0.5 * (1.0 + peak_share)
@@ -113,7 +109,8 @@ class BranchForces:
         self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
         square_front, square_rear = front * front, rear * rear
         # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
-        self._arc_front, self._arc_rear = spread * square_front, spread * square_rear
+        half_spread = 0.5 * spread
+        self._arc_front, self._arc_rear = half_spread * square_front, half_spread * square_rear
         self._edge_front, self._edge_rear = square_front / 24.0, square_rear / 24.0
         # Shear is spread evenly where cohesion gives it: nearer to the edge in front, where it
         # is larger behind, both per displacement at the stress's centroid.
