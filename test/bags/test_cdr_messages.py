@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from estimate_sets import some_estimates
 
 from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.bags.message_types import topic_messages
@@ -16,6 +17,7 @@ from wheel_terra_estimator.messages.cdr import (
     TWIST,
     ClassPacker,
     DamagedMessageError,
+    EstimatePacker,
     JointStatePacker,
     TopicMessages,
     TwistPacker,
@@ -147,6 +149,23 @@ def test_packed_messages_are_the_bytes_of_rosbags(frame, names, factory):
             factory.twist_stamped(header, 0.3, -0.2, covariance), TWIST
         )
         assert twists.packed(stamp, (0.3, 0.0), -0.2, covariance) == bytes(theirs)
+
+
+def test_a_set_is_packed_for_the_topics_that_are_wanted():
+    estimates = some_estimates()
+    packer = EstimatePacker(('left', 'right'))
+    whole = dict(packer.packed(estimates))
+    assert list(whole) == [
+        'slip', 'slip_class', 'sinkage', 'slip_stddev', 'sinkage_stddev', 'mobility', 'soil',
+        'slip_angle', 'slip_angle_stddev', 'twist',
+    ]  # fmt: skip
+    some = {'twist', 'slip_class', 'mobility', 'slip_on_slope'}  # the last one is not due
+    assert dict(packer.packed(estimates, some)) == {t: whole[t] for t in some & whole.keys()}
+    read = topic_messages('std_msgs/msg/UInt8MultiArray').unpack(whole['slip_class'])
+    assert read.data.tolist() == estimates.slip_class.tolist()
+    twist = topic_messages(TWIST).unpack(whole['twist']).twist.twist
+    assert twist.linear.x == estimates.forward_velocity
+    assert twist.angular.z == estimates.yaw_rate
 
 
 def assert_same(found: Any, message: Any) -> None:
