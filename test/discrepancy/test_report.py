@@ -22,6 +22,7 @@ from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, write_report
+from wheel_terra_estimator.discrepancy.report.words import in_words
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_lab.studies.campaigns import Plan, make_campaign, scoring
@@ -190,6 +191,18 @@ def test_changed_keys_are_those_of_the_model_file(page, named, tmp_path):
     before, after = parsed.row(key)[1:]
     assert float(after) == pytest.approx(new[key], rel=1e-3)
     assert float(before) == pytest.approx(named.configuration.flat()[key], rel=1e-3)
+
+
+def test_what_to_do_next_follows_from_what_stays_open(named):
+    """The very model is called the one to go on with only where nothing is left."""
+    whole = replace(named, effects=(), next_measurement=(), proposal=None, gap={})
+    said = in_words(whole)
+    assert said['open'] == ['Nothing beyond noise and the allowed model error.']
+    assert said['next'] == ['Nothing; model.yaml is the model to go on with.']
+    effect = replace(named.effects[0], remainder=True, confounded_with=())
+    said = in_words(replace(whole, effects=(effect,)))
+    assert 'does not explain' in said['open'][0]
+    assert 'best model so far' in said['next'][0]
 
 
 @pytest.mark.parametrize(

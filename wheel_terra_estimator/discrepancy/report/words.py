@@ -73,7 +73,8 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
             left.append(f'These rows cannot tell {plain(effect.name)} from {competitors}.')
     if diagnosis.verdict in OPEN and not still_off:
         left.append('Why these rows need another soil, or more scatter, than was stated.')
-    if not left:
+    settled = not left
+    if settled:
         left.append('Nothing beyond noise and the allowed model error.')
     following = [f'Measure next: {worth(item)}.' for item in diagnosis.next_measurement[:1]]
     if diagnosis.verdict in OPEN and diagnosis.where.box:
@@ -89,8 +90,13 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
         following.append(
             'Until then proposal.yaml may stand in, inside the range of these rows only.'
         )
-    if not following:
+    if not following and settled:
         following.append('Nothing; model.yaml is the model to go on with.')
+    elif not following:
+        following.append(
+            'model.yaml is the best model so far; which measurement would settle what stays open '
+            'these rows do not say.'
+        )
     return {'shrank': shrank, 'open': left, 'next': following}
 
 
@@ -147,7 +153,8 @@ def soil_line(diagnosis: Diagnosis) -> str:
 def law_line(diagnosis: Diagnosis) -> str:
     """Return what the other contact laws leave of the table; empty where they were not fitted."""
     found = [
-        f'{name} leaves {number(law.misfit, 2)} of the misfit ({law.log_evidence:+.1f} ln evidence)'
+        f'{name} leaves {number(law.misfit, 2)} times the misfit '
+        f'({law.log_evidence:+.1f} ln evidence)'
         for name, law in diagnosis.contact_laws.items()
     ]
     return f'Contact law, soil refitted and no effect added: {", ".join(found)}' if found else ''
@@ -218,7 +225,8 @@ def notes(
     found += _repeatability(findings.noise)
     if findings.outliers:
         count = len(findings.outliers)
-        found.append(f'{count} {"cell was" if count == 1 else "cells were"} rejected as outliers')
+        several = f'{count} cells were rejected as outliers'
+        found.append('1 cell was rejected as an outlier' if count == 1 else several)
     found += [f'{text}: look at it before any effect' for text in far(shifts)]
     for c, u in zip(after.coordinates, after.u, strict=True):
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
