@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the terminal says of warnings, right and wrong."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import pytest
 
+from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.judgement.entrapment import Outcome, Verdict
-from wheel_terra_estimator.reporting.drive_summary import DriveSummary, WarningSpan
+from wheel_terra_estimator.reporting.drive_summary import DriveSummary, WarningSpan, WheelSummary
 from wheel_terra_estimator.reporting.replay_report import _error_row, _tone
 from wheel_terra_estimator.reporting.truth_scores import QuantityError, TruthErrors, as_lines
 
@@ -27,11 +29,29 @@ def test_a_warning_without_its_slip_is_said():
 
 
 @pytest.mark.parametrize(
-    ('high', 'stuck', 'tone'), [(0.0, 0.0, 'good'), (2.0, 0.0, 'warn'), (0.0, 5.0, 'warn')]
+    ('high', 'stuck', 'slip', 'tone'),
+    [
+        (0.0, 0.0, (0.0, 0.2), 'good'),
+        (2.0, 0.0, (0.0, 0.7), 'warn'),
+        (0.0, 5.0, (0.0, 1.0), 'warn'),
+        (0.0, 0.0, None, 'warn'),
+    ],
 )
-def test_a_drive_with_high_slip_or_stuck_wheels_is_shown_as_a_warning(high, stuck, tone):
-    wheels = [SimpleNamespace(seconds={'high': high, 'stuck': stuck})]
+def test_a_drive_with_high_slip_stuck_wheels_or_nothing_known_is_shown_as_a_warning(
+    high, stuck, slip, tone
+):
+    wheels = [SimpleNamespace(seconds={'high': high, 'stuck': stuck}, slip=slip)]
     assert _tone(SimpleNamespace(wheels=wheels)) == tone
+
+
+def test_a_drive_of_which_no_slip_is_known_is_not_called_a_good_one():
+    seconds = {c.name.lower(): 0.0 for c in SlipClass}
+    wheel = WheelSummary('a', seconds, seconds, None, None, None, 0, 0, 0, None, None, None)
+    verdict = DriveSummary('drive', 0.0, 1, (wheel,), (), (), ()).verdict
+    assert 'no slip was known' in verdict
+    known = dataclasses.replace(wheel, slip=(0.0, 0.1), max_slip=0.1)
+    verdict = DriveSummary('drive', 0.0, 1, (wheel, known), (), (), ()).verdict
+    assert verdict == 'No stuck warning, no wheel in the classes high or stuck.'
 
 
 def test_errors_in_the_report_are_in_millimetres_degrees_and_per_cent():

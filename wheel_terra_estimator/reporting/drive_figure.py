@@ -83,7 +83,7 @@ def way_figure(track: Track, strengths: tuple[tuple[str, float, float, str], ...
         Panel('worst slip class of a wheel', 0.05, strips=('class',)),
         Panel('shear strength learned, over that stated', 0.05, strips=('soil',)),
     )
-    figure = TimeFigure(panels, (), float(way[-1]), 'way [m]')
+    figure = TimeFigure(panels, (), float(way[-1]), 'distance [m]')
     for slip_class, colour in CLASS_COLOURS.items():
         member = (values['slip_class'] == slip_class)[:, None]
         slender = slip_class is SlipClass.UNKNOWN
@@ -98,7 +98,10 @@ def slopes_figure(found: SlipOnSlope) -> TimeFigure:
     """Return slip over slope uphill with its band of 95 %, and the probability of entrapment."""
     uphill = SLOPES >= 0.0
     slopes, half = SLOPES[uphill], WITHIN * found.std[uphill]
-    panels = Panel('slip ratio [-]', 0.25, (-0.05, 1.05)), Panel('entrapment [-]', 0.12, (0.0, 1.0))
+    panels = (
+        Panel('slip ratio [-]', 0.25, (-0.05, 1.05)),
+        Panel('probability of entrapment [-]', 0.12, (-0.05, 1.05)),
+    )
     switches = (Switch('band', 'band of 95 %'),)
     figure = TimeFigure(panels, switches, float(slopes[-1]), 'slope, uphill [deg]')
     slip = found.slip[uphill]

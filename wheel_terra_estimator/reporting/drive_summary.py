@@ -100,6 +100,8 @@ class DriveSummary:
                 f'No stuck warning. {worst.name} slipped most: {high:.1f} s in the classes high '
                 f'and stuck, at most |slip| {shown(worst.max_slip, ".2f")}.'
             )
+        if all(wheel.slip is None for wheel in self.wheels):
+            return 'No stuck warning, but no slip was known at any time: nothing can be concluded.'
         return 'No stuck warning, no wheel in the classes high or stuck.'
 
 

@@ -61,7 +61,9 @@ def check_slopes(path: Path) -> None:
 def write_slopes(found: SlipOnSlope, path: Path) -> None:
     """Write a row for each slope as CSV."""
     rows = zip(SLOPES, *found, strict=True)
-    write_csv(path, _SLOPE_HEAD, ([f'{value:.6g}' for value in row] for row in rows))
+    write_csv(
+        path, _SLOPE_HEAD, ([f'{round(float(value), 9):.6g}' for value in row] for row in rows)
+    )
 
 
 def _pandas(path: Path) -> Any:

@@ -105,7 +105,7 @@ def _error_row(error: QuantityError) -> dict[str, str]:
 
 def _tone(summary: DriveSummary) -> str:
     high = any(wheel.seconds['high'] + wheel.seconds['stuck'] > 0.0 for wheel in summary.wheels)
-    return 'warn' if high else 'good'
+    return 'warn' if high or all(wheel.slip is None for wheel in summary.wheels) else 'good'
 
 
 def _cards(summary: DriveSummary) -> list[tuple[str, str]]:
