@@ -109,6 +109,9 @@ def test_decimal_commas_between_semicolons_or_tabs(files, delimiter):
         ('column: ax', 'column: axx', "no column 'axx'"),
         ('sinkage:', 'sinkages:', "nearest: 'sinkage'"),
         (', sign: -1}', ', sign: 2}', 'sign must be 1 or -1'),
+        ('imu/data:', 'imu:', "unknown entry 'imu'; nearest: 'imu/data'"),
+        ('{column: ax,', '{colum: ax,', "(unknown: 'colum')"),
+        ('time: {', '\ttime: {', 'line 3: found character that cannot start any token'),
     ],
 )
 def test_a_map_that_cannot_be_used(files, capsys, old, new, words):
@@ -123,3 +126,21 @@ def test_a_cell_that_is_no_number(files, capsys):
     (files / 'log.csv').write_text('\n'.join([HEADER, ROWS[0], ROWS[1].replace('30', 'abc')]))
     assert main(command(files)) == 2
     assert "log.csv, line 3, column rpm_fl: 'abc' is not a number" in capsys.readouterr().err
+
+
+def test_an_empty_table_is_called_empty(files, capsys):
+    (files / 'log.csv').write_text('')
+    assert main(command(files)) == 2
+    assert 'log.csv: empty; the first line must name the columns' in capsys.readouterr().err
+
+
+def test_a_row_that_was_cut_short_is_told(files, capsys):
+    cut = ','.join(ROWS[0].replace('100.0', '100.2').split(',')[:4])
+    (files / 'log.csv').write_text('\n'.join([HEADER, *ROWS]))
+    assert main(command(files)) == 0
+    assert 'note' not in capsys.readouterr().out
+    (files / 'log.csv').write_text('\n'.join([HEADER, *ROWS, cut]))
+    assert main([*command(files), '--overwrite']) == 0
+    said = capsys.readouterr().out
+    assert '/joint_states 3, /imu/data 2' in said
+    assert 'a row ends before the last column of the map (first: line 4)' in said

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.configuration.column_map import UNITS, entry_of, factor, read_map
@@ -101,13 +101,15 @@ class ColumnMap:
     reference: dict[str, Column]
 
 
-def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -> BagFile:
-    """Write the rows of a CSV file as messages.
+class Converted(NamedTuple):
+    """What was written of a table."""
 
-    Returns
-    -------
-    BagFile
-        The closed bag, for its counts.
+    counts: dict[str, int]  # messages by topic
+    short: list[int]  # lines that end before a column of the map
+
+
+def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -> Converted:
+    """Write the rows of a CSV file as messages.
 
     Raises
     ------
@@ -115,6 +117,8 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
         Map or table cannot be used; names file, row, column and remedy.
     """
     with open_csv(table) as file:
+        if not file.header:
+            raise UserError(f'{table}: empty; the first line must name the columns')
         layout = _read_map(columns, file.header, table)
         topics = {f'/{name}': INPUT_TYPES[name] for name in _used(layout)}
         with BagFile(output, topics, overwrite=overwrite, inputs=[table, columns]) as bag:
@@ -123,7 +127,7 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
                 sender.send(line, row)
             if not sender.sent:
                 raise UserError(f'{table}: no rows below the header')
-        return bag
+        return Converted(bag.counts, list(sender.short))
 
 
 def _used(layout: ColumnMap) -> list[str]:
@@ -225,6 +229,7 @@ class _Sender:
         self.decimal_comma = decimal_comma
         self.make = bag.messages
         self.sent = 0
+        self.short: dict[int, None] = {}  # lines, in order
         self.places: deque[tuple[int, float, float]] = deque()  # stamp [ns], place
 
     def send(self, line: int, row: list[str]) -> None:
@@ -254,7 +259,10 @@ class _Sender:
         self.sent += 1
 
     def value(self, line: int, row: list[str], column: Column | None) -> float:
-        if column is None or column.index >= len(row):
+        if column is None:
+            return math.nan
+        if column.index >= len(row):
+            self.short[line] = None
             return math.nan
         where = f'{self.table}, line {line}, column {column.name}'
         return column.factor * number(row[column.index], where, self.decimal_comma)

@@ -43,8 +43,15 @@ def run(arguments: argparse.Namespace) -> int:
     ):
         if value is None:
             raise UserError(f'{name} is missing; a map of columns: wheel-terra convert --example')
-    bag = convert(arguments.table, arguments.columns, arguments.output, arguments.overwrite)
-    counts = ', '.join(f'{topic} {count}' for topic, count in bag.counts.items())
+    written = convert(arguments.table, arguments.columns, arguments.output, arguments.overwrite)
+    counts = ', '.join(f'{topic} {count}' for topic, count in written.counts.items())
     print(f'bag: {arguments.output} ({counts})')
+    if written.short:
+        count = len(written.short)
+        rows = f'{count} rows end' if count > 1 else 'a row ends'
+        print(
+            f'note: {rows} before the last column of the map (first: line {written.short[0]}); '
+            'what is missing there is left out'
+        )
     print(f'next: wheel-terra check {arguments.output} --config ROVER')
     return 0

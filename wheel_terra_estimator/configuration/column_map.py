@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from wheel_terra_estimator.configuration import bounded_yaml
+from wheel_terra_estimator.configuration.ros_yaml import in_words
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import read_text
 
@@ -98,8 +99,10 @@ def entry_of(value: Any, where: str) -> Entry:
         return Entry(value)
     if not isinstance(value, Mapping):
         raise UserError(f'{where}: give column, unit and, if turned round, sign')
-    if set(value) - {'column', 'unit', 'sign'} or 'column' not in value:
-        raise UserError(f'{where}: give column, unit and, if turned round, sign')
+    unknown = ', '.join(repr(key) for key in value if key not in ('column', 'unit', 'sign'))
+    if unknown or 'column' not in value:
+        stray = f' (unknown: {unknown})' if unknown else ''
+        raise UserError(f'{where}: give column, unit and, if turned round, sign{stray}')
     sign = value.get('sign', 1)
     if sign not in (1, -1):
         raise UserError(f'{where}: sign must be 1 or -1')
@@ -116,7 +119,9 @@ def read_map(path: Path) -> Mapping[Any, Any]:
     """
     try:
         document = bounded_yaml.load(read_text(path), yaml.SafeLoader)
-    except (yaml.YAMLError, ValueError) as error:
+    except yaml.YAMLError as error:
+        raise UserError(f'{path}: {in_words(error)}') from None
+    except ValueError as error:
         raise UserError(f'{path}: not valid YAML: {str(error).splitlines()[0]}') from None
     if not isinstance(document, Mapping):
         raise UserError(f'{path}: not a map of columns: one NAME: COLUMN a line')

@@ -126,7 +126,7 @@ def parse_value(text: str, source: str) -> Value:
     try:
         value = bounded_yaml.load(text, _RosLoader)
     except yaml.YAMLError as error:
-        raise UserError(f'{source}: {_in_words(error)}') from None
+        raise UserError(f'{source}: {in_words(error)}') from None
     return _checked(value if text.strip() else _NO_VALUE, source)
 
 
@@ -152,7 +152,7 @@ def read(path: Path) -> dict[str, Value]:
     try:
         document = bounded_yaml.load(text, _RosLoader)
     except yaml.YAMLError as error:
-        raise UserError(f'{path}: {_in_words(error)}') from None
+        raise UserError(f'{path}: {in_words(error)}') from None
     if not isinstance(document, Mapping):
         raise UserError(
             f"{path}: no parameters; give lines 'rover.mass: 22.0', or a ROS parameter file, which "
@@ -274,11 +274,13 @@ def _checked(value: Any, source: str) -> Value:
     return value
 
 
-def _in_words(error: yaml.YAMLError) -> str:
+def in_words(error: yaml.YAMLError) -> str:
     """Return a YAML error in one line, with the line number."""
     mark = getattr(error, 'problem_mark', None)
     problem = getattr(error, 'problem', None) or 'cannot be understood'
     context = getattr(error, 'context', None)
     words = f'{problem} ({context})' if context else str(problem)
+    if 'cannot start any token' in words:
+        words += '; indent with spaces, not tabs'
     where = f'line {mark.line + 1}: ' if mark is not None else ''
     return f'not valid YAML: {where}{words}'.replace('\n', ' ')
