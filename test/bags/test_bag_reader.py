@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from wheel_terra_estimator.bags.reader import MeasurementReader, parse_remaps, read
+from wheel_terra_estimator.bags.reader import MeasurementReader, in_one_line, parse_remaps, read
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
@@ -57,6 +57,14 @@ def test_missing_wheel_odometry_says_which_and_what_is_there(make_bag, rover, dr
     assert '/joint_states is not in the bag' in text
     assert '/imu/data (sensor_msgs/msg/Imu)' in text
     assert '-p wheel_odometry:=odom --remap odom:=/reference_odom' in text
+
+
+def test_topics_of_estimates_are_named_as_such_and_together():
+    kind = 'sensor_msgs/msg/JointState'
+    topics = [(f'/wheel_terra_estimator/{name}', kind) for name in ('slip', 'sinkage', 'soil')]
+    said = in_one_line([('/odom', 'nav_msgs/msg/Odometry'), *topics])
+    assert said.startswith('/odom (nav_msgs/msg/Odometry), 3 topics of estimates')
+    assert kind not in said
 
 
 def test_what_is_missing_is_told_with_what_it_costs(make_bag, rover, drive):

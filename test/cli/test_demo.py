@@ -38,3 +38,9 @@ def test_a_node_that_is_not_found_does_not_end_the_demo(monkeypatch, tmp_path, c
 def test_the_exit_status_is_that_of_the_live_drive():
     live_drive = pytest.importorskip('wheel_terra_estimator.ros.live_drive')
     assert demo.NODE_NOT_FOUND == live_drive.NOT_FOUND
+
+
+def test_an_output_that_is_there_is_refused_with_options_that_the_command_has(tmp_path, capsys):
+    assert main.main(['demo', '-o', str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert '--overwrite' in said and '--resume' not in said

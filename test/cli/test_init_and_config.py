@@ -123,6 +123,10 @@ def test_config(capsys):
     assert main(['config', 'list', 'rovers']) == 0
     listed = capsys.readouterr().out
     assert 'rovers/frostyboy' in listed and 'soils/' not in listed
+    assert main(['config', 'list', 'soils']) == 0
+    listed = capsys.readouterr().out
+    assert 'loose (Hurrell et al. 2025)\n' in listed, 'a point inside a sentence does not end it'
+    assert 'Proxies' not in listed and 'Source' not in listed
     assert main(['config', 'path', 'pathfinder']) == 0
     path = Path(capsys.readouterr().out.strip())
     assert main(['config', 'show', 'pathfinder']) == 0

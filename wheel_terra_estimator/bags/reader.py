@@ -43,6 +43,18 @@ NO_INPUTS = ('/wheel_terra_estimator/', '/ground_truth/')
 """Topics that look like inputs and are estimates or truth."""
 
 
+def in_one_line(topics: Iterable[tuple[str, str]]) -> str:
+    """Return names and types of the topics of a bag; those of estimates together, as such."""
+    there = list(topics)
+    estimates = [name for name, _ in there if name.startswith(NO_INPUTS[0])]
+    words = [f'{name} ({kind})' for name, kind in there if name not in estimates]
+    if estimates:
+        words.append(
+            f'{len(estimates)} topics of estimates ({NO_INPUTS[0]}...), which are no input'
+        )
+    return ', '.join(words)
+
+
 class MeasurementReader:
     """Reads the input topics of the estimator out of an open bag; no other topic is unpacked.
 
@@ -151,7 +163,6 @@ class MeasurementReader:
         """Say what is there and how to use it."""
         there = self.bag.topics.values()
         others = {f'/{other}' for other in INPUT_TYPES if other != name}
-        listed = ', '.join(f'{topic.name} ({topic.type})' for topic in there)
         fitting = [
             topic.name
             for topic in there
@@ -165,7 +176,7 @@ class MeasurementReader:
             odometry = [t.name for t in there if t.type == INPUT_TYPES['odom'] and t.message_count]
             if odometry:
                 remedy = f'use -p wheel_odometry:=odom --remap odom:={odometry[0]}'
-        return f'there are: {listed}; {remedy}'
+        return f'there are: {in_one_line((t.name, t.type) for t in there)}; {remedy}'
 
     def _check_wheel_names(self) -> None:
         """Make sure that some joint message holds a wheel, before anything is written."""

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command: 0 nothing wrong, 1 something to mend."""
-    from wheel_terra_estimator.bags.reader import parse_remaps
+    from wheel_terra_estimator.bags.reader import in_one_line, parse_remaps
     from wheel_terra_estimator.bags.series_reader import read_series
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.checks.run import check_recording
@@ -55,9 +55,9 @@ def run(arguments: argparse.Namespace) -> int:
     with open_bag(arguments.bag, bag_arguments.limits_of(arguments)) as bag:
         recording = read_series(bag, remaps, arguments.bag.resolve().name)
         if recording.joints is None and recording.wheel_odometry is None:
-            listed = ', '.join(f'{name} ({kind})' for name, kind, _ in recording.topics)
+            there = in_one_line((name, kind) for name, kind, _ in recording.topics)
             raise UserError(
-                f'{arguments.bag}: neither joint states nor odometry in it; there are: {listed}; '
+                f'{arguments.bag}: neither joint states nor odometry in it; there are: {there}; '
                 'name the wheel rates with --remap joint_states:=/TOPIC, or record them'
             )
     report = check_recording(recording, configuration, tuple(remaps))

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 
 from wheel_terra_estimator.cli.outputs import Output
 
@@ -75,4 +76,5 @@ def _headline(text: str) -> str:
         if not line.startswith('#') or not line.strip('# '):
             break
         lines.append(line.strip('# '))
-    return ' '.join(lines).partition('. ')[0]
+    sentence, *_ = re.split(r'\. (?=[A-Z])', ' '.join(lines), maxsplit=1)  # no end: et al. 2025
+    return sentence.rstrip('.')

@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.output_folder import working_folder
+from wheel_terra_estimator.output_folder import check_folder, working_folder
 
 SEAL_SHA256 = '78c7f9baa4662e0969d5b5dff2c94fbd5cbd89ae14923cf0fcc754b1af82c5c7'
 """Of the shipped ``sealed.json``, which says what was hidden in the table beside it."""
@@ -91,6 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     output: Path = arguments.output
+    check_folder(output, arguments.overwrite)  # a demo does not go on with an earlier one
     entries = [f'{drive.name}{end}' for drive in DRIVES for end in ('/', '.html')]
     try:
         with working_folder(output, arguments.overwrite, False, [*entries, 'trial/']):
