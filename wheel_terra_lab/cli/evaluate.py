@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.configuration import reader as configuration_reader
+from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.configuration.shipped import FileName
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument
@@ -20,6 +22,7 @@ INTERRUPTED = 130
 EXAMPLES = (
     'wheel-terra evaluate --kinds climb turns --seeds 4',
     'wheel-terra evaluate --rover my_rover.yaml --kinds climb scenarios/slow_entrapment --seeds 2',
+    'wheel-terra evaluate --kinds climb --seeds 4 -p filter.stuck_threshold:=0.6',
     'wheel-terra evaluate --limiter --seeds 10 -o limiter.md',
     'wheel-terra evaluate --simulator A B --kinds firm --modes reference --seeds 50 -o firm.md',
 )
@@ -56,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="rover file, or the bare name of a shipped one, in place of the kinds' own rover "
         '(simulator A)',
     )
+    configuration_reader.add_arguments(parser)
     parser.add_argument(
         '--seeds', type=int, default=20, metavar='N', help='drives of each kind (default 20)'
     )
@@ -105,8 +109,14 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.reporting.tables_page import write_tables
     from wheel_terra_lab.evaluation import tables
 
-    if arguments.rover and (arguments.measured or arguments.limiter):
-        raise UserError('--rover goes with simulated kinds, not with --measured or --limiter')
+    given = (
+        ('--rover', arguments.rover),
+        ('--config', arguments.config),
+        ('-p', arguments.parameters),
+    )
+    for option, value in given:
+        if value and (arguments.measured or arguments.limiter):
+            raise UserError(f'{option} goes with simulated kinds, not with --measured or --limiter')
     if arguments.output:
         check_file(arguments.output, arguments.overwrite)
     if arguments.measured:
@@ -176,6 +186,7 @@ def _simulated(arguments: argparse.Namespace) -> _Told:
     if arguments.rover:
         _check_rover(arguments.rover, arguments.simulator)
     _check_names(arguments.modes, runner.MODES, 'mode')
+    overrides = _overrides(arguments)
     from tqdm import tqdm
 
     with tqdm(total=len(chosen) * arguments.seeds, unit='drive') as bar:
@@ -186,10 +197,13 @@ def _simulated(arguments: argparse.Namespace) -> _Told:
             arguments.jobs,
             lambda _: bar.update(),
             arguments.rover,
+            overrides,
         )
     parts = [tables.report(results, arguments.modes)]
     if arguments.rover:
         parts.append(f'Rover in place of that of the kinds: {arguments.rover}.')
+    if overrides:
+        parts.append(f'The estimator was told, and the drives were not: {", ".join(overrides)}.')
     if results.interrupted:
         parts.append(results.interrupted)
     return _Told(
@@ -197,6 +211,17 @@ def _simulated(arguments: argparse.Namespace) -> _Told:
         [score.health for score in results.drives],
         status=INTERRUPTED if results.interrupted else 0,
     )
+
+
+def _overrides(arguments: argparse.Namespace) -> dict[str, Value]:
+    """Return what --config and -p tell the estimator; the drives do not follow it."""
+    configuration = configuration_reader.from_arguments(arguments, complete=False)
+    if 'wheels.names' in configuration.stated:
+        raise UserError(
+            '--config: a rover file; give it as --rover, so that the drives have it too'
+        )
+    values = configuration.flat()
+    return {key: values[key] for key in sorted(configuration.stated)}
 
 
 def _chosen(names: Sequence[str], kinds: list[str] | None) -> list[tuple[str, str]]:

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
+from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.scheduler import finished
@@ -63,10 +64,20 @@ class Results:
 
 
 def score_drive(
-    simulator: str, kind: str, seed: int, modes: Sequence[str], rover: str | None = None
+    simulator: str,
+    kind: str,
+    seed: int,
+    modes: Sequence[str],
+    rover: str | None = None,
+    overrides: Mapping[str, Value] | None = None,
 ) -> list[DriveScore]:
-    """Simulate one drive and score the estimator on it in each mode."""
+    """Simulate one drive and score the estimator on it in each mode.
+
+    ``overrides`` are parameters of the estimator that differ from those of the drive.
+    """
     drive = SIMULATORS[simulator].simulate(kind, seed, None, rover)
+    if overrides:
+        drive = replace(drive, configuration=drive.configuration.replace(overrides))
     return [score_mode(simulator, kind, seed, mode, drive) for mode in modes]
 
 
@@ -117,8 +128,11 @@ def run(
     processes: int = 1,
     progress: Callable[[str], object] | None = None,
     rover: str | None = None,
+    overrides: Mapping[str, Value] | None = None,
 ) -> Results:
     """Run the bench over pairs of simulator and kind, with a rover file in place of the kinds' own.
+
+    ``overrides`` as in `score_drive`.
 
     Drives come in the order in which they finish, results do not depend on it. Interrupted, it
     returns the drives that are done.
@@ -127,7 +141,7 @@ def run(
     tasks = [(simulator, kind, seed) for seed in seeds for simulator, kind in chosen]
     done = 0
     try:
-        for scores_of_drive, words in _scored(tasks, modes, processes, rover):
+        for scores_of_drive, words in _scored(tasks, modes, processes, rover, overrides):
             results.drives += scores_of_drive
             done += 1
             if progress:
@@ -145,13 +159,14 @@ def _scored(
     modes: Sequence[str],
     processes: int,
     rover: str | None,
+    overrides: Mapping[str, Value] | None,
 ) -> Iterator[tuple[list[DriveScore], str]]:
     """Yield the scores of each drive and its name."""
     if processes == 1:
         for task in tasks:
-            yield score_drive(*task, modes, rover), ' '.join(map(str, task))
+            yield score_drive(*task, modes, rover, overrides), ' '.join(map(str, task))
         return
-    score = partial(_score, modes=modes, rover=rover)
+    score = partial(_score, modes=modes, rover=rover, overrides=overrides)
     with closing(finished(score, tasks, processes)) as outcomes:
         for index, outcome in outcomes:
             if isinstance(outcome, Exception):
@@ -159,5 +174,10 @@ def _scored(
             yield outcome, ' '.join(map(str, tasks[index]))
 
 
-def _score(task: tuple[str, str, int], modes: Sequence[str], rover: str | None) -> list[DriveScore]:
-    return score_drive(*task, modes, rover)
+def _score(
+    task: tuple[str, str, int],
+    modes: Sequence[str],
+    rover: str | None,
+    overrides: Mapping[str, Value] | None,
+) -> list[DriveScore]:
+    return score_drive(*task, modes, rover, overrides)

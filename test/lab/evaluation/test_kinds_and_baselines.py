@@ -52,11 +52,45 @@ def test_another_rover_drives_any_kind_and_any_scenario_of_the_own_world(kind):
         (['--rover', 'frostyboy', '--simulator', 'B', '--kinds', 'climb'], '--simulator A'),
         (['--rover', 'frostyboy', '--limiter'], '--limiter'),
         (['--kinds', 'scenarios/stalled'], 'stalled_wheel'),
+        (['--config', 'frostyboy'], 'give it as --rover'),
+        (['--config', 'frosty'], 'frostyboy'),
+        (['-p', 'filter.clas_std:=0.1'], 'filter.class_std'),
+        (['-p', 'filter.class_std:=0.1', '--limiter'], '--limiter'),
     ],
 )
 def test_what_is_no_rover_and_no_scenario_is_refused_before_the_first_drive(options, words, capsys):
     assert main(['evaluate', '--seeds', '1', *options]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_the_estimator_is_told_of_config_and_parameters_and_the_drive_is_not(monkeypatch, capsys):
+    from wheel_terra_lab.evaluation import bench, tables
+
+    estimators, drives = [], []
+
+    def score(simulator, kind, seed, mode, drive):
+        estimators.append(drive.configuration)
+        drives.append(drive.truth.slip)
+        return bench.DriveScore(kind, seed, mode, None, None, {}, simulator)
+
+    simulator = simulators.SIMULATORS['A']
+    short = replace(
+        simulator, simulate=lambda *given: simulator.simulate(given[0], given[1], 1.0, None)
+    )
+    monkeypatch.setitem(bench.SIMULATORS, 'A', short)
+    monkeypatch.setattr(bench, 'score_mode', score)
+    monkeypatch.setattr(tables, 'report', lambda *_: 'tables')
+    command = ['evaluate', '--kinds', 'climb', '--seeds', '1', '--modes', 'reference']
+    assert main(command) == 0
+    said = capsys.readouterr().out
+    assert 'told' not in said
+    assert main([*command, '--config', 'dlr_mss', '-p', 'filter.class_std:=0.1']) == 0
+    assert 'filter.class_std' in capsys.readouterr().out
+    plain, told = estimators
+    assert told.filter.class_std == 0.1 and plain.filter.class_std != 0.1
+    assert told.soil.cohesion == reader.load(['dlr_mss'], complete=False).soil.cohesion
+    assert told.wheels.names == plain.wheels.names and plain.soil.cohesion != told.soil.cohesion
+    np.testing.assert_array_equal(*drives)
 
 
 def test_baselines_between_references():
