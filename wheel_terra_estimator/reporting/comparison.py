@@ -147,7 +147,7 @@ def _difference(
     return Difference(
         name=name,
         unit=unit_of(name),
-        mean=float(change.mean()),
+        mean=float(change.mean().round(12)),  # of equal sums nothing, no 1e-16
         rms=float(np.sqrt(np.mean(change**2))),
         greatest=float(change[row, wheel]),
         where=f'{first.names[int(wheel)]} at {first.seconds[a[int(row)]]:.1f} s',
@@ -182,7 +182,7 @@ def _origin_lines(comparison: Comparison) -> list[str]:
     if not all(origin.settings for origin in comparison.origins):
         return [*lines, 'settings: not stated in both (a bag that was not written by replay)']
     unlike = comparison.unlike_settings
-    lines.append(f'settings: {len(unlike) or "none"} differ')
+    lines.append(f'settings that differ: {len(unlike) or "none"}')
     return lines + [
         f'  {key}: A {_shown_value(a)}, B {_shown_value(b)}' for key, (a, b) in unlike.items()
     ]
