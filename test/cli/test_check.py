@@ -42,3 +42,11 @@ def test_the_page_says_what_the_terminal_says(tmp_path, capsys):
 def test_what_cannot_be_used(tmp_path, capsys):
     assert main(['check', str(tmp_path / 'nothing')]) == 2
     assert 'no such bag' in capsys.readouterr().err
+
+
+def test_a_remap_to_nothing_names_the_topic_that_is_not_there(make_bag, drive, capsys):
+    topics = {'/imu/data': 'sensor_msgs/msg/Imu', '/joint_states': 'sensor_msgs/msg/JointState'}
+    bag = make_bag(messages=[row for row in drive if row[0] in topics], topics=topics)
+    assert main(['check', str(bag), '--remap', 'joint_states:=/wheels']) == 2
+    said = capsys.readouterr().err
+    assert 'no wheel rates on /wheels' in said and '/joint_states (sensor_msgs' in said

@@ -173,7 +173,7 @@ def test_cells_that_are_no_numbers(tmp_path, cell, parts):
             ('slip is 0.2 in every row', 'add rows at other slips'),
         ),
         ({'sinkage': np.full(8, 0.004)}, ('sinkage', 'all 8 rows', 'leave the column out')),
-        ({'slip': np.r_[np.nan, np.linspace(0.1, 0.8, 7)]}, ('slip', 'missing')),
+        ({'slip': np.r_[np.nan, np.linspace(0.1, 0.8, 7)]}, ('slip', 'the number is missing')),
     ],
 )
 def test_units_and_ranges(changes, parts):

@@ -56,8 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
         recording = read_series(bag, remaps, arguments.bag.resolve().name)
         if recording.joints is None and recording.wheel_odometry is None:
             there = in_one_line((name, kind) for name, kind, _ in recording.topics)
+            topic = remaps.get('joint_states', '/joint_states')
             raise UserError(
-                f'{arguments.bag}: neither joint states nor odometry in it; there are: {there}; '
+                f'{arguments.bag}: no wheel rates on {topic}, and no odometry; there are: {there}; '
                 'name the wheel rates with --remap joint_states:=/TOPIC, or record them'
             )
     report = check_recording(recording, configuration, tuple(remaps))

@@ -151,9 +151,9 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray
     def refuse(bad: Mask, column: str, why: str) -> None:
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
-            raise UserError(
-                f'{name}, line {lines[row]}, column {column}: {arrays[column][row]:g} {why}'
-            )
+            value = arrays[column][row]
+            shown = 'the number' if np.isnan(value) else f'{value:g}'
+            raise UserError(f'{name}, line {lines[row]}, column {column}: {shown} {why}')
 
     if not arrays['slip'].size:
         raise UserError(f'{name}, line 2: no rows below the column names; add one per steady point')
