@@ -182,6 +182,16 @@ def test_the_class_is_that_of_the_published_slip_in_drives(kind):
     assert contradictions(sets) == []
 
 
+@pytest.mark.parametrize(('slip', 'left'), [(0.95, 0.0), (0.85, 3.0), (-0.95, 3.0)])
+def test_a_driving_wheel_that_is_stuck_has_no_travel_left(slip, left):
+    classes = PublishedClasses(configuration())
+    for estimates in sets_of([slip] * 10):
+        ahead = replace(estimates, rim_travel_left=np.full(2, 3.0), time_to_stuck=np.full(2, 3.0))
+        published = classes.follow(ahead)
+    assert published.rim_travel_left == pytest.approx([left] * 2)
+    assert published.time_to_stuck == pytest.approx([left] * 2)
+
+
 def test_a_new_run_begins_without_a_class():
     config = configuration()
     core = EstimatorCore(config)

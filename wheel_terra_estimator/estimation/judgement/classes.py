@@ -116,7 +116,8 @@ class PublishedClasses:
     def follow(self, estimates: EstimateSet) -> EstimateSet:
         """Return a set with the classes that follow from its slips and those before it.
 
-        A wheel whose class is unknown in the set given stays so.
+        A wheel whose class is unknown in the set given stays so; one that drives and is stuck
+        has no rim travel and no time left.
         """
         time = estimates.stamp * _SECOND
         update, most_std = self._classifier.update, self._most_std
@@ -131,4 +132,10 @@ class PublishedClasses:
             )
         ]
         classes = np.array([state.current for state in self._states], dtype=np.uint8)
-        return replace(estimates, slip_class=classes)
+        stuck = (classes == SlipClass.STUCK) & (estimates.slip > 0.0)
+        return replace(
+            estimates,
+            slip_class=classes,
+            rim_travel_left=np.where(stuck, 0.0, estimates.rim_travel_left),
+            time_to_stuck=np.where(stuck, 0.0, estimates.time_to_stuck),
+        )
