@@ -33,6 +33,7 @@ from wheel_terra_estimator.checks.statistics import (
     correlation,
     moving_mean,
     robust_std,
+    robust_std_of_rows,
     runs,
 )
 from wheel_terra_estimator.checks.torque import heading_of_torque, slope_on_the_level
@@ -580,6 +581,12 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
 
 
 def _upper_rms(values: FloatArray) -> float:
-    blocks = [b for b in np.array_split(values, min(max(values.size // 50, 1), 200)) if b.size]
-    deviations = np.array([robust_std(block) for block in blocks])
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return math.nan
+    blocks = min(max(values.size // 50, 1), 200)
+    size, longer = divmod(values.size, blocks)  # so many are longer by one
+    split = longer * (size + 1)
+    rows = values[:split].reshape(longer, size + 1), values[split:].reshape(-1, size)
+    deviations = np.concatenate([robust_std_of_rows(block) for block in rows if block.size])
     return float(np.median(np.sort(deviations)[deviations.size // 2 :]))

@@ -63,6 +63,12 @@ def robust_std(values: FloatArray) -> float:
     return float(MAD_TO_STD * np.median(np.abs(values - np.median(values))))
 
 
+def robust_std_of_rows(rows: FloatArray) -> FloatArray:
+    """Return `robust_std` of each row of (k, n) finite values."""
+    off = np.abs(rows - np.median(rows, axis=1, keepdims=True))
+    return np.asarray(MAD_TO_STD * np.median(off, axis=1))
+
+
 def block_fit(
     design: FloatArray, target: FloatArray, instruments: FloatArray | None = None
 ) -> list[Estimate]:
