@@ -65,6 +65,15 @@ def ten_minute_drive(turns=True):
     return Motion(time, speed, yaw if turns else 0.0 * yaw, np.where(time < 62, hill, back))
 
 
+def starts_and_curves():
+    """Starts and stops for half a minute, then curves, on the level."""
+    time = np.arange(0.0, 70.0, 1.0 / RATE)
+    knots = [2, 3, 8, 9, 11, 12, 18, 19, 21, 22, 70]
+    speed = np.interp(time, knots, [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0, 0, 0.3, 0.3])
+    yaw = np.interp(time, [35, 36, 52, 53, 54, 69], [0, 0.3, 0.3, 0, -0.3, -0.3])
+    return Motion(time, speed, yaw, 0.0 * time)
+
+
 def recording(motion=None, seed=0, **changes):
     """All channels of a drive, with honest noise."""
     m = ten_minute_drive() if motion is None else motion

@@ -143,7 +143,8 @@ class AlwaysStuck:
         self.stamp = stamp
 
 
-def sets_of(drive, fault, seconds=END):
+def sets_of(drive, fault, seconds=END, stands=END):
+    """Sets of a drive with a fault, until the fault has been told for so many seconds."""
     core = EstimatorCore(
         drive.configuration,
         AlwaysStuck(drive.configuration.wheels.count),
@@ -151,9 +152,15 @@ def sets_of(drive, fault, seconds=END):
     )
     begin = drive.arrivals[0].arrival
     sets = []
+    first = None
     for arrival in drive.arrivals:
-        if arrival.arrival - begin < seconds * 1e9:
-            sets += core.add(fault(arrival.measurement))
+        if arrival.arrival - begin >= seconds * 1e9:
+            break
+        new = core.add(fault(arrival.measurement))
+        first = first or next((s.stamp for s in new if told(s)), None)
+        sets += new
+        if first and sets[-1].stamp - first > stands * 1e9:
+            break
     return sets + core.flush()
 
 
@@ -165,7 +172,7 @@ def told(estimates):
 def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(drives, name):
     fault, kind, topic, cure, begins = FAULTS[name]
     drive = drives[SIX]
-    sets = sets_of(drive, fault, min(END, begins + LONGEST + 2.0))
+    sets = sets_of(drive, fault, min(END, begins + LONGEST + 2.0), stands=3.0)
     found = [s for s in sets if told(s)]
     assert found, f'{kind} was not found'
     start = sets[0].stamp

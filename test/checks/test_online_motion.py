@@ -20,16 +20,10 @@ from wheel_terra_estimator.estimation.measurements import (
 DRIVING = 30.0  # [s]
 
 
-def motion():
-    """Starts and stops for half a minute, then curves, on the level."""
-    time = np.arange(0.0, 70.0, 1.0 / rolling.RATE)
-    knots = [2, 3, 8, 9, 11, 12, 18, 19, 21, 22, 70]
-    speed = np.interp(time, knots, [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0, 0, 0.3, 0.3])
-    yaw = np.interp(time, [35, 36, 52, 53, 54, 69], [0, 0.3, 0.3, 0, -0.3, -0.3])
-    return rolling.Motion(time, speed, yaw, 0.0 * time)
+motion = rolling.starts_and_curves
 
 
-def told(recording, since=0.0):
+def told(recording, since=0.0, until=70.0):
     """Return {fault: seconds after a time at which it was told first} over a drive."""
     joints, imu, reference = recording.joints, recording.imu, recording.reference
     inputs = {int(s): {} for s in np.union1d(joints.stamp, imu.stamp)}
@@ -41,6 +35,8 @@ def told(recording, since=0.0):
         inputs[int(stamp)]['inertial'] = InertialReading(int(stamp), force, rate, None)
     checks, first = OnlineChecks(rolling.rover()), {}
     for stamp, what in inputs.items():
+        if stamp > rolling.START + until * 1e9:
+            break
         checks.step(stamp, StepInputs(**what))
         for finding in (*checks.findings, *checks.remarks):
             seconds = (stamp - rolling.START) * 1e-9 - since
@@ -48,7 +44,7 @@ def told(recording, since=0.0):
     return first
 
 
-@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('seed', range(2))
 def test_a_sound_drive_is_silent(seed):
     assert not told(rolling.recording(motion(), seed))
 
@@ -58,7 +54,7 @@ def test_an_imu_turned_about_z(degrees):
     whole = rolling.recording(motion())
     turn = Rotation.from_euler('z', degrees, degrees=True).as_matrix()
     imu = replace(whole.imu, force=whole.imu.force @ turn, rate=whole.imu.rate @ turn)
-    ((fault, (seconds, finding)),) = told(replace(whole, imu=imu)).items()
+    ((fault, (seconds, finding)),) = told(replace(whole, imu=imu), until=DRIVING + 5.0).items()
     assert fault == 'imu_yaw' and finding.kind == 'mounting' and seconds < DRIVING
     assert finding.parameter == 'sensors.imu_mounting_yaw_deg'
 
@@ -77,13 +73,13 @@ def test_a_dead_encoder_and_a_dead_imu():
     whole = rolling.recording(motion())
     rate = whole.joints.rate.copy()
     rate[whole.joints.seconds > 24.0, 1] = 0.0
-    first = told(replace(whole, joints=replace(whole.joints, rate=rate)), since=24.0)
+    first = told(replace(whole, joints=replace(whole.joints, rate=rate)), 24.0, 60.0)
     assert set(first) == {'rate_frozen'}
     assert first['rate_frozen'][0] < DRIVING and first['rate_frozen'][1].wheel == 'front_right'
     at = int(np.argmax(whole.imu.seconds > 24.0))
     force, turning = whole.imu.force.copy(), whole.imu.rate.copy()
     force[at:], turning[at:] = force[at], turning[at]
-    first = told(replace(whole, imu=replace(whole.imu, force=force, rate=turning)), since=24.0)
+    first = told(replace(whole, imu=replace(whole.imu, force=force, rate=turning)), 24.0, 60.0)
     assert set(first) == {'sensor_frozen'} and first['sensor_frozen'][0] < DRIVING
 
 
@@ -93,10 +89,10 @@ def test_a_reference_and_a_torque_that_freeze():
     velocity, torque = whole.reference.velocity.copy(), whole.joints.torque.copy()
     at = int(np.argmax(whole.reference.seconds > since))
     velocity[at:] = velocity[at]
-    first = told(replace(whole, reference=replace(whole.reference, velocity=velocity)), since)
+    first = told(replace(whole, reference=replace(whole.reference, velocity=velocity)), since, 60.0)
     assert set(first) == {'reference_frozen'} and first['reference_frozen'][0] < DRIVING
     at = int(np.argmax(whole.joints.seconds > since))
     torque[at:, 2] = torque[at, 2]
-    first = told(replace(whole, joints=replace(whole.joints, torque=torque)), since)
+    first = told(replace(whole, joints=replace(whole.joints, torque=torque)), since, 60.0)
     assert set(first) == {'torque_frozen'} and first['torque_frozen'][0] < DRIVING
     assert first['torque_frozen'][1].wheel == 'rear_left'

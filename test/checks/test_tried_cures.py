@@ -85,16 +85,6 @@ def test_a_zero_of_the_torques_is_no_radius(zero):
         assert 'radius' not in {f.kind for f in found}, [str(f) for f in found]
 
 
-def test_two_exchanged_wheels_are_no_track():
-    whole = rolling.recording()
-    order = [1, 0, 2, 3]
-    joints = replace(
-        whole.joints, rate=whole.joints.rate[:, order], torque=whole.joints.torque[:, order]
-    )
-    (finding,) = check_recording(replace(whole, joints=joints), rolling.rover()).findings
-    assert finding.kind == 'exchanged_wheels' and finding.wheel == 'front_left, front_right'
-
-
 def test_a_wheel_held_under_torque_is_not_frozen():
     whole = rolling.recording()
     rate, torque = whole.joints.rate.copy(), whole.joints.torque.copy()
