@@ -23,6 +23,7 @@ from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.discrepancy import law_ranking
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
 # The quick tests draw the same in each run; `.ci/slow` draws anew (--hypothesis-profile random).
@@ -33,7 +34,6 @@ hypothesis.settings.load_profile('same')
 LONGEST = (
     'ros/test_parity.py',
     'ros/test_transport_faults.py',
-    'ros/test_soak.py',
     'ros',
     'discrepancy',
     'estimation/test_wheel_soil_estimator.py',
@@ -102,6 +102,12 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
             file.write(b'picture')
 
     monkeypatch.setattr(Figure, 'savefig', savefig)
+
+
+@pytest.fixture
+def own_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No other contact law is fitted to rows that do not agree: a second for each table."""
+    monkeypatch.setattr(law_ranking, 'with_other_laws', lambda diagnosis: diagnosis)
 
 
 class CompiledYaml:

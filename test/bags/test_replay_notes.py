@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 import pytest
+from recordings import beginning
 
 from wheel_terra_estimator.bags.replay import replay
 from wheel_terra_estimator.bags.storage import open_bag
@@ -49,12 +50,13 @@ def test_a_failing_filter_is_said_in_summary_and_diagnostics(
     assert b'filter_restarts' in next((tmp_path / 'out').glob('*.mcap')).read_bytes()
 
 
-def test_odometry_that_might_be_the_reference_is_named():
+def test_odometry_that_might_be_the_reference_is_named(tmp_path):
     """On a measured drive, on which the filter never restarts."""
     from wheel_terra_estimator.cli.demo import DRIVES
 
     drive = next(drive for drive in DRIVES if drive.name == 'pathfinder')
-    with open_bag(shipped.demo_recording(drive.name)) as bag:
+    recording = beginning(shipped.demo_recording(drive.name), tmp_path / 'drive', 12.0)
+    with open_bag(recording) as bag:
         result = replay(bag, reader.load(['pathfinder']), {})
         (said,) = [note for note in result.notes if 'reference_odom:=' in note]
         assert '/wheel/odometry: one that does not come from the wheels' in said

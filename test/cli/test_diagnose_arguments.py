@@ -58,7 +58,7 @@ def test_json_is_the_report_and_nothing_else(tmp_path, capsys):
     assert json.loads(said) == json.loads((out / 'report.json').read_text())
 
 
-def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(tmp_path, capsys):
+def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(tmp_path, capsys, own_law):
     """The same friction of the drive in two soils: each table gets its soil, both the one size."""
     rig = ['--config', 'hit_wh3_lug10']
     for name, soil in (('sand', 'hit_lss1'), ('simulant', 'fjs1_ishigami')):
@@ -70,7 +70,7 @@ def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(tmp_path, cap
     tables = [str(tmp_path / f'{name}.csv') for name in ('sand', 'simulant')]
     capsys.readouterr()
     arguments = ['diagnose', *tables, *rig, '--config', 'hit_lss1', '--no-pictures']
-    arguments += ['--soil', 'own', '--jobs', '2', '--only', 'drivetrain_friction']
+    arguments += ['--soil', 'own', '--jobs', '1', '--only', 'drivetrain_friction']
     arguments += ['-o', str(tmp_path / 'out')]
     assert main(arguments) == 0
     said = capsys.readouterr().out

@@ -9,9 +9,9 @@ import shutil
 
 import numpy as np
 import pytest
+from recordings import changed
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
@@ -33,20 +33,15 @@ def drive(tmp_path_factory):
 @pytest.fixture(scope='module')
 def upside_down(drive, tmp_path_factory):
     """The same drive with the IMU on its back."""
-    from wheel_terra_estimator.bags.message_types import jazzy_types
 
-    store = jazzy_types()
-    path = tmp_path_factory.mktemp('fault') / 'drive'
-    topics = {f'/{name}': kind for name, kind in INPUT_TYPES.items()}
-    with open_bag(drive) as bag, BagFile(path, topics) as file:
-        for log_time, topic, data in bag.messages([t for t in topics if t in bag.topics]):
-            message = store.deserialize_cdr(data, topics[topic])
-            if topic == '/imu/data':
-                for vector in (message.linear_acceleration, message.angular_velocity):
-                    vector.y, vector.z = -vector.y, -vector.z
-                message.orientation_covariance = np.array([-1.0] + [0.0] * 8)
-            file.write(topic, message, log_time)
-    return path
+    def turned(topic, message):
+        if topic == '/imu/data':
+            for vector in (message.linear_acceleration, message.angular_velocity):
+                vector.y, vector.z = -vector.y, -vector.z
+            message.orientation_covariance = np.array([-1.0] + [0.0] * 8)
+        return message if topic[1:] in INPUT_TYPES else None
+
+    return changed(drive, tmp_path_factory.mktemp('fault') / 'drive', turned)
 
 
 @pytest.fixture(scope='module')

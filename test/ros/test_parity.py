@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recordings import beginning
 
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
@@ -41,28 +42,6 @@ def fields(message):
     if isinstance(message, list):
         return tuple(fields(m) for m in message)
     return message.hex() if isinstance(message, float) else message
-
-
-def piece(source, target, seconds):
-    """Write the beginning of a recording as a bag of its own."""
-    from rosbags.rosbag2 import StoragePlugin, Writer
-
-    from wheel_terra_estimator.bags.message_types import jazzy_types
-
-    store = jazzy_types()
-    with (
-        open_bag(source) as bag,
-        Writer(target, version=9, storage_plugin=StoragePlugin.MCAP) as writer,
-    ):
-        connections = {
-            topic.name: writer.add_connection(topic.name, topic.type, typestore=store)
-            for topic in bag.topics.values()
-        }
-        begin = None
-        for raw in bag.messages(tuple(connections)):
-            begin = raw.log_time if begin is None else begin
-            if raw.log_time - begin < seconds * 1e9:
-                writer.write(connections[raw.topic], raw.log_time, raw.data)
 
 
 REPLAY = {
@@ -109,18 +88,18 @@ def test_live_and_replayed_numbers_are_the_same_bits(bag, tmp_path):
     How many sets a busy machine gives is not the point: what comes must be the same.
     """
     live, again, arrival = tmp_path / 'live', tmp_path / 'again', tmp_path / 'arrival.txt'
-    source = tmp_path / 'source'
-    piece(DEMO / bag, source, 10.0)
+    source = beginning(DEMO / bag, tmp_path / 'source', 10.0)
     logged = ['--arrival', str(arrival), *REPLAY[bag]]
     run_live(source, live, '--rate', '4', *logged)
     assert main(['replay', str(source), '-o', str(again), *logged]) == 0
     assert_same_bits(live, again, least=20)
 
 
+@pytest.mark.usefixtures('forked_node')
 def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
     """A frequent topic does not fall behind the others, so no log of arrivals is needed."""
-    live, again, source = tmp_path / 'live', tmp_path / 'again', tmp_path / 'source'
-    piece(DEMO / 'pathfinder', source, 10.0)
+    live, again = tmp_path / 'live', tmp_path / 'again'
+    source = beginning(DEMO / 'pathfinder', tmp_path / 'source', 10.0)
     run_live(source, live, *REPLAY['pathfinder'])
     assert main(['replay', str(source), '-o', str(again), *REPLAY['pathfinder']]) == 0
     assert_same_bits(live, again, least=90)

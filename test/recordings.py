@@ -1,0 +1,37 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings made of recordings."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.bags.storage import open_bag
+
+
+def beginning(source: Path, target: Path, seconds: float) -> Path:
+    """Write the beginning of a recording as a bag of its own."""
+    with open_bag(source) as bag:
+        topics = {topic.name: topic.type for topic in bag.topics.values()}
+        with BagFile(target, topics) as file:
+            first = None
+            for log_time, topic, data in bag.messages(tuple(topics)):
+                first = log_time if first is None else first
+                if log_time - first < seconds * 1e9:
+                    file.write_raw(topic, data, log_time)
+    return target
+
+
+def changed(source: Path, target: Path, change: Callable[[str, Any], Any]) -> Path:
+    """Write a recording once more, each message as `change` returns it; None leaves it out."""
+    store = jazzy_types()
+    with open_bag(source) as bag:
+        topics = {topic.name: topic.type for topic in bag.topics.values()}
+        with BagFile(target, topics) as file:
+            for log_time, topic, data in bag.messages(tuple(topics)):
+                message = change(topic, store.deserialize_cdr(data, topics[topic]))
+                if message is not None:
+                    file.write(topic, message, log_time)
+    return target
