@@ -19,7 +19,9 @@ def table(path: Path, law: str, *more: str) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize('law', ['wong_reece', 'resistive_force'])
+@pytest.mark.parametrize(
+    'law', [pytest.param('wong_reece', marks=pytest.mark.slow), 'resistive_force']
+)
 def test_the_law_that_made_the_rows_is_first(law, tmp_path, capsys):
     path = table(tmp_path / 'rows.csv', law)
     capsys.readouterr()

@@ -38,19 +38,23 @@ def predicted(table, configuration, tmp_path, *files):
 
 
 @pytest.mark.parametrize(
-    ('hidden', 'design'),
+    ('hidden', 'known', 'design'),
     [
-        (('slip_sinkage_exponent',), 'sweep40'),
+        (('slip_sinkage_exponent',), True, 'sweep40'),
         pytest.param(
-            ('slip_sinkage_exponent', 'drivetrain_friction'), 'sweep40', marks=pytest.mark.slow
+            *(('slip_sinkage_exponent', 'drivetrain_friction'), True, 'sweep40'),
+            marks=pytest.mark.slow,
         ),
-        ((), 'lugs48'),
+        (('slip_sinkage_exponent',), False, 'lugs48'),
     ],
 )
-def test_predict_with_the_written_model_gives_the_reported_error(hidden, design, tmp_path):
-    """An effect that was on, 15 % off, is refitted: the file must hold its new value."""
+def test_predict_with_the_written_model_gives_the_reported_error(hidden, known, design, tmp_path):
+    """An effect that was on, 15 % off, is refitted: the file must hold its new value.
+
+    One that was not is named, and on in the file: nobody is told of it a second time.
+    """
     table, values, *_ = make(design, hidden, 1.5)
-    if hidden:
+    if known:
         values |= {
             'effects.slip_sinkage_exponent.enabled': True,
             'effects.slip_sinkage_exponent.n1': 1.0,
@@ -64,8 +68,12 @@ def test_predict_with_the_written_model_gives_the_reported_error(hidden, design,
         error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
         assert error == pytest.approx(found.gap[quantity].fitted, rel=2e-3)
         assert error == pytest.approx(found.gap[quantity].after, rel=0.3)
-    again = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
-    assert diagnose(check_table('t.csv', table), again).verdict == 'agrees'
+    both = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
+    assert both.effects_std['slip_sinkage_exponent']['n1'] > 0.0
+    assert known or 'slip_sinkage_exponent' in both.provenance
+    again = diagnose(check_table('t.csv', table), both)
+    assert again.verdict == 'agrees'
+    assert set(again.base_effects) == set(hidden)
 
 
 def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):

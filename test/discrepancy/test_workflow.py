@@ -16,14 +16,11 @@ import pytest
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
-from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.selection.weights import log_prior
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
-from wheel_terra_estimator.discrepancy.tables.points import operating_points
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_lab.studies.campaigns.groups import GROUPS
 from wheel_terra_lab.studies.campaigns.scoring import diagnose as diagnose_campaign
 from wheel_terra_lab.trials.campaign import Plan, make_campaign
@@ -382,30 +379,6 @@ def test_reference_cancels_a_common_structural_error():
     assert diagnosis.gap['torque'].after < diagnosis.gap['torque'].refit
 
 
-def test_model_file_is_a_configuration_that_predicts_the_table(tmp_path):
-    table, values, *_ = make('lugs48', ('slip_sinkage_exponent',))
-    configuration = reader.from_parameters(values, complete=False)
-    diagnosis = diagnose(check_table('t.csv', table), configuration)
-    assert diagnosis.proposal is None
-    path = tmp_path / 'model.yaml'
-    write_model(diagnosis, path)
-    base = tmp_path / 'base.yaml'
-    configuration.write(base)
-    both = reader.load([base, path], complete=False)
-    assert both.effects['slip_sinkage_exponent']['n1'] > 0.0
-    assert both.effects_std['slip_sinkage_exponent']['n1'] > 0.0
-    assert 'slip_sinkage_exponent' in both.provenance
-    points = operating_points(diagnosis.table.columns, both, diagnosis.table.name)
-    state = WheelSoilModel(both.soil, both.effects).steady_state(points)
-    after = diagnosis.curves.after[:, :3]
-    error = (state.outputs() - after) / np.ptp(after, axis=0)
-    assert np.abs(error).max() < 2e-3
-    # A model that has the effect is no longer told that it lacks it.
-    again = diagnose(check_table('t.csv', table), both)
-    assert again.verdict == 'agrees'
-    assert again.base_effects == ('slip_sinkage_exponent',)
-
-
 def test_same_table_same_report_whatever_the_order_of_rows():
     table, values, *_ = make('basic16', ('bulldozing',), 2.0)
     first = run(table, values).to_dict()
@@ -417,7 +390,7 @@ def test_same_table_same_report_whatever_the_order_of_rows():
         assert mine['confidence'] == pytest.approx(theirs['confidence'], abs=0.02)
 
 
-def test_report_keys_and_command(tmp_path, capsys):
+def test_report_keys_and_command(tmp_path, capsys, own_law):
     table, values, *_ = make('lugs48', ('lug_digging',))
     lines = [','.join(table)] + [
         ','.join(f'{x:.8g}' for x in row) for row in zip(*table.values(), strict=True)

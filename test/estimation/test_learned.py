@@ -43,7 +43,7 @@ def deviation(key):
 
 @pytest.fixture(scope='module')
 def drive():
-    scenario = {'configuration': ['generic_six_wheel', 'dry_sand_ding2015'], 'duration': 28.0}
+    scenario = {'configuration': ['generic_six_wheel', 'dry_sand_ding2015'], 'duration': 20.0}
     return simulate(load(scenario | {'slope.angle_deg': [8.0]}), 3)
 
 

@@ -33,7 +33,7 @@ from wheel_terra_estimator.estimation.traction_limiter import (
     LimiterState,
 )
 
-SEQUENCES = int(os.environ.get('LIMITER_SEQUENCES', '500'))
+SEQUENCES = int(os.environ.get('LIMITER_SEQUENCES', '200'))
 UNKNOWN = 255
 WHEELS = 4
 PERIOD = 0.2  # [s] of sets and commands
@@ -303,7 +303,7 @@ def run(sequences, **more):
 
 @pytest.mark.hypothesis
 @pytest.mark.parametrize(
-    'sequences', [SEQUENCES, pytest.param(20 * SEQUENCES, marks=pytest.mark.slow)]
+    'sequences', [SEQUENCES, pytest.param(50 * SEQUENCES, marks=pytest.mark.slow)]
 )
 def test_no_sequence_of_events_breaks_an_invariant(sequences):
     run(sequences)

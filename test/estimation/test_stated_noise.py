@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Noise of the IMU as its messages state it: the same as in a file, and no placeholder."""
 
+import functools
 from dataclasses import replace
 from math import nan, radians
 
@@ -60,6 +61,11 @@ def drive(variances, backwards=False):
     return stream
 
 
+@functools.cache
+def without_statement():
+    return run(ROVER, drive([InertialVariance()]))
+
+
 def run(configuration, stream):
     """Return speed, slip and their deviations of all sets, and what diagnostics tell."""
     core = EstimatorCore(configuration)
@@ -71,7 +77,7 @@ def run(configuration, stream):
 def test_a_message_states_what_a_file_can_state():
     by_file, _ = run(ROVER.replace(FIGURES), drive([InertialVariance()]))
     by_message, _ = run(ROVER, drive([STATED]))
-    default, _ = run(ROVER, drive([InertialVariance()]))
+    default, _ = without_statement()
     np.testing.assert_array_equal(by_message, by_file)
     assert np.abs(by_message - default).max() > 0.01
 
@@ -85,7 +91,7 @@ def test_a_file_comes_before_the_message_key_by_key():
 
 @pytest.mark.parametrize('variance', [1e-12, 99999.0, nan, -1.0])
 def test_placeholders_leave_the_defaults(variance):
-    default, health = run(ROVER, drive([InertialVariance()]))
+    default, health = without_statement()
     found, told = run(ROVER, drive([InertialVariance(variance, variance, variance)]))
     np.testing.assert_array_equal(found, default)
     assert told == health

@@ -50,6 +50,11 @@ def estimate(drive, mode='reference', estimator=None):
     return sets
 
 
+@functools.cache
+def plain_drive():
+    return drive()
+
+
 def drive(duration=12.0, seed=3, **keys):
     base = {
         'configuration': SAND,
@@ -326,7 +331,7 @@ def test_nothing_drifts_along_the_ridge_of_slip_and_strength(kind, mode, most):
 
 
 def test_a_wheel_sunk_to_its_hub_is_followed():
-    d = drive()
+    d = plain_drive()
     sunk = 0.98 * float(d.configuration.wheels.radius[0])
     half = d.arrivals[0].measurement.stamp + 8_000_000_000
     estimator = WheelSoilEstimator(d.configuration)
@@ -353,7 +358,7 @@ def errors_of(kind, duration, mode, of, truth):
 def test_pull_in_a_patch_follows_the_torque():
     """Soil is learned over travel; what torque says of the pull counts at once."""
     error, _, truth = errors_of(
-        'entrapment_patch', 40.0, 'reference', 'drawbar_pull', 'drawbar_pull'
+        'entrapment_patch', 30.0, 'reference', 'drawbar_pull', 'drawbar_pull'
     )
     assert np.sqrt(np.nanmean(error**2)) < 0.02 * truth.normal_load.mean()
 
@@ -377,7 +382,7 @@ def with_inertial(run, change):
 
 
 def test_a_jolt_at_the_start_does_not_stop_the_speed_without_a_reference():
-    run = drive()
+    run = plain_drive()
 
     def jolted(reading, time):
         jolt = [-0.3 if 0.1 < time < 0.4 else 0.0, 0.0, 0.0]

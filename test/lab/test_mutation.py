@@ -29,7 +29,6 @@ def test_half(sound):
         ('HALF > 0.0', 'True', 'test_half.py', 'survived'),
         ('HALF == 0.7', 'True', 'test_half.py', 'error'),  # fails without the mutant, too
         ('True', 'HALF == 0.5', 'test_half.py', 'error'),  # no test of its own failed
-        ('True', 'True', 'test_import.py', 'error'),
         ('True', 'True', 'test_gone.py', 'error'),
     ],
 )
@@ -43,7 +42,6 @@ def test_a_mutant_is_caught_by_a_test_that_fails_because_of_it(
     module.write_text(TEXT)
     test = TEST.format(asked=asked, fixture=fixture, package=PACKAGE)
     (tmp_path / 'test_half.py').write_text(test)
-    (tmp_path / 'test_import.py').write_text('import nothing_of_this_name')
     (tmp_path / 'pytest.ini').write_text('[pytest]\n')
     at = TEXT.index('/')
     mutant = Mutant(f'{PACKAGE}/errors.py', 1, 'sign', at, at + 1, '/', '*')

@@ -104,10 +104,6 @@ def test_forms_are_effects_of_one_form_under_keys_of_their_own():
             {SKID: {'form': 'lyasko', 'n1': 0.3}},
             'has no parameter n1 in the form lyasko; it has gain',
         ),
-        (
-            {'grouser_thrust': {}, 'lug_shear_radius': {}},
-            'exclude each other',
-        ),
     ],
 )
 def test_settings_of_a_wrong_form_are_refused(settings, words):

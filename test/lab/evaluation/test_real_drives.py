@@ -20,10 +20,8 @@ pytestmark = [
 ]
 
 
-EVENTS = [  # those looked at; runs of high slip in them, of which so many may be found late
-    pytest.param(('event_1_4', 'event_1_5', 'event_1_7'), 7, 0, id='three'),
-    pytest.param((), 15, 2, id='all', marks=pytest.mark.slow),
-]
+ALL = pytest.param((), 15, 2, id='all', marks=pytest.mark.slow)
+"""Events looked at; runs of high slip in them, of which so many may be found late."""
 
 
 def scores(names, rate):
@@ -34,7 +32,7 @@ def scores(names, rate):
     ]
 
 
-@pytest.mark.parametrize(('names', 'least', 'most_late'), EVENTS)
+@pytest.mark.parametrize(('names', 'least', 'most_late'), [(('event_1_4',), 2, 0), ALL])
 def test_snow_events_are_warned_with_the_reference_not_later_than_by_the_author(
     names, least, most_late
 ):
@@ -47,8 +45,8 @@ def test_snow_events_are_warned_with_the_reference_not_later_than_by_the_author(
     assert late <= most_late
 
 
-@pytest.mark.parametrize(('names', 'least', 'most_late'), EVENTS)
-def test_snow_events_are_warned_without_any_speed(names, least, most_late):
+@pytest.mark.parametrize('names', [('event_1_7',), pytest.param((), marks=pytest.mark.slow)])
+def test_snow_events_are_warned_without_any_speed(names):
     found = scores(names, 0.0)
     assert len(found) == (len(names) or 9)
     assert all(s.lead is not None for s in found)
@@ -77,9 +75,9 @@ def test_a_shaking_husky_on_firm_ground_is_not_stuck():
     configuration = reader.from_parameters(HUSKY)
     bag = MEASURED / 'bags' / 'boreal_husky_flooring_00_mcap'
     measurements = [m for _, m in read(bag, {}, configuration)]
-    end = measurements[0].stamp + 60 * 10**9
+    end = measurements[0].stamp + 30 * 10**9
     sets, _ = run_estimator(configuration, [m for m in measurements if m.stamp < end])
-    assert len(sets) > 380
+    assert len(sets) > 190
     assert not any(s.stuck for s in sets)
     high = np.isin(np.array([s.slip_class for s in sets]), (2, 3))
     assert high.mean() < 0.01
