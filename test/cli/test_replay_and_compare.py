@@ -32,7 +32,7 @@ def drive(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def upside_down(drive, tmp_path_factory):
-    """The same drive with the IMU on its back."""
+    """The same drive with the IMU on its back, the topics of the truth without a message."""
 
     def turned(topic, message):
         if topic == '/imu/data':
@@ -74,6 +74,7 @@ def test_findings_come_before_anything_else(upside_down, tmp_path, capsys):
     assert main(['replay', str(upside_down), *CONFIG]) == 0
     said = capsys.readouterr().out
     assert said.startswith('finding: mounting') and 'imu_mounting_roll_deg: 180' in said
+    assert 'against the truth' not in said
 
 
 def test_smoothed(drive, live, tmp_path, capsys, undrawn):

@@ -102,21 +102,31 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
         )
         slips, aside = found['/ground_truth/slip'], found['/ground_truth/slip_angle']
         angle = np.unwrap(aside.value[:, :wheels], axis=0)  # to be interpolated
-        return Truth(
+        truth = Truth(
             source='/ground_truth',
             velocity=found['/ground_truth/twist'].known(),
-            slip=_of_turning_wheels(
-                WheelTruth(slips.stamp, slips.value[:, :wheels]), found['/ground_truth/slip_class']
-            ).known(),
-            sinkage=found['/ground_truth/sinkage'].known(),
-            drawbar_pull=WheelTruth(slips.stamp, slips.value[:, wheels:]).known(),
-            slip_angle=WheelTruth(aside.stamp, angle).known(),
-            lateral_force=WheelTruth(aside.stamp, aside.value[:, wheels:]).known(),
+            slip=_told(
+                _of_turning_wheels(
+                    WheelTruth(slips.stamp, slips.value[:, :wheels]),
+                    found['/ground_truth/slip_class'],
+                )
+            ),
+            sinkage=_told(found['/ground_truth/sinkage']),
+            drawbar_pull=_told(WheelTruth(slips.stamp, slips.value[:, wheels:])),
+            slip_angle=_told(WheelTruth(aside.stamp, angle)),
+            lateral_force=_told(WheelTruth(aside.stamp, aside.value[:, wheels:])),
         )
+        return truth if truth.velocity.stamp.size else None
     if BODY_VELOCITY in bag.topics:
         velocity = _thinned(bag, {BODY_VELOCITY: _Values(_forward, 1)})[BODY_VELOCITY].known()
         return Truth(BODY_VELOCITY, velocity, None, None, None) if velocity.stamp.size else None
     return None
+
+
+def _told(series: WheelTruth) -> WheelTruth | None:
+    """Return what is known of a series; None of a topic that holds nothing."""
+    known = series.known()
+    return known if known.stamp.size else None
 
 
 def _of_turning_wheels(slip: WheelTruth, classes: WheelTruth) -> WheelTruth:
