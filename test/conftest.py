@@ -23,7 +23,6 @@ from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.discrepancy import law_ranking
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
 # The quick tests draw the same in each run; `.ci/slow` draws anew (--hypothesis-profile random).
@@ -107,6 +106,8 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def own_law(monkeypatch: pytest.MonkeyPatch) -> None:
     """No other contact law is fitted to rows that do not agree: a second for each table."""
+    from wheel_terra_estimator.discrepancy import law_ranking
+
     monkeypatch.setattr(law_ranking, 'with_other_laws', lambda diagnosis: diagnosis)
 
 
