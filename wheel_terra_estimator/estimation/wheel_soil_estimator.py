@@ -633,7 +633,7 @@ class WheelSoilEstimator:
             model_variance=model_variance,
             repeats=repeats,
         )
-        self._speed.follow_contacts(self._contact_age.state.travel)
+        self._speed.follow_contacts(self._contact_age.state.travel, self._clock.assessment.digging)
         if not cycle.window.readings:
             return forces, None, rows
         curvature = self._turning.curvature(float(ekf.mean[SPEED]))

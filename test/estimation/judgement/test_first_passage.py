@@ -52,6 +52,21 @@ def sinking(slip, growth=0.0, std=0.03, seconds=20.0, radius=0.12):
     return followed(motion(slip, growth * RIM * time, std, radius) for time in times)
 
 
+@pytest.mark.parametrize(
+    ('sinks', 'digging'), [((4, 1), 0.03), ((3, 1), 0.0), ((3, -1), 0.0), ((5, -1), -0.03)]
+)
+def test_digging_is_what_more_than_half_of_the_wheels_do(sinks, digging):
+    """A sinkage that a first-order lag of 8 cm follows stays 8 cm times its growth ahead of it."""
+    count, sign = sinks
+    growths = [sign * 0.03] * count + [0.0] * (6 - count)
+    motions = []
+    for time in 0.1 * np.arange(301):
+        (wheel, *_) = motion(0.3).wheels
+        wheels = [wheel._replace(sinkage=0.05 + growth * RIM * time) for growth in growths]
+        motions.append(motion(0.3)._replace(wheels=tuple(wheels)))
+    assert followed(motions).digging == pytest.approx(digging, rel=0.05, abs=1e-9)
+
+
 def simulated(slip, std, deepening, travel, paths=100_000):
     """Share of simulated paths that come above 0.9, in steps of 5 cm, exact in each."""
     process, rng, step = SlipProcess(), np.random.default_rng(1), 0.05

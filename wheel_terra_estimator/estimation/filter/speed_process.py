@@ -68,6 +68,9 @@ class SpeedTuning:
     start_walk: float = 0.6
     """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
     start_walk_travel: float = 0.2  # [m] with which it decays
+    digging_walk: float = 25.0
+    """The same over the sinkage that most wheels gain or lose per rim travel [1/sqrt(m)]: where
+    contacts change, the slip does."""
     demand_error: float = 0.3  # of what the demand changes, over that change [-]
     slip_per_demand_walk: float = 0.2  # [1/sqrt(m)]
     inflation_rate: float = 2.0
@@ -285,10 +288,20 @@ class SpeedProcess(Component[SpeedState]):
             other_direction=ended,
         )
 
-    def follow_contacts(self, travel: float) -> None:
-        """Note how far the slip may walk: farther after a start, over some `travel` [m]."""
-        start = self._tuning.start_walk * math.exp(-travel / self._tuning.start_walk_travel)
-        self.state = self.state._replace(ratio_walk=max(self._walk, start))
+    def follow_contacts(self, travel: float, digging: float) -> None:
+        """Note how far the slip may walk: farther where contacts change.
+
+        Parameters
+        ----------
+        travel : float
+            Since the start [m].
+        digging : float
+            Sinkage that most wheels gain over rim travel [m/m].
+        """
+        tuning = self._tuning
+        start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
+        walk = math.hypot(self._walk, tuning.digging_walk * digging)
+        self.state = self.state._replace(ratio_walk=max(walk, start))
 
     # -- Prediction ------------------------------------------------------------------------------
 

@@ -49,6 +49,8 @@ class StuckAssessment(NamedTuple):
     wheels: tuple[WheelForecast, ...] = ()
     stalled: tuple[bool, ...] = ()
     direction: int = 0  # of the rims that led to it: 1, -1; 0 none, both or unknown
+    digging: float = 0.0
+    """Sinkage gained over rim travel by more than half of the wheels [m/m]; < 0: they rise."""
     confirmed: bool = False
     """Whether something says so that no wrong sign or unit of the wheels' readings makes up."""
 
@@ -107,6 +109,7 @@ class StuckMonitor(Component[StuckState]):
             ahead.wheels,
             situation.stalled,
             state.direction,
+            situation.digging,
             state.stuck and _confirmed(situation),
         )
 
