@@ -68,7 +68,7 @@ class SpeedTuning:
     start_walk: float = 0.6
     """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
     start_walk_travel: float = 0.2  # [m] with which it decays
-    digging_walk: float = 25.0
+    digging_walk: float = 15.0
     """The same over the sinkage that most wheels gain or lose per rim travel [1/sqrt(m)]: where
     contacts change, the slip does."""
     demand_error: float = 0.3  # of what the demand changes, over that change [-]
