@@ -633,7 +633,12 @@ class WheelSoilEstimator:
             model_variance=model_variance,
             repeats=repeats,
         )
-        self._speed.follow_contacts(self._contact_age.state.travel, self._clock.assessment.digging)
+        unread = len(self._sinkage.unread(cycle.time))
+        self._speed.follow_contacts(
+            self._contact_age.state.travel,
+            self._clock.assessment.digging,
+            watched=2 * unread < self._rover.wheel_count,
+        )
         if not cycle.window.readings:
             return forces, None, rows
         curvature = self._turning.curvature(float(ekf.mean[SPEED]))

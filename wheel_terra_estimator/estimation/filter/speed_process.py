@@ -71,6 +71,8 @@ class SpeedTuning:
     digging_walk: float = 15.0
     """The same over the sinkage that most wheels gain or lose per rim travel [1/sqrt(m)]: where
     contacts change, the slip does."""
+    watched_share: float = 0.5
+    """Of ``filter.ratio_walk`` where readings of the sinkage would show such a change."""
     demand_error: float = 0.3  # of what the demand changes, over that change [-]
     slip_per_demand_walk: float = 0.2  # [1/sqrt(m)]
     inflation_rate: float = 2.0
@@ -288,7 +290,7 @@ class SpeedProcess(Component[SpeedState]):
             other_direction=ended,
         )
 
-    def follow_contacts(self, travel: float, digging: float) -> None:
+    def follow_contacts(self, travel: float, digging: float, *, watched: bool) -> None:
         """Note how far the slip may walk: farther where contacts change.
 
         Parameters
@@ -297,10 +299,13 @@ class SpeedProcess(Component[SpeedState]):
             Since the start [m].
         digging : float
             Sinkage that most wheels gain over rim travel [m/m].
+        watched : bool
+            Whether most sinkages are read.
         """
         tuning = self._tuning
+        steady = self._walk * (tuning.watched_share if watched else 1.0)
         start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
-        walk = math.hypot(self._walk, tuning.digging_walk * digging)
+        walk = math.hypot(steady, tuning.digging_walk * digging)
         self.state = self.state._replace(ratio_walk=max(walk, start))
 
     # -- Prediction ------------------------------------------------------------------------------
