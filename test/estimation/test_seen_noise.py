@@ -131,6 +131,17 @@ def test_a_reference_that_is_off_by_a_constant_is_not_noisy_for_it(noise):
     assert noise.seen('reference') == pytest.approx(std, rel=0.3)
 
 
+@pytest.mark.parametrize('first', [1, 15])
+def test_wild_references_are_no_noise(noise, first):
+    """One in twenty is off by fifty deviations; the others are still worth what they state."""
+    rng, std = np.random.default_rng(11), 5.0 * noise.stated['reference']
+    for i in range(300):
+        innovation = std * rng.normal() + (50.0 * std if i % 20 == first else 0.0)
+        noise.compare_reference(float(i), innovation, std**2, 1e-6 * std**2, std**2)
+        assert noise.variance('reference', std**2) == std**2
+    assert noise.seen('reference') == pytest.approx(std, rel=0.5)
+
+
 @pytest.mark.parametrize(('share', 'told'), [(1.0, False), (0.1, True)])
 def test_a_reference_is_held_against_its_own_covariance(noise, share, told):
     rng, std = np.random.default_rng(7), 20.0 * noise.stated['reference']

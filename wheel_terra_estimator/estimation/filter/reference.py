@@ -236,11 +236,15 @@ class ReferenceUpdate(Component[ReferenceState]):
         self.state = state._replace(time=time, gap=gap)
 
     def _note_slide(self, ekf: GatedFilter, time: float, forward: float, variance: float) -> None:
-        """Wheels that stand: either the reference agrees with rest, or the rover slides on them."""
+        """Wheels that stand: the references agree with rest, or the rover slides on them.
+
+        A single one that moves may be wild: the slide is believed from the second in a row.
+        """
         tuning = self._tuning
         noise = tuning.moving_std * math.sqrt(variance)
         until = time
-        if abs(forward) > max(noise, tuning.moving_rest * self._rover.rest_speed):
+        moves = abs(forward) > max(noise, tuning.moving_rest * self._rover.rest_speed)
+        if moves and (self.state.rejected_in_a_row or time < self.state.sliding_until):
             until += max(tuning.slide_gaps * self.state.gap, tuning.shortest_slide)
             ekf.inflate(SPEED, forward**2)
         self.state = self.state._replace(sliding_until=until)

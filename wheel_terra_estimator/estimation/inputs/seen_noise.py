@@ -37,6 +37,8 @@ class SeenNoiseTuning:
     references: float = 30.0
     most_jump: float = 4.0
     """Deviations of what is seen beyond which one reading does not count: steps are no noise."""
+    wild: float = 10.0
+    """Deviations of what is seen beyond which a reference is wild: no noise, and the gate's."""
     in_step: float = 0.2  # share by which two spacings of readings may differ
     longest_gap: float = 0.5  # between readings that are compared [s]
     least_share: float = 0.01  # of the stated deviation
@@ -191,9 +193,10 @@ class SeenNoise(Component[SeenNoiseState]):
         if state.last:
             last, gain = state.last
             seen = (innovation - last) ** 2 / (1.0 + (1.0 + gain) ** 2)
-            seen_variance, count = self._mean(
-                'reference', seen_variance, count, seen, self._tuning.references
-            )
+            if seen <= self._tuning.wild**2 * max(seen_variance, variance):
+                seen_variance, count = self._mean(
+                    'reference', seen_variance, count, seen, self._tuning.references
+                )
         kept = (innovation, P / (P + variance))
         self._keep('reference', ChannelState(time, 0.0, kept, (), seen_variance, count))
         own = math.sqrt(stated) if stated > 0.0 else math.nan
