@@ -23,7 +23,10 @@ def usual(parts):
 
 
 def pull_share(parts, slip):
-    """Return pull over load of the whole rover in steady driving at a slip."""
+    """Return pull over load of the whole rover in steady driving at a slip.
+
+    Its soil shears half way up the lugs.
+    """
     configuration = parts.configuration
     wheels, n = configuration.wheels, configuration.wheels.count
     loads = np.asarray(parts.rover.load.loads((0.0, 0.0, parts.rover.gravity)))
@@ -35,7 +38,8 @@ def pull_share(parts, slip):
         gravity=float(configuration.rover.gravity),
         pass_number=np.asarray(wheels.passes, dtype=float),
     )
-    steady = WheelSoilModel(configuration.soil, configuration.effects).steady_state(points)
+    effects = configuration.effects | {'lug_shear_radius': {'lam': 0.5}}
+    steady = WheelSoilModel(configuration.soil, effects).steady_state(points)
     return float(steady.drawbar_pull.sum() / loads.sum())
 
 
@@ -51,3 +55,15 @@ def test_steeper_takes_more_and_no_soil_gives_all(usual):
     assert slips[0] < 0.0
     assert usual.at(2.0, beyond=0.8) == 0.8
     assert usual.at(-2.0, beyond=0.8) == -0.5
+
+
+@pytest.mark.parametrize('slip', [0.05, 0.15, 0.3])
+@pytest.mark.parametrize('stated', [False, True])
+def test_lugs_of_which_no_file_says_it_shear_half_way_up(slip, stated):
+    """Lugs of a tenth of the radius: sheared at the rim they would take 0.05 to 0.2 more."""
+    keys = ['wheels.lug_height:=[0.015, 0.015, 0.015, 0.015, 0.015, 0.015]']
+    keys += ['effects.lug_shear_radius.enabled:=true'] * stated
+    lugged = Parts(reader.load(SAND, keys))
+    demand = pull_share(lugged, slip)
+    found = UsualSlip(lugged.configuration, lugged.rover).at(demand, beyond=0.8)
+    assert found == pytest.approx(slip, abs=0.02)

@@ -16,6 +16,9 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 KEYS = ['effects.lug_digging.enabled:=true', 'effects.slip_sinkage_exponent.enabled:=true']
 
+SHEARED_LUGS = {'lug_shear_radius': {'lam': 0.5}}
+"""What the estimator takes where no effect says at which radius the lugs shear."""
+
 
 LEARNED = 'effects.learned_closure'  # as the proposal.yaml of a diagnosis states it
 PROPOSAL = [
@@ -86,9 +89,10 @@ def test_agrees_with_the_quadrature_at_its_own_steady_state(rover, models, slip)
     load = 290.0
     points = OperatingPoints(slip=np.array([slip]), normal_load=np.array([load]), wheel=wheel)
     law = rover.rover.contact_law
-    truth = WheelSoilModel(rover.soil, rover.effects)
+    effects = rover.effects | SHEARED_LUGS
+    truth = WheelSoilModel(rover.soil, effects)
     if law != LAWS[0]:
-        truth = contact_law(law, rover.soil, rover.effects, float(wheel.width))
+        truth = contact_law(law, rover.soil, effects, float(wheel.width))
     truth = truth.steady_state(points)
     z = float(truth.sinkage[0])
     state = WheelStates(1.0 - slip, z, load)
@@ -114,7 +118,8 @@ def test_the_default_is_the_closed_form_of_the_configured_soil():
     rover = rover_with(LAWS[0], KEYS)
     assert reader.load(['generic_six_wheel']).rover.contact_law == LAWS[0]
     wheels = rover.wheels
-    plain = ConditionedForces(wheels.wheel, rover.soil, rover.effects, 'lug_tip')
+    effects = rover.effects | SHEARED_LUGS
+    plain = ConditionedForces(wheels.wheel, rover.soil, effects, 'lug_tip')
     soil = rover.soil.cohesion, np.tan(rover.soil.friction_angle)
     expected = plain.forces(ConditionedInputs(0.7, 0.02, 290.0, *soil, rover.soil.shear_modulus))
     answer = contact_models(rover).forces(WheelStates(0.7, 0.02, 290.0))

@@ -27,10 +27,17 @@ from wheel_terra_estimator.terramechanics.contact_law import (
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.resistive_force import PER_CUBIC_METRE
 
+_LUG_EFFECTS = frozenset({'lug_shear_radius', 'grouser_thrust'})
+_SHEARED_LUGS = {'lug_shear_radius': {'lam': 0.5}}
+"""Where no file says at which radius lugs shear: half way up (Ding et al. 2010). At the rim a wheel
+that rolls on the tips of its lugs would brake."""
+
 
 def contact_models(configuration: Configuration) -> WheelModels:
     """Return the models of all wheels under the configured contact law."""
     law, soil, effects = configuration.rover.contact_law, configuration.soil, configuration.effects
+    if not _LUG_EFFECTS & effects.keys():
+        effects = effects | _SHEARED_LUGS
     if law == RESISTIVE_FORCE:
         return ResistiveForceModels(configuration)
     if law == WONG_REECE:
