@@ -12,10 +12,10 @@ import rolling_rover as rolling
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.series_reader import choose_topics
 from wheel_terra_estimator.bags.storage import open_bag
-from wheel_terra_estimator.checks.clocks import as_smooth
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.imu import ImuState, check_imu
 from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.statistics import lag
 
 WHOLE = rolling.recording()
 
@@ -484,17 +484,17 @@ def test_a_wheel_with_lugs_rolls_on_the_radius_that_shears_the_soil(at_tips, ref
     assert report.figures['rover.rolling_radius_m'] == pytest.approx(told, rel=0.005)
 
 
-@pytest.mark.parametrize('period', [0.25, 0.75, 2.5])
-def test_rims_are_as_smooth_as_a_straight_line_between_references(period):
-    """A kick at a stamp of the reference is a triangle between the stamps beside it."""
-    time = 0.05 * np.arange(400)
-    at = np.arange(0.0, 20.0, period)
-    kick = at[at.size // 2]
-    rim = np.where(np.abs(time - kick) < 0.01, 1.0, 0.0)
-    smooth, line = as_smooth(time, rim, at, np.where(at == kick, 1.0, 0.0))
-    base = min(period, 1.5)
-    np.testing.assert_allclose(line, np.maximum(1.0 - np.abs(time - kick) / period, 0.0), atol=1e-9)
-    triangle = np.maximum(1.0 - np.abs(time - kick) / base, 0.0) * 0.05 / base
-    # An even number of rows lies half a row to one side, twice.
-    either = [np.abs(smooth - np.roll(triangle, shift)).max() for shift in (-1, 0, 1)]
-    assert min(either) < 1e-9
+@pytest.mark.parametrize('period', [0.25, 0.75, 1.4])
+@pytest.mark.parametrize('late', [-0.6, 0.0, 0.35])
+def test_starts_that_fall_alike_between_references_do_not_look_late(period, late):
+    """Every start is as far behind a stamp of the reference: no line between these tells when."""
+    time = 0.05 * np.arange(3000)
+    at = np.arange(0.0, time[-1], period)
+    starts = [period * round(k * 9.0 / period) + 0.1 * period for k in range(1, 16)]
+
+    def speed(t):
+        ramps = [np.clip((t - start) / 1.2, 0.0, 1.0) * (-1) ** k for k, start in enumerate(starts)]
+        return np.sum(ramps, axis=0)
+
+    told = lag(time, speed(time), at, speed(at - late), 3.0)
+    assert told.value == pytest.approx(late, abs=0.03)

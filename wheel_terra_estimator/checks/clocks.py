@@ -40,22 +40,26 @@ IN_A_DRIVE = 15.0
 """Length of a drive over the greatest lag that it tells [-]."""
 LEAST_OFFSET = {'imu': 0.3, 'reference': 0.25}
 """Lags below this [s] are those of chassis, soil, jitter and filters of encoders."""
-LEAST_PERIODS = 0.5
+LEAST_PERIODS = 0.35
 """The same in periods of the reference: between its stamps nothing is known."""
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}
 """Correlation with the lag taken off, from which it is told [-]."""
 FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}
 """Unlike part on the other half with the lag taken off over that without, at most [-]: an
 accelerometer is noisy, a slow reference ragged."""
-LEAST_STD = {'turns': 0.08, 'starts': 0.15, 'speeds': 0.05}
+LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1}
 """Deviation of a lag, at least [s]: chassis and filters delay what is felt."""
 APART = 0.2
 """Lags of two halves or of two kinds of motion that differ by less agree [s]; also 3 deviations."""
 SIGMAS = 4.0
+WITNESS = 0.25
+"""Deviation of the lag of a third sensor over one, with which it tells whose stamps are off [-]."""
 BETWEEN = 0.25
 """Part of a period that a lag is not known to, one deviation [-]."""
 SLOWEST = 1.5
 """Period of a reference [s] above which nothing is said of its stamps."""
+SMOOTHED = 1.0
+"""Speeds and turns are averaged over this where their changes share a drive in halves [s]."""
 SMOOTHING = 0.4
 """Speeds and accelerations are averaged over this [s]."""
 
@@ -68,6 +72,7 @@ class Lag(NamedTuple):
     by: str
     trial: Trial
     halves: tuple[float, float]
+    alone: bool = True  # nothing else may be it
 
     @property
     def steady(self) -> bool:
@@ -141,6 +146,9 @@ def _counts(evidence: Evidence, name: str, told: Lag) -> bool:
 def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
     """Return the sensor whose stamps are off: the one that is off against both others."""
     late = {name: told for name, told in lags.items() if _counts(evidence, name, told)}
+    if len(late) == 2 and not all(told.steady for told in late.values()):
+        late = {name: told for name, told in late.items() if told.steady}
+        lags = late
     if len(late) == 2:
         imu, reference = late['imu'], late['reference']
         std = math.hypot(
@@ -151,20 +159,27 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
         return late
     for name, told in late.items():
         other = next((lag for key, lag in lags.items() if key != name), None)
-        both = other is not None and abs(other.value - told.value) < abs(other.value)
-        if both or _by_arrival(evidence, name, told.value):
+        if other is not None and other.steady and other.std < WITNESS * abs(told.value):
+            wheels = abs(other.value - told.value) < abs(other.value)
+        else:
+            by_arrival = _by_arrival(evidence, name, told.value)
+            wheels, late[name] = by_arrival > 0, told._replace(alone=by_arrival != 0)
+        if wheels:
             return {'wheel_odometry': told.of_the_first()}
     return late
 
 
-def _by_arrival(evidence: Evidence, name: str, late: float) -> bool:
-    """Whether the wheels' stamps lie off their arrival by what another sensor seems late [s]."""
+def _by_arrival(evidence: Evidence, name: str, late: float) -> int:
+    """Return whose stamps lie off their arrival: 1 the wheels', -1 the other's, 0 nobody's.
+
+    ``late`` is what the other sensor seems late [s].
+    """
     own, others = arrival(evidence.joints), arrival(getattr(evidence.recording, name))
     if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
         by_age = abs(own - late) < abs(own) - 0.5 * abs(late)
-        return by_age or own < FUTURE < others
-    by_wheels = abs(others) + abs(own - late)
-    return by_wheels < abs(own) + abs(others + late) - 0.5 * abs(late)
+        return 1 if by_age or own < FUTURE < others else -1
+    by_wheels = abs(others) + abs(own - late) - abs(own) - abs(others + late)
+    return 0 if abs(by_wheels) <= 0.5 * abs(late) else int(-np.sign(by_wheels))
 
 
 def _whole_std(evidence: Evidence, name: str, told: Lag) -> float:
@@ -190,7 +205,10 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
     std = _whole_std(evidence, name, told)
     against = told.by + told.trial.words('unlike part', '')
     told_of = of_offset(name, told.value, std, against, evidence.facts.configuration)
-    return evidence.found(f'{name}_offset', 0.97, **told_of)
+    if not told.alone:
+        side = 'early' if told.value > 0.0 else 'late'
+        told_of['against'] += f', or those of the wheels are too {side}'
+    return evidence.found(f'{name}_offset', 0.97 if told.alone else 0.5, **told_of)
 
 
 def arrival(channel: Channel) -> float:
@@ -216,14 +234,14 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
         yaw = averaged(at, (imu.rate @ evidence.rotation.T)[:, 2:3], time, 2 * STEP)[:, 0]
         wheels = _even(evidence, difference, time)
         wheels = wheels * np.sign(correlation(wheels, yaw) or 1.0)
-        turned = lag_of(time, wheels, yaw, 'imu', 'turns')
+        turned = lag_of(time, wheels, time, yaw, 'imu', 'turns')
     if evidence.force is not None and time.size > 2:
         width = round(SMOOTHING / STEP)
         speed = moving_mean(_even(evidence, evidence.rim, time), width)
         forward = averaged(at, (imu.force @ evidence.rotation.T)[:, :1], time, 2 * STEP)[:, 0]
         change = without_drift(np.gradient(speed, STEP), STEP)
         felt = without_drift(moving_mean(forward, width), STEP)
-        started = lag_of(time, change, felt, 'imu', 'starts')
+        started = lag_of(time, change, time, felt, 'imu', 'starts')
     best = turned or started
     if best is None:
         reason = 'IMU against wheels: no clear turns in it; drive a circle'
@@ -251,25 +269,14 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     order = np.argsort(at, kind='stable')
     period = float(np.median(np.diff(at[order])))
     forward = without_single_ones(reference.velocity[order, 0])
-    rim, speed = as_smooth(time, _even(evidence, evidence.rim, time), at[order], forward)
+    rim = _even(evidence, evidence.rim, time)
     if period > SLOWEST or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')
-    told = lag_of(time, rim, speed, 'reference', 'speeds')
+    told = lag_of(time, rim, at[order], forward, 'reference', 'speeds')
     if told is None:
         return NotChecked('delay', 'reference: does not follow the wheels closely enough')
     evidence.figures['reference.delay_s'] = round(told.value, 3)
     return told
-
-
-def as_smooth(
-    time: FloatArray, rim: FloatArray, at: FloatArray, forward: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return rim speeds at even times [s] and a reference, seen at other times, alike smooth.
-
-    Between its stamps the reference is a straight line: the rims are smoothed as much.
-    """
-    width = round(min(float(np.median(np.diff(at))), SLOWEST) / float(time[1] - time[0]))
-    return moving_mean(moving_mean(rim, width), width), np.interp(time, at, forward)
 
 
 def without_single_ones(values: FloatArray) -> FloatArray:
@@ -283,23 +290,27 @@ def _even(evidence: Evidence, values: FloatArray, time: FloatArray) -> FloatArra
     return averaged(evidence.time, np.nan_to_num(values)[:, None], time, 2 * STEP)[:, 0]
 
 
-def lag_of(time: FloatArray, first: FloatArray, second: FloatArray, of: str, by: str) -> Lag | None:
+def lag_of(
+    time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, of: str, by: str
+) -> Lag | None:
     """Return by how much the second series lags the first; None where they are not alike.
 
-    The halves share the motion evenly, wherever in the drive it is.
+    The halves share the changes of the motion evenly, wherever in the drive they are.
     """
     limit = min(LONGEST[of], float(time[-1] - time[0]) / IN_A_DRIVE)
-    whole = lag(time, first, second, limit)
+    whole = lag(time, first, at, second, limit)
     if whole is None or whole.fit < LEAST_FIT[by]:
         return None
-    parts = halves((first - first.mean()) ** 2)
-    a, b = (lag(time[part], first[part], second[part], limit) for part in parts)
+    plain = np.interp(at, time, first)
+    calm = first if by == 'starts' else np.gradient(moving_mean(first, round(SMOOTHED / STEP)))
+    parts = halves(np.interp(at, time, (calm - calm.mean()) ** 2))
+    a, b = (lag(time, first, at[part], second[part], limit) for part in parts)
     if a is None or b is None:
         return None
     trials = []
     for part, other in zip(parts, (b, a), strict=True):
-        moved = np.interp(time[part] + other.value, time[part], second[part])
-        trials.append(Trial(unlike(first[part], second[part]), unlike(first[part], moved)))
+        moved = np.interp(at[part] - other.value, time, first)
+        trials.append(Trial(unlike(plain[part], second[part]), unlike(moved, second[part])))
     return Lag(whole.value, whole.std, by, worst(trials), (a.value, b.value))
 
 

@@ -181,37 +181,43 @@ class Lag(NamedTuple):
     fit: float
 
 
-def lag(time: FloatArray, first: FloatArray, second: FloatArray, limit: float) -> Lag | None:
-    """Return by how much ``second`` lags ``first`` on an even grid, at most ``limit`` [s].
+def lag(
+    time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, limit: float
+) -> Lag | None:
+    """Return by how much a series at times ``at`` lags one on an even grid, at most ``limit`` [s].
 
-    The deviation is that of the lags of thirds of the record. None: nothing to correlate.
+    The first is read where the second was measured, never the second in between. The deviation is
+    that of the lags of thirds of the record. None: nothing to correlate.
     """
-    if time.size < 2:
+    if time.size < 2 or not at.size or at[-1] - at[0] < 6.0 * limit:
         return None
     step = float(np.median(np.diff(time)))
     reach = max(round(limit / step), 1)
-    if time.size < 6 * reach or not first.std() or not second.std():
+    inner = (at >= time[0] + reach * step) & (at <= time[-1] - reach * step)
+    at, second = at[inner], second[inner]
+    if at.size < 3 or not first.std() or not second.std():
         return None
-    value, fit = _best_shift(first, second, reach)
+    shifts = step * np.arange(-reach, reach + 1)
+    table = np.stack([np.interp(at - shift, time, first) for shift in shifts])
+    value, fit = _best_shift(table, second)
     parts = []
-    if time.size // 3 > 3 * reach:
-        thirds = zip(np.array_split(first, 3), np.array_split(second, 3), strict=True)
-        parts = [_best_shift(a, b, reach) for a, b in thirds]
+    if (time[-1] - time[0]) / 3.0 > 3.0 * limit:
+        thirds = np.array_split(np.arange(at.size), 3)
+        parts = [_best_shift(table[:, third], second[third]) for third in thirds]
     good = [shift for shift, fits in parts if fits > fit - ALIKE]
     std = float(np.std(good, ddof=1) / math.sqrt(len(good))) if len(good) > 1 else 1.0
-    return Lag(step * value, step * max(std, 0.2), fit)
+    return Lag(step * (value - reach), step * max(std, 0.2), fit)
 
 
-def _best_shift(first: FloatArray, second: FloatArray, reach: int) -> tuple[float, float]:
-    """Return the shift [rows] at which the inner part of a series fits another, and how well."""
-    first, second = first - first.mean(), second - second.mean()
-    inner = first[reach : first.size - reach]
-    energy = np.cumsum(np.concatenate([[0.0], second**2]))
-    energy = (energy[inner.size :] - energy[: -inner.size]) * float(inner @ inner)
-    fits = np.correlate(second, inner, mode='valid') / np.sqrt(np.maximum(energy, 1e-300))
+def _best_shift(table: FloatArray, second: FloatArray) -> tuple[float, float]:
+    """Return the row of (m, k) shifted series that fits a series (k,) best, and how well."""
+    table = table - table.mean(axis=1, keepdims=True)
+    second = second - second.mean()
+    energy = (table**2).sum(axis=1) * float(second @ second)
+    fits = table @ second / np.sqrt(np.maximum(energy, 1e-300))
     peak, offset = int(np.argmax(fits)), 0.0
     if 0 < peak < fits.size - 1:  # top of a parabola through three points
         left, middle, right = fits[peak - 1 : peak + 2]
         bend = left - 2.0 * middle + right
         offset = 0.5 * (left - right) / bend if bend else 0.0
-    return float(peak - reach + offset), float(fits[peak])
+    return peak + float(offset), float(fits[peak])
