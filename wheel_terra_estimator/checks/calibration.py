@@ -240,7 +240,8 @@ def _friction(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
 
 def _track(changes: _Changes, evidence: Evidence) -> None:
     told = None if geometry.skids(evidence) else geometry.rolling_track(evidence)
-    if isinstance(told, geometry.Told) and told.ratio.sigmas_from(1.0) > CLEAR:
+    sure = isinstance(told, geometry.Told) and told.alone
+    if isinstance(told, geometry.Told) and sure and told.ratio.sigmas_from(1.0) > CLEAR:
         lateral = evidence.facts.lateral
         std = float(np.abs(lateral).max()) * told.ratio.std
         source = 'gyro against the difference of the sides in turns'

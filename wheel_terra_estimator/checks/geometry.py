@@ -77,6 +77,8 @@ DEEPEST = 0.3
 LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
+MOST_NOT_ROLLING = 0.04
+"""Distance of speed over rim speed from 1 on straights with which turns tell the track [-]."""
 STEERED_STD = 0.04
 """Slip of steered wheels in curves, as a share of the track, one deviation [-]."""
 CLEAR_TURN = 0.95
@@ -91,6 +93,7 @@ class Told(NamedTuple):
 
     ratio: Estimate
     trial: Trial
+    alone: bool = True  # nothing else may be it
 
 
 class _Speeds(NamedTuple):
@@ -106,6 +109,23 @@ class _Speeds(NamedTuple):
         assert reference is not None
         means = evidence.rim_at(reference.stamp, np.nan_to_num(values), AROUND)
         return means[self.rows] * np.sign(self.rim)
+
+    @property
+    def ratio(self) -> Estimate:
+        """Speed over rim speed [-]."""
+        return block_fit(self.rim[:, None], self.forward)[0]
+
+
+def _straight_speeds(evidence: Evidence) -> _Speeds | None:
+    """Return speeds by the reference and the rims; None without straight, steady stretches."""
+    reference = evidence.recording.reference
+    if reference is None:
+        return None
+    rim = evidence.rim_at(reference.stamp, evidence.rim, AROUND)
+    straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float), AROUND)
+    forward = reference.velocity[:, 0]
+    rows = np.isfinite(rim) & (straight > 0.99) & np.isfinite(forward)
+    return _Speeds(rim[rows], forward[rows], rows) if rows.sum() >= LEAST_REFERENCES else None
 
 
 def radius_ratio(evidence: Evidence) -> Told | NotChecked:
@@ -124,14 +144,10 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
         return NotChecked('radius', 'rates in counts: a radius looks like other counts per turn')
     if rounding(evidence) > MOST_ROUNDING:
         return NotChecked('radius', ROUNDED)
-    rim = evidence.rim_at(reference.stamp, evidence.rim, AROUND)
-    straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float), AROUND)
-    forward = reference.velocity[:, 0]
-    rows = np.isfinite(rim) & (straight > 0.99) & np.isfinite(forward)
-    if rows.sum() < LEAST_REFERENCES:
+    speeds = _straight_speeds(evidence)
+    if speeds is None:
         return NotChecked('radius', 'no straight, steady stretch with a reference in it')
-    speeds = _Speeds(rim[rows], forward[rows], rows)
-    plain = block_fit(speeds.rim[:, None], speeds.forward)[0]
+    plain = speeds.ratio
     # No estimator is better than the mean of independent readings of the reference.
     bound = bend_noise(speeds.forward) / max(float(np.linalg.norm(speeds.rim)), 1e-6)
     figures['rover.radius_bound_by_reference_m'] = round(bound * float(np.mean(facts.radius)), 5)
@@ -296,7 +312,7 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     told = radius_ratio(evidence)
     if isinstance(told, NotChecked):
         return [told], evidence
-    (ratio, trial), facts = told, evidence.facts
+    (ratio, trial, _), facts = told, evidence.facts
     assert facts.configuration is not None
     radius = float(np.mean(facts.radius))
     evidence.figures['rover.rolling_radius_m'] = round(radius * ratio.value, 5)
@@ -407,20 +423,28 @@ def track_ratio(evidence: Evidence) -> Told | NotChecked:
 
 
 def rolling_track(evidence: Evidence) -> Told | NotChecked:
-    """Return the track ratio of a rover that does not skid, unless slip or a radius may be it."""
-    told, figures = track_ratio(evidence), evidence.figures
-    if isinstance(told, NotChecked) or abs(told.ratio.value - 1.0) < LEAST_TRACK_ERROR:
+    """Return the track ratio of a rover that does not skid, where no slip may be it.
+
+    Slip and a wrong radius widen the track of the turns as they slow the straights.
+    """
+    told = track_ratio(evidence)
+    if isinstance(told, NotChecked):
         return told
-    ratio, rolling = told.ratio, figures.get('rover.speed_over_rim_speed')
-    if rolling is not None and abs(ratio.value * rolling - 1.0) < LEAST_TRACK_ERROR:
-        return NotChecked('track', f'turns and straights both need {rolling:.2f} of the radius')
-    soft = figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
-    if soft or turning.unlike_in_turns(evidence):
+    soft = evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
+    if soft or _depth(evidence).value > SOFT_DEPTH or turning.unlike_in_turns(evidence):
         reason = 'wheels slip in turns, whatever the track; drive circles on firm ground'
         return NotChecked('track', reason)
-    if rolling is None:
-        return told._replace(ratio=Estimate(ratio.value, math.hypot(ratio.std, 0.03)))
-    return told
+    speeds, ratio = _straight_speeds(evidence), told.ratio
+    if speeds is None:
+        return told._replace(alone=False)
+    rolling = speeds.ratio.value
+    if abs(rolling - 1.0) > MOST_NOT_ROLLING and abs(ratio.value - 1.0) > LEAST_TRACK_ERROR:
+        reason = (
+            f'turns need {ratio.value:.2f} of the track where straights need {rolling:.2f} of the '
+            'radius: slip or a radius may be both; drive circles and straight on firm ground'
+        )
+        return NotChecked('track', reason)
+    return told._replace(ratio=Estimate(ratio.value, math.hypot(ratio.std, rolling - 1.0)))
 
 
 def check_track(evidence: Evidence) -> list[Outcome]:
@@ -433,7 +457,7 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     told = track_ratio(evidence)
     if isinstance(told, NotChecked):
         return [told]
-    (ratio, trial), stated = told, stated_track(evidence)
+    (ratio, trial, alone), stated = told, stated_track(evidence)
     figures['rover.effective_over_stated_track'] = round(ratio.value, 3)
     figures['rover.effective_track_m'] = round(ratio.value * stated, 4)
     if skids(evidence) and ratio.value > SKID_TRACK:
@@ -449,7 +473,7 @@ def check_track(evidence: Evidence) -> list[Outcome]:
         rolling = rolling_track(evidence)
         if isinstance(rolling, NotChecked):
             return [NotChecked(kind, rolling.reason) for kind in ('track', 'radius')]
-        ratio = rolling.ratio
+        ratio, alone = rolling.ratio, rolling.alone
     if ratio.sigmas_from(1.0) < 4.0 or abs(ratio.value - 1.0) < LEAST_TRACK_ERROR:
         return []
     if skids(evidence):
@@ -465,7 +489,9 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     return [
         evidence.found(
             'track',
-            confidence(ratio.sigmas_from(1.0)),
+            confidence(ratio.sigmas_from(1.0)) if alone else 0.5,
+            rival='' if alone else ', or the radius is another, or the wheels slip',
+            separate='' if alone else '; measure it with a tape, or drive straight by a reference',
             value=round(stated * ratio.value, 4),
             std=round(stated * ratio.std, 4),
             ratio=ratio.value,
