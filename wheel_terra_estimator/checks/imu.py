@@ -94,6 +94,10 @@ UNIT_TOLERANCE = 0.12
 """Share by which the mean specific force may lie off gravity in another unit."""
 ORIENTATION_DEGREES = (30.0, 110.0)
 """Gyro over turning of the orientation that a gyro in degrees per second gives [-]."""
+UP_APART = math.radians(25.0)
+"""Angle between up by orientation and by specific force that no acceleration makes [rad]."""
+MOST_COMPARED = 5000
+"""Messages in which both are compared."""
 FROZEN_SHARE = 0.3
 """Share of messages that repeat the one before."""
 MOUNTING = tuple(f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw'))
@@ -151,10 +155,32 @@ def check_imu(state: ImuState) -> Judged:
     if state.usable_force and state.usable_gyro:
         told, state = _wild(state)
         outcomes += told
+    if state.usable_force:
+        told, state = _up_by_orientation(state)
+        outcomes += told
     if state.usable_gyro:
         told, state = _against_orientation(state)
         outcomes += told
     return outcomes, state
+
+
+def _up_by_orientation(state: ImuState) -> Judged:
+    """Return an orientation that has up elsewhere than the specific force, both in its frame."""
+    from scipy.spatial.transform import Rotation  # heavy
+
+    imu = state.imu
+    known = np.flatnonzero(np.linalg.norm(np.nan_to_num(imu.orientation), axis=1) > 0.5)
+    if known.size < LEAST_MESSAGES:
+        return [], state
+    some = known[np.linspace(0, known.size - 1, min(known.size, MOST_COMPARED)).astype(int)]
+    up = Rotation.from_quat(imu.orientation[some]).inv().apply([0.0, 0.0, 1.0])
+    cosine = (up * imu.force[some]).sum(axis=1) / np.linalg.norm(imu.force[some], axis=1)
+    apart = math.acos(float(np.clip(np.median(cosine), -1.0, 1.0)))
+    upright = float((state.rotation @ np.median(imu.force, axis=0))[2]) > 0.0
+    if apart < UP_APART or (apart > math.pi - UP_APART and not upright):  # see `check_upside`
+        return [], state
+    told = state.found('orientation_tilt', 0.97, apart=math.degrees(apart))
+    return [told], state.with_values(orientation=np.full_like(imu.orientation, np.nan))
 
 
 def _placeholders(state: ImuState) -> Judged:
@@ -391,6 +417,8 @@ def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
     felt = felt_motion(evidence)
     by_motion = yaw_of_motion(*felt) if felt is not None else None
     by_torque = heading_of_torque(evidence)
+    if by_torque is not None:
+        by_torque = by_torque._replace(std=math.hypot(by_torque.std, SLOPES_STD))
     told = sorted((e for e in (by_motion, by_torque) if e is not None), key=lambda e: e.std)
     if not told:
         return None
@@ -408,9 +436,9 @@ def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
         if one is None or other is None:
             return None
         first, second = one.value, other.value
-        told = [Estimate(told[0].value, math.hypot(told[0].std, SLOPES_STD, first - second))]
     apart = abs(math.remainder(first - second, 2.0 * math.pi))
-    return told[0], Trial(abs(math.remainder(second, 2.0 * math.pi)), apart)
+    seen = Estimate(told[0].value, math.hypot(told[0].std, 0.5 * apart))
+    return seen, Trial(abs(math.remainder(second, 2.0 * math.pi)), apart)
 
 
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -453,19 +481,25 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     mended, up = evidence.turned(fix @ evidence.rotation), np.median(evidence.force, axis=0)
     force = f'mean specific force ({up[0]:.2f}, {up[1]:.2f}, {up[2]:.2f}) m/s^2'
-    if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]) and _turns_upright(evidence):
-        told = evidence.found('force_reversed', 0.97, force=force)
-        return [told], replace(evidence, force=-evidence.force)
+    words: dict[str, Any] = {'force': force}
+    sure = 0.999
+    if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
+        upright = _turns_upright(evidence)
+        if upright > CLEAR_AGREEMENT:
+            told = evidence.found('force_reversed', 0.97, **words)
+            return [told], replace(evidence, force=-evidence.force)
+        if upright > -CLEAR_AGREEMENT:
+            sure, words['rival'] = 0.85, ', or linear_acceleration has the wrong sign: drive circles'
     std = math.degrees(STEEPEST_MEAN) / 3.0
-    return [mounting_finding('imu_upside', evidence, mended, std, 0.999, force=force)], mended
+    return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended
 
 
-def _turns_upright(evidence: Evidence) -> bool:
-    """Return whether the gyro turns to the left where the wheels do: it is not upside down."""
+def _turns_upright(evidence: Evidence) -> float:
+    """Return how well gyro and wheels agree in turns: 1 upright, -1 upside down, 0 no turns [-]."""
     rows = evidence.turning & np.isfinite(evidence.side_difference)
     if evidence.gyro is None or rows.sum() * evidence.period < LEAST_TURNING:
-        return False
-    return correlation(evidence.gyro[rows, 2], evidence.side_difference[rows]) > CLEAR_AGREEMENT
+        return 0.0
+    return correlation(evidence.gyro[rows, 2], evidence.side_difference[rows])
 
 
 def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -251,9 +251,9 @@ def _jumps(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
     speed = float(np.quantile(np.abs(forward), 0.8))
     wild = np.abs(off) > max(JUMP_FACTOR * max(robust_std(off), 1e-6), LEAST_JUMP * speed)
     # Starts and stops are no jumps: the wheels change as well.
-    period = float(np.median(np.abs(np.diff(reference.stamp)))) * 1e-9
+    around = 1.5e-9 * float(np.median(np.abs(np.diff(reference.stamp))))
     calm = [
-        np.nan_to_num(evidence.rim_at(reference.stamp, rows.astype(float), period)) > 0.99
+        np.nan_to_num(evidence.rim_at(reference.stamp, rows.astype(float), around)) > 0.99
         for rows in (evidence.steady, evidence.at_rest)
     ]
     if evidence.facts.known:
@@ -272,6 +272,8 @@ def _covariance(
     evidence: Evidence, forward: FloatArray, reference: VelocitySeries
 ) -> list[Outcome]:
     """Compare the stated variance with the scatter of the velocity."""
+    if not np.ptp(reference.velocity[:, 0]):
+        return []  # no reading of a speed
     rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
     noise = min(bend_noise(forward), bend_noise(forward - rim))  # wheels start and stop as well
     evidence.figures['reference.noise_m_s'] = float(f'{noise:.3g}')

@@ -42,7 +42,8 @@ MOST_TRACTION = 0.85
 """Sum of T/r over the weight that no soil gives on the level (tangent of 40 degrees)."""
 UNIT_TRACTION = 15.0
 """The same, above which the torque is in N mm."""
-LEAST_TRACTION = 1e-3
+LEAST_TRACTION = 4e-3
+"""The same, that no ground or drive costs less than."""
 SOFT_TRACTION = 0.25
 """Level traction above which the soil itself changes what a slope costs."""
 LEAST_SLOPE_STD = 0.25
@@ -190,7 +191,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return _not_told(reason), evidence
     assert facts.configuration is not None
     open_to = 1.0 + 3.0 * float(facts.configuration.sensors.torque_gain_std)
-    if LEAST_TRACTION <= traction <= MOST_TRACTION * open_to:
+    if size >= LEAST_TRACTION and traction <= MOST_TRACTION * open_to:
         return [], evidence
     fit = _slope_fit(evidence)
     told: dict[str, Any] = {'gains': '...'}
@@ -199,7 +200,8 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         mean = float(np.mean(whole))
         told = {'value': mean, 'std': mean * fit.gain.std / fit.gain.value}
         told['gains'] = listed(whole, '.3g')
-    finding = evidence.found('torque_scale', 0.8, traction=traction, **told)
+    seen = traction if size >= LEAST_TRACTION else size
+    finding = evidence.found('torque_scale', 0.8, traction=seen, **told)
     return [finding, NotChecked('mass', 'torques have no credible scale')], evidence
 
 
@@ -371,8 +373,14 @@ def _unsigned(evidence: Evidence) -> list[Outcome]:
     )
     if rolls and _follows_slopes(evidence):
         return []
-    if fits is None or not all(
-        zero.value > max(MEAN_SIGMAS * zero.std, abs(resistance.value)) for zero, resistance in fits
+    if fits is None:
+        return []
+    # A mean slope along the rover costs torque both ways as well.
+    facts, along = evidence.facts, _calm_force(evidence)[evidence.straight, 0]
+    sloped = 2.0 * abs(float(along.mean())) * facts.mass / len(fits) * facts.radius
+    if not all(
+        zero.value > max(MEAN_SIGMAS * zero.std, abs(back.value), slope)
+        for (zero, back), slope in zip(fits, np.nan_to_num(sloped), strict=True)
     ):
         return []
     return [evidence.found('torque_unsigned', 0.9)]

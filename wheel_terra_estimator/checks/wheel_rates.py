@@ -89,7 +89,7 @@ LEAST_NOISE_SHARE = 0.08
 """Noise of a rate that matters, as a share of the working rate."""
 COUNTING_STD = 1.0 / math.sqrt(6.0)
 """Deviation of a rate from two counts, each off by up to one, as a share of a count [-]."""
-STEP_FACTOR = 1.0
+STEP_FACTOR = 1.5
 """Noise by the steps over the one stated, above which it matters [-]."""
 KEPT = 0.9
 """Share of rates that repeat the one before, from which they are rounded, not counted [-]."""
@@ -128,6 +128,9 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
                 how += ' while the other wheels change'
                 outcomes.append(evidence.found('rate_frozen', 0.97, wheel=name, how=how))
                 mended[:, index] = np.nan
+            elif look is _stands and not evidence.rate[moving, index].any():
+                reason = f'{name} stands all along: blocked, or its encoder dead; lift and turn it'
+                outcomes.append(NotChecked('frozen', reason))
         evidence = evidence.with_rate(mended) if np.isnan(mended).any() else evidence
     return outcomes, evidence
 
