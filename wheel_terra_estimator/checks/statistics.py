@@ -198,7 +198,7 @@ def lag(
     if at.size < 3 or not first.std() or not second.std():
         return None
     shifts = step * np.arange(-reach, reach + 1)
-    table = np.stack([np.interp(at - shift, time, first) for shift in shifts])
+    table = np.interp(at - shifts[:, None], time, first)
     value, fit = _best_shift(table, second)
     parts = []
     if (time[-1] - time[0]) / 3.0 > 3.0 * limit:

@@ -102,14 +102,13 @@ class Fix(NamedTuple):
     signs: tuple[int, ...]
     exchanged: tuple[int, int] | None = None
 
-    def applied(self, values: FloatArray) -> FloatArray:
-        """Return columns (k, m) as they are under the hypothesis."""
+    def order(self, count: int) -> list[int]:
+        """Return the column that each of so many wheels has under the hypothesis."""
+        order = list(range(count))
         if self.exchanged is not None:
-            order = list(range(values.shape[1]))
             a, b = self.exchanged
             order[a], order[b] = b, a
-            values = values[:, order]
-        return values * np.array(self.signs, dtype=float)
+        return order
 
     def mirrors(self, other: Fix) -> bool:
         """Whether both differ by the sign of everything."""
@@ -140,32 +139,44 @@ class Comparison(NamedTuple):
     rival: Fix | None
 
 
-def fit_of(fix: Fix, stretch: Turning) -> Fit:
-    """Return how well a hypothesis accounts for wheels and gyro."""
-    speed, yaw, lateral = fix.applied(stretch.speed), stretch.yaw, stretch.lateral
+def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
+    """Return how well each of f hypotheses accounts for wheels and gyro."""
+    yaw, lateral = stretch.yaw, stretch.lateral
+    columns = np.array([fix.order(lateral.size) for fix in fixes])
+    signs = np.array([fix.signs for fix in fixes], dtype=float)
+    speed = stretch.speed.T[columns].transpose(0, 2, 1) * signs[:, None]  # (f, k, m)
     speed = speed if stretch.along is None else speed * stretch.along
-    track, alike, cost, rolling = 0.0, 0.0, 0.0, speed
+    track, alike, cost = np.zeros((3, len(fixes)))
+    rolling = speed
     if stretch.turns.sum() >= LEAST_TURNING_ROWS:
         left, right = lateral > 0.0, lateral < 0.0
         stated = float(lateral[left].mean() - lateral[right].mean())
-        difference = speed[:, right].mean(axis=1) - speed[:, left].mean(axis=1)
-        turned, apart = yaw, difference
+        turned, apart = yaw, speed[:, :, right].mean(axis=2) - speed[:, :, left].mean(axis=2)
         if not stretch.unbiased:
-            turned, apart = yaw - yaw.mean(), difference - difference.mean()
-        alike = correlation(turned, apart)
-        track = float(turned @ apart) / max(float(turned @ turned), 1e-12) / stated
-        rolling = speed + track * yaw[:, None] * lateral
+            turned, apart = yaw - yaw.mean(), apart - apart.mean(axis=1, keepdims=True)
+        both, energy = apart @ turned, float(turned @ turned)
+        alike = both / np.maximum(np.sqrt(energy * (apart**2).sum(axis=1)), 1e-300)
+        track = both / max(energy, 1e-12) / stated
+        rolling = speed + track[:, None, None] * yaw[:, None] * lateral
         cost = UNTURNED * (1.0 - alike**2)
-    spread = np.abs(rolling - np.median(rolling, axis=1)[:, None]).mean(axis=1)
-    size = np.maximum(np.abs(speed).mean(axis=1), 1e-9)
-    return Fit(cost + float(np.mean(spread / size)), track, alike)
+    middle = (lateral.size - 1) // 2, lateral.size // 2
+    median = np.sort(rolling, axis=2)[:, :, middle].mean(axis=2)
+    spread = np.abs(rolling - median[:, :, None]).mean(axis=2)
+    size = np.maximum(np.abs(speed).mean(axis=2), 1e-9)
+    cost = cost + (spread / size).mean(axis=1)
+    return [Fit(*map(float, one)) for one in zip(cost, track, alike, strict=True)]
+
+
+def fit_of(fix: Fix, stretch: Turning) -> Fit:
+    """Return how well one hypothesis accounts for wheels and gyro."""
+    return fits_of([fix], stretch)[0]
 
 
 def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
     """Compare hypotheses, the first of which is that nothing is wrong."""
-    whole = [fit_of(fix, stretch) for fix in fixes]
+    whole = fits_of(fixes, stretch)
     both = [stretch.rows(half) for half in halves(np.ones(stretch.yaw.size))]
-    parts = [[fit_of(fix, half).cost for fix in fixes] for half in both]
+    parts = [[fit.cost for fit in fits_of(fixes, half)] for half in both]
     least = min(fit.cost for fit in whole)
     alike = [i for i, fit in enumerate(whole) if fit.cost < least + TIE]
     # Of two that differ by swapped sides the one that agrees with the gyro is meant.
