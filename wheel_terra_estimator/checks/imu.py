@@ -84,6 +84,8 @@ TILT_IS_MOUNTING = 0.95
 """Probability that a tilt seen in circles is the mounting and not the accelerometer's zero [-]."""
 LEAST_TURNING = 10.0
 """Time of turning [s] in which wheels that dig do not agree with a gyro by chance."""
+UNTURNED = 0.85
+"""Probability that an IMU that no turn shows is upside down, not its accelerometer reversed [-]."""
 CLEAR_AGREEMENT = 0.8
 """Correlation of gyro and wheels in turns that are the same way round [-]."""
 LEAST_WILD = 3
@@ -489,7 +491,8 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             told = evidence.found('force_reversed', 0.97, **words)
             return [told], replace(evidence, force=-evidence.force)
         if upright > -CLEAR_AGREEMENT:
-            sure, words['rival'] = 0.85, ', or linear_acceleration has the wrong sign: drive circles'
+            sure = UNTURNED
+            words['rival'] = ', or linear_acceleration has the wrong sign: drive circles'
     std = math.degrees(STEEPEST_MEAN) / 3.0
     return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended
 

@@ -70,7 +70,8 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
     forward = reference.velocity[:, 0]
     least = 0.4 * float(np.quantile(np.abs(forward), 0.9))
-    if _without_sign(forward, rim):
+    # A position has no sign either, and is no speed.
+    if _without_sign(forward, rim) and np.median(np.abs(forward)) < BEYOND * np.abs(rim).max():
         velocity = reference.velocity * np.where(rim < 0.0, -1.0, 1.0)[:, None]
         mended = evidence.with_channel('reference', velocity=velocity)
         return [evidence.found('reference_unsigned', 0.95)], mended
@@ -147,7 +148,7 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         return [NotChecked('mounting', reason)], evidence
     along, across = correlation(rim, forward), correlation(rim, side)
     if abs(across) > 0.7 and abs(across) > abs(along):
-        angle = math.degrees(math.atan2(across, along))
+        angle = math.degrees(math.atan2(float(rim @ side), float(rim @ forward)))
         told: dict[str, Any] = {'value': round(angle, 1), 'std': 5.0, 'turn': -angle, 'rival': ''}
         sure = 0.95
         if not clear or kept.in_body < 0.5 * (1.0 + kept.in_world):

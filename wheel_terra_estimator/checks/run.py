@@ -91,6 +91,8 @@ def examine(
 def _one_cause(findings: list[Finding]) -> list[Finding]:
     """Name the orientation alone where gyro and wheels agree with each other, not with it."""
     reversed_ = [f for f in findings if f.fault == 'gyro_reversed' and ORIENTATION in f.words]
+    if reversed_:  # steered wheels then seem to turn against the gyro as well
+        findings = [f for f in findings if f.fault != 'steering_sign']
     swapped = [f for f in findings if f.fault == 'swapped_sides']
     if reversed_ and not any('.z' in f.words for f in reversed_):  # no turn tells which
         doubtful = [replace(f, confidence=0.45) for f in reversed_]

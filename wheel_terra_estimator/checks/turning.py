@@ -26,6 +26,7 @@ from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS
 from wheel_terra_estimator.checks.felt_motion import felt_motion, yaw_of_motion
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
+from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
     confidence,
     correlation,
@@ -57,6 +58,8 @@ SAME_SENSE = 0.5
 """Share of the way by the reference that goes where the wheels turn, less the rest, that tells."""
 OPPOSED = -0.3
 """Correlation of torque and rate of a wheel that takes power, if one of them is reversed [-]."""
+HEADING_TIME = 3.0
+"""Turns by orientation and gyro are compared over this [s]."""
 LEAST_CORRELATION = 0.7
 """Of gyro and wheels, for turns to tell the sides [-]."""
 TIE = 1e-3
@@ -494,19 +497,36 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
     """Return what makes the wheels turn against the gyro: swapped sides or a reversed gyro."""
     imu, facts = evidence.recording.imu, evidence.facts
     assert imu is not None
-    orientation_told = bool(np.isfinite(imu.orientation).all(axis=1).mean() > 0.9)
+    by_heading = _gyro_by_heading(evidence, imu)
+    if by_heading < -LEAST_CORRELATION:
+        told = {'value': -1.0, 'axis': 'z', 'against': 'wheels and heading'}
+        return [evidence.found('gyro_reversed', 0.97, **told)]
+    alone = by_heading > LEAST_CORRELATION
     mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
     sides = evidence.found(
         'swapped_sides',
-        0.97 if orientation_told else 0.5,
-        rival='' if orientation_told else ', or the gyro counts yaw to the right',
+        0.97 if alone else 0.5,
+        rival='' if alone else ', or the gyro counts yaw to the right',
         names=', '.join(_sides_exchanged(facts)),
         mirrored=f', or wheels.y: [{mirrored}]' if facts.known else '',
     )
-    if orientation_told:
+    if alone:
         return [sides]
     against = 'the wheels, or left and right wheels are swapped'
     return [sides, evidence.found('gyro_reversed', 0.5, value=-1.0, axis='z', against=against)]
+
+
+def _gyro_by_heading(evidence: Evidence, imu: ImuSeries) -> float:
+    """Return the correlation of turns by gyro and by orientation [-]; 0 where it tells none."""
+    known = np.isfinite(imu.orientation).all(axis=1)
+    if known.mean() < 0.9:
+        return 0.0
+    x, y, z, w = imu.orientation[known].T
+    heading = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    heading = np.interp(evidence.time, evidence.seconds(imu)[known], heading)
+    gyro = np.cumsum(evidence.yaw * np.diff(evidence.time, prepend=evidence.time[0]))
+    rows = evidence.rows_in(HEADING_TIME)
+    return correlation(heading[rows:] - heading[:-rows], gyro[rows:] - gyro[:-rows])
 
 
 def _sides_exchanged(facts: RoverFacts) -> list[str]:
