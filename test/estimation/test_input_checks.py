@@ -173,5 +173,5 @@ def test_a_single_sample_that_no_body_makes_is_dropped_and_counted(checks):
     assert not passes(10, 80.0) and passes(11, 0.2)
     assert not passes(12, 0.2, turn=20.0) and passes(13, 0.2)
     assert checks.refused[inertial] == 2
-    assert checks.rejected[inertial] == {'a single sample that no body makes': 2}
+    assert checks.rejected[inertial] == {'a wild single sample, as no rover moves': 2}
     assert not passes(14, 90.0) and passes(15, 88.0), 'two alike are no single sample'

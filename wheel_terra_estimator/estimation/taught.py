@@ -103,8 +103,10 @@ class Taught:
 
     def with_unit(self, std: float) -> str:
         """Return a deviation for a reader."""
-        relative = self.unit == RELATIVE
-        return f'{100.0 * std:.2g} %' if relative else f'{std:.2g} {self.unit}'.rstrip(' -')
+        if self.unit == RELATIVE:
+            digits = 0 if std > 0.1 else 1
+            return f'{100.0 * std:.{digits}f} %'
+        return f'{std:.2g} {self.unit}'.rstrip(' -')
 
 
 def with_model_errors(mean: FloatArray, covariance: FloatArray, layout: StateLayout) -> FloatArray:

@@ -176,7 +176,7 @@ class InputChecks:
                 angular_rate=_UNKNOWN if bad_rate else m.angular_rate,
             )
         if self._is_wild(m):
-            self.refuse(INERTIAL, 'a single sample that no body makes')
+            self.refuse(INERTIAL, 'a wild single sample, as no rover moves')
             return None
         return m if m.orientation is None else self._oriented(m, m.orientation)
 
