@@ -201,13 +201,20 @@ def test_the_slip_of_a_start_walks_farther():
     assert walks == pytest.approx([0.6, 0.6 * np.exp(-0.5), 0.1])
 
 
-@pytest.mark.parametrize('digging', [0.02, -0.02])
-def test_the_slip_walks_farther_where_most_wheels_sink_or_rise(digging):
+@pytest.mark.parametrize(
+    ('digging', 'watched', 'walk'),
+    [
+        (0.0, True, 0.05),
+        (0.02, True, np.hypot(0.05, 0.3)),
+        (-0.02, True, 0.05),
+        (0.2, True, 0.6),
+        (0.2, False, 0.1),
+    ],
+)
+def test_the_slip_walks_farther_where_most_wheels_are_seen_to_sink(digging, watched, walk):
     made = process([0.05] * 6)
-    made.follow_contacts(10.0, 0.0, watched=True)
-    assert made.state.ratio_walk == pytest.approx(0.05)
-    made.follow_contacts(10.0, digging, watched=True)
-    assert made.state.ratio_walk == pytest.approx(np.hypot(0.05, 0.3))
+    made.follow_contacts(10.0, digging, watched=watched)
+    assert made.state.ratio_walk == pytest.approx(walk)
 
 
 def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():

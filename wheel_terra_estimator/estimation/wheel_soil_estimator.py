@@ -637,7 +637,7 @@ class WheelSoilEstimator:
         self._speed.follow_contacts(
             self._contact_age.state.travel,
             self._clock.assessment.digging,
-            watched=2 * unread < self._rover.wheel_count,
+            watched=cycle.reference_known and 2 * unread < self._rover.wheel_count,
         )
         if not cycle.window.readings:
             return forces, None, rows

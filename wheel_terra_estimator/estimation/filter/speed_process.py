@@ -69,8 +69,8 @@ class SpeedTuning:
     """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
     start_walk_travel: float = 0.2  # [m] with which it decays
     digging_walk: float = 15.0
-    """The same over the sinkage that most wheels gain or lose per rim travel [1/sqrt(m)]: where
-    contacts change, the slip does."""
+    """The same over the sinkage that most wheels gain per rim travel, up to that of a start
+    [1/sqrt(m)]: where contacts change, the slip does."""
     watched_share: float = 0.5
     """Of ``filter.ratio_walk`` where readings of the sinkage would show such a change."""
     demand_error: float = 0.3  # of what the demand changes, over that change [-]
@@ -300,12 +300,15 @@ class SpeedProcess(Component[SpeedState]):
         digging : float
             Sinkage that most wheels gain over rim travel [m/m].
         watched : bool
-            Whether most sinkages are read.
+            Whether most sinkages are read and references are known. Without a reference the speed
+            would follow soil models that are off by as much.
         """
         tuning = self._tuning
-        steady = self._walk * (tuning.watched_share if watched else 1.0)
         start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
-        walk = math.hypot(steady, tuning.digging_walk * digging)
+        walk = self._walk
+        if watched:
+            sinking = tuning.digging_walk * max(digging, 0.0)
+            walk = min(math.hypot(tuning.watched_share * walk, sinking), tuning.start_walk)
         self.state = self.state._replace(ratio_walk=max(walk, start))
 
     # -- Prediction ------------------------------------------------------------------------------

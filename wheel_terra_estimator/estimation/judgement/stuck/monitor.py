@@ -50,7 +50,7 @@ class StuckAssessment(NamedTuple):
     stalled: tuple[bool, ...] = ()
     direction: int = 0  # of the rims that led to it: 1, -1; 0 none, both or unknown
     digging: float = 0.0
-    """Sinkage gained over rim travel by more than half of the wheels [m/m]; < 0: they rise."""
+    """Sinkage gained over rim travel by more than half of the wheels [m/m]."""
     confirmed: bool = False
     """Whether something says so that no wrong sign or unit of the wheels' readings makes up."""
 

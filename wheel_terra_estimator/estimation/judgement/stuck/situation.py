@@ -114,16 +114,13 @@ class Situation:
 
     @cached_property
     def digging(self) -> float:
-        """Sinkage gained over rim travel by more than half of the wheels [m/m]; < 0: they rise.
+        """Sinkage gained over rim travel by more than half of the wheels [m/m].
 
         Half of the wheels sink where the first axle of two enters other soil: that is a step, and
         no rover that digs itself in.
         """
         growths = sorted(self.growths)
-        if not growths:
-            return 0.0
-        lower, upper = growths[(len(growths) - 1) // 2], growths[len(growths) // 2]
-        return lower if lower > 0.0 else min(upper, 0.0)
+        return growths[(len(growths) - 1) // 2] if growths else 0.0
 
     @cached_property
     def growths(self) -> tuple[float, ...]:
