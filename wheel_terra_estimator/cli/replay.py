@@ -186,16 +186,16 @@ def _check_kinds(arguments: argparse.Namespace) -> list[Path]:
     from wheel_terra_estimator.reporting import estimates_table, track_table
     from wheel_terra_estimator.reporting.html import check_page
 
-    kinds: dict[Path | None, Callable[[Path], None]] = {
-        arguments.report: check_page,
-        arguments.table: estimates_table.check_table,
-        arguments.track: track_table.check_track,
-        arguments.slip_on_slope: estimates_table.check_slopes,
-    }
-    for path, check in kinds.items():
+    kinds: tuple[tuple[Path | None, Callable[[Path], None]], ...] = (
+        (arguments.report, check_page),
+        (arguments.table, estimates_table.check_table),
+        (arguments.track, track_table.check_track),
+        (arguments.slip_on_slope, estimates_table.check_slopes),
+    )
+    for path, check in kinds:
         if path:
             check(path)
-    return [path for path in kinds if path]
+    return [path for path, _ in kinds if path]
 
 
 def _check_outputs(arguments: argparse.Namespace) -> None:
