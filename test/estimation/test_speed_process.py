@@ -9,6 +9,7 @@ from parts import SAND, Parts
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.speed_process import (
+    ContactChange,
     RimSpeeds,
     SpeedProcess,
     SpeedStep,
@@ -19,6 +20,7 @@ from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
 
 NAN = float('nan')
+UNSEEN = ContactChange(NAN, NAN)
 
 
 def process(rims, ratio=0.8, keys=()):
@@ -196,25 +198,41 @@ def test_the_slip_of_a_start_walks_farther():
     made = process([0.05] * 6)
     walks = []
     for travel in (0.0, 0.1, 10.0):
-        made.follow_contacts(travel, 0.0, watched=False)
+        made.follow_contacts(travel, UNSEEN, reference_known=True)
         walks.append(made.state.ratio_walk)
     assert walks == pytest.approx([0.6, 0.6 * np.exp(-0.5), 0.1])
 
 
 @pytest.mark.parametrize(
-    ('digging', 'watched', 'walk'),
+    ('sinkage', 'torque', 'reference_known', 'walk'),
     [
-        (0.0, True, 0.05),
-        (0.02, True, np.hypot(0.05, 0.3)),
-        (-0.02, True, 0.05),
-        (0.2, True, 0.6),
-        (0.2, False, 0.1),
+        (0.0, NAN, True, 0.05),
+        (0.02, NAN, True, np.hypot(0.05, 0.24)),
+        (0.02, 1.0, True, np.hypot(0.05, 0.24)),
+        (0.02, NAN, False, np.hypot(0.1, 0.24)),
+        (-0.02, NAN, True, 0.05),
+        (0.2, NAN, True, 0.6),
+        (NAN, 0.1, True, np.hypot(0.05, 0.2)),
+        (NAN, 0.1, False, 0.1),
     ],
 )
-def test_the_slip_walks_farther_where_most_wheels_are_seen_to_sink(digging, watched, walk):
+def test_the_slip_walks_farther_where_contacts_change(sinkage, torque, reference_known, walk):
     made = process([0.05] * 6)
-    made.follow_contacts(10.0, digging, watched=watched)
+    made.follow_contacts(10.0, ContactChange(sinkage, torque), reference_known=reference_known)
     assert made.state.ratio_walk == pytest.approx(walk)
+
+
+def test_without_a_reference_the_rover_does_not_move_against_its_wheels():
+    spin = [0.05, -0.05] * 3
+    for rims, speed, kept in (
+        ([0.05] * 6, -0.02, 0.0),
+        ([0.05] * 6, 0.02, 0.02),
+        (spin, -0.02, -0.02),
+    ):
+        made, ekf = process(rims), Parts(reader.load(SAND)).filter()
+        ekf.set(SPEED, speed, 1e-6)
+        made.keep_with_rims(ekf, speeds(rims))
+        assert ekf.mean[SPEED] == kept
 
 
 def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():

@@ -33,6 +33,7 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
 )
 from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestClimb
 from wheel_terra_estimator.estimation.contacts.steering import Steering
+from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
@@ -58,7 +59,11 @@ from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
-from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
+from wheel_terra_estimator.estimation.filter.speed_process import (
+    ContactChange,
+    RimSpeeds,
+    SpeedProcess,
+)
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     GRAVITY_BIAS,
@@ -216,6 +221,7 @@ class WheelSoilEstimator:
         self._contact_age = ContactAge(rover)
         self._ruts = Ruts(rover)
         self._unloaded = UnloadedWheels(rover, sensors)
+        self._torque_change = TorqueChange(rover)
         self._demand = Demand()
         self._climb = SteepestClimb()
         angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
@@ -256,6 +262,7 @@ class WheelSoilEstimator:
             self._contact_age,
             self._ruts,
             self._unloaded,
+            self._torque_change,
             self._demand,
             self._climb,
             self._linearisation,
@@ -418,6 +425,8 @@ class WheelSoilEstimator:
         )
         ekf.fuse(rows, considered)
 
+        if not cycle.reference_known:
+            self._speed.keep_with_rims(ekf, cycle.yaw_compensated)
         self._speed.end_cycle(time, ekf, cycle.yaw_compensated, settled=self._contact_age.settled)
         self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
         self._speed.keep_least_variance(ekf, cycle.rims)
@@ -633,12 +642,7 @@ class WheelSoilEstimator:
             model_variance=model_variance,
             repeats=repeats,
         )
-        unread = len(self._sinkage.unread(cycle.time))
-        self._speed.follow_contacts(
-            self._contact_age.state.travel,
-            self._clock.assessment.digging,
-            watched=cycle.reference_known and 2 * unread < self._rover.wheel_count,
-        )
+        self._note_changing_contacts(cycle)
         if not cycle.window.readings:
             return forces, None, rows
         curvature = self._turning.curvature(float(ekf.mean[SPEED]))
@@ -654,6 +658,24 @@ class WheelSoilEstimator:
             repeats=repeats,
         )
         return forces, total, [*rows, balance]
+
+    def _note_changing_contacts(self, cycle: _Cycle) -> None:
+        """Note how fast the contacts change: the sinkages tell, else the torques."""
+        straight = self._turning.state.lateral_motion <= _SHARP_TURN
+        if not (straight and self._contact_age.settled):
+            self._torque_change.reset()
+        torque = self._torque_change.update(
+            cycle.torque,
+            cycle.loads.load,
+            cycle.turns,
+            max([abs(rim) for rim in known(cycle.rims)], default=0.0) * cycle.dt,
+        )
+        read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
+        self._speed.follow_contacts(
+            self._contact_age.state.travel,
+            ContactChange(self._clock.assessment.digging if read else NAN, torque),
+            reference_known=cycle.reference_known,
+        )
 
     def _stationary_pulls(self, cycle: _Cycle) -> list[StationaryPull | None]:
         """Return what to expect of the wheels that do not turn under a load; None = it turns."""

@@ -68,11 +68,13 @@ class SpeedTuning:
     start_walk: float = 0.6
     """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
     start_walk_travel: float = 0.2  # [m] with which it decays
-    digging_walk: float = 15.0
+    digging_walk: float = 12.0
     """The same over the sinkage that most wheels gain per rim travel, up to that of a start
     [1/sqrt(m)]: where contacts change, the slip does."""
+    torque_walk: float = 2.0
+    """The same over the change of torque over load times radius, without sinkages [sqrt(m)]."""
     watched_share: float = 0.5
-    """Of ``filter.ratio_walk`` where readings of the sinkage would show such a change."""
+    """Of ``filter.ratio_walk`` where a reading would show such a change."""
     demand_error: float = 0.3  # of what the demand changes, over that change [-]
     slip_per_demand_walk: float = 0.2  # [1/sqrt(m)]
     inflation_rate: float = 2.0
@@ -162,6 +164,13 @@ class SpeedState(NamedTuple):
     slow_rims: Floats = ()  # mean of `rims.each` over the last second [m/s]
     settled: bool = True  # the contacts were, at the last cycle
     other_direction: PastDrive | None = None
+
+
+class ContactChange(NamedTuple):
+    """How fast the contacts change along the way; nan = not read."""
+
+    sinkage: float  # gained by most wheels over rim travel [m/m]
+    torque: float  # change of torque over load times radius, per rim travel [1/m]
 
 
 class AccelerationNoise(NamedTuple):
@@ -290,25 +299,30 @@ class SpeedProcess(Component[SpeedState]):
             other_direction=ended,
         )
 
-    def follow_contacts(self, travel: float, digging: float, *, watched: bool) -> None:
+    def follow_contacts(
+        self, travel: float, change: ContactChange, *, reference_known: bool
+    ) -> None:
         """Note how far the slip may walk: farther where contacts change.
 
         Parameters
         ----------
         travel : float
             Since the start [m].
-        digging : float
-            Sinkage that most wheels gain over rim travel [m/m].
-        watched : bool
-            Whether most sinkages are read and references are known. Without a reference the speed
-            would follow soil models that are off by as much.
+        change : ContactChange
+            Of the contacts, per rim travel.
+        reference_known : bool
+            Without a reference the torques tell slip and ground not apart, and the walk between
+            changes is not narrowed.
         """
-        tuning = self._tuning
+        tuning, walk = self._tuning, self._walk
         start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
-        walk = self._walk
-        if watched:
-            sinking = tuning.digging_walk * max(digging, 0.0)
-            walk = min(math.hypot(tuning.watched_share * walk, sinking), tuning.start_walk)
+        if not isnan(change.sinkage):
+            changing = tuning.digging_walk * max(change.sinkage, 0.0)
+        else:
+            changing = tuning.torque_walk * change.torque if reference_known else NAN
+        if not isnan(changing):
+            share = tuning.watched_share if reference_known else 1.0
+            walk = min(math.hypot(share * walk, changing), tuning.start_walk)
         self.state = self.state._replace(ratio_walk=max(walk, start))
 
     # -- Prediction ------------------------------------------------------------------------------
@@ -504,6 +518,15 @@ class SpeedProcess(Component[SpeedState]):
         noise = tuning.start_noise * self.acceleration_noise(stated).density
         if abs(rim) > self._rover.low_rim and tuning.start_share * abs(usual) < off < noise:
             ekf.set(SPEED, usual, (state.ratio_std * rim) ** 2)
+
+    def keep_with_rims(self, ekf: GatedFilter, rims: RimSpeeds) -> None:
+        """Let a rover without a reference velocity stand where it would move against its wheels.
+
+        Only a slide does that, and no force of its wheels would ever end it.
+        """
+        if abs(rims.typical) > self._rover.low_rim and rims.oppose(float(ekf.mean[SPEED])):
+            least = (self._tuning.first_ratio_std * rims.typical) ** 2
+            ekf.set(SPEED, 0.0, max(float(ekf.covariance[SPEED, SPEED]), least))
 
     def keep_least_variance(self, ekf: GatedFilter, rims: Floats) -> None:
         """Keep a least slip deviation."""
