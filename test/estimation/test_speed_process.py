@@ -200,7 +200,7 @@ def test_the_slip_of_a_start_walks_farther():
     for travel in (0.0, 0.1, 10.0):
         made.follow_contacts(travel, UNSEEN, reference_known=True)
         walks.append(made.state.ratio_walk)
-    assert walks == pytest.approx([0.6, 0.6 * np.exp(-0.5), 0.1])
+    assert walks == pytest.approx([0.4, 0.4 * np.exp(-0.5), 0.1])
 
 
 @pytest.mark.parametrize(

@@ -65,12 +65,13 @@ class SpeedTuning:
     rim_change: float = 0.2
     """Error of a change of rim speed as a change of speed, over that change [-]."""
     floor_walk: float = 1e-8  # [(m/s)^2/s]
-    start_walk: float = 0.6
+    start_walk: float = 0.4
     """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
     start_walk_travel: float = 0.2  # [m] with which it decays
     digging_walk: float = 12.0
-    """The same over the sinkage that most wheels gain per rim travel, up to that of a start
-    [1/sqrt(m)]: where contacts change, the slip does."""
+    """The same over the sinkage that most wheels gain per rim travel [1/sqrt(m)]: where contacts
+    change, the slip does."""
+    most_walk: float = 0.6  # of it where contacts change [1/sqrt(m)]
     torque_walk: float = 2.0
     """The same over the change of torque over load times radius, without sinkages [sqrt(m)]."""
     watched_share: float = 0.5
@@ -322,7 +323,7 @@ class SpeedProcess(Component[SpeedState]):
             changing = tuning.torque_walk * change.torque if reference_known else NAN
         if not isnan(changing):
             share = tuning.watched_share if reference_known else 1.0
-            walk = min(math.hypot(share * walk, changing), tuning.start_walk)
+            walk = min(math.hypot(share * walk, changing), tuning.most_walk)
         self.state = self.state._replace(ratio_walk=max(walk, start))
 
     # -- Prediction ------------------------------------------------------------------------------
