@@ -151,3 +151,26 @@ def test_sinkage_readings_below_their_zero_stop_no_rover_on_hard_ground(seed):
     assert not any(s.stuck for s in sets)
     slip = np.array([s.slip for s in sets if s.stamp > 8e9])
     assert np.sqrt(np.mean((slip - SLIP) ** 2)) < 0.06
+
+
+def test_the_loads_of_a_suspension_that_nobody_states_are_open():
+    """Six wheels may hang on a bogie: hub loads by its levers, taken by hand."""
+    unstated = Rover.from_configuration(reader.from_parameters(TEN_LINES))
+    rigid = np.array(unstated.load.loads((0.0, 0.0, GRAVITY)))
+    # Level, at rest: pivot of the bogie 0.04 m in front of the middle of its two wheels, centre of
+    # gravity above the middle wheels.
+    half, front, bogie = 0.5 * MASS * GRAVITY, 0.4, -0.16
+    on_bogie = half * front / (front - bogie)
+    middle = on_bogie * (bogie + 0.4) / 0.4
+    hung = np.repeat([half - on_bogie, middle, on_bogie - middle], 2)
+    off = np.abs(hung - rigid) / rigid.mean()
+    assert off.max() > 0.1
+    assert np.sqrt(np.mean(off**2)) < 1.5 * unstated.load_std
+
+
+@pytest.mark.parametrize('stated', [{'rover.load_std': 0.03}, {'rover.suspension': 'rigid'}])
+def test_loads_that_a_file_states_are_believed(stated):
+    stated = Rover.from_configuration(reader.from_parameters({**TEN_LINES, **stated}))
+    four = {k: v[:4] if isinstance(v, list) else v for k, v in TEN_LINES.items()}
+    assert stated.load_std == Rover.from_configuration(reader.from_parameters(four)).load_std
+    assert stated.load_std == pytest.approx(0.03)
