@@ -88,6 +88,7 @@ from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudg
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import Instant as SlopeInstant
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import SlopeCurve
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import (
+    SINKING,
     StuckAssessment,
     StuckMonitor,
 )
@@ -641,6 +642,9 @@ class WheelSoilEstimator:
             turning=cycle.turns,
             model_variance=model_variance,
             repeats=repeats,
+            together=not cycle.reference_known
+            and self._sinkages_read(cycle.time)
+            and self._clock.assessment.digging <= SINKING,
         )
         self._note_changing_contacts(cycle)
         if not cycle.window.readings:
@@ -670,12 +674,16 @@ class WheelSoilEstimator:
             cycle.turns,
             max([abs(rim) for rim in known(cycle.rims)], default=0.0) * cycle.dt,
         )
-        read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
+        read = self._sinkages_read(cycle.time)
         self._speed.follow_contacts(
             self._contact_age.state.travel,
             ContactChange(self._clock.assessment.digging if read else NAN, torque),
             reference_known=cycle.reference_known,
         )
+
+    def _sinkages_read(self, time: float) -> bool:
+        """Say whether those of most wheels are."""
+        return 2 * len(self._sinkage.unread(time)) < self._rover.wheel_count
 
     def _stationary_pulls(self, cycle: _Cycle) -> list[StationaryPull | None]:
         """Return what to expect of the wheels that do not turn under a load; None = it turns."""
