@@ -18,7 +18,6 @@ from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.contacts.ruts import Ruts, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
 from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
-from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
@@ -522,18 +521,3 @@ def test_half_of_an_excess_of_twice_the_noise_is_believed(parts):
 )
 def test_sides_that_turn_against_each_other_ask_for_a_spin(rims, spins):
     assert sides_oppose(rims, (-0.3,) * 3 + (0.3,) * 3) is spins
-
-
-# -- Torques along the way --------------------------------------------------------------------
-
-
-def test_the_change_of_torques_is_that_per_travel(parts):
-    """A ramp that is seen through two low-passes is behind by the difference of their lengths."""
-    change, loads, radius = TorqueChange(parts.rover), (300.0,) * 6, parts.rover.shear_radius
-    slope, step = 0.4, 0.005
-    for k in range(400):
-        torque = tuple(300.0 * r * (0.1 + slope * step * k) for r in radius)
-        found = change.update((NAN, *torque[1:]), loads, (True,) * 6, step)
-    assert found == pytest.approx(slope * 0.75, rel=0.02)
-    assert math.isnan(change.update((NAN,) * 6, loads, (True,) * 6, step))
-    assert math.isnan(change.update(torque, loads, (False,) * 6, step))

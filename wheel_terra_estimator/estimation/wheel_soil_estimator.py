@@ -33,7 +33,6 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
 )
 from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestClimb
 from wheel_terra_estimator.estimation.contacts.steering import Steering
-from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
@@ -59,11 +58,7 @@ from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
-from wheel_terra_estimator.estimation.filter.speed_process import (
-    ContactChange,
-    RimSpeeds,
-    SpeedProcess,
-)
+from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     GRAVITY_BIAS,
@@ -222,7 +217,6 @@ class WheelSoilEstimator:
         self._contact_age = ContactAge(rover)
         self._ruts = Ruts(rover)
         self._unloaded = UnloadedWheels(rover, sensors)
-        self._torque_change = TorqueChange(rover)
         self._demand = Demand()
         self._climb = SteepestClimb()
         angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
@@ -263,7 +257,6 @@ class WheelSoilEstimator:
             self._contact_age,
             self._ruts,
             self._unloaded,
-            self._torque_change,
             self._demand,
             self._climb,
             self._linearisation,
@@ -633,6 +626,8 @@ class WheelSoilEstimator:
         stationary = self._stationary_pulls(cycle)
         start = self._contact_age.shear_variance
         model_variance = tuple([start if turns else 0.0 for turns in cycle.turns])
+        read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
+        digging = self._clock.assessment.digging if read else NAN
         repeats = correlated_cycles(cycle.rims, cycle.dt) * self._reference.model_variance_factor
         rows = self._torque.update(
             ekf,
@@ -642,11 +637,11 @@ class WheelSoilEstimator:
             turning=cycle.turns,
             model_variance=model_variance,
             repeats=repeats,
-            together=not cycle.reference_known
-            and self._sinkages_read(cycle.time)
-            and self._clock.assessment.digging <= SINKING,
+            together=not cycle.reference_known and digging <= SINKING,
         )
-        self._note_changing_contacts(cycle)
+        self._speed.follow_contacts(
+            self._contact_age.state.travel, digging, reference_known=cycle.reference_known
+        )
         if not cycle.window.readings:
             return forces, None, rows
         curvature = self._turning.curvature(float(ekf.mean[SPEED]))
@@ -662,28 +657,6 @@ class WheelSoilEstimator:
             repeats=repeats,
         )
         return forces, total, [*rows, balance]
-
-    def _note_changing_contacts(self, cycle: _Cycle) -> None:
-        """Note how fast the contacts change: the sinkages tell, else the torques."""
-        straight = self._turning.state.lateral_motion <= _SHARP_TURN
-        if not (straight and self._contact_age.settled):
-            self._torque_change.reset()
-        torque = self._torque_change.update(
-            cycle.torque,
-            cycle.loads.load,
-            cycle.turns,
-            max([abs(rim) for rim in known(cycle.rims)], default=0.0) * cycle.dt,
-        )
-        read = self._sinkages_read(cycle.time)
-        self._speed.follow_contacts(
-            self._contact_age.state.travel,
-            ContactChange(self._clock.assessment.digging if read else NAN, torque),
-            reference_known=cycle.reference_known,
-        )
-
-    def _sinkages_read(self, time: float) -> bool:
-        """Say whether those of most wheels are."""
-        return 2 * len(self._sinkage.unread(time)) < self._rover.wheel_count
 
     def _stationary_pulls(self, cycle: _Cycle) -> list[StationaryPull | None]:
         """Return what to expect of the wheels that do not turn under a load; None = it turns."""

@@ -72,10 +72,8 @@ class SpeedTuning:
     """The same over the sinkage that most wheels gain per rim travel [1/sqrt(m)]: where contacts
     change, the slip does."""
     most_walk: float = 0.6  # of it where contacts change [1/sqrt(m)]
-    torque_walk: float = 2.0
-    """The same over the change of torque over load times radius, without sinkages [sqrt(m)]."""
     watched_share: float = 0.5
-    """Of ``filter.ratio_walk`` where a reading would show such a change."""
+    """Of ``filter.ratio_walk`` where sinkages would show such a change."""
     demand_error: float = 0.3  # of what the demand changes, over that change [-]
     slip_per_demand_walk: float = 0.2  # [1/sqrt(m)]
     inflation_rate: float = 2.0
@@ -165,13 +163,6 @@ class SpeedState(NamedTuple):
     slow_rims: Floats = ()  # mean of `rims.each` over the last second [m/s]
     settled: bool = True  # the contacts were, at the last cycle
     other_direction: PastDrive | None = None
-
-
-class ContactChange(NamedTuple):
-    """How fast the contacts change along the way; nan = not read."""
-
-    sinkage: float  # gained by most wheels over rim travel [m/m]
-    torque: float  # change of torque over load times radius, per rim travel [1/m]
 
 
 class AccelerationNoise(NamedTuple):
@@ -300,30 +291,24 @@ class SpeedProcess(Component[SpeedState]):
             other_direction=ended,
         )
 
-    def follow_contacts(
-        self, travel: float, change: ContactChange, *, reference_known: bool
-    ) -> None:
+    def follow_contacts(self, travel: float, digging: float, *, reference_known: bool) -> None:
         """Note how far the slip may walk: farther where contacts change.
 
         Parameters
         ----------
         travel : float
             Since the start [m].
-        change : ContactChange
-            Of the contacts, per rim travel.
+        digging : float
+            Sinkage that most wheels gain over rim travel [m/m]; nan = most are not read.
         reference_known : bool
-            Without a reference the torques tell slip and ground not apart, and the walk between
-            changes is not narrowed.
+            Without a reference the walk between changes is not narrowed.
         """
         tuning, walk = self._tuning, self._walk
         start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
-        if not isnan(change.sinkage):
-            changing = tuning.digging_walk * max(change.sinkage, 0.0)
-        else:
-            changing = tuning.torque_walk * change.torque if reference_known else NAN
-        if not isnan(changing):
-            share = tuning.watched_share if reference_known else 1.0
-            walk = min(math.hypot(share * walk, changing), tuning.most_walk)
+        if not isnan(digging):
+            steady = walk * (tuning.watched_share if reference_known else 1.0)
+            changing = min(tuning.digging_walk * max(digging, 0.0), tuning.most_walk)
+            walk = math.hypot(steady, changing)
         self.state = self.state._replace(ratio_walk=max(walk, start))
 
     # -- Prediction ------------------------------------------------------------------------------
