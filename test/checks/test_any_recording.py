@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings with any stamps and any numbers: no check fails, and one that did would be alone."""
 
+import time
 import warnings
 from dataclasses import fields, replace
 
@@ -140,3 +141,14 @@ def test_a_required_input_that_is_missing_is_the_first_finding():
     odometry = replace(WHOLE.reference, topic='/wheel/odometry')
     report = check_recording(replace(WHOLE, joints=None, wheel_odometry=odometry), CONFIGURATION)
     assert '-p wheel_odometry:=odom --remap odom:=/wheel/odometry' in report.findings[0].cure
+
+
+def test_a_few_wheel_rates_in_a_long_time_are_not_correlated():
+    """Eleven days on an even grid would take half a minute."""
+    joints = replace(WHOLE.joints, stamp=START + 300 * (WHOLE.joints.stamp - START))
+    imu = replace(WHOLE.imu, stamp=START + 300 * (WHOLE.imu.stamp - START))
+    begun = time.process_time()
+    report = check_recording(replace(WHOLE, joints=joints, imu=imu), CONFIGURATION)
+    assert time.process_time() - begun < 5.0
+    reasons = [entry.reason for entry in report.not_checked if entry.kind == 'delay']
+    assert any('too seldom' in reason for reason in reasons)

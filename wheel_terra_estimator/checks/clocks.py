@@ -57,7 +57,7 @@ WITNESS = 0.25
 BETWEEN = 0.25
 """Part of a period that a lag is not known to, one deviation [-]."""
 SLOWEST = 1.5
-"""Period of a reference [s] above which nothing is said of its stamps."""
+"""Period of the wheels or of a reference [s] above which nothing is said of their stamps."""
 SMOOTHED = 1.0
 """Speeds and turns are averaged over this where their changes share a drive in halves [s]."""
 SMOOTHING = 0.4
@@ -228,6 +228,8 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
     imu, difference = evidence.recording.imu, evidence.side_difference
     if imu is None or evidence.gyro is None:
         return NotChecked('delay', 'IMU against wheels: no IMU')
+    if evidence.period > SLOWEST:
+        return NotChecked('delay', 'IMU against wheels: the wheels are told too seldom')
     time, at = even_times(evidence.time, STEP), evidence.seconds(imu)
     turned = started = None
     if np.isfinite(difference).any():
