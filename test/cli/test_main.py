@@ -98,13 +98,18 @@ def examples():
             yield pytest.param(line, id=line[:40])
 
 
+@pytest.fixture(scope='module')
+def parser():
+    return main.build_parser()
+
+
 @pytest.mark.parametrize('line', list(examples()))
-def test_examples_of_the_help_parse(line):
+def test_examples_of_the_help_parse(line, parser):
     own, _, _ = line.partition(' > ')  # what follows is the shell's
     program, *arguments = shlex.split(own)
     assert program == 'wheel-terra'
     if '--help' not in arguments:
-        main.build_parser().parse_args(arguments)
+        parser.parse_args(arguments)
 
 
 def test_every_command_has_examples_and_a_debug_option():
