@@ -32,3 +32,5 @@ def test_wheels_and_base_that_hang_side_by_side_on_one_root(tmp_path):
     assert sketch.x == pytest.approx([0.3, -0.3])
     assert sketch.y == pytest.approx([0.0, 0.0], abs=1e-5)
     assert sketch.z == pytest.approx([0.0, 0.0], abs=1e-5)
+    # Without masses the centre of gravity is guessed: 1.4 radii above the ground, hubs one.
+    assert sketch.centre_of_gravity == pytest.approx([0.0, 0.0, 0.04])
