@@ -401,7 +401,7 @@ def forces(parts, ekf):
     return linearised(parts, ekf.mean, loads), loads
 
 
-def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0, together=False):
+def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0):
     update, (found, _) = (
         TorqueUpdate(parts.configuration, parts.rover, parts.layout),
         forces(parts, ekf),
@@ -414,7 +414,6 @@ def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0, together=False):
         turning=(True,) * 4 + (False,) * 2,
         model_variance=(doubt,) * 6,
         repeats=repeats,
-        together=together,
     ), found
 
 
@@ -426,15 +425,6 @@ def test_torques_are_rows_of_turning_wheels_that_were_read(parts, ekf):
     assert rows[0].variance == pytest.approx(noise, rel=1e-3)
     many, _ = torque_rows(parts, ekf, 0.3, repeats=30.0)
     assert many[0].variance == pytest.approx(30.0 * noise, rel=1e-3)
-
-
-def test_what_the_wheels_differ_by_is_not_in_their_mean(parts, ekf):
-    apart = np.array([1.0, -1.0, 0.5, -0.5, 0.0, 0.0])
-    (row,), _ = torque_rows(parts, ekf, 0.3 + apart, together=True)
-    rows, _ = torque_rows(parts, ekf, 0.3)
-    assert row.residual == pytest.approx(0.3)
-    assert row.variance == pytest.approx(sum(r.variance for r in rows) / 16.0, rel=1e-6)
-    assert row.jacobian == pytest.approx(np.mean([r.jacobian for r in rows], axis=0))
 
 
 def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ekf):

@@ -83,7 +83,6 @@ from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudg
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import Instant as SlopeInstant
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import SlopeCurve
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import (
-    SINKING,
     StuckAssessment,
     StuckMonitor,
 )
@@ -626,8 +625,6 @@ class WheelSoilEstimator:
         stationary = self._stationary_pulls(cycle)
         start = self._contact_age.shear_variance
         model_variance = tuple([start if turns else 0.0 for turns in cycle.turns])
-        read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
-        digging = self._clock.assessment.digging if read else NAN
         repeats = correlated_cycles(cycle.rims, cycle.dt) * self._reference.model_variance_factor
         rows = self._torque.update(
             ekf,
@@ -637,10 +634,12 @@ class WheelSoilEstimator:
             turning=cycle.turns,
             model_variance=model_variance,
             repeats=repeats,
-            together=not cycle.reference_known and digging <= SINKING,
         )
+        read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
         self._speed.follow_contacts(
-            self._contact_age.state.travel, digging, reference_known=cycle.reference_known
+            self._contact_age.state.travel,
+            self._clock.assessment.digging if read else NAN,
+            reference_known=cycle.reference_known,
         )
         if not cycle.window.readings:
             return forces, None, rows

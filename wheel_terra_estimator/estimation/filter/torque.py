@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isnan
 
 import numpy as np
@@ -68,7 +67,6 @@ class TorqueUpdate(ForceRows):
         turning: tuple[bool, ...],
         model_variance: Floats,
         repeats: float,
-        together: bool = False,
     ) -> list[Row]:
         """Return the rows of the torques of a cycle.
 
@@ -88,11 +86,8 @@ class TorqueUpdate(ForceRows):
             Of the shear model of each wheel, over its square [-].
         repeats : float
             Cycles that are one piece of information.
-        together : bool
-            Whether only their mean tells: what the wheels differ by is their loads and the ground
-            under each, as long as the rover does not dig itself in.
         """
-        rows, known = [], []
+        rows = []
         H, zeros = forces.torque_rows, self.zeros(ekf.mean)
         if self._known:
             H = H.copy()
@@ -106,16 +101,5 @@ class TorqueUpdate(ForceRows):
             noise = variance + (self._load_std * model) ** 2 + _FLOOR_VARIANCE
             total = repeats * noise + model_variance[i] * model**2
             total += noises[i] ** 2
-            rows.append(Row(reading - zeros[i] - model, H[i], total))
-            known.append(priors[i])
-        if together and rows:
-            mean = mean_row(rows)
-            rows, known = [mean], [float(mean.jacobian @ ekf.covariance @ mean.jacobian)]
-        return [self.row(row, prior) for row, prior in zip(rows, known, strict=True)]
-
-
-def mean_row(rows: Sequence[Row]) -> Row:
-    """Return the mean of independent readings as one row."""
-    residuals, jacobians, variances = zip(*rows, strict=True)
-    count = len(rows)
-    return Row(sum(residuals) / count, sum(jacobians) / count, sum(variances) / count**2)
+            rows.append(self.row(Row(reading - zeros[i] - model, H[i], total), priors[i]))
+        return rows

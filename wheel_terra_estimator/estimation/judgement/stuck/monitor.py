@@ -36,8 +36,7 @@ HOLD, SINKING_HOLD, STANDING_HOLD = 0.95, 0.45, 0.15
 """Times [s] that a criterion must hold, half a cycle short of 1, 0.5, 0.2 s: slip, slip of wheels
 that sink, standing (two readings of wheel odometry). Where the rover stops, a reference stands up
 to 0.9 s before the wheels do, and none of them sinks."""
-SINKING = 0.01
-"""Sinkage gained over rim travel by most wheels [m/m], above which they dig in."""
+_SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
 _DIGGING_SLIP = 0.8  # median slip above which a rover that drives on digs itself in
 _SETTINGS = StuckSettings()
 
@@ -91,7 +90,7 @@ class StuckMonitor(Component[StuckState]):
             (time if isnan(begun) else begun) if met else NAN
             for met, begun in zip(there, old.since, strict=True)
         )
-        holds = SINKING_HOLD if situation.digging > SINKING else HOLD, STANDING_HOLD
+        holds = SINKING_HOLD if situation.digging > _SINKING else HOLD, STANDING_HOLD
         held = [time - begun > hold for begun, hold in zip(since, holds, strict=True)]
         state = old._replace(memory=situation.memory, since=since, clear_since=NAN)
         if any(held) and not old.stuck:
