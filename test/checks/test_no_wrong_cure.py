@@ -10,6 +10,7 @@ import pytest
 import rolling_rover as rolling
 
 from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import block_fit
 
 WHOLE = rolling.recording()
@@ -249,3 +250,32 @@ def test_noise_of_another_unit_is_no_zero_of_a_sinkage():
     (finding,) = checked(sinkage=replace(WHOLE.sinkage, sinkage=firm)).findings
     assert finding.fault == 'sinkage_noise' and finding.confidence < 0.6
     assert 'or it is in centimetres' in finding.words
+
+
+@pytest.mark.parametrize('rows', [1, 20, 140])
+def test_a_recording_without_a_drive_is_said_to_be_one(rows):
+    """Fourteen seconds of standing tell no unit; a row tells nothing."""
+    changes = {
+        name: rows_of(channel, channel.seconds < WHOLE.joints.seconds[rows - 1] + 0.01)
+        for name in ('joints', 'imu', 'sinkage', 'reference')
+        if (channel := getattr(WHOLE, name)) is not None
+    }
+    assert faults(checked(**changes)) == ['no_drive']
+
+
+def test_wheels_wound_up_otherwise_at_each_stop_have_no_zero():
+    """Only forward, with stops; one torque holds 25 N m at rest, this way round or that."""
+    time = np.arange(0.0, 100.0, 1.0 / rolling.RATE)
+    speed = 0.3 * (time % 20.0 > 8.0)
+    truth = rolling.Motion(time, speed, 0.0 * time, 0.0 * time)
+    whole = rolling.recording(truth)
+    rest = np.abs(truth.speed) < 1e-9
+    stop = np.cumsum(np.diff(rest.astype(int), prepend=0) > 0)
+
+    def with_torque(size):
+        torque = whole.joints.torque.copy()
+        torque[rest, 1] += np.broadcast_to(size, rest.shape)[rest]
+        return checked(whole=whole, joints=replace(whole.joints, torque=torque))
+
+    assert 'torque_zero' in faults(with_torque(25.0))
+    assert 'torque_zero' not in faults(with_torque(25.0 * (-1.0) ** stop))
