@@ -134,11 +134,12 @@ def _directions(changes: _Changes, report: CheckReport, configuration: Configura
 
 
 def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
-    told = next((f for f in report.findings if f.parameter in imu.MOUNTING), None)
+    all_told = [f for f in report.findings if f.parameter in imu.MOUNTING]
+    if any(f.confidence <= LEAST_SURE for f in all_told):  # a rival may be it
+        evidence, all_told = evidence.turned(configured_mounting(evidence.facts.configuration)), []
+    told = all_told[0] if all_told else None
     rotation, std = evidence.rotation, told.std if told is not None else None
     source = told.words if told is not None else 'mean specific force'
-    if told is not None and told.confidence <= LEAST_SURE:
-        rotation = configured_mounting(evidence.facts.configuration)
     tilt = imu.small_tilt(evidence)
     if tilt is not None and tilt.std < imu.EVEN_GROUND_STD:
         if tilt.sigmas > CLEAR:

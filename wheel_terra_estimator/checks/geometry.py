@@ -381,7 +381,9 @@ def _of_sides(evidence: Evidence) -> Estimate:
         return Estimate(0.0, math.inf)
     track = stated_track(evidence) * (1.0 if isinstance(told, NotChecked) else told.ratio.value)
     apart = (evidence.side_difference - track * evidence.yaw)[rows]
-    return block_fit(evidence.rim[rows, None], apart)[0]
+    rim = evidence.rim[rows]
+    trial = tried(lambda part: block_fit(rim[part, None], apart[part])[0].value, 0.0, rim**2)
+    return block_fit(rim[:, None], apart)[0] if trial.falls else Estimate(0.0, math.inf)
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:

@@ -67,6 +67,8 @@ LEAST_TURN = 4.5
 """Heading that a drive has to cover for the mounting to be told from a slope [rad]."""
 FLAT_TURN_STD = math.radians(0.1)
 """Part of the mounting that unevenness of the ground leaves open [rad]."""
+TURNED_ROUND = 0.75
+"""Probability that an IMU that no curve shows is turned round, not its x axis reversed [-]."""
 ROUGH, LEAST_QUARTER = math.radians(4.0), math.radians(45.0)
 """Deviation beyond which a yaw is told roughly, and least yaw of a quarter turn [rad]."""
 ALONG_AXIS = math.cos(math.radians(25.0))
@@ -476,7 +478,7 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sure = 0.97
     if not clear and math.cos(seen.value) < -ALONG_AXIS:
         words['rival'] = ', or linear_acceleration.x has the wrong sign: drive circles'
-        sure = UNTURNED
+        sure = TURNED_ROUND
     elif seen.std > ROUGH and not _quarter(seen):
         words['rival'], sure = ' (roughly: measure it)', 0.6
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)

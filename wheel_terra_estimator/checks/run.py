@@ -158,8 +158,12 @@ def _examined(
     evidence = against_each_other(recording, facts, AGAINST_EACH_OTHER, mended)
     if evidence is None:
         report.not_checked.append(NotChecked('sign', 'no wheel rates to compare with'))
-    rim = 0.0 if evidence is None else moving_mean(evidence.rim, evidence.rows_in(1.0))
-    if np.quantile(np.abs(rim), 0.99) < LEAST_RIM_SPEED and not report.findings:
+    rims = np.zeros(1)
+    if evidence is not None:  # means over a second: noise turns no wheel
+        width = evidence.rows_in(1.0)
+        means = [np.abs(moving_mean(np.nan_to_num(speed), width)) for speed in evidence.speed.T]
+        rims = np.max(means, axis=0)
+    if np.quantile(rims, 0.99) < LEAST_RIM_SPEED and not report.findings:
         topic = recording.joints.topic if recording.joints is not None else ''
         report.take([found('no_drive', topic, 0.99)])
     return evidence

@@ -468,7 +468,8 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
         # out is told.
         stops = [np.nanmedian(evidence.torque[i:j], axis=0) for i, j in runs(rest)]
         apart = np.array([stop - np.nanmedian(stop) for stop in stops])
-        level, wound = np.median(apart, axis=0), np.std(apart, axis=0)
+        level = np.median(apart, axis=0)
+        wound = np.std(apart, axis=0) / math.sqrt(len(stops))
         spread = max(1.5 * float(np.nanmedian(np.abs(level))), stated)
         zeros = [
             Estimate(float(v), max(spread, float(w))) for v, w in zip(level, wound, strict=True)
