@@ -375,15 +375,21 @@ def _of_sides(evidence: Evidence) -> Estimate:
 
     On the straight the sides differ by what the gyro sees, times the track that turns need.
     """
-    rows, told = evidence.straight, track_ratio(evidence)
-    unknown = isinstance(told, NotChecked) and turning.skids(evidence)
+    rows, turns = evidence.straight, track_ratio(evidence)
+    unknown = not evidence.facts.has_sides() or (
+        isinstance(turns, NotChecked) and turning.skids(evidence)
+    )
     if unknown or not evidence.rested or rows.sum() < LEAST_MOVING_ROWS:
         return Estimate(0.0, math.inf)
-    track = stated_track(evidence) * (1.0 if isinstance(told, NotChecked) else told.ratio.value)
+    track = stated_track(evidence) * (1.0 if isinstance(turns, NotChecked) else turns.ratio.value)
     apart = (evidence.side_difference - track * evidence.yaw)[rows]
     rim = evidence.rim[rows]
     trial = tried(lambda part: block_fit(rim[part, None], apart[part])[0].value, 0.0, rim**2)
-    return block_fit(rim[:, None], apart)[0] if trial.falls else Estimate(0.0, math.inf)
+    told = block_fit(rim[:, None], apart)[0]
+    shares = np.nanmedian(evidence.speed[rows] / rim[:, None], axis=0)
+    odd = max(float(np.ptp(shares[evidence.facts.side == side])) for side in (1.0, -1.0))
+    alike = odd < 0.5 * abs(told.value)  # else it is one wheel
+    return told if trial.falls and alike else Estimate(0.0, math.inf)
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:

@@ -561,9 +561,9 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if evidence.facts.configuration is not None:
         biases += evidence.facts.configuration.sensors.specific_force_bias
     biases[:2] += gravity * np.array([-tilt.pitch.value, tilt.roll.value])
-    seen = {'size': math.degrees(size), 'zero': math.sin(size) * gravity}
-    told_of: dict[str, Any] = seen | {'biases': listed(biases, '.2f')}
-    told = mounting_finding('imu_tilt', evidence, mended, std, sure, **told_of)
+    words = {'size': math.degrees(size), 'zero': math.sin(size) * gravity}
+    shown = listed(biases, '.2f')
+    told = mounting_finding('imu_tilt', evidence, mended, std, sure, biases=shown, **words)
     return [told], mended
 
 
