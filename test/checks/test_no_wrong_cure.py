@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 
+from wheel_terra_estimator.checks.calibration import calibrate
 from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import block_fit
 
 WHOLE = rolling.recording()
@@ -169,3 +171,121 @@ def test_a_circle_with_a_gap_of_the_imu_tells_no_tilt():
     )
     assert 'imu_tilt' not in faults(checked(imu=imu))
     assert math.isclose(turn, 7.85, abs_tol=0.01)
+
+
+@pytest.mark.parametrize(('axis', 'name'), [(0, 'x'), (1, 'y')])
+def test_a_reversed_axis_of_the_accelerometer_is_no_turned_imu(axis, name):
+    """No rotation reverses one horizontal axis: starts are felt along x, curves along y."""
+    whole = rolling.recording(rolling.starts_and_curves())
+    force = whole.imu.force * np.where(np.arange(3) == axis, -1.0, 1.0)
+    (finding,) = checked(whole=whole, imu=replace(whole.imu, force=force)).findings
+    assert finding.fault == 'force_mirrored' and f'linear_acceleration.{name} ' in finding.words
+
+
+def test_without_curves_a_reversed_axis_is_told_beside_a_turned_imu():
+    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
+    back = replace(straight.imu, force=straight.imu.force * [-1.0, 1.0, 1.0])
+    (finding,) = checked(whole=straight, imu=back).findings
+    assert finding.fault == 'imu_yaw' and 'wrong sign: drive circles' in finding.words
+    assert finding.confidence < 0.8
+    changed = calibrate(replace(straight, imu=back), rolling.rover()).changes
+    assert not any('mounting' in change.key for change in changed)
+
+
+def test_single_wild_rates_and_torques_are_no_noise():
+    random = np.random.default_rng(3)
+    rate, torque = WHOLE.joints.rate.copy(), WHOLE.joints.torque.copy()
+    for table, size in ((rate, 40.0), (torque, 300.0)):
+        rows = random.choice(np.arange(0, table.shape[0], 3), 12, replace=False)
+        table[rows, random.integers(4, size=12)] += size
+    told = checked(joints=replace(WHOLE.joints, rate=rate, torque=torque)).findings
+    assert {(f.fault, f.words.split()[0]) for f in told} == {('wild', '12')} and len(told) == 2
+
+
+def test_a_gyro_of_another_scale_is_no_track():
+    """The reference turns as the rover does, the gyro 15 % more."""
+    report = checked(imu=replace(WHOLE.imu, rate=1.15 * WHOLE.imu.rate))
+    (finding,) = report.findings
+    assert finding.fault == 'gyro_scale' and finding.value == pytest.approx(1 / 1.15, rel=0.01)
+
+
+def test_a_track_that_no_second_gyro_bears_out_is_told_with_its_rival():
+    mute = replace(WHOLE.reference, yaw_rate=0.0 * WHOLE.reference.yaw_rate)
+    wide = rolling.rover(**{'wheels.y': [1.3 * rolling.HALF_TRACK, -1.3 * rolling.HALF_TRACK] * 2})
+    (finding,) = checked(wide, reference=mute).findings
+    assert finding.fault == 'track' and 'or the gyro has another scale' in finding.words
+    assert finding.value == pytest.approx(2.0 * rolling.HALF_TRACK, rel=0.03)
+
+
+def test_radii_of_one_side_are_not_shared_out():
+    """The file has the left wheels 10 % too large: the gyro sees a straight drive straight."""
+    radii = [1.1 * rolling.RADIUS, rolling.RADIUS] * 2
+    (finding,) = checked(rolling.rover(**{'wheels.radius': radii})).findings
+    told = [float(r) for r in finding.cure.partition('[')[2].partition(']')[0].split(',')]
+    assert finding.fault == 'radius' and 'left and right' in finding.words
+    np.testing.assert_allclose(told, rolling.RADIUS, rtol=0.02)
+
+
+def test_a_scale_of_one_torque_is_no_mass():
+    torque = WHOLE.joints.torque * [1.0, 3.0, 1.0, 1.0]
+    report = checked(joints=replace(WHOLE.joints, torque=torque))
+    assert not {'torque_gain', 'mass'} & set(faults(report))
+    assert any('each wheel another share' in entry.reason for entry in report.not_checked)
+
+
+def test_a_diameter_for_a_radius_is_one_finding():
+    """Torque over radius is then half of what slopes ask for; that is no mass."""
+    double = rolling.rover(**{'wheels.radius': [2.0 * rolling.RADIUS] * 4})
+    report = checked(double)
+    assert faults(report) == ['radius']
+    assert report.findings[0].value == pytest.approx(rolling.RADIUS, rel=0.03)
+
+
+def test_steps_of_an_accelerometer_are_noise():
+    coarse = replace(WHOLE.imu, force=np.round(WHOLE.imu.force))
+    told = [f for f in checked(imu=coarse).findings if f.fault == 'imu_noise']
+    assert [f.value for f in told] == pytest.approx([1.0 / math.sqrt(12.0)], rel=0.1)
+
+
+def test_noise_of_another_unit_is_no_zero_of_a_sinkage():
+    """Centimetres on firm ground: 0.05 with a noise of 0.2."""
+    firm = 0.05 + 0.2 * np.random.default_rng(4).standard_normal(WHOLE.sinkage.sinkage.shape)
+    (finding,) = checked(sinkage=replace(WHOLE.sinkage, sinkage=firm)).findings
+    assert finding.fault == 'sinkage_noise' and finding.confidence < 0.6
+    assert 'or it is in centimetres' in finding.words
+
+
+@pytest.mark.parametrize('rows', [1, 20, 140])
+def test_a_recording_without_a_drive_is_said_to_be_one(rows):
+    """Fourteen seconds of standing tell no unit; a row tells nothing."""
+    changes = {
+        name: rows_of(channel, channel.seconds < WHOLE.joints.seconds[rows - 1] + 0.01)
+        for name in ('joints', 'imu', 'sinkage', 'reference')
+        if (channel := getattr(WHOLE, name)) is not None
+    }
+    assert faults(checked(**changes)) == ['no_drive']
+
+
+def test_wheels_wound_up_otherwise_at_each_stop_have_no_zero():
+    """Only forward, with stops; one torque holds 25 N m at rest, this way round or that."""
+    time = np.arange(0.0, 100.0, 1.0 / rolling.RATE)
+    speed = 0.3 * (time % 20.0 > 8.0)
+    truth = rolling.Motion(time, speed, 0.0 * time, 0.0 * time)
+    whole = rolling.recording(truth)
+    rest = np.abs(truth.speed) < 1e-9
+    stop = np.cumsum(np.diff(rest.astype(int), prepend=0) > 0)
+
+    def with_torque(size):
+        torque = whole.joints.torque.copy()
+        torque[rest, 1] += np.broadcast_to(size, rest.shape)[rest]
+        return checked(whole=whole, joints=replace(whole.joints, torque=torque))
+
+    assert 'torque_zero' in faults(with_torque(25.0))
+    assert 'torque_zero' not in faults(with_torque(25.0 * (-1.0) ** stop))
+
+
+def test_turns_on_the_spot_are_a_drive():
+    """The mean of the rims is nothing."""
+    time = np.arange(0.0, 80.0, 1.0 / rolling.RATE)
+    spot = rolling.Motion(time, 0.0 * time, 0.3 * (time % 20.0 > 6.0), 0.0 * time)
+    assert faults(checked(whole=rolling.recording(spot))) == []

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.checks import geometry, imu, torque
+from wheel_terra_estimator.checks import geometry, imu, torque, turning
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
-from wheel_terra_estimator.checks.run import examine
+from wheel_terra_estimator.checks.run import configured_mounting, examine
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.ros_yaml import Value
@@ -90,7 +90,8 @@ def calibrate(
     _track(changes, evidence)
     report.not_checked.append(NO_CENTRE_OF_GRAVITY)
     mended = {change.key for change in changes.made}
-    left = [f for f in report.findings if f.parameter not in mended and f.kind != 'mass']
+    rivals = ('mass', 'reference_scale' if 'wheels.radius' in mended else '')
+    left = [f for f in report.findings if f.parameter not in mended and f.fault not in rivals]
     return Calibration(tuple(changes.made), tuple(report.not_checked), tuple(left), report.figures)
 
 
@@ -133,7 +134,10 @@ def _directions(changes: _Changes, report: CheckReport, configuration: Configura
 
 
 def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
-    told = next((f for f in report.findings if f.parameter in imu.MOUNTING), None)
+    all_told = [f for f in report.findings if f.parameter in imu.MOUNTING]
+    if any(f.confidence <= LEAST_SURE for f in all_told):  # a rival may be it
+        evidence, all_told = evidence.turned(configured_mounting(evidence.facts.configuration)), []
+    told = all_told[0] if all_told else None
     rotation, std = evidence.rotation, told.std if told is not None else None
     source = told.words if told is not None else 'mean specific force'
     tilt = imu.small_tilt(evidence)
@@ -239,7 +243,7 @@ def _friction(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
 
 
 def _track(changes: _Changes, evidence: Evidence) -> None:
-    told = None if geometry.skids(evidence) else geometry.rolling_track(evidence)
+    told = None if turning.skids(evidence) else geometry.rolling_track(evidence)
     sure = isinstance(told, geometry.Told) and told.alone
     if isinstance(told, geometry.Told) and sure and told.ratio.sigmas_from(1.0) > CLEAR:
         lateral = evidence.facts.lateral

@@ -5,28 +5,51 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.statistics import DRIFT, Estimate, moving_mean, without_drift
+from wheel_terra_estimator.checks.statistics import (
+    DRIFT,
+    Estimate,
+    block_fit,
+    moving_mean,
+    without_drift,
+)
+
+Complex: TypeAlias = NDArray[np.complex128]
 
 LEAST_YAW = math.radians(25.0)
 """Yaw of the mounting below which starts, stops and slopes do not tell it [rad]."""
 YAW_SIGMAS = 4.0
+LEAST_FELT = 0.4
+"""What is felt along an axis over what wheels and gyro say, at least [-]."""
 FELT_BLOCKS = 10
 """Parts of a drive that a deviation comes from."""
 
 
-def felt_motion(
-    evidence: Evidence, drift: float = DRIFT
-) -> tuple[NDArray[np.complex128], float] | None:
+def felt_motion(evidence: Evidence, drift: float = DRIFT) -> tuple[Complex, float] | None:
     """Return sums over blocks of acceleration felt times that of the wheels, and their energy.
 
     Along x the acceleration of starts and stops, along y that of curves, as complex numbers; what
     changes more slowly than over ``drift`` [s] is the slope. None without an IMU.
     """
+    both = _motions(evidence, drift)
+    if both is None:
+        return None
+    motion, seen = both
+    energy = np.cumsum(np.abs(motion) ** 2)
+    edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], FELT_BLOCKS + 1)[1:-1])
+    parts = np.array(
+        [np.vdot(m, s) for m, s in zip(np.split(motion, edges), np.split(seen, edges), strict=True)]
+    )
+    return parts, float(energy[-1])
+
+
+def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None:
+    """Return what wheels and gyro say that is felt, and what is (k,) [m/s^2]; see `felt_motion`."""
     if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
         return None
     period = evidence.period
@@ -36,15 +59,29 @@ def felt_motion(
     motion = without_drift(np.gradient(speed, period) + 1j * curve, period, drift)
     along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
     seen = without_drift(along + 1j * across, period, drift)
-    energy = np.cumsum(np.abs(motion) ** 2)
-    edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], FELT_BLOCKS + 1)[1:-1])
-    parts = np.array(
-        [np.vdot(m, s) for m, s in zip(np.split(motion, edges), np.split(seen, edges), strict=True)]
-    )
-    return parts, float(energy[-1])
+    return motion, seen
 
 
-def yaw_of_motion(parts: NDArray[np.complex128], energy: float) -> Estimate | None:
+def reversed_axis(evidence: Evidence) -> tuple[str, bool]:
+    """Return the horizontal axis whose sign is wrong, '' for none, and whether curves tell it.
+
+    An IMU that is turned feels starts and curves turned alike; no rotation reverses one of them.
+    """
+    both = _motions(evidence, DRIFT)
+    if both is None:
+        return '', False
+    fits = [
+        block_fit(wheels[:, None], felt)[0]
+        for wheels, felt in ((both[0].real, both[1].real), (both[0].imag, both[1].imag))
+    ]
+    clear = [abs(f.value) > LEAST_FELT and f.sigmas_from(0.0) > YAW_SIGMAS for f in fits]
+    starts, curves = (fit.value for fit in fits)
+    if not all(clear) or starts * curves > 0.0:
+        return '', clear[1]
+    return 'x' if starts < 0.0 else 'y', True
+
+
+def yaw_of_motion(parts: Complex, energy: float) -> Estimate | None:
     """Return the angle by which a motion is felt turned [rad]; None where it is not clear."""
     total = parts.sum()
     spread = float(np.sqrt(np.sum(np.abs(parts - total / parts.size) ** 2)))

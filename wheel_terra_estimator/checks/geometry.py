@@ -12,11 +12,12 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
-from wheel_terra_estimator.checks.evidence import Evidence, Mask
+from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask
 from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, listed
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
+    UNIFORM_STD,
     Estimate,
     bend_noise,
     block_fit,
@@ -31,6 +32,8 @@ from wheel_terra_estimator.checks.wheel_rates import rounding
 LEAST_RADIUS_ERROR = 0.025
 """Share by which a radius is wrong before it is a finding [-]."""
 RADIUS_SIGMAS = 4.0
+LEAST_OF_SIDES = 0.05
+"""Share by which the radii of the sides differ, at least [-]; a cross slope makes a side slip."""
 LEAST_RATIO = 0.3
 """Speed over rim speed below which a rover is stuck, or its reference dead [-]."""
 MOST_RATIO = 1.4
@@ -55,8 +58,6 @@ PARTS = 8
 """Parts of a drive in which a radius is the same."""
 EVEN_SHARE = 0.25
 """Scatter of the ratio of speeds between them over its distance from 1, beyond which it is slip."""
-UNIFORM_STD = 1.0 / math.sqrt(12.0)
-"""Standard deviation of what lies anywhere in an interval, as a share of its length [-]."""
 MOST_ROUNDING = 0.02
 """Error of the mean rate by rounding, over the working rate, with which a scale is told [-]."""
 ROUNDED = 'rates are rounded to coarse steps, so their mean is off; publish more digits'
@@ -317,21 +318,30 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     radius = float(np.mean(facts.radius))
     evidence.figures['rover.rolling_radius_m'] = round(radius * ratio.value, 5)
     evidence.figures['rover.rolling_radius_std_m'] = round(radius * ratio.std, 5)
-    sigmas = ratio.sigmas_from(1.0)
-    if abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < RADIUS_SIGMAS:
+    sides = _of_sides(evidence)
+    lopsided = abs(sides.value) > max(LEAST_OF_SIDES, RADIUS_SIGMAS * sides.std)
+    sigmas = sides.sigmas_from(0.0) if lopsided else ratio.sigmas_from(1.0)
+    if not lopsided and (abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < RADIUS_SIGMAS):
         return [], evidence
-    if not trial.falls:
+    scale = ratio.value * (1.0 + (0.5 * sides.value * facts.side if lopsided else 0.0 * facts.side))
+    if not (trial.falls or lopsided):
         reason = 'its halves of the drive say another: drive longer, over firm ground'
         return [NotChecked('radius', reason)], evidence
     wheels = facts.configuration.wheels
-    rims = facts.radius * ratio.value - (wheels.slip_radius - wheels.radius)  # lugs stay
-    share, sure = _share_of_radius(evidence, ratio), confidence(sigmas)
+    rims = facts.radius * scale - (wheels.slip_radius - wheels.radius)  # lugs stay
+    share = 1.0 if lopsided else _share_of_radius(evidence, ratio)
+    sure = confidence(sigmas) * (SURE if lopsided else 1.0)
+    evidence.figures['rover.radius_ratio'] = round(ratio.value, 4)
     alone = max(share, 1.0 - share) > SURE
     words: dict[str, Any] = {
         'ratio': ratio.value,
         'off': ratio.std,
         'trial': trial.words('off by', 'of the speed'),
-        'rival': '' if alone else ': the radius of the wheels, or the scale of the reference',
+        'rival': f', left and right {100 * abs(sides.value):.0f} % unlike (or their encoders)'
+        if lopsided
+        else ''
+        if alone
+        else ': the radius of the wheels, or the scale of the reference',
         'separate': ''
         if alone
         else '; measure ten metres with a tape: the rims or the reference must say ten',
@@ -357,7 +367,29 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return found, evidence
     if share < 0.5:
         return found[1:], evidence
-    return found[:1], replace(evidence, facts=replace(facts, radius=facts.radius * ratio.value))
+    return found[:1], replace(evidence, facts=replace(facts, radius=facts.radius * scale))
+
+
+def _of_sides(evidence: Evidence) -> Estimate:
+    """Return true over stated radius of the left wheels less that of the right ones [-].
+
+    On the straight the sides differ by what the gyro sees, times the track that turns need.
+    """
+    rows, turns = evidence.straight, track_ratio(evidence)
+    unknown = not evidence.facts.has_sides() or (
+        isinstance(turns, NotChecked) and turning.skids(evidence)
+    )
+    if unknown or not evidence.rested or rows.sum() < LEAST_MOVING_ROWS:
+        return Estimate(0.0, math.inf)
+    track = stated_track(evidence) * (1.0 if isinstance(turns, NotChecked) else turns.ratio.value)
+    apart = (evidence.side_difference - track * evidence.yaw)[rows]
+    rim = evidence.rim[rows]
+    trial = tried(lambda part: block_fit(rim[part, None], apart[part])[0].value, 0.0, rim**2)
+    told = block_fit(rim[:, None], apart)[0]
+    shares = np.nanmedian(evidence.speed[rows] / rim[:, None], axis=0)
+    odd = max(float(np.ptp(shares[evidence.facts.side == side])) for side in (1.0, -1.0))
+    alike = odd < 0.5 * abs(told.value)  # else it is one wheel
+    return told if trial.falls and alike else Estimate(0.0, math.inf)
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
@@ -366,7 +398,11 @@ def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
     Where the rover need not skid to turn, the gyro knows the scale of the rims.
     """
     odds = math.log(PRIOR_OF_RADIUS / (1.0 - PRIOR_OF_RADIUS))
-    turns = None if skids(evidence) else track_ratio(evidence)
+    gain, off = (evidence.figures.get(f'torque.gain{end}', math.nan) for end in ('', '_std'))
+    of_scale, of_radius = abs(gain - 1.0) / off, abs(gain - ratio.value) / off
+    if min(of_scale, of_radius) < 1.0:  # the torque over the radius is what slopes ask for
+        odds += 0.5 * (of_scale**2 - of_radius**2)
+    turns = None if turning.skids(evidence) else track_ratio(evidence)
     if isinstance(turns, Told):
         std = math.hypot(turns.ratio.std, TRACK_STD, ratio.std)
         rolling = 1.0 / evidence.figures['rover.speed_over_rim_speed']
@@ -375,18 +411,6 @@ def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
         if min(of_scale, of_radius) < 1.0:  # else the track is another as well
             odds += 0.5 * (of_scale**2 - of_radius**2)
     return 1.0 / (1.0 + math.exp(-min(max(odds, -50.0), 50.0)))
-
-
-def skids(evidence: Evidence) -> bool:
-    """Return whether wheels do not roll as the track says in turns: several rows not steered."""
-    configuration = evidence.facts.configuration
-    if configuration is None:
-        return True
-    wheels = configuration.wheels
-    known = np.isfinite(evidence.steering).all(axis=0)
-    fixed = wheels.x[~known]
-    unknown = bool((np.array(wheels.steered) & ~known).any())
-    return unknown or float(np.ptp(fixed)) > 0.3 * float(np.ptp(wheels.y)) if fixed.size else False
 
 
 def stated_track(evidence: Evidence) -> float:
@@ -460,7 +484,7 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     (ratio, trial, alone), stated = told, stated_track(evidence)
     figures['rover.effective_over_stated_track'] = round(ratio.value, 3)
     figures['rover.effective_track_m'] = round(ratio.value * stated, 4)
-    if skids(evidence) and ratio.value > SKID_TRACK:
+    if turning.skids(evidence) and ratio.value > SKID_TRACK:
         return [
             NotChecked(
                 'track',
@@ -469,14 +493,14 @@ def check_track(evidence: Evidence) -> list[Outcome]:
                 'that is skid no recording tells: measure it with a tape',
             )
         ]
-    if not skids(evidence):
+    if not turning.skids(evidence):
         rolling = rolling_track(evidence)
         if isinstance(rolling, NotChecked):
             return [NotChecked(kind, rolling.reason) for kind in ('track', 'radius')]
         ratio, alone = rolling.ratio, rolling.alone
     if ratio.sigmas_from(1.0) < 4.0 or abs(ratio.value - 1.0) < LEAST_TRACK_ERROR:
         return []
-    if skids(evidence):
+    if turning.skids(evidence):
         return [
             evidence.found(
                 'track_at_most',
@@ -489,9 +513,12 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     return [
         evidence.found(
             'track',
-            confidence(ratio.sigmas_from(1.0)) if alone else 0.5,
-            rival='' if alone else ', or the radius is another, or the wheels slip',
-            separate='' if alone else '; measure it with a tape, or drive straight by a reference',
+            0.9 * confidence(ratio.sigmas_from(1.0)) if alone else 0.5,
+            rival=', or the gyro has another scale'
+            if alone
+            else ', or the radius is another, or the wheels slip',
+            separate='; measure it with a tape'
+            + ('' if alone else ', or drive straight by a reference'),
             value=round(stated * ratio.value, 4),
             std=round(stated * ratio.std, 4),
             ratio=ratio.value,

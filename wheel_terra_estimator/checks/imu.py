@@ -21,12 +21,14 @@ from wheel_terra_estimator.checks.felt_motion import (
     LEAST_YAW,
     YAW_SIGMAS,
     felt_motion,
+    reversed_axis,
     yaw_of_motion,
 )
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
     DRIFT,
+    UNIFORM_STD,
     Estimate,
     block_fit,
     confidence,
@@ -35,6 +37,7 @@ from wheel_terra_estimator.checks.statistics import (
     robust_std,
     robust_std_of_rows,
     runs,
+    step_of,
 )
 from wheel_terra_estimator.checks.torque import heading_of_torque, slope_on_the_level
 from wheel_terra_estimator.checks.trial import Trial
@@ -64,6 +67,12 @@ LEAST_TURN = 4.5
 """Heading that a drive has to cover for the mounting to be told from a slope [rad]."""
 FLAT_TURN_STD = math.radians(0.1)
 """Part of the mounting that unevenness of the ground leaves open [rad]."""
+TURNED_ROUND = 0.75
+"""Probability that an IMU that no curve shows is turned round, not its x axis reversed [-]."""
+ROUGH, LEAST_QUARTER = math.radians(4.0), math.radians(45.0)
+"""Deviation beyond which a yaw is told roughly, and least yaw of a quarter turn [rad]."""
+ALONG_AXIS = math.cos(math.radians(25.0))
+"""Cosine of the angle to an axis within which that axis is meant [-]."""
 SLOPES_STD = math.radians(5.0)
 """Deviation that soil leaves in a direction by torques on slopes [rad]."""
 EVEN = 0.6
@@ -445,6 +454,11 @@ def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
 
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return an IMU whose x axis does not point forward, and the evidence with that mended."""
+    axis, clear = reversed_axis(evidence)
+    if axis and evidence.force is not None and _turns_upright(evidence) > CLEAR_AGREEMENT:
+        signs = np.array([-1.0 if name == axis else 1.0 for name in 'xyz'])
+        told_of = evidence.found('force_mirrored', 0.95, value=-1.0, axis=axis)
+        return [told_of], replace(evidence, force=evidence.force * signs)
     told = yaw_of_imu(evidence)
     if told is None:
         reason = 'yaw of the IMU: neither lively starts and stops nor slopes in it'
@@ -461,19 +475,29 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         'off': math.degrees(seen.std),
         'trial': Trial(*np.degrees(trial[:2]).tolist()).words('off by', 'degrees'),
     }
+    sure = 0.97
+    if not clear and math.cos(seen.value) < -ALONG_AXIS:
+        words['rival'] = ', or linear_acceleration.x has the wrong sign: drive circles'
+        sure = TURNED_ROUND
+    elif seen.std > ROUGH and not _quarter(seen):
+        words['rival'], sure = ' (roughly: measure it)', 0.6
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)
-    return [mounting_finding('imu_yaw', evidence, mended, words['off'], 0.97, **words)], mended
+    return [mounting_finding('imu_yaw', evidence, mended, words['off'], sure, **words)], mended
 
 
 def without_yaw(seen: Estimate) -> FloatArray:
     """Return the rotation that takes a yaw off; right angles are meant where they fit."""
     from scipy.spatial.transform import Rotation  # heavy
 
-    angle = -seen.value
-    quarter = round(angle / (math.pi / 2.0)) * math.pi / 2.0
-    if abs(angle - quarter) < 2.5 * max(seen.std, math.radians(4.0)):
-        angle = quarter
-    return np.asarray(Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix())
+    quarter = round(seen.value / (math.pi / 2.0)) * math.pi / 2.0
+    angle = quarter if _quarter(seen) else seen.value
+    return np.asarray(Rotation.from_rotvec([0.0, 0.0, -angle]).as_matrix())
+
+
+def _quarter(seen: Estimate) -> bool:
+    """Return whether a yaw may be a whole quarter turn."""
+    apart = math.remainder(seen.value, math.pi / 2.0)
+    return abs(apart) < 2.5 * max(seen.std, math.radians(4.0)) and abs(seen.value) > LEAST_QUARTER
 
 
 def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -516,7 +540,7 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         seen = Mounting(nothing, Estimate(-pitch.value, pitch.std), 0.0)
         mended, std = evidence.turned(seen.taken_off(evidence.rotation)), math.degrees(pitch.std)
         words = {'size': math.degrees(abs(pitch.value)), 'off': std}
-        told = mounting_finding('imu_pitch', evidence, mended, std, 0.8, **words)
+        told = mounting_finding('imu_pitch', evidence, mended, std, 0.5, **words)
         return [told], mended
     if tilt is None:
         reason = 'no full circle in it: mounting not told from slope; drive a circle both ways'
@@ -533,8 +557,13 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     mended = evidence.turned(tilt.taken_off(evidence.rotation))
     sure = min(confidence(tilt.sigmas), TILT_IS_MOUNTING)
-    words = {'size': math.degrees(size), 'zero': math.sin(size) * evidence.facts.gravity}
-    told = mounting_finding('imu_tilt', evidence, mended, std, sure, **words)
+    gravity, biases = evidence.facts.gravity, np.zeros(3)
+    if evidence.facts.configuration is not None:
+        biases += evidence.facts.configuration.sensors.specific_force_bias
+    biases[:2] += gravity * np.array([-tilt.pitch.value, tilt.roll.value])
+    words = {'size': math.degrees(size), 'zero': math.sin(size) * gravity}
+    shown = listed(biases, '.2f')
+    told = mounting_finding('imu_tilt', evidence, mended, std, sure, biases=shown, **words)
     return [told], mended
 
 
@@ -577,7 +606,9 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
     ):
         change = np.diff(values, axis=0) / math.sqrt(2.0)
         # Vibration comes and goes with driving: the root mean square of the livelier half counts.
+        step = max(step_of(column) for column in values.T)
         noise = float(np.median([_upper_rms(column) for column in change.T]))
+        noise = math.hypot(noise, UNIFORM_STD * step)
         stated = getattr(sensors, key)
         evidence.figures[f'imu.{key}'] = float(f'{noise:.3g}')
         in_degrees = math.radians(noise) / stated if by_noise and values is imu.rate else 0.0

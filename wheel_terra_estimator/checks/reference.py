@@ -57,6 +57,8 @@ MOSTLY = 0.4
 """Mean over median rim speed of wheels most of which turn one way [-]."""
 AROUND = 0.3
 """Half of the time around a velocity that rim speeds are averaged over [s]."""
+CLEAR_SPEED = 5.0
+"""Speed over the noise of the reference that a ratio of speeds needs [-]."""
 LEAST_ROWS = 5
 """Velocities beside rims that a ratio needs."""
 KNOWN_UNITS = {'kilometres per hour': 3.6, 'millimetres per second': 1000.0, 'knots': 1.9438}
@@ -202,6 +204,8 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if rows.sum() < LEAST_ROWS:
         return [], evidence
     sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim, AROUND))
+    if hardly_moves(reference.velocity[:, 0], rows):
+        return [], evidence
     ratio = float(np.median(sense * reference.velocity[rows, 0] / rim[rows]))
     fitting = reference_units(ratio)
     near = {unit: f for unit, f in fitting.items() if abs(ratio / f - 1.0) < WITHOUT_SLIP}
@@ -220,6 +224,11 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         either = [] if track and turning.ordinary_track(track) else either_unit(evidence, ratio)
         return either or [evidence.found('reference_unit', 0.9, **told)], mended
     return [], evidence
+
+
+def hardly_moves(speed: FloatArray, rows: Mask) -> bool:
+    """Return whether a speed (k,) is little more than its noise in some rows: no unit is told."""
+    return float(np.quantile(np.abs(speed[rows]), 0.8)) < CLEAR_SPEED * bend_noise(speed)
 
 
 def either_unit(evidence: Evidence, ratio: float | None) -> list[Outcome]:

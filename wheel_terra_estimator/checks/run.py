@@ -9,6 +9,7 @@ finding. Each check runs apart: one that fails leaves what it was given as it wa
 from __future__ import annotations
 
 import logging
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -43,8 +44,11 @@ from wheel_terra_estimator.checks.finding import (
 )
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Recording, Series, rows_of
+from wheel_terra_estimator.checks.statistics import moving_mean
 from wheel_terra_estimator.configuration.configuration import Configuration
 
+LEAST_RIM_SPEED = 0.005
+"""Rim speed that no drive stays below [m/s]."""
 ORIENTATION = 'the orientation'
 """What a gyro is said to turn against."""
 _LOGGER = logging.getLogger(__name__)
@@ -83,9 +87,19 @@ def examine(
         evidence = run_apart(
             report, 'sign', None, lambda: _examined(recording, configuration, remapped, report)
         )
-    report.findings = _one_cause(report.findings)
+    report.findings = _one_cause(_without_following(report))
     report.findings.sort(key=lambda finding: RANK.get(finding.fault, 0))
     return report, evidence
+
+
+def _without_following(report: CheckReport) -> list[Finding]:
+    """Leave out a scale of the torques that is no other than that of the radius below them."""
+    figures, findings = report.figures, report.findings
+    apart = abs(figures.get('torque.gain', 0.0) - figures.get('rover.radius_ratio', math.inf))
+    radius = any(finding.fault == 'radius' for finding in findings)
+    if not radius or apart > 3.0 * figures.get('torque.gain_std', 0.0):
+        return findings
+    return [f for f in findings if f.fault not in ('torque_gain', 'mass')]
 
 
 def _one_cause(findings: list[Finding]) -> list[Finding]:
@@ -101,7 +115,8 @@ def _one_cause(findings: list[Finding]) -> list[Finding]:
     if not swapped or not reversed_:
         return findings
     told = found('orientation_frame', reversed_[0].topic, swapped[0].confidence)
-    return [*(f for f in findings if f not in reversed_ and f not in swapped), told]
+    following = ('gyro_reversed', 'swapped_sides', 'force_mirrored')
+    return [*(f for f in findings if f.fault not in following), told]
 
 
 def run_apart(
@@ -143,6 +158,14 @@ def _examined(
     evidence = against_each_other(recording, facts, AGAINST_EACH_OTHER, mended)
     if evidence is None:
         report.not_checked.append(NotChecked('sign', 'no wheel rates to compare with'))
+    rims = np.zeros(1)
+    if evidence is not None:  # means over a second: noise turns no wheel
+        width = evidence.rows_in(1.0)
+        means = [np.abs(moving_mean(np.nan_to_num(speed), width)) for speed in evidence.speed.T]
+        rims = np.max(means, axis=0)
+    if np.quantile(rims, 0.99) < LEAST_RIM_SPEED and not report.findings:
+        topic = recording.joints.topic if recording.joints is not None else ''
+        report.take([found('no_drive', topic, 0.99)])
     return evidence
 
 
@@ -202,6 +225,7 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('mounting', imu, 'check_upside'),
     ('missing_wheel', wheel_rates, 'check_dead_wheels'),
     ('frozen', repeats, 'check_repeats'),
+    ('jumps', wheel_rates, 'check_wild'),
     ('unit', wheel_rates, 'check_positions'),
     ('unit', turning, 'check_steering_unit'),
     ('radius', wheel_rates, 'check_scales'),
@@ -217,6 +241,7 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('mounting', imu, 'check_yaw'),
     ('delay', clocks, 'check_clocks'),
     ('covariance', reference, 'check_quality'),
+    ('gain', turning, 'check_gyro_scale'),
     ('zero', imu, 'check_noise_and_zero'),
     ('zero', sinkage, 'check_sinkage'),
     ('radius', geometry, 'check_radius'),

@@ -24,6 +24,10 @@ DEEPEST = 1.2
 """Sinkage over radius that no wheel gets out of [-]."""
 LEAST_READINGS = 50
 NOISE_FACTOR = 4.0
+LEAST_SURE = 0.6
+"""Confidence of noise below which nothing else is told."""
+ANOTHER_UNIT = 30.0
+"""Noise over the stated one from which it may be another unit [-]."""
 BELOW_ZERO = 0.006
 """A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
 BURIED = 0.5
@@ -54,7 +58,7 @@ STAMPS = NotChecked(
 
 def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return what is wrong with the sinkage readings, and the evidence with their signs mended."""
-    sinkage, configuration = evidence.recording.sinkage, evidence.facts.configuration
+    sinkage = evidence.recording.sinkage
     if sinkage is None:
         return [NotChecked('zero', 'no sinkage in the recording')], evidence
     outcomes: list[Outcome] = [ORDER, STAMPS]
@@ -64,11 +68,18 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     names, table = without_stated_errors(evidence.facts, sinkage)
     if not names or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS:
         return [*outcomes, NotChecked('zero', 'hardly any sinkage readings')], evidence
+    if not np.nan_to_num(table).any():
+        reason = 'sinkage is 0 in every message: firm ground, or nothing is measured'
+        return [*outcomes, NotChecked('placeholder', reason)], evidence
     unit, table = _unit(evidence, table)
     middle = np.array([_median(column) for column in table.T])
     evidence.figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
+    noise = _noise(evidence, table)
+    if noise and noise[0].confidence < LEAST_SURE:  # zeros and signs would be those of noise
+        unknown = np.full_like(sinkage.sinkage, np.nan)
+        return [*outcomes, *unit, *noise], evidence.with_channel('sinkage', sinkage=unknown)
     told = _sign_and_zero(evidence, names, table, middle)
-    outcomes += [*unit, *told]
+    outcomes += [*unit, *told, *noise]
     mended = evidence
     for finding in told:
         if isinstance(finding, Finding) and finding.fault == 'sinkage_sign':
@@ -76,14 +87,6 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             mended = mended.with_channel(
                 'sinkage', sinkage=sinkage.sinkage * np.where(wrong, -1.0, 1.0)
             )
-    if configuration is None:
-        return outcomes, mended
-    noise, usual = _reading_noise(table), float(configuration.sensors.sinkage_std)
-    evidence.figures['sinkage.noise_m'] = float(f'{noise:.3g}')
-    if noise > NOISE_FACTOR * usual:
-        words = {'noise': noise, 'noise_mm': 1000.0 * noise, 'stated': 1000.0 * usual}
-        value = float(f'{noise:.2g}')
-        outcomes.append(evidence.found('sinkage_noise', 0.95, value=value, **words))
     return outcomes, mended
 
 
@@ -139,6 +142,22 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
 def _reading_noise(table: FloatArray) -> float:
     columns = [column[np.isfinite(column)] for column in table.T]
     return float(np.median([bend_noise(c) for c in columns if c.size > 12] or [0.0]))
+
+
+def _noise(evidence: Evidence, table: FloatArray) -> list[Finding]:
+    """Return noise beyond the stated one; far beyond it may be another unit."""
+    if evidence.facts.configuration is None:
+        return []
+    noise, stated = _reading_noise(table), float(evidence.facts.configuration.sensors.sinkage_std)
+    evidence.figures['sinkage.noise_m'] = float(f'{noise:.3g}')
+    if noise <= NOISE_FACTOR * stated:
+        return []
+    words: dict[str, Any] = {'noise': noise, 'noise_mm': 1000 * noise, 'stated': 1000 * stated}
+    sure = 0.95
+    if noise > ANOTHER_UNIT * stated:
+        sure = 0.5
+        words['rival'] = ', or it is in centimetres or millimetres: drive where it is soft'
+    return [evidence.found('sinkage_noise', sure, value=float(f'{noise:.2g}'), **words)]
 
 
 def _sign_and_zero(

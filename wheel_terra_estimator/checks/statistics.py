@@ -27,6 +27,14 @@ LONGEST_PAUSE = 3600.0
 """Between stamps of one drive [s]."""
 DRIFT = 6.0
 """Slopes change more slowly than this [s], speeds faster."""
+UNIFORM_STD = 1.0 / math.sqrt(12.0)
+"""Standard deviation of what lies anywhere in an interval, as a share of its length [-]."""
+MOST_STEPS = 200
+"""Different values of a reading beyond which steps do not matter."""
+SAME_VALUE = 1e-6
+"""Share of the greatest value below which two values are one."""
+OFF_A_STEP = 0.05
+"""Distance from a multiple of a step, as a share of it."""
 ALIKE = 0.05
 """Parts of a record that fit this much worse than the whole say nothing of the lag."""
 
@@ -221,3 +229,21 @@ def _best_shift(table: FloatArray, second: FloatArray) -> tuple[float, float]:
         bend = left - 2.0 * middle + right
         offset = 0.5 * (left - right) / bend if bend else 0.0
     return peak + float(offset), float(fits[peak])
+
+
+def step_of(values: FloatArray) -> float:
+    """Return the number that values (k,) are multiples of; 0 where they are not."""
+    top = float(np.abs(values).max()) if values.size else 0.0
+    if not top:
+        return 0.0
+    distinct = np.unique(np.round(np.abs(values) / (SAME_VALUE * top))) * SAME_VALUE * top
+    if not 1 < len(distinct) <= min(MOST_STEPS, values.size / 4):
+        return 0.0
+    step = float(np.quantile(np.diff(distinct), 0.1, method='lower'))
+    for _ in range(2):  # refined by all multiples
+        count = np.round(values / step)
+        step = float(values @ count / (count @ count)) if count.any() else 0.0
+        if step <= 0.0:
+            return 0.0
+    fits = np.abs(values / step - np.round(values / step)) < OFF_A_STEP
+    return step if float(np.mean(fits)) > 0.95 else 0.0

@@ -26,6 +26,7 @@ from wheel_terra_estimator.checks.statistics import (
     confidence,
     correlation,
     moving_mean,
+    runs,
 )
 from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
@@ -55,12 +56,16 @@ GAIN_MODEL_STD = 0.05
 """What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
 SLOPE_TIME = 2.0
 """Forces are averaged over this for a slope that a sign is told on [s]."""
+MOST_UNLIKE_SHARES = 1.8
+"""Most over least that slopes cost of the torques of single wheels [-]."""
 SMOOTH_ROWS = 20
 """Rows over which slopes are averaged."""
 AXES_APART = math.radians(20.0)
 """No heading by the torques is told where the slopes vary along another axis than it [rad]."""
 LEAST_BACK_ROWS = 10
 """Rows of wheels turning back in the air that tell zero and friction apart."""
+LEAST_BOTH_WAYS = 3.0
+"""Straight drive each way that zeros are told on [s]."""
 RUTS = 0.3
 """Half of the difference of resistance one way and back over its mean, one deviation [-]."""
 RUT_TILT = 0.5
@@ -180,12 +185,12 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         )
         return [NotChecked('gain', reason)], evidence
     level = (thrust(evidence) - facts.mass * evidence.force[:, 0]) * np.sign(evidence.rim)
-    traction = float(np.median(level[rows])) / (facts.mass * facts.gravity)
+    traction = _middle_mean(level[rows]) / (facts.mass * facts.gravity)
     evidence.figures['torque.level_traction'] = round(traction, 4)
     if traction > UNIT_TRACTION:
         finding = evidence.found('torque_unit', 0.97, value=1e-3, traction=traction)
         return [finding], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
-    size = float(np.median(np.abs(thrust(evidence)[rows]))) / (facts.mass * facts.gravity)
+    size = _middle_mean(np.abs(thrust(evidence)[rows])) / (facts.mass * facts.gravity)
     if traction < LEAST_TRACTION < size:
         reason = 'torque: does not fit the slopes: mounting of the IMU, or zeros of the torques'
         return _not_told(reason), evidence
@@ -195,7 +200,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     fit = _slope_fit(evidence)
     told: dict[str, Any] = {'gains': '...'}
-    if fit is not None and fit.gain.value > 0.0:
+    if fit is not None and fit.gain.value > GAIN_SIGMAS * max(fit.gain.std, fit.trial.after):
         whole = whole_gain(evidence, fit.gain.value)
         mean = float(np.mean(whole))
         told = {'value': mean, 'std': mean * fit.gain.std / fit.gain.value}
@@ -205,15 +210,23 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [finding, NotChecked('mass', 'torques have no credible scale')], evidence
 
 
+def _middle_mean(values: FloatArray) -> float:
+    """Return the mean without the outermost tenths: a median of coarse steps is one of them."""
+    low, high = np.quantile(values, (0.1, 0.9))
+    return float(np.mean(np.clip(values, low, high)))
+
+
 class _Slopes(NamedTuple):
     """Thrust over mass times specific force: torque gain times true over stated mass; its trial.
 
-    ``scatter`` is that of the specific force along the drive [m/s^2].
+    ``scatter`` is that of the specific force along the drive [m/s^2]; ``unlike``: the wheels take
+    shares too unlike for loads to explain it.
     """
 
     gain: Estimate
     trial: Trial
     scatter: float
+    unlike: bool
 
 
 def _slope_fit(evidence: Evidence) -> _Slopes | None:
@@ -231,6 +244,9 @@ def _slope_fit(evidence: Evidence) -> _Slopes | None:
     if scatter < LEAST_SLOPE_STD or max(down, -up) > -UP_AND_DOWN:
         return None
     columns = [evidence.facts.mass * along, sense]
+    across = moving_mean(evidence.force[:, 1], SMOOTH_ROWS)[rows]
+    if float(np.std(across)) > LEAST_SLOPE_STD:  # an IMU that is turned about z feels it along x
+        columns.append(across)
     if (sense > 0).any() and (sense < 0).any():
         columns.append(np.ones(along.size))
     design = np.column_stack(columns)
@@ -239,7 +255,10 @@ def _slope_fit(evidence: Evidence) -> _Slopes | None:
         1.0,
         (along - along.mean()) ** 2,
     )
-    return _Slopes(block_fit(design, pushed)[0], trial, scatter)
+    single = [moving_mean(column, SMOOTH_ROWS)[rows] for column in evidence.torque.T]
+    shares = sorted(block_fit(design, column)[0].value for column in single)
+    unlike = shares[-1] > MOST_UNLIKE_SHARES * shares[0]
+    return _Slopes(block_fit(design, pushed)[0], trial, scatter, unlike)
 
 
 def whole_gain(evidence: Evidence, left: float) -> FloatArray:
@@ -275,6 +294,12 @@ def torque_gain(evidence: Evidence) -> _Slopes | NotChecked:
         return NotChecked(
             'gain',
             'torque: its scale by one half of the drive does not fit the slopes of the other',
+        )
+    if abs(fit.gain.value - 1.0) > LEAST_GAIN_ERROR and fit.unlike:
+        return NotChecked(
+            'gain',
+            'torque: slopes cost each wheel another share: scale, sign or zero of single torques; '
+            'lift the wheels and load each alike',
         )
     apart = min(0.5 * fit.trial.after, 1.0)
     # A body that digs in reads uphill where thrust rises: slopes seem to cost less, never more.
@@ -356,7 +381,8 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     smooth = moving_mean(evidence.common_rate, evidence.rows_in(SETTLING))
     rows = evidence.straight & (np.abs(smooth) > 0.5 * evidence.working_rate)
     sense = np.sign(smooth[rows])
-    if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
+    least = max(2 * LEAST_MOVING_ROWS, evidence.rows_in(LEAST_BOTH_WAYS))
+    if min((sense > 0).sum(), (sense < 0).sum()) < least:
         return None
     slopes = _calm_force(evidence)[rows]  # along both axes: the IMU may be turned about z
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
@@ -371,9 +397,11 @@ def _unsigned(evidence: Evidence) -> list[Outcome]:
     rolls = fits is not None and all(
         abs(back.value) > LEAST_ROLLING * abs(zero.value) for zero, back in fits
     )
-    if rolls and _follows_slopes(evidence):
-        return []
     if fits is None:
+        return []
+    if (np.nanquantile(evidence.torque[evidence.moving], 0.02, axis=0) >= 0.0).all():
+        return [evidence.found('torque_unsigned', 0.9)]
+    if rolls and _follows_slopes(evidence):
         return []
     # A mean slope along the rover costs torque both ways as well.
     facts, along = evidence.facts, _calm_force(evidence)[evidence.straight, 0]
@@ -436,11 +464,16 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
         if rest.sum() < LEAST_MOVING_ROWS:
             reason = 'torque: neither standstill nor both ways in it; stand still, drive back'
             return [NotChecked('zero', reason)]
-        # Standing wheels are wound up against each other; only an odd one out is told.
-        level = np.nanmedian(evidence.torque[rest], axis=0)
-        level = level - float(np.nanmedian(level))
-        spread = 1.5 * float(np.nanmedian(np.abs(level)))
-        zeros = [Estimate(float(value), max(spread, stated)) for value in level]
+        # Standing wheels are wound up against each other, otherwise at each stop; only an odd one
+        # out is told.
+        stops = [np.nanmedian(evidence.torque[i:j], axis=0) for i, j in runs(rest)]
+        apart = np.array([stop - np.nanmedian(stop) for stop in stops])
+        level = np.median(apart, axis=0)
+        wound = np.std(apart, axis=0) / math.sqrt(len(stops))
+        spread = max(1.5 * float(np.nanmedian(np.abs(level))), stated)
+        zeros = [
+            Estimate(float(v), max(spread, float(w))) for v, w in zip(level, wound, strict=True)
+        ]
         where = 'standing'
     least = max(ZERO_FACTOR * stated, 0.5 * driving)
     wrong = [i for i, z in enumerate(zeros) if abs(z.value) > max(least, ZERO_SIGMAS * z.std)]

@@ -28,6 +28,7 @@ from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
+    block_fit,
     confidence,
     correlation,
     moving_mean,
@@ -58,6 +59,8 @@ SAME_SENSE = 0.5
 """Share of the way by the reference that goes where the wheels turn, less the rest, that tells."""
 OPPOSED = -0.3
 """Correlation of torque and rate of a wheel that takes power, if one of them is reversed [-]."""
+SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0
+"""Correlation of turns by two sensors that tells a scale, its least error [-] and deviations."""
 HEADING_TIME = 3.0
 """Turns by orientation and gyro are compared over this [s]."""
 LEAST_CORRELATION = 0.7
@@ -518,15 +521,49 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
 
 def _gyro_by_heading(evidence: Evidence, imu: ImuSeries) -> float:
     """Return the correlation of turns by gyro and by orientation [-]; 0 where it tells none."""
-    known = np.isfinite(imu.orientation).all(axis=1)
-    if known.mean() < 0.9:
+    heading = _heading(evidence, imu)
+    if heading is None:
         return 0.0
-    x, y, z, w = imu.orientation[known].T
-    heading = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
-    heading = np.interp(evidence.time, evidence.seconds(imu)[known], heading)
     gyro = np.cumsum(evidence.yaw * np.diff(evidence.time, prepend=evidence.time[0]))
     rows = evidence.rows_in(HEADING_TIME)
     return correlation(heading[rows:] - heading[:-rows], gyro[rows:] - gyro[:-rows])
+
+
+def _heading(evidence: Evidence, imu: ImuSeries) -> FloatArray | None:
+    """Return the heading by the orientation (k,) [rad]; None where there is none."""
+    known = np.isfinite(imu.orientation).all(axis=1)
+    if known.mean() < 0.9:
+        return None
+    x, y, z, w = imu.orientation[known].T
+    heading = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    return np.asarray(np.interp(evidence.time, evidence.seconds(imu)[known], heading))
+
+
+def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return a gyro whose turns have another scale than heading or reference say, and it mended."""
+    imu, reference, pairs = evidence.recording.imu, evidence.recording.reference, []
+    if imu is None or evidence.gyro is None:
+        return [], evidence
+    steps = np.diff(evidence.time, prepend=evidence.time[0])
+    turned, heading = np.cumsum(evidence.yaw * steps), _heading(evidence, imu)
+    if heading is not None:
+        pairs.append(('orientation', heading))
+    if reference is not None and reference.stamp.size > 1:
+        at = evidence.seconds(reference)
+        yaw = np.interp(evidence.time, at, np.nan_to_num(reference.yaw_rate))
+        pairs.append(('twist.angular', np.cumsum(yaw * steps)))
+    rows = evidence.rows_in(HEADING_TIME)
+    gyro = turned[rows:] - turned[:-rows]
+    for name, other in pairs:
+        seen = other[rows:] - other[:-rows]
+        if correlation(gyro, seen) < SAME_TURNS:
+            continue
+        scale = block_fit(np.column_stack([seen, np.ones(seen.size)]), gyro)[0]
+        if abs(scale.value - 1.0) > max(LEAST_SCALE, SCALE_SIGMAS * scale.std):
+            told = {'times': scale.value, 'against': name, 'std': scale.std}
+            finding = evidence.found('gyro_scale', 0.9, value=1.0 / scale.value, **told)
+            return [finding], replace(evidence, gyro=evidence.gyro / scale.value)
+    return [], evidence
 
 
 def _sides_exchanged(facts: RoverFacts) -> list[str]:
@@ -576,6 +613,18 @@ def track_ratio(evidence: Evidence) -> float | None:
     if evidence.gyro is None or not evidence.facts.has_sides() or rows.sum() < LEAST_TURNING_ROWS:
         return None
     return fit_of(Fix((1,) * there.size), stretch_of(evidence, there, rows)).clear_track or None
+
+
+def skids(evidence: Evidence) -> bool:
+    """Return whether wheels do not roll as the track says in turns: several rows not steered."""
+    configuration = evidence.facts.configuration
+    if configuration is None:
+        return True
+    wheels = configuration.wheels
+    known = np.isfinite(evidence.steering).all(axis=0)
+    fixed = wheels.x[~known]
+    unknown = bool((np.array(wheels.steered) & ~known).any())
+    return unknown or float(np.ptp(fixed)) > 0.3 * float(np.ptp(wheels.y)) if fixed.size else False
 
 
 def unlike_in_turns(evidence: Evidence) -> bool:

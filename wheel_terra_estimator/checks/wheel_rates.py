@@ -24,14 +24,15 @@ from wheel_terra_estimator.checks.reference import (
     LEAST_ROWS,
     ahead,
     either_unit,
+    hardly_moves,
 )
 from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import (
-    bend_noise,
     correlation,
     moving_mean,
     robust_std,
     runs,
+    step_of,
 )
 
 MOST_COUNT = 0.07
@@ -70,10 +71,15 @@ LIVELY = 0.3
 """Rate of the other wheels beside which a wheel does not stand, over the working rate [-]."""
 GOES_ON = 0.75
 """Speed over that of the rims of the other side of a rover that does not turn about one [-]."""
-SAME_SPEED = 0.05
-"""Speed of a side against the middle, as a share of it, in which all wheels roll alike [-]."""
+SAME_SPEED, ROLLING_SPEED = 0.05, 0.3
+"""Speed of a side against the middle, as a share of it, in which all wheels roll as the gyro says
+[-]; of wheels that need not skid in turns."""
 LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0
 """Speed of an odd wheel over that of the others [ln]: least, most of a radius; over scatter [-]."""
+WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0
+"""Change to and fro that no wheel makes over the greatest usual value, and the usual change [-]."""
+LEAST_WILD, MOST_WILD = 3, 0.1
+"""Number and share of single wild values that are told."""
 LONG_FROZEN_TIME = 10.0
 """Time of driving in which an encoder that repeats itself is told from a coarse one [s]."""
 LEAST_CHANGES = 20.0
@@ -82,8 +88,6 @@ LEAST_STEPS = 3.0
 """Range of these over a usual step of theirs: a coarse rate near a step goes to and fro [-]."""
 HELD_TORQUE = 1.5
 """Torque of a standing wheel over that of the others meanwhile, above which it is held [-]."""
-CLEAR_SPEED = 5.0
-"""Speed over the noise of the reference that a ratio of speeds needs [-]."""
 NOISE_FACTOR = 5.0
 LEAST_NOISE_SHARE = 0.08
 """Noise of a rate that matters, as a share of the working rate."""
@@ -95,12 +99,6 @@ KEPT = 0.9
 """Share of rates that repeat the one before, from which they are rounded, not counted [-]."""
 LEAST_STEP_SHARE = 0.02
 """Noise by the steps of an encoder that matters, as a share of the working rate."""
-MOST_STEPS = 200
-"""Different rates of one wheel beyond which steps do not matter."""
-SAME_VALUE = 1e-6
-"""Share of the greatest rate below which two rates are one."""
-OFF_A_STEP = 0.05
-"""Distance from a multiple of a step, as a share of it."""
 
 
 # Dead channels -----------------------------------------------------------------------------------
@@ -202,13 +200,34 @@ def _held(evidence: Evidence, index: int, rows: Any) -> bool:
     return bool(np.nanmedian(own) > HELD_TORQUE * max(float(np.nanmedian(others)), 1e-9))
 
 
+def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return single rates and torques that leave the ones before and after; left out from here."""
+    outcomes, mended = list[Outcome](), []
+    for name, table in (('velocity', evidence.rate), ('effort', evidence.torque)):
+        steps = np.diff(np.pad(table, ((1, 1), (0, 0)), constant_values=np.nan), axis=0)
+        off = np.minimum(np.abs(steps[:-1]), np.abs(steps[1:])) * (steps[:-1] * steps[1:] < 0.0)
+        usual = np.nanquantile(np.abs(table), 0.98, axis=0)
+        noise = np.array([robust_std(column) for column in steps.T])
+        wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
+        if LEAST_WILD <= wild.sum() < MOST_WILD * wild.size:
+            wheels = ', '.join(evidence.facts.names[i] for i in np.flatnonzero(wild.any(axis=0)))
+            told = {'field': name, 'count': int(wild.sum()), 'most': float(off[wild].max())}
+            outcomes.append(evidence.found('wild', 0.97, wheel=wheels, **told))
+            table = np.where(wild, np.nan, table)
+        mended.append(table)
+    return outcomes, evidence.with_rate(*mended) if outcomes else evidence
+
+
 def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels that turn faster or slower than all others all along, made alike."""
-    facts, speed = evidence.facts, np.abs(evidence.speed)
-    middle = row_medians(speed)
+    facts = evidence.facts
+    speed = np.abs(
+        evidence.speed + np.where(facts.known, evidence.yaw, 0.0)[:, None] * facts.lateral
+    )
+    middle, straight = row_medians(speed), SAME_SPEED if turning.skids(evidence) else ROLLING_SPEED
     rows = evidence.steady & (middle > 0.5 * evidence.working_rate * np.nanmean(evidence.radius))
     if evidence.gyro is not None:
-        rows &= np.abs(evidence.yaw) * np.abs(facts.lateral).max() < SAME_SPEED * middle
+        rows &= np.abs(evidence.yaw) * np.abs(facts.lateral).max() < straight * middle
     few = rows.sum() < 2 * LEAST_MOVING_ROWS or speed.shape[1] < 3
     if few or facts.configuration is None:
         return [], evidence
@@ -358,8 +377,8 @@ def _speed_ratio(evidence: Evidence) -> float | None:
     speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
     if rows.sum() < LEAST_ROWS:
         return None
-    if float(np.quantile(speed[rows], 0.8)) < CLEAR_SPEED * bend_noise(reference.velocity[:, 0]):
-        return None  # hardly moves: stuck, not another unit
+    if hardly_moves(speed, rows):
+        return None  # stuck, not another unit
     if correlation(np.nan_to_num(rim), np.nan_to_num(speed)) < 0.8:
         return None
     return float(np.quantile(speed[rows] / rim[rows], 0.8))
@@ -448,24 +467,7 @@ def rate_step(rate: FloatArray, interval: FloatArray) -> float:
     rate, interval = rate[known], interval[known]
     usual = float(np.median(interval)) if interval.size else 1.0
     for values in (rate, rate * interval / usual):
-        step = _step_of(values)
+        step = step_of(values)
         if step:
             return step
     return 0.0
-
-
-def _step_of(values: FloatArray) -> float:
-    top = float(np.abs(values).max()) if values.size else 0.0
-    if not top:
-        return 0.0
-    distinct = np.unique(np.round(np.abs(values) / (SAME_VALUE * top))) * SAME_VALUE * top
-    if not 1 < len(distinct) <= min(MOST_STEPS, values.size / 4):
-        return 0.0
-    step = float(np.quantile(np.diff(distinct), 0.1, method='lower'))
-    for _ in range(2):  # refined by all multiples
-        count = np.round(values / step)
-        step = float(values @ count / (count @ count)) if count.any() else 0.0
-        if step <= 0.0:
-            return 0.0
-    fits = np.abs(values / step - np.round(values / step)) < OFF_A_STEP
-    return step if float(np.mean(fits)) > 0.95 else 0.0
