@@ -186,7 +186,7 @@ LABORATORY_MAY_USE = {
             'bags',
             'reporting',
         },
-        {'numpy', 'scipy'} | PICTURES,
+        {'numpy', 'scipy', 'yaml'} | PICTURES,
     ),
     # Discrete elements know nothing of the models that they are to judge.
     'soilbin': (

@@ -34,7 +34,7 @@ COLOUR_MAP = 'viridis'
 _DISCRETE = ('#E69F00', '#009E73', '#0072B2', '#7B4FA3', '#111111', '#D55E00')
 _SHAPES = 'os^Dv<'
 _MOST_CURVES = 6
-_LEGEND_MARK, _LEGEND_LETTER = 0.45, 0.072  # room of an entry and of a letter [inch]
+_LEGEND_LINE, _LEGEND_MARK, _LEGEND_LETTER = 0.28, 0.45, 0.072  # room they take [inch]
 
 
 def shown_input(name: str) -> tuple[float, str]:
@@ -113,7 +113,7 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
         lines = [Line2D([], [], ls=style, color=INK, lw=1.2) for style in (':', '-')]
         if others:
             marks = [Line2D([], [], ls=''), *marks]
-        _legend(figure, marks, texts, 'outside lower left')
+        _legend(figure, marks, texts, 'lower left')
         _legend(figure, lines, models)
     return figure
 
@@ -342,10 +342,15 @@ def _colour_bar(figure: Figure, axes: Any, drawn: Any, text: str) -> None:
     bar.ax.grid(visible=False)
 
 
-def _legend(figure: Figure, handles: Any, labels: Any, place: str = 'outside upper left') -> None:
+def _legend(figure: Figure, handles: Any, labels: Any, place: Any = 'upper left') -> None:
     """Put a legend above the panels, or below, in as many columns as there is room for."""
     widest = max(_LEGEND_MARK + _LEGEND_LETTER * len(text) for text in labels)
     columns = max(1, int(figure.get_figwidth() / widest))
+    share = _LEGEND_LINE * -(-len(labels) // columns) / figure.get_figheight()
+    engine: Any = figure.get_layout_engine()
+    left, bottom, width, height = engine.get()['rect']
+    bottom += share if place == 'lower left' else 0.0
+    engine.set(rect=(left, bottom, width, height - share))
     figure.legend(handles, labels, loc=place, ncols=columns, columnspacing=1.4, handletextpad=0.4)
 
 

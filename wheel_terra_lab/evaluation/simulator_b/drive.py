@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_lab.evaluation.bench_drive import Arrival, Truth
 from wheel_terra_lab.evaluation.simulator_b.ground import Ground, Patch, RandomField
 from wheel_terra_lab.evaluation.simulator_b.kinds import KINDS, Kind, PatchPlan
 from wheel_terra_lab.evaluation.simulator_b.motion import Plant, State, WheelCommand, World
@@ -22,7 +23,6 @@ from wheel_terra_lab.evaluation.simulator_b.rovers import (
     steepest_slope,
 )
 from wheel_terra_lab.evaluation.simulator_b.sensing import (
-    Arrival,
     Course,
     SensorSet,
     measure,
@@ -31,7 +31,6 @@ from wheel_terra_lab.evaluation.simulator_b.sensing import (
 )
 from wheel_terra_lab.evaluation.simulator_b.truth import (
     REST_SPEED,
-    Truth,
     resting,
     slip_classes,
 )
@@ -353,9 +352,7 @@ def _truth(course: Course, rows: _TruthRows, sensors: SensorSet, draw: Draw) -> 
         drawbar_pull=at(rows.pull),
         normal_load=at(rows.load),
         sinkage=course.at('sinkage', time),
-        torque=course.at('torque', time),
         wheel_rate=rate,
         slip_class=slip_classes(slip),
-        forward_velocity=speed[:, 0],
         yaw_rate=speed[:, 2],
     )

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,23 +12,6 @@ FloatArray = NDArray[np.float64]
 CLASS_BORDERS = (0.3, 0.6, 0.9)
 REST_SPEED, REST_TIME = 2e-3, 0.5  # [m/s], [s]
 _UNKNOWN_CLASS = 255
-
-
-@dataclass(frozen=True)
-class Truth:
-    """Truth of a drive: k stamps, n wheels."""
-
-    stamp: NDArray[np.int64]
-    slip: FloatArray  # (k, n), nan at rest
-    slip_velocity: FloatArray  # (k, n) [m/s]
-    drawbar_pull: FloatArray  # (k, n) [N]
-    normal_load: FloatArray  # (k, n) [N]
-    sinkage: FloatArray  # (k, n) [m]
-    torque: FloatArray  # (k, n) [N m]
-    wheel_rate: FloatArray  # (k, n) [rad/s]
-    slip_class: NDArray[np.uint8]  # (k, n)
-    forward_velocity: FloatArray  # (k,) [m/s]
-    yaw_rate: FloatArray  # (k,) [rad/s]
 
 
 def resting(time: FloatArray, rim: FloatArray, ground: FloatArray) -> NDArray[np.bool_]:
