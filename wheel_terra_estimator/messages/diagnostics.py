@@ -81,7 +81,7 @@ class Diagnostics:
         node_name: str = NODE,
     ) -> None:
         self.node_name = node_name
-        self.clock: Callable[[int], int] = _stamp_itself
+        self.clock: Callable[[int], int] = int
         self.new_faults: list[str] = []
         self._names = names
         self._counters = counters
@@ -195,10 +195,6 @@ class Diagnostics:
         return [
             _wheel_status(estimates, i, name, self.node_name) for i, name in enumerate(self._names)
         ]
-
-
-def _stamp_itself(stamp: int) -> int:
-    return stamp
 
 
 def _wheel_level(estimates: EstimateSet, i: int) -> int:

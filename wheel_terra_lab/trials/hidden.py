@@ -309,10 +309,6 @@ def _offset(size: float, gain: float) -> Hidden:
     return adding('sinkage_offset', 'sinkage', off)
 
 
-def _layer_kind(power: float) -> Callable[[float, float, Rows, TrueSoil], Hidden]:
-    return lambda a, k, rows, soil: _layer(a, layer_depth(k, rows, soil), power)
-
-
 def stiffness_near(rows: Rows, soil: TrueSoil) -> float:
     """Slope of the bearing stress [Pa/m] at a depth of 5 % of the radius."""
     z = 0.05 * mean_radius(rows)
@@ -382,7 +378,12 @@ def _kinds(other: bool) -> dict[str, Kind]:
             signed=True,
             needs=('angular_velocity',),
         ),
-        'hard_layer': Kind(_layer_kind(p), stiffness_near, 20, two_parameters=True),
+        'hard_layer': Kind(
+            lambda a, k, rows, soil: _layer(a, layer_depth(k, rows, soil), p),
+            stiffness_near,
+            20,
+            two_parameters=True,
+        ),
         'drivetrain_friction': Kind(
             lambda a, k, r, s: _friction(a, o),
             lambda r, s: 0.04 * mean_load(r) * mean_radius(r),
