@@ -167,7 +167,6 @@ MAY_USE = {
 }
 LABORATORY = PACKAGE.with_name('wheel_terra_lab')
 LABORATORY_MAY_USE = {
-    'terramechanics': ({'terramechanics'}, {'numpy'}),
     # The plain ways that the package is timed against need scipy's quadrature.
     'benchmarks': (
         {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
