@@ -145,7 +145,7 @@ class Diagnostics:
         node = self._node_status(self._level(estimates), '; '.join(words) or 'running', values)
         return [node, *self._wheel_statuses(estimates)]
 
-    def stale(self, words: str, latest: EstimateSet | None = None, stamp: int = 0) -> list[Status]:
+    def stale(self, words: str, latest: EstimateSet | None = None) -> list[Status]:
         """Return the statuses while there are no estimates; values are held as in the latest set.
 
         Parameters
@@ -154,11 +154,9 @@ class Diagnostics:
             Why there are none.
         latest : EstimateSet, optional
             The latest set, if there ever was one.
-        stamp : int
-            Time of the message [ns].
         """
-        self.look(stamp)
-        told = '; '.join([words, *self._log.standing(self.clock(stamp))])
+        self.look()
+        told = '; '.join([words, *self._log.standing(self.clock(0))])
         stuck = latest is not None and latest.stuck
         values = [('stuck', str(stuck).lower()), *_values(self._counters())]
         node = self._node_status(STALE, told, values)
