@@ -69,7 +69,6 @@ class Kind:
     needs: tuple[str, ...] = ()  # rows must vary in these columns, else nothing can be seen
     # One output that the effect cannot be seen without; empty = any will do.
     requires: str = ''
-    two_parameters: bool = False  # `secondary` matters
     all_or_nothing: bool = False  # a claim with no amplitude: half of the cases keep size 1
 
 
@@ -349,7 +348,6 @@ def _kinds(other: bool) -> dict[str, Kind]:
             else (lambda a, k, r, s: _mound(a, 0.3 + 0.25 * k, 'ramp')),
             fixed(1.0),
             5,
-            two_parameters=True,
         ),
         'stress_peak_shift': Kind(lambda a, k, r, s: _peak_shift(a, p), fixed(0.15), 2.5),
         'slope_gravity': Kind(
@@ -382,7 +380,6 @@ def _kinds(other: bool) -> dict[str, Kind]:
             lambda a, k, rows, soil: _layer(a, layer_depth(k, rows, soil), p),
             stiffness_near,
             20,
-            two_parameters=True,
         ),
         'drivetrain_friction': Kind(
             lambda a, k, r, s: _friction(a, o),
