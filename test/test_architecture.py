@@ -167,7 +167,6 @@ MAY_USE = {
 }
 LABORATORY = PACKAGE.with_name('wheel_terra_lab')
 LABORATORY_MAY_USE = {
-    'terramechanics': ({'terramechanics'}, {'numpy'}),
     # The plain ways that the package is timed against need scipy's quadrature.
     'benchmarks': (
         {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
@@ -186,7 +185,7 @@ LABORATORY_MAY_USE = {
             'bags',
             'reporting',
         },
-        {'numpy', 'scipy'} | PICTURES,
+        {'numpy', 'scipy', 'yaml'} | PICTURES,
     ),
     # Discrete elements know nothing of the models that they are to judge.
     'soilbin': (

@@ -52,7 +52,7 @@ def _tex(piece: str) -> str:
     made = ''
     for token in _TOKEN.finditer(text):
         kind, value = token.lastgroup, token.group()
-        made += {'word': _word, 'assign': _assign}.get(str(kind), str)(value)
+        made += _word(value) if kind == 'word' else value.replace('*=', r'\times= ')
     made = made.replace('⟨', r'\langle ').replace('⟩', r'\rangle ').replace('...', r'\dots ')
     return re.sub(r'\s+', ' ', made).strip()
 
@@ -67,10 +67,6 @@ def _braces(text: str, name: str, opening: str) -> str:
         inside = text[found.end() : end - 1]
         text = text[: found.start()] + opening.replace('\\\\', '\\') + inside + '}' + text[end:]
     return text
-
-
-def _assign(value: str) -> str:
-    return r'\times= ' if value == '*=' else value
 
 
 def _word(word: str) -> str:

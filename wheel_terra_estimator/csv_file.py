@@ -86,7 +86,7 @@ def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
             before = 1 if stated else 0
             titles = text.readline() if stated else first
             text.seek(0)
-            delimiter = stated[1] if stated else max(DELIMITERS, key=_unquoted(titles).count)
+            delimiter = stated[1] if stated else max(DELIMITERS, key=_QUOTED.sub('', titles).count)
             reader = csv.reader(text, delimiter=delimiter)
             for _ in range(before):
                 next(reader)
@@ -108,10 +108,6 @@ def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) 
         writer = csv.writer(file)
         writer.writerow(header)
         writer.writerows(rows)
-
-
-def _unquoted(line: str) -> str:
-    return _QUOTED.sub('', line)
 
 
 def number(cell: Any, where: str, decimal_comma: bool = False) -> float:

@@ -94,17 +94,23 @@ def test_batched_model_is_the_package_model(forward):
     for b, name in enumerate(names):
         own = effect_coordinates(catalogue()[name])
         values = {c.name: float(c.value(0.4)) for c in own}
-        keys = ['soil.cohesion', *(f'effects.{name}.{c.name}' for c in own)]
-        expected, jacobian = WheelSoilModel(SOIL, {name: values}).jacobian(forward.points, keys)
+        expected = WheelSoilModel(SOIL, {name: values}).steady_state(forward.points)
         scale = np.abs(expected.outputs()).max(axis=0)
         np.testing.assert_allclose(
             state.outputs[b][:, :3] / scale, expected.outputs() / scale, atol=3e-4
         )
-        columns = [4, *range(len(soil), len(soil) + len(own))]
-        scales = [soil[4].scale, *(c.scale for c in own)]
-        for column, unit, k in zip(columns, scales, range(len(keys)), strict=True):
+        places = [4, *range(len(soil), len(soil) + len(own))]
+        for c, column in zip((soil[4], *own), places, strict=True):
+            step = 1e-3 * c.scale
+            ends = []
+            for change in (step, -step):
+                moved = SOIL, {**values, c.name: values.get(c.name, 0.0) + change}
+                if c.owner == 'soil':
+                    moved = replace(SOIL, cohesion=SOIL.cohesion + change), values
+                model = WheelSoilModel(moved[0], {name: moved[1]})
+                ends.append(model.steady_state(forward.points).outputs())
             mine = state.jacobian[b][:, :3, column] / scale
-            theirs = jacobian[:, :, k] * unit / scale
+            theirs = (ends[0] - ends[1]) / 2e-3 / scale
             np.testing.assert_allclose(mine, theirs, atol=2e-3 + 0.02 * np.abs(theirs).max())
 
 

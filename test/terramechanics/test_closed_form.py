@@ -18,7 +18,7 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
-from wheel_terra_lab.terramechanics.decoupled_pull import decoupled_pull
+from wheel_terra_lab.reproduction.equivalent_contact import decoupled_pull
 
 MOUND = {**EFFECTS, 'soil_mound': {'kappa': 1.5, 'onset': 0.2}}
 

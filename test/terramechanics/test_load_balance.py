@@ -70,17 +70,6 @@ def test_the_first_guess_is_near_in_either_pressure_law(law, monkeypatch):
     np.testing.assert_allclose(guesses[0], found.entrance_angle, rtol=0.4)
 
 
-def test_a_derivative_within_the_range_is_taken_to_both_sides():
-    soil = {'cohesion': 250.0, 'shear_modulus': 0.0114, 'sinkage_exponent': 1.1}
-    names = [f'soil.{name}' for name in soil]
-    batch = model_module._Batch(soil, {}, points(np.array([0.2]), 80.0), names)
-    for index, (name, value) in enumerate(soil.items()):
-        moved = np.asarray(batch.soil[name])[:, 0]
-        raised, lowered = moved[index], moved[index + len(names)]
-        assert raised - value == pytest.approx(value - lowered) != 0.0
-        assert batch.steps[index] == pytest.approx(raised - lowered)
-
-
 def test_soil_without_weight_does_not_bulldoze():
     light = replace(SAND, density=0.0, cohesion=0.0)
     plain, pushed = (

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, second_model, state
+from terra_tools import SAND, WHEEL, points, random_cases, second_model, state
 
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.model import (
@@ -100,59 +100,6 @@ def test_reece_law_equals_bekker_s_at_one_width_and_gravity():
     )
     low_gravity = state([0.3], soil=reece, gravity=1.62)
     assert low_gravity.sinkage > 1.5 * state([0.3], soil=reece).sinkage
-
-
-@pytest.mark.parametrize('method', ['quadrature', 'closed_form'])
-def test_jacobian_against_central_differences(method):
-    effects = {**EFFECTS, 'soil_mound': {'kappa': 1.0, 'onset': 0.3}, 'bulldozing': {'kb': 0.3}}
-    row = points(np.array([-0.3, 0.1, 0.5, 0.8]), np.array([40.0, 80.0, 80.0, 120.0]))
-    model = WheelSoilModel(SAND, effects, method)
-    names = {
-        'soil.frictional_modulus': 1e3,
-        'soil.sinkage_exponent': 1e-4,
-        'soil.cohesion': 0.1,
-        'soil.friction_angle': 1e-5,
-        'soil.shear_modulus': 1e-6,
-        'soil.peak_stress_ratio': 1e-5,
-        'soil.leaving_angle_ratio': 1e-5,
-        'effects.slip_sinkage_exponent.n1': 1e-4,
-        'effects.soil_mound.kappa': 1e-4,
-        'effects.soil_mound.onset': 1e-5,
-        'effects.bulldozing.kb': 1e-4,
-    }
-    _, jacobian = model.jacobian(row, list(names))
-    for column, (name, step) in enumerate(names.items()):
-        ends = []
-        for sign in (1.0, -1.0):
-            kind, _, rest = name.partition('.')
-            soil, changed = SAND, {k: dict(v) for k, v in model.effects.items()}
-            if kind == 'soil':
-                soil = replace(SAND, **{rest: getattr(SAND, rest) + sign * step})
-            else:
-                effect, parameter = rest.split('.')
-                changed[effect][parameter] += sign * step
-            ends.append(WheelSoilModel(soil, changed, method).steady_state(row).outputs())
-        truth = (ends[0] - ends[1]) / (2.0 * step)
-        scale = np.abs(truth).max(axis=0)
-        assert np.abs(jacobian[..., column] - truth) == pytest.approx(
-            0.0, abs=1e-4 * scale.max()
-        ), name
-
-
-def test_jacobian_by_slip_and_load_and_of_effects_that_are_off():
-    row = points(np.array([0.2, 0.6]))
-    model = WheelSoilModel(SAND)
-    _, jacobian = model.jacobian(row, ['slip', 'normal_load', 'effects.lug_digging.kd'])
-    more = (model.steady_state(points(row.slip + 1e-5)).outputs()
-            - model.steady_state(points(row.slip - 1e-5)).outputs()) / 2e-5  # fmt: skip
-    assert jacobian[..., 0] == pytest.approx(more, rel=1e-4)
-    heavier = (model.steady_state(points(row.slip, 80.01)).outputs()
-               - model.steady_state(points(row.slip, 79.99)).outputs()) / 0.02  # fmt: skip
-    assert jacobian[..., 1] == pytest.approx(heavier, rel=1e-4)
-    assert jacobian[:, 0, 2] == pytest.approx(WHEEL.lug_height * row.slip)
-    assert jacobian[:, 1:, 2] == pytest.approx(0.0)
-    with pytest.raises(ValueError, match=r'effects\.no_such\.kd'):
-        model.jacobian(row, ['effects.no_such.kd'])
 
 
 def test_load_that_the_soil_cannot_carry():

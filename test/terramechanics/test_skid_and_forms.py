@@ -115,10 +115,6 @@ def test_two_forms_stand_side_by_side_in_one_model():
     """What a search over forms needs: the one at its neutral value leaves the other alone."""
     both = state(0.4, effects={SKID: {'n1': 0.3}, f'{SKID}:lyasko': {'gain': 0.0}})
     assert both.outputs() == pytest.approx(state(0.4, effects={SKID: {'n1': 0.3}}).outputs())
-    _, rates = WheelSoilModel(SAND).jacobian(points(0.4), [f'effects.{SKID}:lyasko.gain'])
-    step = state(0.4, effects={SKID: {'form': 'lyasko', 'gain': 1e-4}})
-    change = (step.outputs() - state(0.4).outputs()) / 1e-4
-    assert rates[..., 0] == pytest.approx(change, rel=1e-3)
 
 
 def test_the_order_of_settings_does_not_matter():

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.bags.message_types import topic_messages
-from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits, in_words
+from wheel_terra_estimator.bags.salvage.limits import in_words
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
@@ -26,16 +26,13 @@ from wheel_terra_estimator.messages.convert import (
 
 
 def read(
-    path: str | Path,
-    remaps: Mapping[str, str],
-    configuration: Configuration,
-    limits: Limits = LIMITS,
+    path: str | Path, remaps: Mapping[str, str], configuration: Configuration
 ) -> Iterator[tuple[int, Measurement]]:
     """Yield (log time [ns], measurement) of all used topics of a bag, in the order of log times.
 
     See `MeasurementReader` for the parameters and errors.
     """
-    with open_bag(path, limits) as bag:
+    with open_bag(path) as bag:
         yield from MeasurementReader(bag, remaps, configuration).measurements()
 
 

@@ -45,30 +45,22 @@ def climb(
     Raises
     ------
     UserError
-        For a slope beyond 60 degrees, or an effect that makes the balance already.
+        For a slope beyond 60 degrees.
+    ValueError
+        For an effect that makes the balance already.
     """
     if np.abs(slopes).max() > STEEPEST:
         raise UserError('--slope: slopes of --climb are at most 1.05 rad (60 degrees)')
-    if 'slope_gravity' in configuration.effects:
-        raise UserError(
-            'effects.slope_gravity.enabled: --climb makes the balance on the slope itself; leave '
-            'the effect off'
-        )
     model = WheelSoilModel(configuration.soil, configuration.effects, method, strict=False)
     wheels = configuration.wheels
     chosen = list(range(wheels.count)) if who == 'rover' else [wheel]
+    loads: list[float] | list[FloatArray] = [weight]
     if who == 'rover':
         from wheel_terra_estimator.estimation.rover import Rover
 
         rover = Rover.from_configuration(configuration)
-        loads = np.array(
-            [
-                rover.load.loads((rover.gravity * np.sin(a), 0.0, rover.gravity * np.cos(a)))
-                for a in slopes
-            ]
-        )
-    else:
-        loads = weight * np.cos(slopes)[:, None]
+        along, down = rover.gravity * np.sin(slopes), rover.gravity * np.cos(slopes)
+        loads = [rover.load.loads((x, 0.0, z)) for x, z in zip(along, down, strict=True)]
     state = rover_climb(
         model,
         wheels.wheel.map(lambda values: values[chosen]),
@@ -82,7 +74,7 @@ def climb(
     result = {
         'slope': np.repeat(state.slope, count),
         'slip': np.repeat(state.slip, count),
-        'normal_load': loads.ravel(),
+        'normal_load': state.normal_load.ravel(),
     }
     if who == 'rover':
         result['pass_number'] = np.tile(np.asarray(wheels.passes, dtype=float), len(slopes))

@@ -8,7 +8,7 @@ import argparse
 import csv
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -384,15 +384,11 @@ def _read_points(path: Path) -> dict[str, FloatArray]:
     return columns
 
 
-def _cells(columns: Mapping[str, FloatArray]) -> Iterable[list[str]]:
-    for row in zip(*columns.values(), strict=True):
-        yield [f'{value:.9g}' if np.isfinite(value) else '' for value in row]
-
-
 def _write_csv(columns: Mapping[str, FloatArray], stream: Any) -> None:
     writer = csv.writer(stream, lineterminator='\n')
     writer.writerow(columns)
-    writer.writerows(_cells(columns))
+    for row in zip(*columns.values(), strict=True):
+        writer.writerow(f'{value:.9g}' if np.isfinite(value) else '' for value in row)
 
 
 def _write_text(columns: Mapping[str, FloatArray], stream: Any) -> None:

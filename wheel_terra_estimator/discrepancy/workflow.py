@@ -96,11 +96,7 @@ def diagnose(
         wheels.radius if 'wheels.radius' in stated else (),
         wheels.width if 'wheels.width' in stated else (),
     )
-    check_against_wheel(
-        both,
-        np.broadcast_to(points.wheel.radius, (len(both),)),
-        np.broadcast_to(points.wheel.width, (len(both),)),
-    )
+    check_against_wheel(both, np.broadcast_to(points.wheel.radius, (len(both),)))
     known = catalogue()
     effects, not_tried = _effects_to_try(configuration, chosen, known)
     readings = Readings.of(configuration).true_on(both.true_rows)

@@ -81,7 +81,7 @@ class Diagnostics:
         node_name: str = NODE,
     ) -> None:
         self.node_name = node_name
-        self.clock: Callable[[int], int] = _stamp_itself
+        self.clock: Callable[[int], int] = int
         self.new_faults: list[str] = []
         self._names = names
         self._counters = counters
@@ -145,7 +145,7 @@ class Diagnostics:
         node = self._node_status(self._level(estimates), '; '.join(words) or 'running', values)
         return [node, *self._wheel_statuses(estimates)]
 
-    def stale(self, words: str, latest: EstimateSet | None = None, stamp: int = 0) -> list[Status]:
+    def stale(self, words: str, latest: EstimateSet | None = None) -> list[Status]:
         """Return the statuses while there are no estimates; values are held as in the latest set.
 
         Parameters
@@ -154,11 +154,9 @@ class Diagnostics:
             Why there are none.
         latest : EstimateSet, optional
             The latest set, if there ever was one.
-        stamp : int
-            Time of the message [ns].
         """
-        self.look(stamp)
-        told = '; '.join([words, *self._log.standing(self.clock(stamp))])
+        self.look()
+        told = '; '.join([words, *self._log.standing(self.clock(0))])
         stuck = latest is not None and latest.stuck
         values = [('stuck', str(stuck).lower()), *_values(self._counters())]
         node = self._node_status(STALE, told, values)
@@ -195,10 +193,6 @@ class Diagnostics:
         return [
             _wheel_status(estimates, i, name, self.node_name) for i, name in enumerate(self._names)
         ]
-
-
-def _stamp_itself(stamp: int) -> int:
-    return stamp
 
 
 def _wheel_level(estimates: EstimateSet, i: int) -> int:

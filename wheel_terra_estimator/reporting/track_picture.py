@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import BoolArray
 from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS
@@ -54,13 +54,9 @@ def has_map(track: Track) -> bool:
 def is_straight(track: Track) -> bool:
     """Whether a way is so straight that a map of it would be a line."""
     points = np.column_stack([track.values['x'], track.values['y']])
-    spans = np.ptp((points - points.mean(axis=0)) @ _main_axes(points), axis=0)
+    main_axes = np.linalg.eigh(np.cov(points.T))[1]
+    spans = np.ptp((points - points.mean(axis=0)) @ main_axes, axis=0)
     return bool(spans.min() < STRAIGHT * spans.max())
-
-
-def _main_axes(points: FloatArray) -> FloatArray:
-    axes: FloatArray = np.linalg.eigh(np.cov(points.T))[1]
-    return axes
 
 
 def maps(track: Track) -> tuple[Map, Map]:

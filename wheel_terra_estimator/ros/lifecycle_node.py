@@ -535,13 +535,11 @@ class EstimatorNode(LifecycleNode):
             faults.append(('name', words))
         if self._kept is not None and self._kept.fault:
             faults.append(('soil_file', self._kept.fault))
-        if self._has_no_clock() and now - self._started > DISCOVERY:
+        simulated = bool(self.get_parameter('use_sim_time').value)
+        no_clock = simulated and self.get_clock().now().nanoseconds == 0
+        if no_clock and now - self._started > DISCOVERY:
             faults.append(('clock', 'use_sim_time is true, but nothing comes on /clock'))
         return faults
-
-    def _has_no_clock(self) -> bool:
-        sim_time = self.get_parameter('use_sim_time').value
-        return bool(sim_time) and self.get_clock().now().nanoseconds == 0
 
     def _watch_names(self) -> None:
         """Look for a node of the same name, and for topics with more than one publisher."""

@@ -20,7 +20,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO, NamedTuple
@@ -241,7 +240,7 @@ class _Player(Node):
                 begin = message.log_time, time.monotonic()
             if rate > 0.0:
                 due = begin[1] + (message.log_time - begin[0]) * 1e-9 / rate
-                self._spin_until(partial(_past, due), max(due - time.monotonic(), 0.0))
+                self._spin_until(lambda: False, due - time.monotonic())
             self._inputs[names[message.topic]].publish(message.data)
             arrivals.expect()
             if rate <= 0.0:
@@ -301,10 +300,6 @@ class _Arrivals:
 def _must_run(process: subprocess.Popen[bytes]) -> None:
     if process.poll() is not None:
         raise UserError('the node ended by itself; its message stands above')
-
-
-def _past(due: float) -> bool:
-    return time.monotonic() >= due
 
 
 def record(heard: Sequence[Heard], path: Path, start: int, overwrite: bool = False) -> None:

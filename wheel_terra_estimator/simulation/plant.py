@@ -349,13 +349,10 @@ class RoverPlant:
     def _contact_force(self) -> FloatArray:
         """Return the sum of all soil forces over the mass, along the ground below the rover."""
         up = self._gravity * np.sqrt(max(1.0 - float(self._sine @ self._sine), 0.01))
-        on_body = np.einsum('ijn,in->j', self._lever, self._wheel_push())
+        on_wheels = np.stack([self._forces.pull, self._forces.side_force])
+        on_body = np.einsum('ijn,in->j', self._lever, on_wheels)
         push = on_body[0] - (self._load * self._tilt).sum()
         return np.array([push / self._mass, on_body[1] / self._mass, up])
-
-    def _wheel_push(self) -> FloatArray:
-        """Return the (2, n) forces along and across each wheel [N]."""
-        return np.stack([self._forces.pull, self._forces.side_force])
 
     def _static_loads(self, force: FloatArray) -> FloatArray:
         cosine = self._lever[0, 0]  # of the steering angle

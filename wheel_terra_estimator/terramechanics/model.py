@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.terramechanics import closed_form, quadrature
 from wheel_terra_estimator.terramechanics.checks import check_range, common_length
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, check_settings
+from wheel_terra_estimator.terramechanics.effects import EffectSettings, check_settings
 from wheel_terra_estimator.terramechanics.load_balance import (
     balance,
     explicit_entrance_angle,
@@ -33,9 +32,6 @@ from wheel_terra_estimator.terramechanics.terms import (
 )
 
 METHODS = ('quadrature', 'closed_form', 'triangles')
-
-# Scale of finite steps for soil parameters that may be zero.
-_SMALLEST_SCALE = {'cohesion': 100.0, 'cohesive_modulus': 1e3, 'friction_angle': 0.1}
 
 OVERLOADED = 1  # the soil cannot carry the load: values belong to a sinkage of one radius
 # |slip| above 0.95, where no steady state is known; or effects made the strength negative.
@@ -178,52 +174,6 @@ class WheelSoilModel:
                     f'{name} with the effects on', value, 0.0, np.inf, unit, open_lower=positive
                 )
 
-    def jacobian(
-        self, points: OperatingPoints, names: Sequence[str]
-    ) -> tuple[SteadyState, FloatArray]:
-        """Return the steady state and its derivatives by the implicit function theorem.
-
-        The load balance is solved once; one batched evaluation at the fixed entrance angle then
-        gives the partial derivatives of the balance and of the outputs for all names.
-
-        Parameters
-        ----------
-        points : OperatingPoints
-            N points.
-        names : sequence of str
-            ``soil.<field>``, ``effects.<name>.<parameter>`` (``<name>:<form>`` for another form
-            than the first; an effect that is off counts as on at its neutral values), ``slip`` or
-            ``normal_load``.
-
-        Returns
-        -------
-        SteadyState
-        numpy.ndarray
-            (N, 3, P) derivatives of sinkage, drawbar pull, torque per unit of each name.
-        """
-        state = self.steady_state(points)
-        batch = _Batch(self._soil, self.effects, points, names)
-        terms = Terms(batch.effects)
-        contact = build_contact(batch.points, batch.soil, self.soil.pressure_law, terms)
-        angle = np.broadcast_to(state.entrance_angle, (batch.rows, len(points))).copy()
-        angle_step = 1e-5 * state.entrance_angle
-        angle[-2] += angle_step
-        angle[-1] -= angle_step
-        response = np.stack(
-            [
-                np.broadcast_to(values, angle.shape)
-                for values in self._response(contact, angle, batch.points, terms)
-            ],
-            axis=-1,
-        )  # (rows, N, 4): balance, sinkage, pull, torque
-        count = len(names)
-        steps = batch.steps[..., None]
-        partial = (response[:count] - response[count : 2 * count]) / steps
-        slope = (response[-2] - response[-1]) / (2.0 * angle_step[:, None])
-        shift = -partial[..., 0] / slope[:, 0]
-        total = partial[..., 1:] + shift[..., None] * slope[:, 1:]
-        return state, np.moveaxis(total, 0, -1)
-
     def _entrance_angle(
         self, contact: Contact[Quantity], load: FloatArray, points: OperatingPoints, terms: Terms
     ) -> tuple[FloatArray, BoolArray]:
@@ -291,73 +241,3 @@ class WheelSoilModel:
             np.array(np.broadcast_to(column, shape)) for column in columns
         )
         return SteadyState(sinkage, pull, torque, entrance, peak, leaving, lateral, flags)
-
-
-class _Batch:
-    """Perturbed copies of all inputs for one evaluation of all partial derivatives.
-
-    Rows: P with the parameter raised, P with it lowered (or as it is, at the edge of its range),
-    two unchanged ones for the entrance angle.
-    """
-
-    def __init__(
-        self,
-        soil: Mapping[str, Any],
-        effects: Mapping[str, Mapping[str, float]],
-        points: OperatingPoints,
-        names: Sequence[str],
-    ) -> None:
-        self.rows = 2 * len(names) + 2
-        self.steps = np.empty((len(names), len(points)))
-        self.soil = dict(soil)
-        self.effects: dict[str, dict[str, Any]] = {k: dict(v) for k, v in effects.items()}
-        self.points: Any = SimpleNamespace(
-            **{name: getattr(points, name) for name in points.__dataclass_fields__}
-        )
-        for index, name in enumerate(names):
-            head, _, tail = name.partition('.')
-            if head == 'soil' and tail in self.soil:
-                value = self.soil[tail]
-                step = 1e-5 * max(float(np.max(np.abs(value))), _SMALLEST_SCALE.get(tail, 1e-3))
-                lower, upper = (-np.inf, 0.0) if tail == 'leaving_angle_ratio' else (0.0, np.inf)
-                self.soil[tail] = self._perturb(index, value, step, lower, upper)
-            elif head == 'effects':
-                self._perturb_effect(index, name, *tail.split('.'))
-            elif name == 'slip':
-                points_slip = self._perturb(index, points.slip, 1e-6, -1.0, 1.0)
-                self.points.slip = points_slip
-            elif name == 'normal_load':
-                step = 1e-5 * float(np.min(points.normal_load))
-                self.points.normal_load = self._perturb(
-                    index, points.normal_load, step, 0.0, np.inf
-                )
-            else:
-                raise ValueError(f'no derivative by {name!r}: not a parameter of the model')
-
-    def _perturb(
-        self, index: int, value: Quantity, step: float, lower: float, upper: float
-    ) -> FloatArray:
-        """Return `value` for all rows, raised in one row and lowered in its partner."""
-        value = np.asarray(value, float)
-        if value.ndim < 2:
-            value = np.broadcast_to(value, (self.rows, value.size))
-        batch = value.copy()
-        raised, lowered = index, index + (self.rows - 2) // 2
-        batch[raised] = np.where(batch[raised] + step <= upper, batch[raised] + step, batch[raised])
-        batch[lowered] = np.where(
-            batch[lowered] - step >= lower, batch[lowered] - step, batch[lowered]
-        )
-        self.steps[index] = batch[raised] - batch[lowered]
-        return batch
-
-    def _perturb_effect(self, index: int, name: str, effect: str, parameter: str = '') -> None:
-        known = catalogue().get(effect)
-        if known is None or parameter not in known.forms[0].defaults():
-            raise ValueError(f'no derivative by {name!r}: not in the catalogue of effects')
-        if effect not in self.effects:
-            self.effects[effect] = dict(known.neutral())
-        values = self.effects[effect]
-        declared = known.parameter(parameter)
-        values[parameter] = self._perturb(
-            index, values[parameter], 1e-4 * declared.prior_scale, declared.lower, declared.upper
-        )

@@ -1,9 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""A rover that climbs by itself: slip from the balance of forces along the slope.
-
-Power number as in Nakashima et al. 2010.
-"""
+"""A rover that climbs by itself: slip from the balance of forces along the slope."""
 
 from __future__ import annotations
 
@@ -36,8 +33,6 @@ class RoverSlopeState:
         (N,) [rad], [-]; the slip is nan where the soil cannot give the pull.
     normal_load, sinkage, drawbar_pull, torque : numpy.ndarray
         (N, n) [N], [m], [N], [N m].
-    power_number : numpy.ndarray
-        (N,) energy per weight and distance, sum of T w over W v [-].
     """
 
     slope: FloatArray
@@ -46,7 +41,6 @@ class RoverSlopeState:
     sinkage: FloatArray
     drawbar_pull: FloatArray
     torque: FloatArray
-    power_number: FloatArray
 
 
 def rover_climb(
@@ -83,7 +77,7 @@ def rover_climb(
         If ``slope_gravity`` is on, or shapes do not fit.
     """
     if 'slope_gravity' in model.effects:
-        raise ValueError('slope_gravity is on in the model; the balance is made here: leave off')
+        raise ValueError('effects.slope_gravity is on; the balance is made here: leave it off')
     check_range('slope', slopes, -0.5 * np.pi, 0.5 * np.pi, 'rad')
     slopes = np.atleast_1d(np.asarray(slopes, float))
     loads = np.asarray(normal_loads, float)
@@ -126,10 +120,7 @@ def rover_climb(
         np.where(known[:, None], column.reshape(loads.shape), np.nan)
         for column in (state.sinkage, state.drawbar_pull, state.torque)
     )
-    radius = np.reshape(each.tip_radius if slip_radius == 'lug_tip' else each.radius, loads.shape)
-    ratio = np.where(slip >= 0.0, 1.0 - slip, 1.0 / (1.0 + slip))  # v/(r w)
-    power = (torque / radius).sum(axis=1) / (weight * ratio)
-    return RoverSlopeState(slopes, slip, loads, sinkage, drawbar_pull, torque, power)
+    return RoverSlopeState(slopes, slip, loads, sinkage, drawbar_pull, torque)
 
 
 def _smallest_slip(pull: Callable[[FloatArray], FloatArray], need: FloatArray) -> FloatArray:

@@ -16,15 +16,15 @@ from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSetti
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.scheduler import finished
 from wheel_terra_lab.evaluation import baselines, scores
+from wheel_terra_lab.evaluation.bench_drive import BenchDrive
 from wheel_terra_lab.evaluation.foresight import Foresight, foresight
 from wheel_terra_lab.evaluation.runner import (
     SMOOTHED,
     inputs_of_mode,
     record,
     run_estimator,
-    run_smoother,
 )
-from wheel_terra_lab.evaluation.simulators import SIMULATORS, BenchDrive
+from wheel_terra_lab.evaluation.simulators import SIMULATORS
 from wheel_terra_lab.evaluation.two_state_filters import slip_course
 
 
@@ -85,8 +85,8 @@ def score_mode(simulator: str, kind: str, seed: int, mode: str, drive: BenchDriv
     """Score the estimator in one mode on a drive."""
     configuration, truth = drive.configuration, drive.truth
     measurements = list(inputs_of_mode(drive.arrivals, mode))
-    run = run_smoother if mode.startswith(SMOOTHED) else run_estimator
-    sets, health = run(configuration, measurements)
+    smooth = mode.startswith(SMOOTHED)
+    sets, health = run_estimator(configuration, measurements, smooth)
     kept = record(sets, health)
     radius = configuration.wheels.slip_radius
     return DriveScore(

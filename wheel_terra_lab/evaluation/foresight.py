@@ -18,8 +18,8 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.judgement.entrapment import entrapments
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
+from wheel_terra_lab.evaluation.bench_drive import Truth
 from wheel_terra_lab.evaluation.runner import Record
-from wheel_terra_lab.evaluation.simulators import Truth
 
 SPACING = 0.5
 """Between two rows that are scored [s]."""

@@ -22,7 +22,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
-from wheel_terra_lab.evaluation.simulators import TimedMeasurement
+from wheel_terra_lab.evaluation.bench_drive import Arrival
 
 LATE = 'reference_2s_late'
 LATE_BY = 2_000_000_000  # [ns], in place of what the sensor file says
@@ -63,7 +63,7 @@ class Record:
     health: dict[str, Any]
 
 
-def inputs_of_mode(arrivals: Iterable[TimedMeasurement], mode: str) -> Iterator[Measurement]:
+def inputs_of_mode(arrivals: Iterable[Arrival], mode: str) -> Iterator[Measurement]:
     """Yield what a mode gets of a drive, in the order of arrival."""
     mode = mode.removeprefix(SMOOTHED).removeprefix('_')
     timed = [(a.arrival, a.measurement) for a in arrivals]
@@ -87,19 +87,27 @@ def inputs_of_mode(arrivals: Iterable[TimedMeasurement], mode: str) -> Iterator[
 
 
 def run_estimator(
-    configuration: Configuration, measurements: Iterable[Measurement]
+    configuration: Configuration, measurements: Iterable[Measurement], smooth: bool = False
 ) -> tuple[list[EstimateSet], dict[str, Any]]:
-    """Run what node and replay run over measurements in the order of arrival.
+    """Run what node and replay run over measurements in the order of arrival, or the smoother.
 
     Returns its sets and its health.
     """
     from wheel_terra_estimator.estimation.core import EstimatorCore
+    from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 
-    core = EstimatorCore(configuration, judged_by=InputJudge)
+    smoother = DriveSmoother(configuration) if smooth else None
+    estimator = smoother.estimator if smoother else None
+    core = EstimatorCore(configuration, estimator, judged_by=InputJudge)
     sets: list[EstimateSet] = []
+    take = smoother.keep if smoother else sets.append
     for measurement in measurements:
-        sets += core.add(measurement)
-    sets += core.flush()
+        for estimates in core.add(measurement):
+            take(estimates)
+    for estimates in core.flush():
+        take(estimates)
+    if smoother:
+        sets = [kept.estimates for kept in smoother.sets()]
     return sets, core.health()
 
 
@@ -127,20 +135,3 @@ def record(sets: Sequence[EstimateSet], health: dict[str, Any]) -> Record:
             )
         },
     )
-
-
-def run_smoother(
-    configuration: Configuration, measurements: Iterable[Measurement]
-) -> tuple[list[EstimateSet], dict[str, Any]]:
-    """Run the smoother over measurements in the order of arrival; as `run_estimator`."""
-    from wheel_terra_estimator.estimation.core import EstimatorCore
-    from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
-
-    smoother = DriveSmoother(configuration)
-    core = EstimatorCore(configuration, smoother.estimator, judged_by=InputJudge)
-    for measurement in measurements:
-        for estimates in core.add(measurement):
-            smoother.keep(estimates)
-    for estimates in core.flush():
-        smoother.keep(estimates)
-    return [kept.estimates for kept in smoother.sets()], core.health()

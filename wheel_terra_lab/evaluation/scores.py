@@ -22,8 +22,8 @@ from wheel_terra_estimator.estimation.judgement.entrapment import (
     lead_of,
     verdicts,
 )
+from wheel_terra_lab.evaluation.bench_drive import Truth
 from wheel_terra_lab.evaluation.runner import Record
-from wheel_terra_lab.evaluation.simulators import Truth
 from wheel_terra_lab.evaluation.two_state_filters import SlipCourse
 
 LEAST_SPEED, FIRST_SECONDS, NEAR_BORDER = 0.005, 10.0, 0.05

@@ -4,68 +4,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.configuration import shipped
-from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_lab.evaluation import kinds as kinds_a
+from wheel_terra_lab.evaluation.bench_drive import Arrival, BenchDrive, Truth
 from wheel_terra_lab.evaluation.simulator_b import kinds as kinds_b
 from wheel_terra_lab.evaluation.simulator_c import plans as plans_c
 
 SCENARIO = 'scenarios/'
 """Begins the name of a kind that is a shipped scenario."""
-
-
-class TimedMeasurement(Protocol):
-    """A measurement and when it arrives [ns]."""
-
-    @property
-    def arrival(self) -> int: ...  # noqa: D102
-
-    @property
-    def measurement(self) -> Measurement: ...  # noqa: D102
-
-
-class Truth(Protocol):
-    """Ground truth of a drive, k stamps and n wheels; slip is nan at rest."""
-
-    @property
-    def stamp(self) -> IntArray: ...  # noqa: D102
-    @property
-    def slip(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def slip_velocity(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def drawbar_pull(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def normal_load(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def sinkage(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def wheel_rate(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def slip_class(self) -> NDArray[np.uint8]: ...  # noqa: D102
-    @property
-    def yaw_rate(self) -> FloatArray: ...  # noqa: D102
-
-
-@dataclass(frozen=True)
-class BenchDrive:
-    """A drive as the bench needs it."""
-
-    configuration: Configuration
-    arrivals: Sequence[TimedMeasurement]
-    truth: Truth
 
 
 @dataclass(frozen=True)
@@ -98,7 +50,8 @@ def _simulate_a(kind: str, seed: int, duration: float | None, rover: str | None)
     scenario = load(kinds.get(kind, kind), rover=rover)
     longest = scenario.duration if duration is None else min(duration, scenario.duration)
     drive = simulate(scenario, seed, longest)
-    return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
+    arrivals = [Arrival(*told) for told in drive.arrivals]
+    return BenchDrive(drive.configuration, arrivals, Truth.of(drive.truth))
 
 
 def _simulated(

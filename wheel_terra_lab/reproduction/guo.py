@@ -19,11 +19,11 @@ from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.reproduction.ding_curves import SUPPORT
+from wheel_terra_lab.reproduction.equivalent_contact import equivalent_contact
 from wheel_terra_lab.reproduction.statement import Statement
 from wheel_terra_lab.studies.model_validation import hit_wheels
 from wheel_terra_lab.studies.model_validation.fitting import Free, Model, fit
 from wheel_terra_lab.studies.model_validation.hit_wheels import BASE, read
-from wheel_terra_lab.terramechanics.equivalent_contact import equivalent_contact
 
 TITLE = 'Guo, Ding et al., high-slip wheel-terrain contact, Mech. Mach. Theory (public text)'
 ROWS = Path(__file__).parent / 'data' / 'single_wheel.csv'

@@ -41,11 +41,6 @@ def largest_time_step(stiffness: float, damping: float, mass: float, modes: floa
     return (math.sqrt(b * b + 4 * a) - b) / a
 
 
-def smallest_mass(case: Case) -> float:
-    """Return the mass [kg] of the lightest grain of the bed."""
-    return float(np.min(bed_discs(case)[2]))
-
-
 def stable_time_step(case: Case) -> float:
     """Return the largest stable time step [s] of a bed of the case's lightest grains.
 
@@ -55,7 +50,7 @@ def stable_time_step(case: Case) -> float:
     """
     grains = case.grains
     damping = damping_coefficient(case)
-    mass = smallest_mass(case)
+    mass = float(np.min(bed_discs(case)[2]))  # of the lightest grain [kg]
     kinds = [(grains.normal_stiffness, 1.0)]
     if grains.rotation == 'free':
         kinds.append((grains.tangential_stiffness, 4.0))

@@ -56,7 +56,10 @@ def run_job(job: Job, work: str, cache: str) -> dict[str, object]:
     folder = Path(work) / job.key
     try:
         row = run_case(job.case, folder, Path(cache) if cache else None)
-        _keep_series(folder / 'series.npy', Path(work).parent / SERIES_FOLDER / f'{job.key}.npy')
+        if (series := folder / 'series.npy').exists():
+            kept = Path(work).parent / SERIES_FOLDER / f'{job.key}.npy'
+            kept.parent.mkdir(exist_ok=True)
+            shutil.move(series, kept)
     except CaseFailedError as error:
         row = {'stopped': str(error)}
     except UserError:
@@ -66,13 +69,6 @@ def run_job(job: Job, work: str, cache: str) -> dict[str, object]:
     shutil.rmtree(folder, ignore_errors=True)
     row = dict(job.labels) | {'key': job.key} | row
     return {name: _text(value) for name, value in row.items()}
-
-
-def _keep_series(series: Path, kept: Path) -> None:
-    """Keep the time series beside the table of the study."""
-    if series.exists():
-        kept.parent.mkdir(exist_ok=True)
-        shutil.move(series, kept)
 
 
 def run_in_folder(

@@ -47,7 +47,8 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
-from wheel_terra_lab.evaluation.simulators import SIMULATORS, BenchDrive
+from wheel_terra_lab.evaluation.bench_drive import BenchDrive
+from wheel_terra_lab.evaluation.simulators import SIMULATORS
 
 SURE = 0.6
 """Confidence from which a finding counts as said [-]."""

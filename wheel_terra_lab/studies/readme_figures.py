@@ -253,7 +253,10 @@ def kinds(rows: Sequence[Row]) -> str:
         for row in rows:
             if row['simulator'] == simulator:
                 found[row['kind']].append(row)
-        cells = {kind: [_of_mode(part, mode) for mode in MODES] for kind, part in found.items()}
+        cells = {
+            kind: [[row for row in part if row['mode'] == mode] for mode in MODES]
+            for kind, part in found.items()
+        }
         worst = sorted(found, key=lambda kind: rms(cells[kind][0], 'slip'), reverse=True)
         lines += [
             f'| {simulator} {kind.replace("_", " ")} | '
@@ -262,10 +265,6 @@ def kinds(rows: Sequence[Row]) -> str:
             for kind in worst[:WORST_KINDS]
         ]
     return '\n'.join(lines) + '\n'
-
-
-def _of_mode(rows: Sequence[Row], mode: str) -> list[Row]:
-    return [row for row in rows if row['mode'] == mode]
 
 
 def page(rows: Sequence[Row]) -> str:

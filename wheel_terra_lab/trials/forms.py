@@ -233,14 +233,13 @@ FORMS = {
         5,
         needs=('lug_height',),
         requires='sinkage',
-        two_parameters=True,
     ),
     'lug_support:by_height': Kind(
         _by_height, fixed(0.3), 5, needs=('lug_height', 'tall_lugs'), requires='sinkage'
     ),
     'bulldozing:terzaghi': Kind(_terzaghi, fixed(0.3), 6, requires='drawbar_pull'),
     'multipass:rut': Kind(_rut, lambda r, s: 0.02 * mean_radius(r), 5, needs=('pass_number',)),
-    'hard_layer:bearing': Kind(_bearing_layer, stiffness_near, 20, two_parameters=True),
+    'hard_layer:bearing': Kind(_bearing_layer, stiffness_near, 20),
     'stress_peak_shift:backward': Kind(_backward, fixed(0.1), 2.5),
     'drivetrain_friction:proportional': Kind(_proportional, fixed(0.08), 6, requires='torque'),
     'drivetrain_friction:viscous': Kind(

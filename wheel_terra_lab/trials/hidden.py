@@ -69,7 +69,6 @@ class Kind:
     needs: tuple[str, ...] = ()  # rows must vary in these columns, else nothing can be seen
     # One output that the effect cannot be seen without; empty = any will do.
     requires: str = ''
-    two_parameters: bool = False  # `secondary` matters
     all_or_nothing: bool = False  # a claim with no amplitude: half of the cases keep size 1
 
 
@@ -309,10 +308,6 @@ def _offset(size: float, gain: float) -> Hidden:
     return adding('sinkage_offset', 'sinkage', off)
 
 
-def _layer_kind(power: float) -> Callable[[float, float, Rows, TrueSoil], Hidden]:
-    return lambda a, k, rows, soil: _layer(a, layer_depth(k, rows, soil), power)
-
-
 def stiffness_near(rows: Rows, soil: TrueSoil) -> float:
     """Slope of the bearing stress [Pa/m] at a depth of 5 % of the radius."""
     z = 0.05 * mean_radius(rows)
@@ -353,7 +348,6 @@ def _kinds(other: bool) -> dict[str, Kind]:
             else (lambda a, k, r, s: _mound(a, 0.3 + 0.25 * k, 'ramp')),
             fixed(1.0),
             5,
-            two_parameters=True,
         ),
         'stress_peak_shift': Kind(lambda a, k, r, s: _peak_shift(a, p), fixed(0.15), 2.5),
         'slope_gravity': Kind(
@@ -382,7 +376,11 @@ def _kinds(other: bool) -> dict[str, Kind]:
             signed=True,
             needs=('angular_velocity',),
         ),
-        'hard_layer': Kind(_layer_kind(p), stiffness_near, 20, two_parameters=True),
+        'hard_layer': Kind(
+            lambda a, k, rows, soil: _layer(a, layer_depth(k, rows, soil), p),
+            stiffness_near,
+            20,
+        ),
         'drivetrain_friction': Kind(
             lambda a, k, r, s: _friction(a, o),
             lambda r, s: 0.04 * mean_load(r) * mean_radius(r),

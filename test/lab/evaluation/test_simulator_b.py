@@ -18,7 +18,7 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.evaluation.simulator_b import drive as drive_b
-from wheel_terra_lab.evaluation.simulator_b import rovers, sensing, truth, vehicle, wheel_soil
+from wheel_terra_lab.evaluation.simulator_b import rovers, sensing, vehicle, wheel_soil
 
 SLIPS = np.array([-0.6, -0.2, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95])
 SHAPE = wheel_soil.WheelShape(*(np.full(9, v) for v in (0.157, 0.165, 0.01, 24.0)))
@@ -146,10 +146,10 @@ def test_orientation_is_nose_up_on_a_climb(climb):
 def test_truth_knows_rest_and_classes():
     time = np.arange(0.0, 10.0, 0.1)
     rim = np.where(time < 5.0, 0.05, 0.0)[:, None]
-    rest = truth.resting(time, rim, 0.5 * rim)
+    rest = drive_b.resting(time, rim, 0.5 * rim)
     assert not rest[:54].any() and rest[56:].all()
     np.testing.assert_array_equal(
-        truth.slip_classes(np.array([-0.3, 0.31, 0.6, 0.95, np.nan])), [0, 1, 1, 3, 255]
+        drive_b.slip_classes(np.array([-0.3, 0.31, 0.6, 0.95, np.nan])), [0, 1, 1, 3, 255]
     )
 
 

@@ -605,11 +605,8 @@ class McapFile:
         unknown = sum(n for number, n in self._counts.items() if number not in self.channels)
         if unknown:
             self.losses.left_out.append(f'{unknown} messages of channels that are not described')
-        if not self._indexed():
+        if all(piece.channels is None for piece in self._pieces):  # no index
             self.losses.recovered.update(counts)
-
-    def _indexed(self) -> bool:
-        return any(piece.channels is not None for piece in self._pieces)
 
 
 class _Definitions:

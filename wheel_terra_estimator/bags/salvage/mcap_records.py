@@ -134,8 +134,9 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
         record = record or _record(content, at, end, possible)
         if record is not None and behind_damage and CHUNK in possible.opcodes:
             behind_damage = record.opcode != CHUNK
-            if record.opcode == MESSAGE and _chunk_inside(content, record, end) < record.end:
-                record = None
+            if record.opcode == MESSAGE:  # one that lost some bytes may reach over a chunk
+                chunk = _next(content, record.begin, record.end, end, Possible((CHUNK,)))
+                record = record if chunk >= record.end else None
         if record is None and before is not None:
             inside = _inside(content, before, at, end, possible)
             if inside < at:  # bytes are missing in the record before, so it reached too far
@@ -189,11 +190,6 @@ def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | 
 def next_outside(content: Buffer, begin: int, stop: int, end: int) -> int:
     """Return where a record that stands outside of chunks can begin before ``stop``, else it."""
     return _next(content, begin, stop, end, Possible((CHUNK, SCHEMA, CHANNEL)))
-
-
-def _chunk_inside(content: Buffer, record: Record, end: int) -> int:
-    """Return where a chunk begins in the bytes of a message that lost some, else its end."""
-    return _next(content, record.begin, record.end, end, Possible((CHUNK,)))
 
 
 def _inside(content: Buffer, record: Record, stop: int, end: int, possible: Possible) -> int:
@@ -283,7 +279,7 @@ def chunk_head(content: Buffer, at: int, end: int) -> ChunkHead | None:
     if opcode != CHUNK or letters > 8 or begin > end or length < CHUNK_HEAD + letters:
         return None
     codec = bytes(content[begin - 8 - letters : begin - 8]).decode('ascii', 'replace')
-    packed = _uint64(content, begin - 8)
+    packed = int.from_bytes(content[begin - 8 : begin], 'little')
     if codec not in CODECS or packed != length - CHUNK_HEAD - letters:
         return None
     return ChunkHead(start, last, size, checksum, codec, begin, packed)
@@ -376,7 +372,3 @@ def _uint16(content: Buffer, at: int) -> int:
 
 def _uint32(content: Buffer, at: int) -> int:
     return int.from_bytes(content[at : at + 4], 'little')
-
-
-def _uint64(content: Buffer, at: int) -> int:
-    return int.from_bytes(content[at : at + 8], 'little')

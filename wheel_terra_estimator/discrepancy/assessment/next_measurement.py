@@ -54,7 +54,7 @@ def propose(
         names = (joined(chosen.names), joined(competitor.names))
         if names[0] == names[1]:  # two forms of the same
             names = (' + '.join(chosen.names), ' + '.join(competitor.names))
-        now = _distance(setting, chosen, competitor, None, std)
+        now = _distance(setting, chosen, competitor)
         ours, theirs = ([effect_of(key) for key in f.names] for f in (chosen, competitor))
         for name in dict.fromkeys((*ours, *theirs)):
             if name in ZERO_CHECKS and (name in ours) != (name in theirs):
@@ -174,15 +174,14 @@ def _with_rows(
     difference = ((outputs[0] - outputs[1]) / std).reshape(-1)
     jacobian = (sensitivity / std[None, :, None]).reshape(len(difference), -1)
     keep = np.isfinite(difference)
-    return _distance(setting, chosen, competitor, (difference[keep], jacobian[keep]), std)
+    return _distance(setting, chosen, competitor, (difference[keep], jacobian[keep]))
 
 
 def _distance(
     setting: Setting,
     chosen: Fit,
     competitor: Fit,
-    new: tuple[FloatArray, FloatArray] | None,
-    std: FloatArray,
+    new: tuple[FloatArray, FloatArray] | None = None,
 ) -> float:
     """Distance d' of the chosen prediction from the competitor's best refit to it (linear)."""
     problem = setting.problem

@@ -67,7 +67,9 @@ def locate(
             box, inside = sides[best], chosen
     if not box:
         share_inside = 1.0
-    std = _std_of_rows(problem, worst, len(table))[inside]
+    std = np.zeros(len(table))
+    std[problem.row[problem.quantity == worst]] = problem.std[problem.quantity == worst]
+    std = std[inside]
     physical = values[inside] * std
     mean, size = float(np.mean(physical)), float(np.sqrt(np.mean(physical**2)))
     noise = float(np.sqrt(np.mean(std**2)))
@@ -139,13 +141,6 @@ def _simulated(problem: Problem, nothing: Fit, quantity: int, rows: int) -> Floa
     full = np.zeros((_DRAWS, rows))
     full[:, problem.row[mine]] = draws[mine].T
     return full
-
-
-def _std_of_rows(problem: Problem, quantity: int, rows: int) -> FloatArray:
-    std = np.zeros(rows)
-    mine = problem.quantity == quantity
-    std[problem.row[mine]] = problem.std[mine]
-    return std
 
 
 def _sentence(

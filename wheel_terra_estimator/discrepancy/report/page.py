@@ -170,6 +170,7 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
         if figure is None:
             return None
         figure.savefig(folder / f'{name}.png', dpi=_RESOLUTION, metadata={'Software': None})
+        figure.set_layout_engine('none')  # laid out once, for both formats
         return picture(figure)
 
     proposed = next((m for m in diagnosis.next_measurement if m.rows is not None), None)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,10 +34,7 @@ COLOUR_MAP = 'viridis'
 _DISCRETE = ('#E69F00', '#009E73', '#0072B2', '#7B4FA3', '#111111', '#D55E00')
 _SHAPES = 'os^Dv<'
 _MOST_CURVES = 6
-_LEGEND_LINE, _LEGEND_SIZE = 0.28, 8.5  # [inch], [points]
-_LEGEND_MARK, _LEGEND_LETTER = 0.45, 0.072  # [inch], of an entry, at the usual size
-_LEFT = 0.72  # room for the labels of an axis [inch]
-_BETWEEN_ROWS = 0.28  # of panels [inch]
+_LEGEND_LINE, _LEGEND_MARK, _LEGEND_LETTER = 0.28, 0.45, 0.072  # room they take [inch]
 
 
 def shown_input(name: str) -> tuple[float, str]:
@@ -54,10 +50,8 @@ def label(name: str, unit: str) -> str:
 def measured_against_model(diagnosis: Diagnosis) -> Figure:
     """Draw measured over modelled values, before and after, one panel per quantity."""
     curves, table = diagnosis.curves, diagnosis.table
-    with _style():
-        names = ['as configured', _last(diagnosis)]
-        lines = _legend_lines(names, table.quantities)
-        figure, axes = _panels(1, table.quantities, height=2.7, legend=lines)
+    with picture_style():
+        figure, axes = _panels(1, table.quantities, height=2.7)
         for axis, q, scale in _each(axes, table.quantities, 'model [{}]', 'measured [{}]'):
             measured = scale * table.measured[:, q]
             good = np.isfinite(measured) & ~_rejected_cells(diagnosis, q)
@@ -76,7 +70,7 @@ def measured_against_model(diagnosis: Diagnosis) -> Figure:
             ends = np.array([values.min(), values.max()])
             axis.plot(ends, ends, color=INK, lw=0.8)
         handles, labels = axes[0][0].get_legend_handles_labels()
-        _legend(figure, handles, labels, lines=lines)
+        _legend(figure, handles, labels)
     return figure
 
 
@@ -93,11 +87,8 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
     others = [plain(name) for name in table.varying() if name != 'slip']
     texts = [*([f'{", ".join(others)}:'] if others else []), *(text for text, _ in groups)]
     models = ['model as configured', f'model {_last(diagnosis)}']
-    with _style():
-        below = _legend_lines(models, table.quantities)
-        lines_of_groups = _legend_lines(texts, table.quantities)
-        legend = below + lines_of_groups
-        figure, axes = _panels(1, table.quantities, height=3.0, legend=legend)
+    with picture_style():
+        figure, axes = _panels(1, table.quantities, height=3.0)
         for axis, q, scale in _each(axes, table.quantities):
             kept = np.isfinite(table.measured[:, q]) & ~_rejected_cells(diagnosis, q)
             for (_, rows), colour, shape in zip(groups, _DISCRETE, _SHAPES, strict=False):
@@ -122,8 +113,8 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
         lines = [Line2D([], [], ls=style, color=INK, lw=1.2) for style in (':', '-')]
         if others:
             marks = [Line2D([], [], ls=''), *marks]
-        _legend(figure, marks, texts, below=below, lines=lines_of_groups)
-        _legend(figure, lines, models, lines=below)
+        _legend(figure, marks, texts, 'lower left')
+        _legend(figure, lines, models)
     return figure
 
 
@@ -167,14 +158,11 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     few = np.unique(np.round(colour[np.isfinite(colour)], 9))
     discrete = len(few) <= 5
     texts = [with_unit(f'{plain(colour_by)} {value:.3g}', unit) for value in few]
-    lines = _legend_lines(texts, stages) if discrete else 0
-    with _style():
+    with picture_style():
         figure, axes = _panels(
             len(table.quantities),
             stages,
             height=1.95,
-            bar=not discrete,
-            legend=lines,
             shared=True,
         )
         drawn = None
@@ -214,9 +202,9 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
                 Line2D([], [], marker=shape, ms=5, ls='', color=c)
                 for c, shape in zip(_DISCRETE, _SHAPES, strict=True)
             ]
-            _legend(figure, handles[: len(few)], texts, lines=lines)
+            _legend(figure, handles[: len(few)], texts)
         else:
-            _colour_bar(figure, drawn, label(colour_by, unit))
+            _colour_bar(figure, axes, drawn, label(colour_by, unit))
     return figure
 
 
@@ -226,8 +214,8 @@ def where_map(diagnosis: Diagnosis) -> Figure:
     second = next(iter(colour_inputs(diagnosis)), 'normal_load')
     factor, unit = shown_input(second)
     x, y = table.columns['slip'], factor * table.columns[second]
-    with _style():
-        figure, axes = _panels(1, table.quantities, height=2.7, bar=True)
+    with picture_style():
+        figure, axes = _panels(1, table.quantities, height=2.7)
         drawn = None
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q = QUANTITIES.index(name)
@@ -250,7 +238,7 @@ def where_map(diagnosis: Diagnosis) -> Figure:
             if name == where.quantity:
                 _box(axis, diagnosis, second)
         axes[0][0].set_ylabel(label(second, unit))
-        _colour_bar(figure, drawn, 'measured minus model [s.d.]')
+        _colour_bar(figure, axes, drawn, 'measured minus model [s.d.]')
     return figure
 
 
@@ -260,10 +248,9 @@ def structural_error(diagnosis: Diagnosis) -> Figure | None:
     if left is None:
         return None
     slip = table.columns['slip']
-    with _style():
+    with picture_style():
         names = ['measured minus model', 'smooth part, with two standard deviations']
-        lines = _legend_lines(names, table.quantities)
-        figure, axes = _panels(1, table.quantities, height=2.5, legend=lines)
+        figure, axes = _panels(1, table.quantities, height=2.5)
         for axis, q, scale in _each(axes, table.quantities):
             inside = ~_rejected_cells(diagnosis, q)
             dots = axis.plot(
@@ -279,7 +266,7 @@ def structural_error(diagnosis: Diagnosis) -> Figure | None:
                 elinewidth=0.9,
             )
             axis.axhline(0.0, color=INK, lw=0.8)
-        _legend(figure, [dots[0], bars], names, lines=lines)
+        _legend(figure, [dots[0], bars], names)
     return figure
 
 
@@ -291,12 +278,10 @@ def competitors(item: NextMeasurement) -> Figure | None:
     factor, unit = shown_input(x_name)
     x = factor * np.asarray(item.rows[x_name], dtype=float)
     order = np.argsort(x, kind='stable')
-    with _style():
-        names = [plain(competitor) for competitor in item.predictions]
+    with picture_style():
         aside = any(np.asarray(values)[:, -1].any() for values in item.predictions.values())
         shown = QUANTITIES if aside else QUANTITIES[:-1]
-        lines = _legend_lines(names, shown)
-        figure, axes = _panels(1, shown, height=2.2, legend=lines)
+        figure, axes = _panels(1, shown, height=2.2)
         for axis, q, scale in _each(axes, shown, label(x_name, unit), 'predicted [{}]'):
             for (competitor, values), colour, marker in zip(
                 item.predictions.items(), (BLUE, RED, GREEN, PURPLE), 'oDs^', strict=False
@@ -311,7 +296,7 @@ def competitors(item: NextMeasurement) -> Figure | None:
                     label=plain(competitor),
                 )
         handles, labels = axes[0][0].get_legend_handles_labels()
-        _legend(figure, handles, labels, lines=lines)
+        _legend(figure, handles, labels)
     return figure
 
 
@@ -334,95 +319,39 @@ def _each(
         axis.set_ylabel(y.format(unit))
 
 
-@contextmanager
-def _style() -> Iterator[None]:
-    """Style of all pictures; titles at a fixed height, which saves a layout of every axis."""
-    import matplotlib as mpl
-
-    with picture_style(), mpl.rc_context({'axes.titley': 1.01}):
-        yield
-
-
 def _panels(
-    rows: int,
-    columns: Sequence[Any],
-    height: float,
-    *,
-    bar: bool = False,
-    legend: int = 0,
-    shared: bool = False,
+    rows: int, columns: Sequence[Any], height: float, *, shared: bool = False
 ) -> tuple[Figure, Any]:
-    """Return a figure with (rows, columns) axes, margins in inches.
-
-    Fixed margins: a layout engine would draw every figure three times over. ``bar`` leaves room
-    for a colour bar on the right, ``legend`` for so many lines above; ``shared``: the axes of a row
-    have the same y axis.
-    """
+    """Return a figure with (rows, columns) axes, each so high [inch]; ``shared``: rows share y."""
     from matplotlib.figure import Figure
 
     count = len(columns)
-    left, right = _LEFT, 0.95 if bar else 0.12
-    top, bottom = 0.34 + _LEGEND_LINE * legend, 0.5
-    # Panels that share an axis stand closer, but not so close that the last label of one meets
-    # the first of the next.
-    between = 0.4 if shared else _LEFT
-    cell = _cell(count) + (0.32 if shared else 0.0)
-    width = left + right + count * cell + (count - 1) * between
-    total = top + bottom + rows * height + (rows - 1) * _BETWEEN_ROWS
-    figure = Figure(figsize=(width, total), layout='none')  # type: ignore[arg-type]
+    width = {1: 6.5, 2: 4.1}.get(count, 3.4) * count
+    figure = Figure(figsize=(width, 0.7 + rows * (height + 0.3)), layout='constrained')
     axes = figure.subplots(
         rows, count, squeeze=False, sharex=shared, sharey='row' if shared else False
     )
     for axis in axes.flat:
         axis.locator_params(nbins=5)
-    figure.subplots_adjust(
-        left=left / width,
-        right=1 - right / width,
-        top=1 - top / total,
-        bottom=bottom / total,
-        wspace=between / cell,
-        hspace=_BETWEEN_ROWS / height,
-    )
     return figure, axes
 
 
-def _colour_bar(figure: Figure, drawn: Any, text: str) -> None:
-    """Add a colour bar in the margin that `_panels` left for it."""
-    width, height = figure.get_size_inches()
-    place = figure.add_axes((1 - 0.82 / width, 0.5 / height, 0.14 / width, 1 - 0.84 / height))
-    bar = figure.colorbar(drawn, cax=place)
-    bar.set_label(text)
+def _colour_bar(figure: Figure, axes: Any, drawn: Any, text: str) -> None:
+    bar = figure.colorbar(drawn, ax=axes, label=text, pad=0.01, aspect=25)
     bar.outline.set_visible(False)
-    place.grid(visible=False)
+    bar.ax.grid(visible=False)
 
 
-def _cell(count: int) -> float:
-    """Return the width [inch] of each of so many panels beside one another."""
-    return {1: 5.6, 2: 3.4}.get(count, 2.73)
-
-
-def _legend_lines(texts: Sequence[str], columns: Sequence[Any]) -> int:
-    """Return how many lines a legend above so many panels takes, its text at full size."""
-    count = len(columns)
-    room = count * (_cell(count) + _LEFT) - _LEFT
-    widest = max((_LEGEND_MARK + _LEGEND_LETTER * len(text) for text in texts), default=room)
-    return -(-len(texts) // max(1, int(room / widest)))
-
-
-def _legend(figure: Figure, handles: Any, labels: Any, *, below: int = 0, lines: int = 1) -> None:
-    """Put a legend of so many lines above the panels, ``below`` lines from the top."""
-    width, height = figure.get_size_inches()
-    left = 0.6
-    figure.legend(
-        handles,
-        labels,
-        loc='upper left',
-        bbox_to_anchor=(left / width, 1.0 - (0.02 + 0.9 * _LEGEND_LINE * below) / height),
-        ncols=-(-len(labels) // lines),
-        fontsize=_LEGEND_SIZE,
-        columnspacing=1.4,
-        handletextpad=0.4,
-    )
+def _legend(figure: Figure, handles: Any, labels: Any, place: Any = 'upper left') -> None:
+    """Put a legend above the panels, or below, in as many columns as there is room for."""
+    widest = max(_LEGEND_MARK + _LEGEND_LETTER * len(text) for text in labels)
+    columns = max(1, int(figure.get_figwidth() / widest))
+    share = _LEGEND_LINE * -(-len(labels) // columns) / figure.get_figheight()
+    engine: Any = figure.get_layout_engine()
+    left, bottom, width, height = engine.get()['rect']
+    bottom += share if place == 'lower left' else 0.0
+    engine.set(rect=(left, bottom, width, height - share))
+    figure.legend(handles, labels, loc=place, ncols=columns, columnspacing=1.4, handletextpad=0.4)
 
 
 def _band(axis: Axes, slip: FloatArray, half: FloatArray) -> None:

@@ -292,7 +292,7 @@ def check_wheel_of_model(
             )
 
 
-def check_against_wheel(table: SteadyTable, radius: FloatArray, width: FloatArray) -> None:
+def check_against_wheel(table: SteadyTable, radius: FloatArray) -> None:
     """Raise where a row cannot belong to the wheel: sinkage or torque out of proportion."""
     sinkage, torque = table.measured[:, 0], table.measured[:, 2]
     load = table.columns['normal_load']

@@ -407,8 +407,5 @@ def _find(titles: Sequence[str], entry: Entry) -> tuple[int, str, int] | None:
         if not brackets or brackets[1] not in titles:
             return None
         text, unit = brackets[1], brackets[2].strip()
-    return titles.index(text), unit or _unit_in(text), sign
-
-
-def _unit_in(title: str) -> str:
-    return next((unit for _, unit in _readings(title) if unit), '')
+    said = next((unit for _, unit in _readings(text) if unit), '')
+    return titles.index(text), unit or said, sign

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_lab.evaluation import bench_drive
+from wheel_terra_lab.evaluation.bench_drive import Arrival
 from wheel_terra_lab.evaluation.simulator_b.ground import Ground, Patch, RandomField
 from wheel_terra_lab.evaluation.simulator_b.kinds import KINDS, Kind, PatchPlan
 from wheel_terra_lab.evaluation.simulator_b.motion import Plant, State, WheelCommand, World
@@ -22,29 +24,32 @@ from wheel_terra_lab.evaluation.simulator_b.rovers import (
     steepest_slope,
 )
 from wheel_terra_lab.evaluation.simulator_b.sensing import (
-    Arrival,
     Course,
     SensorSet,
     measure,
     odometry_times,
     stamps,
 )
-from wheel_terra_lab.evaluation.simulator_b.truth import (
-    REST_SPEED,
-    Truth,
-    resting,
-    slip_classes,
-)
 from wheel_terra_lab.evaluation.simulator_b.wheel_soil import slip_ratio
 
 FloatArray = NDArray[np.float64]
 
+_CLASS_BORDERS = (0.3, 0.6, 0.9)
+_REST_SPEED, _REST_TIME = 2e-3, 0.5  # [m/s], [s]
+_UNKNOWN_CLASS = 255
 _STANDING = 3.0  # [s] at rest before the first start
 _RAMP = 1.0  # [s]
 _HEADING_GAIN = 0.4  # [1/s], of the driver that keeps the heading
 _STEERING_SHARE = 0.3  # of the speed, at most, for that
 _STEERING_ZERO = np.radians(0.5)  # deviation of the zeros of steering angles [rad]
 _TRAPPING_SHARE = 0.85  # of the slope: what a patch that traps still carries the rover up
+
+
+@dataclass(frozen=True)
+class Truth(bench_drive.Truth):
+    """Ground truth with the torques of the wheels (k, n) [N m]."""
+
+    torque: FloatArray
 
 
 @dataclass(frozen=True)
@@ -203,7 +208,7 @@ class _Driver:
         # Each steered wheel heads where its hub is to go, or away from it and turns backwards.
         back = np.where(ahead < 0.0, -1.0, 1.0)
         heading = np.where(draw.steered, np.arctan2(back * aside, np.abs(ahead)), 0.0)
-        heading = np.where(np.hypot(ahead, aside) > REST_SPEED, heading, state.steering)
+        heading = np.where(np.hypot(ahead, aside) > _REST_SPEED, heading, state.steering)
         return np.where(draw.steered, back * np.hypot(ahead, aside), ahead), heading
 
 
@@ -339,8 +344,8 @@ def _truth(course: Course, rows: _TruthRows, sensors: SensorSet, draw: Draw) -> 
     angle = course.at('steering', time)
     ground = np.cos(angle) * (speed[:, :1] - speed[:, 2:] * vehicle.y)
     ground += np.sin(angle) * (speed[:, 1:2] + speed[:, 2:] * vehicle.x)
-    held = np.where(np.abs(ground) > REST_SPEED, -1.0, np.nan)
-    slip = np.where(np.abs(rim) > REST_SPEED, slip_ratio(ground, rim), held)
+    held = np.where(np.abs(ground) > _REST_SPEED, -1.0, np.nan)
+    slip = np.where(np.abs(rim) > _REST_SPEED, slip_ratio(ground, rim), held)
     slip = np.where(resting(time, rim, ground), np.nan, slip)
 
     def at(values: FloatArray) -> FloatArray:
@@ -356,6 +361,19 @@ def _truth(course: Course, rows: _TruthRows, sensors: SensorSet, draw: Draw) -> 
         torque=course.at('torque', time),
         wheel_rate=rate,
         slip_class=slip_classes(slip),
-        forward_velocity=speed[:, 0],
         yaw_rate=speed[:, 2],
     )
+
+
+def resting(time: FloatArray, rim: FloatArray, ground: FloatArray) -> NDArray[np.bool_]:
+    """Return which wheels (k, n) have stood still for the rest time."""
+    still = np.maximum(np.abs(rim), np.abs(ground)) < _REST_SPEED
+    moved = np.where(still, -np.inf, time[:, None])
+    last = np.maximum.accumulate(moved, axis=0)
+    return np.asarray(time[:, None] - np.maximum(last, time[0] - _REST_TIME) >= _REST_TIME)
+
+
+def slip_classes(slip: FloatArray) -> NDArray[np.uint8]:
+    """Return classes 0 to 3 of slips, 255 where nan."""
+    found = np.searchsorted(_CLASS_BORDERS, np.abs(np.nan_to_num(slip)), side='left')
+    return np.where(np.isnan(slip), _UNKNOWN_CLASS, found).astype(np.uint8)

@@ -232,7 +232,8 @@ class Plant:
         speed, step, best = s.speed.copy(), np.zeros(3), np.inf
         for _ in range(_NEWTON_ROUNDS):
             found = self._forces(soil, speed + step + probe)
-            total = self._total(found) - weight
+            # Forward force, left force and yaw moment (..., 3).
+            total = found.pull @ self._lever.T + found.side @ self._lateral_lever.T - weight
             residual = self._inertia * (speed + step + probe - s.speed) / STEP - total
             error = float(np.abs(residual[0] / unit).max())
             if error > best and np.abs(step * unit).max() > _SMALLEST_CHANGE:
@@ -253,10 +254,6 @@ class Plant:
         return soil_forces(
             world.vehicle.shape, soil, world.laws, motion, s.depth, s.sinkage, s.load
         )
-
-    def _total(self, forces: SoilForces) -> FloatArray:
-        """Return forward force, left force and yaw moment (..., 3)."""
-        return np.asarray(forces.pull @ self._lever.T + forces.side @ self._lateral_lever.T)
 
     def _sink(self, soil: SoilHere) -> None:
         s, world = self.state, self.world

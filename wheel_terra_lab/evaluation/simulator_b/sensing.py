@@ -5,18 +5,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
-    Measurement,
     ReferenceVelocity,
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_lab.evaluation.bench_drive import Arrival
 
 FloatArray = NDArray[np.float64]
 
@@ -24,13 +23,6 @@ START = 1_700_000_000_000_000_000  # [ns], stamp of the beginning
 _OUTLIER_SHARE, _DROPOUT_SHARE = 0.01, 0.03
 _OUTLIER_SIZE = 10.0  # deviations
 _STAMP_JITTER = 5e-4  # [s]
-
-
-class Arrival(NamedTuple):
-    """A measurement and when it arrives [ns]."""
-
-    arrival: int
-    measurement: Measurement
 
 
 @dataclass(frozen=True)

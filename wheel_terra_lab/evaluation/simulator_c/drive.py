@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab.evaluation.bench_drive import Arrival, Truth
 from wheel_terra_lab.evaluation.simulator_c.dynamics import STEP, Course, Motion, drive
 from wheel_terra_lab.evaluation.simulator_c.ground import Ground
 from wheel_terra_lab.evaluation.simulator_c.plans import (
@@ -27,7 +28,6 @@ from wheel_terra_lab.evaluation.simulator_c.plans import (
 from wheel_terra_lab.evaluation.simulator_c.rover import FAMILIES, Rover, draw_rover
 from wheel_terra_lab.evaluation.simulator_c.rover_file import configuration_of
 from wheel_terra_lab.evaluation.simulator_c.sensors import (
-    Arrival,
     Instruments,
     Sensing,
     draw_instruments,
@@ -45,21 +45,6 @@ _START_TIME = 4.0  # of a drive, in which slips mean little [s]
 _ALMOST_TRAPPED, _OFTEN = 0.85, 0.05  # median slip, and for which share of the time at most
 _HARDER, _EASIER = 1.25, 0.75  # steps of hardness until the right one is bracketed
 _UNKNOWN = 255
-
-
-@dataclass(frozen=True)
-class Truth:
-    """Ground truth at the stamps of the wheel odometry, k stamps and n wheels; nan: at rest."""
-
-    stamp: NDArray[np.int64]
-    slip: FloatArray
-    slip_velocity: FloatArray
-    drawbar_pull: FloatArray
-    normal_load: FloatArray
-    sinkage: FloatArray
-    wheel_rate: FloatArray
-    slip_class: NDArray[np.uint8]
-    yaw_rate: FloatArray
 
 
 @dataclass(frozen=True)

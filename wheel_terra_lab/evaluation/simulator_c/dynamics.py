@@ -139,7 +139,8 @@ class Motion:
         contacts.travel(ground, STEP, state.rate, speed, rut)
         forces, shear = contacts.step(ground, STEP, state.rate, speed, side_speed)
         rise = np.clip((heights[n : 2 * n] - heights[2 * n :]) / rover.rims.radius, -0.9, 0.9)
-        tilt = np.arcsin(rise) - np.arcsin(np.clip(self._along_chassis(along), -0.9, 0.9))
+        chassis = along[:, 0] * self._level[0] + along[:, 1] * self._level[1]  # sine of its slope
+        tilt = np.arcsin(rise) - np.arcsin(np.clip(chassis, -0.9, 0.9))
         new = self._advance(command, along, across, forces, tilt, gravity)
         contacts.keep(shear, new.rate, new.speed, across @ new.velocity)
         contacts.settle(loads, forces.normal, rover.spring)
@@ -171,10 +172,6 @@ class Motion:
         """Return (n, 3): what the body's speeds give along and across each wheel."""
         c, s, x, y = np.cos(steering), np.sin(steering), self.rover.x, self.rover.y
         return np.stack([c, s, x * s - y * c], axis=1), np.stack([-s, c, x * c + y * s], axis=1)
-
-    def _along_chassis(self, along: FloatArray) -> FloatArray:
-        """Return the sine of the chassis' slope along each wheel."""
-        return np.asarray(along[:, 0] * self._level[0] + along[:, 1] * self._level[1])
 
     def _places(self, along: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return (3n,) places of the hubs, and half a radius ahead of and behind them."""

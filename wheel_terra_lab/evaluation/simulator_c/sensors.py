@@ -18,6 +18,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_lab.evaluation.bench_drive import Arrival
 from wheel_terra_lab.evaluation.simulator_c.dynamics import STEP, Course
 from wheel_terra_lab.evaluation.simulator_c.plans import Kind
 from wheel_terra_lab.evaluation.simulator_c.rover import Rover
@@ -27,14 +28,6 @@ FloatArray = NDArray[np.float64]
 START = 1_900_000_000_000_000_000
 """Stamp of the beginning of every drive [ns]."""
 _SMOOTHED = 5  # steps over which attitude and acceleration are averaged before they are sensed
-
-
-@dataclass(frozen=True)
-class Arrival:
-    """A measurement and when it arrives [ns]."""
-
-    arrival: int
-    measurement: Measurement
 
 
 @dataclass(frozen=True)

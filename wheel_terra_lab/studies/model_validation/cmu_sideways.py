@@ -15,7 +15,6 @@ from scipy.optimize import least_squares
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_lab.studies.model_validation import published_sideways
 from wheel_terra_lab.studies.model_validation.cmu_wheel import WHEEL, plates
 from wheel_terra_lab.studies.model_validation.fitting import FloatArray, Free, Model
 
@@ -126,9 +125,6 @@ def section(shared: Path, figures: Path) -> str:
         model, values = fit(soil, flank, rows)
         found[flank] = predict(model, flank, rows)
         texts.append(f'{flank}: ' + ', '.join(f'{k} = {v:.4g}' for k, v in values.items()))
-    found['published'] = published_sideways.predict(
-        rows.slip_angle, rows.speed, rows.rim_speed, rows.load
-    )
     lines = [
         '## CMU smooth wheel sliding sideways',
         '',

@@ -21,7 +21,22 @@ import numpy as np
 
 from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.closed_form import coefficients
-from wheel_terra_lab.terramechanics.decoupled_pull import decoupled_pull
+
+
+def decoupled_pull(
+    torque: Any,
+    normal_load: Any,
+    entrance_angle: Any,
+    peak_angle: Any,
+    leaving_angle: Any,
+    shear_radius: Any,
+) -> Any:
+    """Drawbar pull from torque, load and contact angles: no soil parameter, no width [N].
+
+    F = (A^2 + B^2)/(A C) T/R - (B/A) W: both peak stresses eliminated from the three balances.
+    """
+    a, b, c = coefficients(entrance_angle, peak_angle, leaving_angle)
+    return (a * a + b * b) / (a * c) * torque / shear_radius - b / a * normal_load
 
 
 @dataclass(frozen=True)
@@ -40,10 +55,6 @@ class EquivalentContact:
     entrance_angle: Any
     peak_angle: Any
     leaving_angle: Any
-
-    def coefficients(self) -> tuple[Any, Any, Any]:
-        """Return k1, k2, k3 [-]: W = b r_e (k1 sigma + k2 tau), T = b r_e^2 k3 tau."""
-        return coefficients(self.entrance_angle, self.peak_angle, self.leaving_angle)
 
     def drawbar_pull(self, torque: Any, normal_load: Any) -> Any:
         """Pull from torque and load, no soil parameter [N].
