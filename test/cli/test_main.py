@@ -132,7 +132,7 @@ def test_the_shipped_completion_is_that_of_the_parsers(shell, text, capsys):
         ('repl', ['replay']),
         ('replay --rem', ['--remap']),
         ('replay bag --config fros', ['frostyboy']),
-        ('predict --climb ', ['wheel', 'rover']),
+        ('diagnose rows.csv --soil ', ['shared', 'own']),
         ('config sh', ['show']),
         ('replay no_such_file', []),
     ],

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.outputs import Output, file_or_entry
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
+from wheel_terra_estimator.scheduler import add_jobs_argument, finished
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.configuration import Configuration
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 EXAMPLES = (
     'wheel-terra diagnose rows.csv --config hit_wh3 --config hit_fit -o diagnosis',
     'wheel-terra diagnose my_bag --config my_rover.yaml --remap reference_odom:=/vo -o diagnosis',
+    'wheel-terra diagnose sand.csv gravel.csv --soil own --jobs 2 --config rig.yaml -o diagnosis',
 )
 
 
@@ -34,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs='+',
         metavar='DATA',
-        help='CSV table of steady rows, or a rosbag2; several are diagnosed as one, with one soil',
+        help='CSV table of steady rows, or a rosbag2; several: see --soil',
     )
     parser.add_argument(
         '-o',
@@ -44,6 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DIR',
         help='folder to be written',
     )
+    parser.add_argument(
+        '--soil',
+        choices=('shared', 'own'),
+        default='shared',
+        help='of several tables: diagnosed as one with one soil (default), or each with a soil of '
+        'its own, in a folder of its name, with a summary of which effect they favour together',
+    )
+    add_jobs_argument(parser, words='tables with their own soil side by side (default 1)')
     parser.add_argument(
         '--reference',
         type=Path,
@@ -146,6 +157,8 @@ def run(arguments: argparse.Namespace) -> int:
             )
         if arguments.smooth:
             raise UserError(f'--smooth: goes with a bag, but {given[0]} is a table; leave it out')
+    if arguments.soil == 'own' and len(arguments.data) > 1:
+        return _each_with_its_soil(arguments)
     diagnosis = _diagnosed(arguments)
     with new_folder(output, arguments.overwrite) as folder:
         write_files(diagnosis, folder, pictures=not arguments.no_pictures)
@@ -181,6 +194,50 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
         note = 'no soil was stated (--config): the default sand was taken for the model believed in'
         diagnosis = replace(diagnosis, notes=(*diagnosis.notes, note))
     return diagnosis
+
+
+def _each_with_its_soil(arguments: argparse.Namespace) -> int:
+    """Diagnose each table with a soil of its own, side by side, and sum up what they favour."""
+    from wheel_terra_estimator.discrepancy.report.model_file import write_files
+    from wheel_terra_estimator.discrepancy.report.several import (
+        over_all,
+        write_shared_effect,
+        write_summary,
+    )
+
+    names = _folder_names(arguments.data)
+    plain = {key: value for key, value in vars(arguments).items() if key != 'run'}
+    tasks = [argparse.Namespace(**{**plain, 'data': [data]}) for data in arguments.data]
+    found: dict[str, Diagnosis] = {}
+    for index, outcome in finished(_diagnosed, tasks, arguments.jobs):
+        if isinstance(outcome, Exception):
+            raise outcome
+        found[names[index]] = outcome
+    found = {name: found[name] for name in names}
+    output: Path = arguments.output
+    with new_folder(output, arguments.overwrite) as folder:
+        for name, diagnosis in found.items():
+            (folder / name).mkdir()
+            write_files(diagnosis, folder / name, pictures=not arguments.no_pictures)
+        write_summary(found, folder / 'summary.csv')
+        write_shared_effect(found, folder / 'effect.yaml')
+    if arguments.json:
+        print(json.dumps({name: diagnosis.to_dict() for name, diagnosis in found.items()}))
+        return 0
+    for name, diagnosis in found.items():
+        print(f'{name}:')
+        _tell(diagnosis, output / name)
+    print(over_all(found))
+    return 0
+
+
+def _folder_names(data: list[str]) -> list[str]:
+    """Return a name for each table: that of its file, with a number where two are alike."""
+    names: list[str] = []
+    for path in map(Path, data):
+        stem = path.stem or 'table'
+        names.append(stem if stem not in names else f'{stem}_{len(names) + 1}')
+    return names
 
 
 def _tell(diagnosis: Diagnosis, output: Path) -> None:
