@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import os
 import random
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState
 
 NODE = '/wheel_terra_estimator'
+TICKS = os.sysconf('SC_CLK_TCK')
 NOISES = 997
 """Draws of noise that are used in turn."""
 
@@ -31,6 +33,11 @@ class Process:
 
     def __init__(self, arguments: Sequence[str]) -> None:
         self._popen = subprocess.Popen([sys.executable, *arguments])
+
+    def seconds(self) -> float:
+        """Return the processor time so far [s]."""
+        fields = Path(f'/proc/{self._popen.pid}/stat').read_text().rpartition(')')[2].split()
+        return (int(fields[11]) + int(fields[12])) / TICKS
 
     def resident(self) -> float:
         """Return the resident memory [MB]."""
@@ -102,6 +109,10 @@ class Rover(Node):
         for topic in ('sinkage', 'slip_stddev', 'sinkage_stddev', 'mobility', 'soil'):
             self.create_subscription(JointState, f'{NODE}/{topic}', self._on_other, 100)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
+
+    def slow_down(self, topic: str, rate: float) -> None:
+        """Publish a topic at another rate [Hz] from now on."""
+        self._periods[topic] = 1.0 / rate
 
     def publish_due(self) -> float:
         """Send what is due; return when the next message is."""
