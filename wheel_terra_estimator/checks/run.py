@@ -158,15 +158,19 @@ def _examined(
     evidence = against_each_other(recording, facts, AGAINST_EACH_OTHER, mended)
     if evidence is None:
         report.not_checked.append(NotChecked('sign', 'no wheel rates to compare with'))
-    rims = np.zeros(1)
-    if evidence is not None:  # means over a second: noise turns no wheel
-        width = evidence.rows_in(1.0)
-        means = [np.abs(moving_mean(np.nan_to_num(speed), width)) for speed in evidence.speed.T]
-        rims = np.max(means, axis=0)
-    if np.quantile(rims, 0.99) < LEAST_RIM_SPEED and not report.findings:
+    if not report.findings and not _drives(evidence):
         topic = recording.joints.topic if recording.joints is not None else ''
         report.take([found('no_drive', topic, 0.99)])
     return evidence
+
+
+def _drives(evidence: Evidence | None) -> bool:
+    """Return whether a wheel turns; by means over a second, since noise turns none."""
+    if evidence is None:
+        return False
+    width = evidence.rows_in(1.0)
+    means = [np.abs(moving_mean(np.nan_to_num(speed), width)) for speed in evidence.speed.T]
+    return bool(np.quantile(np.max(means, axis=0), 0.99) >= LEAST_RIM_SPEED)
 
 
 class Mended:

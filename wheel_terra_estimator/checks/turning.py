@@ -524,9 +524,19 @@ def _gyro_by_heading(evidence: Evidence, imu: ImuSeries) -> float:
     heading = _heading(evidence, imu)
     if heading is None:
         return 0.0
-    gyro = np.cumsum(evidence.yaw * np.diff(evidence.time, prepend=evidence.time[0]))
+    gyro = _integrated(evidence, evidence.yaw)
+    return correlation(_turns(evidence, heading), _turns(evidence, gyro))
+
+
+def _integrated(evidence: Evidence, yaw_rate: FloatArray) -> FloatArray:
+    """Return the heading (k,) [rad] of a yaw rate (k,) [rad/s]."""
+    return np.cumsum(yaw_rate * np.diff(evidence.time, prepend=evidence.time[0]))
+
+
+def _turns(evidence: Evidence, heading: FloatArray) -> FloatArray:
+    """Return by how much a heading (k,) changes over `HEADING_TIME` [rad]."""
     rows = evidence.rows_in(HEADING_TIME)
-    return correlation(heading[rows:] - heading[:-rows], gyro[rows:] - gyro[:-rows])
+    return heading[rows:] - heading[:-rows]
 
 
 def _heading(evidence: Evidence, imu: ImuSeries) -> FloatArray | None:
@@ -544,18 +554,16 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     imu, reference, pairs = evidence.recording.imu, evidence.recording.reference, []
     if imu is None or evidence.gyro is None:
         return [], evidence
-    steps = np.diff(evidence.time, prepend=evidence.time[0])
-    turned, heading = np.cumsum(evidence.yaw * steps), _heading(evidence, imu)
+    heading = _heading(evidence, imu)
     if heading is not None:
         pairs.append(('orientation', heading))
     if reference is not None and reference.stamp.size > 1:
         at = evidence.seconds(reference)
         yaw = np.interp(evidence.time, at, np.nan_to_num(reference.yaw_rate))
-        pairs.append(('twist.angular', np.cumsum(yaw * steps)))
-    rows = evidence.rows_in(HEADING_TIME)
-    gyro = turned[rows:] - turned[:-rows]
+        pairs.append(('twist.angular', _integrated(evidence, yaw)))
+    gyro = _turns(evidence, _integrated(evidence, evidence.yaw))
     for name, other in pairs:
-        seen = other[rows:] - other[:-rows]
+        seen = _turns(evidence, other)
         if correlation(gyro, seen) < SAME_TURNS:
             continue
         scale = block_fit(np.column_stack([seen, np.ones(seen.size)]), gyro)[0]

@@ -98,13 +98,13 @@ _UNSTATED_LOAD_STD = 0.2
 """Deviation of a wheel's load over the mean load where nobody states the suspension of more than
 four wheels: pivots off the middle load the axles of a rocker-bogie by 1.28, 0.83 and 0.91 of what a
 rigid chassis does."""
-_LOADS_BY_SIZE = 4  # wheels up to which the suspension hardly matters
+_FEW_WHEELS = 4  # up to which the suspension hardly matters
 
 
 def _load_std(configuration: Configuration) -> float:
     """Return the deviation of the load of a wheel, over the mean load."""
     told = not {'rover.load_std', 'rover.suspension'}.isdisjoint(configuration.stated)
-    if told or configuration.wheels.count <= _LOADS_BY_SIZE:
+    if told or configuration.wheels.count <= _FEW_WHEELS:
         return float(configuration.rover.load_std)
     return _UNSTATED_LOAD_STD
 
