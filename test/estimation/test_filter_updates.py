@@ -401,7 +401,7 @@ def forces(parts, ekf):
     return linearised(parts, ekf.mean, loads), loads
 
 
-def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0):
+def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0, reference_known=True):
     update, (found, _) = (
         TorqueUpdate(parts.configuration, parts.rover, parts.layout),
         forces(parts, ekf),
@@ -414,7 +414,33 @@ def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0):
         turning=(True,) * 4 + (False,) * 2,
         model_variance=(doubt,) * 6,
         repeats=repeats,
+        reference_known=reference_known,
     ), found
+
+
+def test_without_a_reference_torques_tell_little_by_what_they_differ(parts, ekf):
+    """The mean of all is known as well as by single rows, what they differ by a fifth as well."""
+    alone, _ = torque_rows(parts, ekf, 0.3, repeats=10.0)
+    rows, found = torque_rows(parts, ekf, 0.3, repeats=10.0, reference_known=False)
+    same = np.array([1.0, 1.0, 1.0, 1.0])
+
+    def information(rows):
+        """Fisher information of the jacobians' own coordinates: H' R^-1 H with H = rows of I."""
+        J = np.array([row.jacobian for row in rows])
+        W = J / np.sqrt([[row.variance] for row in rows])
+        return (
+            np.linalg.pinv(np.array([row.jacobian for row in alone]).T)
+            @ W.T
+            @ W
+            @ np.linalg.pinv(np.array([row.jacobian for row in alone]))
+        )
+
+    inverse = np.linalg.inv(information(rows))
+    single = np.diag([row.variance for row in alone])
+    apart = 0.025 * float(np.abs(found.torque).mean())
+    expected = single + apart**2 * 10.0 * 5.0 / 0.15 * (np.eye(4) - 0.25)
+    assert inverse == pytest.approx(expected, rel=1e-6)
+    assert same @ inverse @ same == pytest.approx(same @ single @ same)
 
 
 def test_torques_are_rows_of_turning_wheels_that_were_read(parts, ekf):
@@ -448,6 +474,7 @@ def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ek
             torque=tuple(torque.tolist()),
             variance=parts.sensors.torque_std**2,
             turning=(True,) * 6,
+            reference_known=True,
             model_variance=(0.0,) * 6,
             repeats=1.0,
         )
@@ -471,6 +498,7 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
             torque=tuple(found.torque.tolist()),
             variance=noise,
             turning=(True,) * 6,
+            reference_known=True,
             **given,
         )
         total = balance.sum_of_pulls(window(0.0, 9.8), loads, 0.0)

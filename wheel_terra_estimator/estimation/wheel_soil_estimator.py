@@ -634,6 +634,7 @@ class WheelSoilEstimator:
             turning=cycle.turns,
             model_variance=model_variance,
             repeats=repeats,
+            reference_known=cycle.reference_known,
         )
         read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
         self._speed.follow_contacts(

@@ -71,7 +71,7 @@ class PriorTuning:
     most_speed: float = 20.0  # [m/s]
     most_gravity_bias: float = 2.0  # [m/s^2]
     most_strength: float = 1.0  # [ln]
-    most_shear_modulus: float = 1.0  # [ln]
+    most_shear_modulus: float = 1.3  # [ln]
     most_slip_sinkage: float = 0.8
     most_centroid: float = 0.3
     most_mound: float = 0.6

@@ -13,12 +13,18 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.filter.consistency import distrusted, smoothed_nis
+from wheel_terra_estimator.estimation.filter.correlation import SAME_GROUND
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover
 
 Floats = tuple[float, ...]
 _FLOOR_VARIANCE = 1e-6  # [N^2 m^2]
+_APART_STD = 0.025
+"""What a wheel's torque differs by from the models of all, over their mean: loads and ground of
+each. Tuned without references on simulators A, B and a foreign one."""
+_APART_LENGTH = 5.0  # rim travel over which it lasts [m]
+_LEAST_APART = 2  # wheels that can differ
 
 
 class ForceRows(Component['float | None']):
@@ -67,6 +73,7 @@ class TorqueUpdate(ForceRows):
         turning: tuple[bool, ...],
         model_variance: Floats,
         repeats: float,
+        reference_known: bool,
     ) -> list[Row]:
         """Return the rows of the torques of a cycle.
 
@@ -86,6 +93,9 @@ class TorqueUpdate(ForceRows):
             Of the shear model of each wheel, over its square [-].
         repeats : float
             Cycles that are one piece of information.
+        reference_known : bool
+            Without a reference velocity the slip follows what all torques say, and only little what
+            they differ by.
         """
         rows = []
         H, zeros = forces.torque_rows, self.zeros(ekf.mean)
@@ -102,4 +112,18 @@ class TorqueUpdate(ForceRows):
             total = repeats * noise + model_variance[i] * model**2
             total += noises[i] ** 2
             rows.append(self.row(Row(reading - zeros[i] - model, H[i], total), priors[i]))
-        return rows
+        if reference_known or len(rows) < _LEAST_APART:
+            return rows
+        return _independent(rows, _APART_STD * float(np.abs(forces.torque).mean()), repeats)
+
+
+def _independent(rows: list[Row], apart: float, repeats: float) -> list[Row]:
+    """Return rows with independent errors for rows that differ by a lasting `apart` [N m] as well.
+
+    That is about the mean of all, so the mean is known as well as before.
+    """
+    residuals, jacobians, variances = zip(*rows, strict=True)
+    n, lasting = len(rows), apart**2 * repeats * _APART_LENGTH / SAME_GROUND
+    root = np.linalg.cholesky(np.diag(variances) + lasting * (np.eye(n) - 1.0 / n))
+    whole = np.linalg.solve(root, np.column_stack([residuals, jacobians]))
+    return [Row(float(row[0]), row[1:], 1.0) for row in whole]
