@@ -57,7 +57,7 @@ class PriorTuning:
     sinkage_floor: float = 0.005  # [m]
     own_stiffness_share: float = 0.5
     """Spread of the stiffness between wheels, over that of all wheels together."""
-    least_strength_std: float = 0.1  # [ln]
+    least_strength_std: float = 0.2  # [ln]
     least_shear_modulus_std: float = 0.3  # [ln]
     least_stiffness_std: float = 0.2  # [ln]
     unstated_strength_std: float = 0.3
