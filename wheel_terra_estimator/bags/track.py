@@ -24,7 +24,11 @@ from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.measurements import InertialReading, Measurement
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    Measurement,
+    heading_of,
+)
 from wheel_terra_estimator.messages.convert import ODOMETRY, stamp_of
 
 SPACING = 0.02
@@ -87,7 +91,7 @@ class TrackRecorder:
         # Both are learned by one factor; either may be 0.
         self._modulus = max(moduli.items(), key=lambda item: abs(item[1]))
         self._attitude_stamps: list[int] = []
-        self._attitudes: list[tuple[float, float]] = []  # heading and sine of the climb
+        self._attitudes: list[tuple[float, float]] = []  # heading [rad], sine of the climb (nose up)
         self._rows = ThinnedRows(MOST_POINTS)
         self._origin = self._stamp = self._noted = 0
         self._place = [0.0, 0.0, 0.0]
@@ -100,7 +104,9 @@ class TrackRecorder:
         stamps = self._attitude_stamps
         if not stamps or measurement.stamp - stamps[-1] >= ATTITUDE_PERIOD / _SECOND:
             stamps.append(measurement.stamp)
-            self._attitudes.append(heading_and_climb(measurement.orientation))
+            x, y, z, w = measurement.orientation.tolist()
+            heading = float(heading_of(measurement.orientation))
+            self._attitudes.append((heading, -2.0 * (w * y - x * z)))
 
     def add(self, estimates: EstimateSet) -> None:
         """Go on to a set."""
@@ -175,13 +181,6 @@ class TrackRecorder:
         )
 
 
-def heading_and_climb(orientation: FloatArray) -> tuple[float, float]:
-    """Return heading [rad] and sine of the climb (nose up) of a quaternion x, y, z, w."""
-    x, y, z, w = orientation.tolist()
-    heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return heading, -2.0 * (w * y - x * z)
-
-
 def read_odometry(bag: Bag, topic: str) -> Track:
     """Read the positions of an odometry (nav_msgs/Odometry) in a recording.
 
@@ -205,7 +204,7 @@ def read_odometry(bag: Bag, topic: str) -> Track:
         pose = message.pose.pose
         turned = np.array([getattr(pose.orientation, axis) for axis in 'xyzw'])
         place = [pose.position.x, pose.position.y, pose.position.z]
-        row = [*place, heading_and_climb(turned)[0]]
+        row = [*place, float(heading_of(turned))]
         if np.isfinite(row).all():
             rows[stamp_of(message)] = row
     if not rows:

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 
@@ -73,6 +75,12 @@ class InertialReading:
     angular_rate: FloatArray
     orientation: FloatArray | None
     variance: InertialVariance = NO_VARIANCE
+
+
+def heading_of(orientation: FloatArray) -> Any:
+    """Return the heading [rad] of quaternions x, y, z, w (..., 4), from x of the world to y."""
+    x, y, z, w = np.moveaxis(orientation, -1, 0)
+    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 @dataclass(frozen=True)
