@@ -21,7 +21,7 @@ def test_joints_that_steer(stated):
     stamp = np.arange(10) * 100_000_000
     rate = np.ones((10, len(names)))
     joints = JointSeries('/joint_states', stamp, stamp, names, rate, np.full_like(rate, np.nan))
-    outcomes = check_wheel_names(
+    outcomes, _ = check_wheel_names(
         Recording('drive', (), joints, None, None, None, None), from_configuration(rover)
     )
     cures = [str(outcome.cure) for outcome in outcomes]

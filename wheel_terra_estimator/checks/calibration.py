@@ -142,7 +142,7 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
     source = told.words if told is not None else 'mean specific force'
     tilt = imu.small_tilt(evidence)
     if tilt is not None and tilt.std < imu.EVEN_GROUND_STD:
-        if tilt.sigmas > CLEAR:
+        if tilt.sigmas > CLEAR and tilt.sure > LEAST_SURE:
             rotation = tilt.taken_off(rotation)
         std = math.degrees(tilt.std)
         source = f'specific force over {tilt.turn:.0f} rad of turning, slope taken off'
@@ -153,13 +153,11 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
 
 def _biases(changes: _Changes, evidence: Evidence) -> None:
     configuration = evidence.facts.configuration
-    if evidence.gyro is None or configuration is None:
-        return
-    bias, std, where = imu.gyro_bias(evidence)
-    if np.isfinite(std).all():
-        whole = (bias + configuration.sensors.angular_rate_bias).round(6).tolist()
-        source = f'mean of the gyro {where}'
-        changes.add('sensors.angular_rate_bias', whole, float(np.max(std)), source)
+    seen = imu.gyro_bias(evidence)
+    if seen is not None and configuration is not None:
+        whole = (seen[0] + configuration.sensors.angular_rate_bias).round(6).tolist()
+        source = 'mean of the gyro at rest'
+        changes.add('sensors.angular_rate_bias', whole, float(np.max(seen[1])), source)
 
 
 SEEN = {
@@ -224,7 +222,9 @@ def _torques(changes: _Changes, evidence: Evidence) -> None:
     if evidence.force is None:
         return
     zeros = torque.torque_zeros(evidence)
-    if zeros is not None and any(zero.sigmas_from(0.0) > CLEAR for zero in zeros):
+    if zeros is None or torque.like_a_pitch(evidence, zeros):
+        return
+    if any(zero.sigmas_from(0.0) > CLEAR for zero in zeros):
         zeros = torque.whole_zeros(evidence, zeros)
         after, std = [round(zero.value, 3) for zero in zeros], max(zero.std for zero in zeros)
         source = 'straight stretches driven both ways'

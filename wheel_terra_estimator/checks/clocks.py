@@ -139,16 +139,13 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 def _counts(evidence: Evidence, name: str, told: Lag) -> bool:
     least = max(LEAST_OFFSET[name], 1.5 * evidence.period)
     if name == 'reference' and evidence.recording.reference is not None:
-        least = max(least, LEAST_PERIODS * _period(evidence.recording.reference))
+        least = max(least, LEAST_PERIODS * evidence.recording.reference.period)
     return told.counts(least)
 
 
 def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
     """Return the sensor whose stamps are off: the one that is off against both others."""
     late = {name: told for name, told in lags.items() if _counts(evidence, name, told)}
-    if len(late) == 2 and not all(told.steady for told in late.values()):
-        late = {name: told for name, told in late.items() if told.steady}
-        lags = late
     if len(late) == 2:
         imu, reference = late['imu'], late['reference']
         std = math.hypot(
@@ -174,7 +171,8 @@ def _by_arrival(evidence: Evidence, name: str, late: float) -> int:
 
     ``late`` is what the other sensor seems late [s].
     """
-    own, others = arrival(evidence.joints), arrival(getattr(evidence.recording, name))
+    channels = evidence.joints, _channel(evidence, name)
+    own, others = (float(np.median(channel.late)) for channel in channels)
     if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
         by_age = abs(own - late) < abs(own) - 0.5 * abs(late)
         return 1 if by_age or own < FUTURE < others else -1
@@ -184,7 +182,7 @@ def _by_arrival(evidence: Evidence, name: str, late: float) -> int:
 
 def _whole_std(evidence: Evidence, name: str, told: Lag) -> float:
     """Return the deviation of a lag [s]; between two messages nothing is known of a change."""
-    between = BETWEEN * max(evidence.period, _period(_channel(evidence, name)))
+    between = BETWEEN * max(evidence.period, _channel(evidence, name).period)
     return math.hypot(told.std, between, LEAST_STD[told.by])
 
 
@@ -209,15 +207,6 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
         side = 'early' if told.value > 0.0 else 'late'
         told_of['against'] += f', or those of the wheels are too {side}'
     return evidence.found(f'{name}_offset', 0.97 if told.alone else 0.5, **told_of)
-
-
-def arrival(channel: Channel) -> float:
-    """Return the usual time from stamp to log time [s]."""
-    return float(np.median(channel.log_time - channel.stamp)) * 1e-9
-
-
-def _period(channel: Channel) -> float:
-    return float(np.median(np.abs(np.diff(channel.stamp)))) * 1e-9
 
 
 # Lags of pairs -----------------------------------------------------------------------------------
@@ -270,7 +259,7 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
         return NotChecked('delay', 'reference: the drive is too short')
     order = np.argsort(at, kind='stable')
     period = float(np.median(np.diff(at[order])))
-    forward = without_single_ones(reference.velocity[order, 0])
+    forward = reference.velocity[order, 0]
     rim = _even(evidence, evidence.rim, time)
     if period > SLOWEST or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')
@@ -279,13 +268,6 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
         return NotChecked('delay', 'reference: does not follow the wheels closely enough')
     evidence.figures['reference.delay_s'] = round(told.value, 3)
     return told
-
-
-def without_single_ones(values: FloatArray) -> FloatArray:
-    """Return (k,) values with single wild ones replaced by the median of three."""
-    calm = values.copy()
-    calm[1:-1] = np.median(np.stack([values[:-2], values[1:-1], values[2:]]), axis=0)
-    return calm
 
 
 def _even(evidence: Evidence, values: FloatArray, time: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
 from wheel_terra_estimator.checks.faults import FAULTS, found
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
@@ -44,6 +44,8 @@ SHORTEST_FREE = 3.0
 """Wheels that turn so long while the rover stands may be in the air [s]."""
 LEAST_MOVING_ROWS = 30
 """Fewer rows of driving than these tell nothing."""
+AROUND = 0.25
+"""Half of the time around a velocity that rim speeds are averaged over [s]."""
 
 
 @dataclass(frozen=True)
@@ -264,7 +266,7 @@ class Evidence:
         smooth = moving_mean(np.nan_to_num(reference.velocity[:, 0]), SMOOTH_ROWS)
         return _shared(np.abs(np.interp(self.time, self.seconds(reference), smooth)))
 
-    def rim_at(self, stamp: NDArray[np.int64], values: FloatArray, half: float) -> FloatArray:
+    def rim_at(self, stamp: IntArray, values: FloatArray, half: float = AROUND) -> FloatArray:
         """Return means of (k,) values within ``half`` [s] around stamps [ns]; nan for none."""
         at = (stamp - self.origin) * 1e-9
         first = np.searchsorted(self.time, at - half)

@@ -34,12 +34,11 @@ from wheel_terra_estimator.checks.statistics import (
     confidence,
     correlation,
     moving_mean,
-    robust_std,
+    probability,
     robust_std_of_rows,
     runs,
     step_of,
 )
-from wheel_terra_estimator.checks.torque import heading_of_torque, slope_on_the_level
 from wheel_terra_estimator.checks.trial import Trial
 from wheel_terra_estimator.checks.turning import ordinary_track, track_ratio
 from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
@@ -59,8 +58,6 @@ LEAST_SHOWN = 0.01
 """Change of an angle [deg] below which a cure leaves it out."""
 LEAST_MOUNTING = math.radians(1.5)
 """Mounting errors below this [rad] are left to calibration."""
-LEAST_PITCH = math.radians(3.0)
-"""The same of a pitch that the torques tell [rad]."""
 LONGEST_GAP = 1.0
 """Time without IMU in which a turn may pass unseen [s]."""
 LEAST_TURN = 4.5
@@ -69,28 +66,29 @@ FLAT_TURN_STD = math.radians(0.1)
 """Part of the mounting that unevenness of the ground leaves open [rad]."""
 TURNED_ROUND = 0.75
 """Probability that an IMU that no curve shows is turned round, not its x axis reversed [-]."""
-ROUGH, LEAST_QUARTER = math.radians(4.0), math.radians(45.0)
-"""Deviation beyond which a yaw is told roughly, and least yaw of a quarter turn [rad]."""
+LEAST_QUARTER = math.radians(45.0)
+"""Least yaw of a quarter turn [rad]."""
 ALONG_AXIS = math.cos(math.radians(25.0))
 """Cosine of the angle to an axis within which that axis is meant [-]."""
-SLOPES_STD = math.radians(5.0)
-"""Deviation that soil leaves in a direction by torques on slopes [rad]."""
 EVEN = 0.6
 """Length of the mean direction of the headings in turns, 0 where all occur alike, at most [-]."""
 EVEN_GROUND_STD = math.radians(0.8)
 """Deviation of a tilt [rad] above which the ground was no plane."""
 NOISE_FACTOR = 4.0
 """Noise above so many times the stated one is a finding."""
-DEGREES = (0.4, 4.0)
-"""Noise of a gyro over the one stated, if it were in degrees per second, that tells it is [-]."""
-PERHAPS_DEGREES = 0.15
-"""The same, from which it may be [-]."""
+DEGREES = (0.15, 4.0)
+"""Noise of a gyro over the one stated if it were in degrees per second, as it then may be [-]."""
 BIAS_FACTOR = 6.0
 """A bias above so many stated deviations is a finding."""
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
+LEAST_STANDSTILL = 3.0  # [s]
 BIAS_SIGMAS = 5.0
-TILT_IS_MOUNTING = 0.95
+TILT_IS_MOUNTING = 0.7
 """Probability that a tilt seen in circles is the mounting and not the accelerometer's zero [-]."""
+NO_ZERO = 0.97
+"""The same, from which the mounting is named alone [-]."""
+CROSS_AXIS = 0.01
+"""Misalignment of the axes of gyro and accelerometer in one housing [rad]; data sheets of MEMS."""
 LEAST_TURNING = 10.0
 """Time of turning [s] in which wheels that dig do not agree with a gyro by chance."""
 UNTURNED = 0.85
@@ -157,21 +155,17 @@ def check_imu(state: ImuState) -> Judged:
         ]
         return none, replace(state, usable_force=False, usable_gyro=False)
     outcomes, state = _placeholders(state)
-    if state.usable_force and state.usable_gyro:
-        told, state = _frozen(state)
-        outcomes += told
-    if state.usable_force:
-        told, state = _gravity(state)
-        outcomes += told
-    if state.usable_force and state.usable_gyro:
-        told, state = _wild(state)
-        outcomes += told
-    if state.usable_force:
-        told, state = _up_by_orientation(state)
-        outcomes += told
-    if state.usable_gyro:
-        told, state = _against_orientation(state)
-        outcomes += told
+    force, gyro = 'usable_force', 'usable_gyro'
+    for check, *needed in (
+        (_frozen, force, gyro),
+        (_gravity, force),
+        (_wild, force, gyro),
+        (_up_by_orientation, force),
+        (_against_orientation, gyro),
+    ):
+        if all(getattr(state, name) for name in needed):
+            told, state = check(state)
+            outcomes += told
     return outcomes, state
 
 
@@ -322,6 +316,7 @@ class Mounting:
     roll: Estimate
     pitch: Estimate
     turn: float  # heading covered [rad]
+    sure: float  # probability that it is no zero of the accelerometer
 
     @property
     def std(self) -> float:
@@ -366,18 +361,16 @@ def gross_tilt(evidence: Evidence) -> FloatArray | None:
     return np.asarray(Rotation.from_rotvec(turn).as_matrix())
 
 
-def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray, str]:
-    """Return the gyro's bias (3,) [rad/s], its deviation, and where it was seen."""
-    assert evidence.gyro is not None
-    imu = evidence.recording.imu
-    heard = evidence.time <= (0.0 if imu is None else evidence.seconds(imu).max())
-    rest = evidence.at_rest & heard  # behind its last message nothing is known
-    rows = evidence.gyro[rest]
-    if rest.sum() * evidence.period >= 3.0:
-        spread = np.array([robust_std(column) for column in rows.T])
-        return np.median(rows, axis=0), spread / math.sqrt(max(rest.sum() / 4.0, 1.0)), 'at rest'
-    nothing = np.full(3, np.nan)
-    return np.zeros(3), nothing, 'nowhere: no standstill'
+def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
+    """Return the gyro's bias at rest (3,) [rad/s] and its deviation; None without a standstill."""
+    imu, gyro = evidence.recording.imu, evidence.gyro
+    if imu is None or gyro is None:
+        return None
+    rest = evidence.at_rest & (evidence.time <= evidence.seconds(imu).max())  # while it is heard
+    if rest.sum() * evidence.period < LEAST_STANDSTILL:
+        return None
+    spread = robust_std_of_rows(gyro[rest].T)
+    return np.median(gyro[rest], axis=0), spread / math.sqrt(max(rest.sum() / 4.0, 1.0))
 
 
 def small_tilt(evidence: Evidence) -> Mounting | None:
@@ -394,11 +387,13 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     track = track_ratio(evidence)
     if track is None or (evidence.facts.known and not ordinary_track(track)):
         return None  # the wheels see no such turns: a bias, or another unit
-    bias, std, _ = gyro_bias(evidence)
-    if not np.isfinite(std).all():  # by the wheels, which see no turn where there is none
+    seen = gyro_bias(evidence)
+    if seen is not None:
+        bias = float(seen[0][2])
+    else:  # by the wheels, which see no turn where there is none
         turns = np.column_stack([evidence.side_difference, np.ones(evidence.time.size)])
-        bias = np.array([0.0, 0.0, block_fit(turns, evidence.gyro[:, 2])[1].value])
-    yaw = evidence.gyro[:, 2] - bias[2]
+        bias = block_fit(turns, evidence.gyro[:, 2])[1].value
+    yaw = evidence.gyro[:, 2] - bias
     turned = yaw * np.minimum(np.diff(evidence.time, prepend=evidence.time[0]), 1.0)
     smooth = np.abs(moving_mean(yaw, evidence.rows_in(2.0)))
     turning = smooth > 0.5 * float(np.quantile(smooth, 0.97))
@@ -415,8 +410,16 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     if evidence.facts.configuration is not None:
         sensors = evidence.facts.configuration.sensors
         floor = math.hypot(floor, sensors.specific_force_bias_std / evidence.facts.gravity)
+    # A body that turns on a plane turns about its own axis: an IMU that is tilted has part of the
+    # turns on x and y, a zero of the accelerometer leaves them there as they are.
+    turns = np.column_stack([yaw, np.ones(yaw.size)])[turning, : 2 if seen is None else 1]
+    axis = [block_fit(turns, column)[0] for column in evidence.gyro[turning, :2].T]
+    both = np.array([along.value, across.value]), np.array([a.value for a in axis])
+    var = max(a.std for a in axis) ** 2 + CROSS_AXIS**2 + floor**2
+    odds = (both[0] @ both[1] - 0.5 * both[0] @ both[0]) / var
     # A sensor whose x axis points up by p reads +g sin p on x; one rolled by q reads -g sin q on y.
     return Mounting(
+        sure=probability(math.log(TILT_IS_MOUNTING / (1.0 - TILT_IS_MOUNTING)) + float(odds)),
         roll=Estimate(across.value, math.hypot(across.std, floor)),
         pitch=Estimate(-along.value, math.hypot(along.std, floor)),
         turn=covered,
@@ -424,32 +427,19 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
 
 
 def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
-    """Return the yaw of the IMU in ``base_link`` [rad] and its trial, angles off."""
-    felt = felt_motion(evidence)
+    """Return the yaw of the IMU in ``base_link`` [rad] and its trial, angles off.
+
+    Slopes at the places of starts and stops fall off faster than these: a rover that goes to and
+    fro feels the same ones each time.
+    """
+    felt, quick = felt_motion(evidence), felt_motion(evidence, 0.5 * DRIFT)
     by_motion = yaw_of_motion(*felt) if felt is not None else None
-    by_torque = heading_of_torque(evidence)
-    if by_torque is not None:
-        by_torque = by_torque._replace(std=math.hypot(by_torque.std, SLOPES_STD))
-    told = sorted((e for e in (by_motion, by_torque) if e is not None), key=lambda e: e.std)
-    if not told:
+    if by_motion is None or quick is None:
         return None
-    first = second = told[0].value
-    if len(told) > 1:
-        second = told[1].value  # slopes and starts are each other's trial
-    elif felt is not None and by_motion is not None:
-        # Slopes at the places of starts and stops fall off faster than these: a rover that goes
-        # to and fro feels the same ones each time.
-        quick = felt_motion(evidence, 0.5 * DRIFT)
-        assert quick is not None
-        first, second = (float(np.angle(parts.sum())) for parts, _ in (felt, quick))
-    else:
-        one, other = (heading_of_torque(evidence, half) for half in (0, 1))
-        if one is None or other is None:
-            return None
-        first, second = one.value, other.value
-    apart = abs(math.remainder(first - second, 2.0 * math.pi))
-    seen = Estimate(told[0].value, math.hypot(told[0].std, 0.5 * apart))
-    return seen, Trial(abs(math.remainder(second, 2.0 * math.pi)), apart)
+    other = float(np.angle(quick[0].sum()))
+    apart = abs(math.remainder(by_motion.value - other, 2.0 * math.pi))
+    seen = Estimate(by_motion.value, math.hypot(by_motion.std, 0.5 * apart))
+    return seen, Trial(abs(math.remainder(other, 2.0 * math.pi)), apart)
 
 
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -461,7 +451,7 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [told_of], replace(evidence, force=evidence.force * signs)
     told = yaw_of_imu(evidence)
     if told is None:
-        reason = 'yaw of the IMU: neither lively starts and stops nor slopes in it'
+        reason = 'yaw of the IMU: no lively starts and stops in it'
         return [NotChecked('mounting', reason)], evidence
     seen, trial = told
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
@@ -479,8 +469,6 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not clear and math.cos(seen.value) < -ALONG_AXIS:
         words['rival'] = ', or linear_acceleration.x has the wrong sign: drive circles'
         sure = TURNED_ROUND
-    elif seen.std > ROUGH and not _quarter(seen):
-        words['rival'], sure = ' (roughly: measure it)', 0.6
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)
     return [mounting_finding('imu_yaw', evidence, mended, words['off'], sure, **words)], mended
 
@@ -534,14 +522,6 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if evidence.force is None:
         return [], evidence
     tilt = small_tilt(evidence)
-    pitch = slope_on_the_level(evidence) if tilt is None or tilt.std > EVEN_GROUND_STD else None
-    if pitch is not None and pitch.sigmas_from(0.0) > 4.0 and LEAST_PITCH < abs(pitch.value) < 0.5:
-        nothing = Estimate(0.0, pitch.std)
-        seen = Mounting(nothing, Estimate(-pitch.value, pitch.std), 0.0)
-        mended, std = evidence.turned(seen.taken_off(evidence.rotation)), math.degrees(pitch.std)
-        words = {'size': math.degrees(abs(pitch.value)), 'off': std}
-        told = mounting_finding('imu_pitch', evidence, mended, std, 0.5, **words)
-        return [told], mended
     if tilt is None:
         reason = 'no full circle in it: mounting not told from slope; drive a circle both ways'
         return [NotChecked('mounting', reason)], evidence
@@ -555,16 +535,22 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     size = math.hypot(tilt.roll.value, tilt.pitch.value)
     if size < LEAST_MOUNTING or tilt.sigmas < 4.0:
         return [], evidence
-    mended = evidence.turned(tilt.taken_off(evidence.rotation))
-    sure = min(confidence(tilt.sigmas), TILT_IS_MOUNTING)
     gravity, biases = evidence.facts.gravity, np.zeros(3)
+    off = gravity * np.array([-tilt.pitch.value, tilt.roll.value, 0.0])
     if evidence.facts.configuration is not None:
         biases += evidence.facts.configuration.sensors.specific_force_bias
-    biases[:2] += gravity * np.array([-tilt.pitch.value, tilt.roll.value])
-    words = {'size': math.degrees(size), 'zero': math.sin(size) * gravity}
-    shown = listed(biases, '.2f')
-    told = mounting_finding('imu_tilt', evidence, mended, std, sure, biases=shown, **words)
-    return [told], mended
+    zero = f'sensors.specific_force_bias: [{listed(biases + off, ".2f")}]'
+    words = {'size': math.degrees(size), 'zero': math.sin(size) * gravity, 'biases': zero}
+    sure = confidence(tilt.sigmas) * max(tilt.sure, 1.0 - tilt.sure)
+    if tilt.sure < 0.5:
+        words['rival'] = ', or its axes are tilted' if tilt.sure > 1.0 - NO_ZERO else ''
+        told_of = evidence.found('force_bias', sure, **words)
+        return [told_of], replace(evidence, force=evidence.force - off)
+    if tilt.sure < NO_ZERO:
+        words['rival'] = f' (or its accelerometer is off by {words["zero"]:.2g} m/s^2)'
+        words['separate'] = f'  (or {zero}, in the frame that is mounted so now)'
+    mended = evidence.turned(tilt.taken_off(evidence.rotation))
+    return [mounting_finding('imu_tilt', evidence, mended, std, sure, **words)], mended
 
 
 def mounting_angles(rotation: FloatArray) -> list[float]:
@@ -615,35 +601,25 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         told: dict[str, Any] = {'noise': noise, 'stated': stated, 'unit': unit}
         told |= {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}'}
         if DEGREES[0] < in_degrees < DEGREES[1]:  # which of both, a turn would tell
-            perhaps = {'times': noise / stated, 'how': 'noise of a gyro'}
-            unit_of_gyro = evidence.found('gyro_degrees', 0.55, value=math.radians(1.0), **perhaps)
-            return [*outcomes, unit_of_gyro, evidence.found('imu_noise', 0.4, **told)]
-        if PERHAPS_DEGREES < in_degrees < DEGREES[0]:
             reason = f'gyro: noise of {noise:.2g}: vibration, or degrees per second; drive a circle'
             outcomes += [NotChecked(kind, reason) for kind in ('unit', 'noise')]
         elif noise > NOISE_FACTOR * stated:
             by_noise = False  # vibration, which a gyro has as well
             outcomes.append(evidence.found('imu_noise', confidence(noise / stated), **told))
-    bias, std, where = gyro_bias(evidence)
-    if not np.isfinite(std).all():
-        reason = 'IMU: no standstill of 3 s in it; stand still for 10 s'
+    seen = gyro_bias(evidence)
+    if seen is None:
+        reason = f'IMU: no standstill of {LEAST_STANDSTILL:g} s in it; stand still for 10 s'
         return [*outcomes, NotChecked('zero', reason)]
+    bias, std = seen
     evidence.figures['imu.gyro_bias_rad_s'] = [float(f'{b:.3g}') for b in bias]
     worst = int(np.argmax(np.abs(bias)))
     least = max(BIAS_FACTOR * sensors.angular_rate_bias_std, LEAST_GYRO_BIAS)
     if abs(bias[worst]) > max(least, BIAS_SIGMAS * std[worst]):
         whole = bias + sensors.angular_rate_bias
+        value, biases = float(f'{whole[worst]:.4g}'), listed(whole, '.5f')
+        told = {'axis': 'xyz'[worst], 'bias': float(bias[worst]), 'biases': biases}
         outcomes.append(
-            evidence.found(
-                'gyro_bias',
-                0.99,
-                value=float(f'{whole[worst]:.4g}'),
-                std=float(std[worst]),
-                axis='xyz'[worst],
-                bias=float(bias[worst]),
-                where=where,
-                biases=listed(whole, '.5f'),
-            )
+            evidence.found('gyro_bias', 0.99, value=value, std=float(std[worst]), **told)
         )
     return outcomes
 

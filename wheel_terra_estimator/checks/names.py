@@ -7,6 +7,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,13 +61,13 @@ def check_topics(recording: Recording, remapped: Sequence[str]) -> list[Outcome]
     return outcomes
 
 
-def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
-    """Return wheels that are absent from the recording, or there under another name."""
+def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome], RoverFacts]:
+    """Return wheels that are absent from the recording, and the facts with the names it has."""
     joints = recording.joints
     if joints is None:
-        return [NotChecked('missing_wheel', 'no joint states in the recording')]
+        return [NotChecked('missing_wheel', 'no joint states in the recording')], facts
     if not facts.known:
-        return []
+        return [], facts
     silent = {
         name
         for name, column in zip(joints.names, joints.rate.T, strict=True)
@@ -75,14 +76,11 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
     absent = [name for name in facts.names if name not in joints.names]
     spare = [name for name in wheel_names(joints.names) if name not in facts.names]
     renamed = _pairs(absent, spare)
+    names = tuple(renamed.get(name, name) for name in facts.names)
     outcomes: list[Outcome] = []
     if renamed:
-        names = [renamed.get(name, name) for name in facts.names]
-        listed = ', '.join(names)
-        own, other = ', '.join(renamed), ', '.join(renamed.values())
-        outcomes.append(
-            found('joint_name', joints.topic, 0.95, wheel=own, other=other, names=listed)
-        )
+        told: dict[str, Any] = {'wheel': ', '.join(renamed), 'other': ', '.join(renamed.values())}
+        outcomes.append(found('joint_name', joints.topic, 0.95, names=', '.join(names), **told))
     gone = [name for name in absent if name not in renamed]
     if gone:
         outcomes.append(_missing(joints.topic, gone, 'in no message'))
@@ -92,7 +90,7 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
     for name in spare:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
             outcomes.append(found('spare_joint', joints.topic, 0.7, wheel=name))
-    return [*outcomes, *_steering(joints, facts)]
+    return [*outcomes, *_steering(joints, facts)], replace(facts, names=names)
 
 
 def _steering(joints: JointSeries, facts: RoverFacts) -> list[Outcome]:

@@ -17,21 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks import (
-    clocks,
-    imu,
-    reference,
-    repeats,
-    rover_facts,
-    sinkage,
-    torque,
-    turning,
-    wheel_rates,
-)
+from wheel_terra_estimator.checks import rover_facts
 from wheel_terra_estimator.checks.faults import FAULTS, RANK
 from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
 from wheel_terra_estimator.checks.run import (
-    Check,
+    LEAST_RIM_SPEED,
+    WHILE_DRIVING,
     Mended,
     against_each_other,
     configured_mounting,
@@ -57,8 +48,6 @@ OFTEN, SELDOM = 20, 60
 """Bins between two judgements: 2 s in the first half minute of motion, 6 s later."""
 TRIAL = 80
 """Bins of motion in which wrong signs and units would show on a straight."""
-LEAST_RIM_SPEED = 0.005
-"""Rim speed [m/s] from which wheels turn."""
 NEEDED = 2
 """Judgements that agree before a fault is told."""
 MEMORY = 6
@@ -67,22 +56,6 @@ CAP = 4
 """Agreeing judgements beyond this many count no more."""
 LEAST_SURE = 0.5
 """Confidence from which a finding counts."""
-
-WHILE_DRIVING: tuple[Check, ...] = (
-    ('mounting', imu, 'check_upside'),
-    ('missing_wheel', wheel_rates, 'check_dead_wheels'),
-    ('frozen', repeats, 'check_repeats'),
-    ('sign', turning, 'check_signs'),
-    ('sign', reference, 'check_sense'),
-    ('unit', turning, 'check_gyro_unit'),
-    ('unit', wheel_rates, 'check_unit'),
-    ('mounting', reference, 'check_frame'),
-    ('gain', torque, 'check_torque'),
-    ('mounting', imu, 'check_yaw'),
-    ('delay', clocks, 'check_clocks'),
-    ('zero', sinkage, 'check_sinkage'),
-)
-"""What half a minute can tell, in the order of ``run.AGAINST_EACH_OTHER``."""
 
 
 class Row(NamedTuple):

@@ -17,6 +17,7 @@ from wheel_terra_estimator.checks.series import VelocitySeries
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,
     correlation,
+    integrated,
     moving_mean,
     robust_std,
 )
@@ -55,8 +56,6 @@ SLIPPING = 0.7
 """Speed over that of the rims in firm ground, at least [-]."""
 MOSTLY = 0.4
 """Mean over median rim speed of wheels most of which turn one way [-]."""
-AROUND = 0.3
-"""Half of the time around a velocity that rim speeds are averaged over [s]."""
 CLEAR_SPEED = 5.0
 """Speed over the noise of the reference that a ratio of speeds needs [-]."""
 LEAST_ROWS = 5
@@ -69,7 +68,7 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < LEAST_REFERENCES:
         return [], evidence
-    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
+    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
     forward = reference.velocity[:, 0]
     least = 0.4 * float(np.quantile(np.abs(forward), 0.9))
     # A position has no sign either, and is no speed.
@@ -117,22 +116,10 @@ def check_frame(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [*frame, *unit], evidence
 
 
-def check_quality(evidence: Evidence) -> list[Outcome]:
-    """Return jumps of the reference, and what is wrong with its variance."""
-    reference = evidence.recording.reference
-    if reference is None:
-        reason = 'no reference velocity in it (visual odometry, GNSS)'
-        return [NotChecked(kind, reason) for kind in ('jumps', 'covariance')]
-    if reference.stamp.size < LEAST_REFERENCES:
-        return [NotChecked('jumps', 'hardly any reference velocity in it')]
-    jumps, calm = _jumps(evidence, reference)
-    return [*jumps, *_covariance(evidence, calm, reference)]
-
-
 def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome], Evidence]:
     """Find a velocity that is given in a world frame, or along another axis of the body."""
     forward, side = reference.velocity[:, 0], reference.velocity[:, 1]
-    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
+    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
     size = np.hypot(forward, side)
     if not _sideways(reference):
         return [], evidence
@@ -170,7 +157,7 @@ class _KeptDirection(NamedTuple):
 def _kept_direction(
     evidence: Evidence, reference: VelocitySeries, rim: FloatArray
 ) -> _KeptDirection:
-    heading = np.cumsum(evidence.yaw * np.diff(evidence.time, prepend=evidence.time[0]))
+    heading = integrated(evidence.time, evidence.yaw)
     psi = np.interp(evidence.seconds(reference), evidence.time, heading)
     moving = np.abs(rim) > 0.3 * np.quantile(np.abs(rim), 0.9)
     if moving.sum() < LEAST_ROWS:
@@ -187,10 +174,10 @@ def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[Flo
     In turns on the spot the mean of the rims is next to nothing.
     """
     typical = evidence.common_rate * float(np.nanmean(evidence.radius))
-    rim = np.abs(evidence.rim_at(series.stamp, typical, AROUND))
+    rim = np.abs(evidence.rim_at(series.stamp, typical))
     usual = float(np.nanquantile(rim, 0.9)) if np.isfinite(rim).any() else 0.0
     least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
-    mean = np.abs(evidence.rim_at(series.stamp, evidence.rim, AROUND))
+    mean = np.abs(evidence.rim_at(series.stamp, evidence.rim))
     rows = (rim > max(share * usual, least, 1e-9)) & (mean > MOSTLY * rim)
     return rim, rows & np.isfinite(series.velocity[:, :2]).all(axis=1)
 
@@ -203,7 +190,7 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     rim, rows = ahead(evidence, reference, 0.4)
     if rows.sum() < LEAST_ROWS:
         return [], evidence
-    sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim, AROUND))
+    sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim))
     if hardly_moves(reference.velocity[:, 0], rows):
         return [], evidence
     ratio = float(np.median(sense * reference.velocity[rows, 0] / rim[rows]))
@@ -253,15 +240,18 @@ def reference_units(ratio: float) -> dict[str, float]:
     }
 
 
-def _jumps(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome], FloatArray]:
-    """Return a finding for wild velocities, and the velocities with these made calm."""
-    forward = reference.velocity[:, 0].copy()
+def check_jumps(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return velocities that leave their neighbours, and the evidence with these made calm."""
+    reference = evidence.recording.reference
+    if reference is None or reference.stamp.size < LEAST_REFERENCES:
+        return [NotChecked('jumps', 'hardly any reference velocity in it')], evidence
+    forward = reference.velocity[:, 0]
     beside = np.median(np.stack([forward[:-4], forward[1:-3], forward[3:-1], forward[4:]]), axis=0)
     off = forward[2:-2] - beside
     speed = float(np.quantile(np.abs(forward), 0.8))
     wild = np.abs(off) > max(JUMP_FACTOR * max(robust_std(off), 1e-6), LEAST_JUMP * speed)
     # Starts and stops are no jumps: the wheels change as well.
-    around = 1.5e-9 * float(np.median(np.abs(np.diff(reference.stamp))))
+    around = 1.5 * reference.period
     calm = [
         np.nan_to_num(evidence.rim_at(reference.stamp, rows.astype(float), around)) > 0.99
         for rows in (evidence.steady, evidence.at_rest)
@@ -270,21 +260,26 @@ def _jumps(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         fastest = max(speed, float(np.quantile(np.abs(evidence.rim), 0.99)))
         calm.append(np.abs(forward) > BEYOND * fastest)
     wild &= np.any(calm, axis=0)[2:-2]
-    share = float(np.mean(wild))
-    forward[2:-2] = np.where(wild, beside, forward[2:-2])
+    if not wild.any():
+        return [], evidence
+    velocity = reference.velocity.copy()
+    velocity[2:-2, 0] = np.where(wild, beside, forward[2:-2])
+    mended, share = evidence.with_channel('reference', velocity=velocity), float(np.mean(wild))
     if share < JUMP_SHARE or wild.sum() < LEAST_JUMPS:
-        return [], forward
+        return [], mended
     told = {'count': int(wild.sum()), 'share': 100.0 * share, 'most': float(np.abs(off).max())}
-    return [evidence.found('jumps', 0.97, **told)], forward
+    return [evidence.found('jumps', 0.97, **told)], mended
 
 
-def _covariance(
-    evidence: Evidence, forward: FloatArray, reference: VelocitySeries
-) -> list[Outcome]:
+def check_covariance(evidence: Evidence) -> list[Outcome]:
     """Compare the stated variance with the scatter of the velocity."""
-    if not np.ptp(reference.velocity[:, 0]):
+    reference = evidence.recording.reference
+    if reference is None:
+        return [NotChecked('covariance', 'no reference velocity in it (visual odometry, GNSS)')]
+    forward = reference.velocity[:, 0]
+    if reference.stamp.size < LEAST_REFERENCES or not np.ptp(forward):
         return []  # no reading of a speed
-    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
+    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
     noise = min(bend_noise(forward), bend_noise(forward - rim))  # wheels start and stop as well
     evidence.figures['reference.noise_m_s'] = float(f'{noise:.3g}')
     stated = reference.variance[np.isfinite(reference.variance)]

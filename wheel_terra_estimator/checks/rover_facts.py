@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +43,10 @@ class RoverFacts:
     def known(self) -> bool:
         """Whether there is a rover file."""
         return self.configuration is not None
+
+    def named(self, which: Any) -> str:
+        """Return the wheels that are picked (n,), in words."""
+        return ', '.join(itertools.compress(self.names, which))
 
     def has_sides(self) -> bool:
         """Return whether wheels on both sides are known."""

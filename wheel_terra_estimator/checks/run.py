@@ -108,10 +108,6 @@ def _one_cause(findings: list[Finding]) -> list[Finding]:
     if reversed_:  # steered wheels then seem to turn against the gyro as well
         findings = [f for f in findings if f.fault != 'steering_sign']
     swapped = [f for f in findings if f.fault == 'swapped_sides']
-    if reversed_ and not any('.z' in f.words for f in reversed_):  # no turn tells which
-        doubtful = [replace(f, confidence=0.45) for f in reversed_]
-        rest = [f for f in findings if f not in reversed_]
-        return [*rest, *doubtful, found('orientation_frame', reversed_[0].topic, 0.45)]
     if not swapped or not reversed_:
         return findings
     told = found('orientation_frame', reversed_[0].topic, swapped[0].confidence)
@@ -145,8 +141,8 @@ def _examined(
     mended = Mended(report)
     mended('drop_outs', None, lambda: names.check_required(recording, configuration))
     mended('unknown_name', None, lambda: names.check_topics(recording, remapped))
-    mended('missing_wheel', None, lambda: names.check_wheel_names(recording, facts))
-    facts = _with_names_in(facts, report)
+    stated = facts
+    facts = mended('missing_wheel', facts, lambda: names.check_wheel_names(recording, stated))
     late: dict[str, float] = {}
     late = mended(
         'order', late, lambda: transport.check_transport(recording, configuration, report.figures)
@@ -217,41 +213,45 @@ def against_each_other(
         return None
     force = evidence.force if state.usable_force else None
     evidence = replace(evidence, force=force, gyro=evidence.gyro if state.usable_gyro else None)
-    for kind, module, check in checks:
+    for kind, module, check, *_ in checks:
         given = evidence
         evidence = mended(kind, given, lambda: getattr(module, check)(given), check)  # noqa: B023
     return evidence
 
 
-Check: TypeAlias = 'tuple[str, ModuleType, str]'
-"""Kind of what it finds, module and name of a check."""
+DRIVING = True
+"""Half a minute can tell it."""
+Check: TypeAlias = 'tuple[str, ModuleType, str] | tuple[str, ModuleType, str, bool]'
+"""Kind of what it finds, module and name of a check; whether it also runs while driving."""
 AGAINST_EACH_OTHER: tuple[Check, ...] = (
-    ('mounting', imu, 'check_upside'),
-    ('missing_wheel', wheel_rates, 'check_dead_wheels'),
-    ('frozen', repeats, 'check_repeats'),
+    ('mounting', imu, 'check_upside', DRIVING),
+    ('missing_wheel', wheel_rates, 'check_dead_wheels', DRIVING),
+    ('frozen', repeats, 'check_repeats', DRIVING),
     ('jumps', wheel_rates, 'check_wild'),
     ('unit', wheel_rates, 'check_positions'),
     ('unit', turning, 'check_steering_unit'),
     ('radius', wheel_rates, 'check_scales'),
-    ('sign', turning, 'check_signs'),
+    ('sign', turning, 'check_signs', DRIVING),
     ('sign', turning, 'check_steering_sign'),
-    ('sign', reference, 'check_sense'),
-    ('unit', turning, 'check_gyro_unit'),
-    ('unit', wheel_rates, 'check_unit'),
+    ('sign', reference, 'check_sense', DRIVING),
+    ('unit', turning, 'check_gyro_unit', DRIVING),
+    ('unit', wheel_rates, 'check_unit', DRIVING),
     ('noise', wheel_rates, 'check_noise'),
     ('mounting', imu, 'check_tilt'),
-    ('mounting', reference, 'check_frame'),
-    ('gain', torque, 'check_torque'),
-    ('mounting', imu, 'check_yaw'),
-    ('delay', clocks, 'check_clocks'),
-    ('covariance', reference, 'check_quality'),
+    ('mounting', reference, 'check_frame', DRIVING),
+    ('gain', torque, 'check_torque', DRIVING),
+    ('mounting', imu, 'check_yaw', DRIVING),
+    ('jumps', reference, 'check_jumps', DRIVING),
+    ('delay', clocks, 'check_clocks', DRIVING),
+    ('covariance', reference, 'check_covariance'),
     ('gain', turning, 'check_gyro_scale'),
     ('zero', imu, 'check_noise_and_zero'),
-    ('zero', sinkage, 'check_sinkage'),
+    ('zero', sinkage, 'check_sinkage', DRIVING),
     ('radius', geometry, 'check_radius'),
     ('track', geometry, 'check_track'),
 )
-"""Checks that hold one channel against another, in order: kind, module, function."""
+"""Checks that hold one channel against another, in order."""
+WHILE_DRIVING = tuple(check for check in AGAINST_EACH_OTHER if check[3:])
 
 
 def _whole_rows(recording: Recording) -> Recording:
@@ -281,12 +281,3 @@ def configured_mounting(configuration: Configuration | None) -> NDArray[np.float
     sensors = configuration.sensors
     angles = [getattr(sensors, f'imu_mounting_{axis}') for axis in ('roll', 'pitch', 'yaw')]
     return np.asarray(Rotation.from_euler('xyz', angles).as_matrix())
-
-
-def _with_names_in(facts: RoverFacts, report: CheckReport) -> RoverFacts:
-    """Go on with the names that the recording has."""
-    renamed = [f for f in report.findings if f.fault == 'joint_name']
-    if not renamed or not facts.known:
-        return facts
-    listed = renamed[0].cure.partition('[')[2].rstrip(']')
-    return replace(facts, names=tuple(name.strip() for name in listed.split(',')))

@@ -11,11 +11,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
-
-IntArray = NDArray[np.int64]
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -30,6 +27,17 @@ class Channel:
     def seconds(self) -> FloatArray:
         """Stamps relative to the first one [s]."""
         return (self.stamp - self.stamp[:1].sum()) * 1e-9
+
+    @property
+    def late(self) -> FloatArray:
+        """Log time less stamp of the messages that have a stamp [s]."""
+        late = (self.log_time - self.stamp)[self.stamp > 0]
+        return np.asarray(late * 1e-9, dtype=np.float64)
+
+    @property
+    def period(self) -> float:
+        """Median time between the stamps of one message and the next [s]."""
+        return float(np.median(np.abs(np.diff(self.stamp)))) * 1e-9
 
 
 Series = TypeVar('Series', bound=Channel)

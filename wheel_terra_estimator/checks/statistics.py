@@ -165,6 +165,16 @@ def confidence(sigmas: float) -> float:
     return min(math.erf(abs(sigmas) / math.sqrt(2.0)), 0.999)
 
 
+def integrated(time: FloatArray, rate: FloatArray) -> FloatArray:
+    """Return the integral (k,) of a rate from the first of its times [s] on."""
+    return np.cumsum(rate * np.diff(time, prepend=time[0]))
+
+
+def probability(log_odds: float) -> float:
+    """Return the probability that has these odds [ln]."""
+    return 1.0 / (1.0 + math.exp(-min(max(log_odds, -50.0), 50.0)))
+
+
 def averaged(time: FloatArray, values: FloatArray, at: FloatArray, width: float) -> FloatArray:
     """Return the means of (k, p) values over windows ``[at - width, at]`` [s].
 

@@ -8,7 +8,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import (
@@ -19,9 +18,9 @@ from wheel_terra_estimator.checks.evidence import (
 )
 from wheel_terra_estimator.checks.faults import listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.imu import EVEN_GROUND_STD
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
-    bend_noise,
     block_fit,
     confidence,
     correlation,
@@ -60,8 +59,6 @@ MOST_UNLIKE_SHARES = 1.8
 """Most over least that slopes cost of the torques of single wheels [-]."""
 SMOOTH_ROWS = 20
 """Rows over which slopes are averaged."""
-AXES_APART = math.radians(20.0)
-"""No heading by the torques is told where the slopes vary along another axis than it [rad]."""
 LEAST_BACK_ROWS = 10
 """Rows of wheels turning back in the air that tell zero and friction apart."""
 LEAST_BOTH_WAYS = 3.0
@@ -75,11 +72,8 @@ LEAST_GAIN_ERROR = 0.15
 GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
 ZERO_SIGMAS = 5.0
-MEAN_SIGMAS = 2.0
-LEAST_ROLLING = 0.3
-"""Resistance over the slope that all torques deny: without, they have no sign [-]."""
-UNSIGNED = 0.9
-"""Residual of torques without a sign over that of torques with one, at most, on slopes [-]."""
+ALIKE_ZEROS = 0.25
+"""Scatter of zeros over the radius, as a share of their mean, within which they are one [-]."""
 
 
 def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -204,7 +198,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         whole = whole_gain(evidence, fit.gain.value)
         mean = float(np.mean(whole))
         told = {'value': mean, 'std': mean * fit.gain.std / fit.gain.value}
-        told['gains'] = listed(whole, '.3g')
+        told |= {'gains': listed(whole, '.3g')}
     seen = traction if size >= LEAST_TRACTION else size
     finding = evidence.found('torque_scale', 0.8, traction=seen, **told)
     return [finding, NotChecked('mass', 'torques have no credible scale')], evidence
@@ -347,32 +341,18 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
     return [Estimate(zero.value, math.hypot(zero.std, RUTS * back.value)) for zero, back in fits]
 
 
-def slope_on_the_level(evidence: Evidence) -> Estimate | None:
-    """Return the slope [rad] that the IMU sees and the torques of all wheels alike deny.
-
-    The zero of a torque is that of its wheel alone. None without drives both ways.
-    """
-    force, facts = evidence.force, evidence.facts
-    fits = both_ways(evidence) if force is not None else None
-    if force is None or fits is None or _unsigned(evidence):
-        return None
-    share = facts.mass * facts.gravity / len(fits) * facts.radius
-    seen = -np.array([zero.value for zero, _ in fits]) / share
-    resistance = float(np.mean([back.value for _, back in fits] / share))
-    alike = float(np.ptp(seen)) < 0.5 * ALIKE * abs(float(np.mean(seen)))
-    rows, calm = evidence.straight, _calm_force(evidence)
-    left = bend_noise(force[rows, :1]) / math.sqrt(evidence.rows_in(SLOPE_TIME))
-    alike &= left < 0.2 * float(np.std(calm[rows, 0]))  # noise makes slopes look flat
-    if not alike or resistance < LEAST_ROLLING * abs(float(np.mean(seen))):
-        return None
-    return Estimate(float(np.mean(seen)), RUTS * resistance)
-
-
 def _calm_force(evidence: Evidence) -> FloatArray:
     """Return horizontal specific forces (k, 2) without vibration [m/s^2]."""
     assert evidence.force is not None
     width = evidence.rows_in(SLOPE_TIME)
     return np.column_stack([moving_mean(column, width) for column in evidence.force[:, :2].T])
+
+
+def like_a_pitch(evidence: Evidence, zeros: list[Estimate]) -> bool:
+    """Return whether zeros are one in all torques, as a pitch of the IMU that no circle told is."""
+    told = evidence.figures.get('imu.tilt_std_deg', math.inf) < math.degrees(EVEN_GROUND_STD)
+    seen = np.array([zero.value for zero in zeros]) / evidence.facts.radius
+    return not told and float(np.ptp(seen)) < ALIKE_ZEROS * abs(float(np.mean(seen)))
 
 
 def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
@@ -392,42 +372,11 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
 
 
 def _unsigned(evidence: Evidence) -> list[Outcome]:
-    """Return torques whose mean both ways exceeds what the sense of motion changes, all wheels."""
-    fits = both_ways(evidence)
-    rolls = fits is not None and all(
-        abs(back.value) > LEAST_ROLLING * abs(zero.value) for zero, back in fits
-    )
-    if fits is None:
-        return []
-    if (np.nanquantile(evidence.torque[evidence.moving], 0.02, axis=0) >= 0.0).all():
-        return [evidence.found('torque_unsigned', 0.9)]
-    if rolls and _follows_slopes(evidence):
-        return []
-    # A mean slope along the rover costs torque both ways as well.
-    facts, along = evidence.facts, _calm_force(evidence)[evidence.straight, 0]
-    sloped = 2.0 * abs(float(along.mean())) * facts.mass / len(fits) * facts.radius
-    if not all(
-        zero.value > max(MEAN_SIGMAS * zero.std, abs(back.value), slope)
-        for (zero, back), slope in zip(fits, np.nan_to_num(sloped), strict=True)
-    ):
+    """Return torques that are never negative although all wheels drive both ways."""
+    lowest = np.nanquantile(evidence.torque[evidence.moving], 0.02, axis=0)
+    if both_ways(evidence) is None or not (lowest >= 0.0).all():
         return []
     return [evidence.found('torque_unsigned', 0.9)]
-
-
-def _follows_slopes(evidence: Evidence) -> bool:
-    """Return whether thrust follows slopes as well as what they are along the drive."""
-    assert evidence.force is not None
-    rows = evidence.straight
-    sense, pushed = np.sign(evidence.rim[rows]), _smooth(thrust(evidence)[rows, None])
-    slopes = _smooth(evidence.force[rows, :2])
-    both = _smooth(np.column_stack([np.ones(sense.size), sense]))
-    against = _smooth(evidence.force[rows, :2] * sense[:, None])
-    left = [
-        float(np.linalg.norm(pushed - design @ np.linalg.lstsq(design, pushed, rcond=None)[0]))
-        for design in (np.hstack([both, slopes]), np.hstack([both, against]))
-    ]
-    sloped = float(np.std(slopes, axis=0).max()) >= LEAST_SLOPE_STD
-    return sloped and left[1] > UNSIGNED * left[0]
 
 
 def drive_friction(evidence: Evidence) -> Estimate | NotChecked:
@@ -480,61 +429,16 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     if not wrong:
         return []
     whole = whole_zeros(evidence, zeros)
-    # With another scale every zero is another.
-    doubt = evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
+    rivals = []  # with another scale every zero is another; a slope that is none is in all of them
+    if evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION:
+        rivals.append('the torques have another scale')
+    if like_a_pitch(evidence, zeros):
+        rivals.append('the IMU is pitched: drive a level circle')
     sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong))
-    sure *= 0.5 if doubt or where == 'standing' else 1.0
-    return [
-        evidence.found(
-            'torque_zero',
-            sure,
-            wheel=', '.join(facts.names[i] for i in wrong),
-            value=round(whole[wrong[0]].value, 3),
-            std=round(whole[wrong[0]].std, 3),
-            left=', '.join(f'{zeros[i].value:.2f}' for i in wrong),
-            where=where,
-            rival=', or the torques have another scale' if doubt else '',
-            zeros=listed((zero.value for zero in whole), '.2f'),
-        )
-    ]
-
-
-def heading_of_torque(evidence: Evidence, part: int | None = None) -> Estimate | None:
-    """Return the direction in the IMU's horizontal plane in which slopes cost torque [rad].
-
-    Zero where the IMU's x axis points forward. None without slopes; by one half of the drive if
-    a ``part`` (0 or 1) is asked for.
-    """
-    if evidence.force is None or not np.isfinite(evidence.torque).any():
-        return None
-    rows = np.flatnonzero(evidence.straight)
-    if part is not None:
-        rows = np.array_split(rows, 2)[part]
-    if rows.size < 3 * LEAST_MOVING_ROWS:
-        return None
-    horizontal = evidence.force[rows, :2]
-    smooth = _smooth(horizontal)
-    if float(np.std(smooth, axis=0).max()) < LEAST_SLOPE_STD:
-        return None
-    sense = np.sign(evidence.rim[rows])
-    along, across = block_fit(np.column_stack([horizontal, sense]), thrust(evidence)[rows])[:2]
-    size = math.hypot(along.value, across.value)
-    if size < 4.0 * max(along.std, across.std):
-        return None
-    if not 0.5 < size / evidence.facts.mass < 2.0:
-        return None  # the soil's own resistance is at work, not the slope
-    heading = Estimate(math.atan2(across.value, along.value), max(along.std, across.std) / size)
-    apart = abs((heading.value - _axis_of(smooth) + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
-    return heading if apart < AXES_APART else None
-
-
-def _axis_of(horizontal: FloatArray) -> float:
-    """Return the direction in which the slope (k, 2) varies most [rad], either way round."""
-    (xx, xy), (_, yy) = np.cov(horizontal.T)
-    return 0.5 * math.atan2(2.0 * xy, xx - yy)
-
-
-def _smooth(rows: FloatArray) -> FloatArray:
-    """Return means of (k, p) rows over ``SMOOTH_ROWS`` of them."""
-    width = min(SMOOTH_ROWS, rows.shape[0])
-    return np.asarray(sliding_window_view(rows, width, axis=0).mean(axis=-1))
+    sure *= 0.5 if rivals or where == 'standing' else 1.0
+    told: dict[str, Any] = {'where': where, 'rival': ''.join(f', or {rival}' for rival in rivals)}
+    told['left'] = listed((zeros[i].value for i in wrong), '.2f')
+    told['zeros'] = listed((zero.value for zero in whole), '.2f')
+    told['wheel'] = ', '.join(facts.names[i] for i in wrong)
+    value, std = (round(number, 3) for number in whole[wrong[0]])
+    return [evidence.found('torque_zero', sure, value=value, std=std, **told)]

@@ -53,9 +53,8 @@ def check_transport(
             continue
         most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
         outcomes += _order(channel, most_back) or _drop_outs(name, channel, figures)
-        stamped = channel.stamp > 0
-        if stamped.any():
-            delays[name] = float(np.median((channel.log_time - channel.stamp)[stamped])) * 1e-9
+        if channel.late.size:
+            delays[name] = float(np.median(channel.late))
     late: dict[str, float] = {}
     if 'joints' not in delays:
         return outcomes, late
@@ -77,7 +76,7 @@ def check_transport(
             how = f'its stamps lie {abs(value):.3g} s off: another clock, such as time since start'
             outcomes.append(found('order', channel.topic, 0.99, how=how))
             continue
-        std = math.hypot(_jitter(channel), _jitter(recording.joints), ARRIVAL_STD)
+        std = math.hypot(robust_std(channel.late), robust_std(recording.joints.late), ARRIVAL_STD)
         told = of_offset(name, value, std, 'log time: two clocks', configuration)
         outcomes.append(found(f'{name}_offset', channel.topic, 0.999, **told))
     return outcomes, late
@@ -87,8 +86,7 @@ def _shifted(joints: Channel, imu: Channel) -> list[Outcome]:
     """Return that one of two clocks runs apart from the other: no offset mends that."""
     shifts = {}
     for channel in (joints, imu):
-        late = (channel.log_time - channel.stamp)[channel.stamp > 0] * 1e-9
-        quarter = max(late.size // 4, 1)
+        late, quarter = channel.late, max(channel.late.size // 4, 1)
         shifts[channel.topic] = float(np.median(late[-quarter:]) - np.median(late[:quarter]))
     of_joints, of_imu = shifts[joints.topic], shifts[imu.topic]
     if abs(of_joints - of_imu) < CLOCK_DIFFERENCE:
@@ -96,12 +94,6 @@ def _shifted(joints: Channel, imu: Channel) -> list[Outcome]:
     topic, shift = max(shifts.items(), key=lambda item: abs(item[1]))
     how = f'its stamps shift by {-shift:.2g} s against log time: a clock is set, or drifts'
     return [found('order', topic, 0.97, how=how)]
-
-
-def _jitter(channel: Channel) -> float:
-    """Return the deviation of the usual time from stamp to log time [s]."""
-    late = (channel.log_time - channel.stamp)[channel.stamp > 0] * 1e-9
-    return robust_std(np.asarray(late, dtype=np.float64))
 
 
 def _order(channel: Channel, most_back: float) -> list[Outcome]:

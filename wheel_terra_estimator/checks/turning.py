@@ -15,14 +15,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
-from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS
+from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS, listed
 from wheel_terra_estimator.checks.felt_motion import felt_motion, yaw_of_motion
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
@@ -31,11 +31,12 @@ from wheel_terra_estimator.checks.statistics import (
     block_fit,
     confidence,
     correlation,
+    integrated,
     moving_mean,
     robust_std,
 )
-from wheel_terra_estimator.checks.torque import heading_of_torque
 from wheel_terra_estimator.checks.trial import Trial, halves, worst
+from wheel_terra_estimator.estimation.measurements import heading_of
 
 Mask = BoolArray
 
@@ -251,17 +252,13 @@ def _known(evidence: Evidence) -> tuple[NDArray[np.intp], Mask]:
 
 
 class _Chosen(NamedTuple):
-    """What the wheels say: signs (n,), track (0: no turns), exchanged wheels, trial, certainty.
-
-    ``unlike`` where another hypothesis is far better and none is good.
-    """
+    """What the wheels say: signs (n,), track (0: no turns), exchanged wheels, trial, certainty."""
 
     signs: FloatArray
     track: float = 0.0
     exchanged: tuple[int, int] | None = None
     trial: str = ''
     sure: float = 0.99
-    unlike: bool = False
 
 
 def check_steering_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -286,8 +283,7 @@ def check_steering_sign(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     wrong = np.array(fits) < -LEAST_CORRELATION
     if not wrong.any():
         return [], evidence
-    wheel = ', '.join(name for name, w in zip(facts.names, wrong, strict=True) if w)
-    told = evidence.found('steering_sign', 0.95, wheel=wheel, value=-1.0)
+    told = evidence.found('steering_sign', 0.95, wheel=facts.named(wrong), value=-1.0)
     return [told], replace(evidence, steering=evidence.steering * np.where(wrong, -1.0, 1.0))
 
 
@@ -302,9 +298,6 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes: list[Outcome] = []
     chosen = _chosen(evidence, there, rows)
     signs, turn, mended = chosen.signs, chosen.track, evidence
-    if chosen.unlike:
-        reason = 'the wheels are too unlike to tell which one counts backwards; drive straight'
-        outcomes.append(NotChecked('sign', reason))
     if chosen.exchanged is not None:
         finding, mended = _exchanged(evidence, chosen.exchanged, chosen)
         outcomes.append(finding)
@@ -313,15 +306,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if not facts.known:
             reason = 'left and right need the places of the wheels: a rover file (wheel-terra init)'
         outcomes += [NotChecked(kind, reason) for kind in ('swapped_sides', 'exchanged_wheels')]
-    told, reversed_twice = _told_direction(mended, signs), 2 * int(np.sum(signs[there] < 0.0))
-    blame = _blame(told, reversed_twice >= there.size, turn)
-    if reversed_twice == there.size and not turn and told == _Told(None, None):
-        others = ', '.join(facts.names[i] for i in there if signs[i] > 0.0)
-        trial = f'{chosen.trial}, or {others} do: drive a circle, or beside a reference'
-        chosen = chosen._replace(sure=0.5, trial=trial)
-    if blame == 'unsure':
-        cure = _directions(evidence, -np.ones(signs.size))
-        outcomes.append(evidence.found('all_backwards', 0.4, value=-1.0, directions=cure))
+    told = _told_direction(mended, signs)
+    blame = _blame(told, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
     if blame == 'wheels':
         signs, turn = -signs, -turn
     if (signs < 0.0).any():
@@ -333,9 +319,10 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     elif turn < 0.0:
         outcomes += _swapped(evidence)
         mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
-    if blame in ('reference', 'unsure') and evidence.recording.reference is not None:
-        sure = confidence(3.0) if turn or told.force is not None else 0.5
-        outcomes.append(evidence.found('reference_reversed', sure, value=-1.0, or_wheels=''))
+    if blame == 'reference' and evidence.recording.reference is not None:
+        alone = bool(turn) or told.force is not None
+        sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels count backwards')
+        outcomes.append(evidence.found('reference_reversed', sure, value=-1.0, rival=rival))
         velocity = -evidence.recording.reference.velocity
         mended = mended.with_channel('reference', velocity=velocity)
     return outcomes, mended
@@ -355,7 +342,7 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     steered = np.isfinite(evidence.steering).any()
     if not best.trial.falls or best.trial.after > (MOST_LEFT_STEERED if steered else MOST_LEFT):
         track = fit_of(Fix((1,) * count), stretch).clear_track
-        return _Chosen(signs, track, unlike=best.trial.falls)
+        return _Chosen(signs, track)
     turn = best.fit.clear_track
     signs[there] = best.fix.signs
     if evidence.gyro is None and _like_a_spin(evidence, signs):
@@ -403,7 +390,7 @@ class _Told(NamedTuple):
 
 
 def _blame(told: _Told, half_reversed: bool, turn: float) -> str:
-    """Return what runs backwards: all wheels beyond the signs that were found, the reference, ''.
+    """Return what runs backwards: the wheels beyond the signs that were found, the reference, ''.
 
     Parameters
     ----------
@@ -422,16 +409,14 @@ def _blame(told: _Told, half_reversed: bool, turn: float) -> str:
     # Wheels or reference are backwards: with the turns on their side it is not the wheels.
     if half_reversed and turn <= 0.0:
         return 'wheels'  # the other half counts backwards
-    if turn or told.force is not None:
-        return 'wheels' if turn < 0.0 or (not turn and against_force) else 'reference'
-    return 'unsure'
+    return 'wheels' if turn < 0.0 or (not turn and against_force) else 'reference'
 
 
 def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
     speed = row_medians(np.nan_to_num(evidence.rate) * signs)
     reference, by_reference, by_force = evidence.recording.reference, None, None
     if reference is not None:
-        sense = np.sign(np.nan_to_num(evidence.rim_at(reference.stamp, speed, 0.3)))
+        sense = np.sign(np.nan_to_num(evidence.rim_at(reference.stamp, speed)))
         forward = np.nan_to_num(reference.velocity[:, 0])  # the faster, the more it tells
         most = 2.0 * float(np.median(np.abs(forward[sense != 0.0]))) if sense.any() else 0.0
         forward = np.clip(forward, -most, most)  # but for jumps
@@ -451,24 +436,7 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
             yaw = yaw_of_motion(*felt)
             if yaw is not None and abs(math.cos(yaw.value)) > CLEAR_DIRECTION:
                 by_force = math.cos(yaw.value)
-        if by_force is None:
-            by_force = _climbs(evidence.with_rate(evidence.rate * signs, evidence.torque * signs))
     return _Told(by_reference, by_force)
-
-
-def _climbs(evidence: Evidence) -> float | None:
-    """Return the agreement of the drive torques with the slopes they carry the rover up or down."""
-    if not np.nansum(evidence.torque * evidence.rate) > 0.0:
-        return None  # the torques count the other way
-    uphill = heading_of_torque(evidence)
-    if uphill is None or abs(math.cos(uphill.value)) <= CLEAR_DIRECTION:
-        return None
-    return math.cos(uphill.value)
-
-
-def _directions(evidence: Evidence, signs: FloatArray) -> str:
-    pairs = zip(evidence.facts.direction, signs, strict=True)
-    return ', '.join(f'{int(d * s)}' for d, s in pairs)
 
 
 def _backwards(
@@ -479,19 +447,13 @@ def _backwards(
         sign < 0.0 and correlation(torque[rows], rate[rows]) < OPPOSED
         for sign, torque, rate in zip(signs, evidence.torque.T, evidence.rate.T, strict=True)
     ]
-    right = ', '.join(name for name, keep in zip(facts.names, kept, strict=True) if keep)
-    wrong = np.flatnonzero(signs < 0.0)
-    finding = evidence.found(
-        'backwards',
-        chosen.sure,
-        wheel=', '.join(facts.names[i] for i in wrong),
-        value=float(-facts.direction[wrong[0]]),
-        trial=chosen.trial,
-        directions=_directions(evidence, signs),
-        torque=f' and negate effort of {right} in the driver (it is right as it is)'
-        if right
-        else '',
-    )
+    right = facts.named(kept)
+    told: dict[str, Any] = {'trial': chosen.trial, 'wheel': facts.named(signs < 0.0), 'torque': ''}
+    if right:
+        told['torque'] = f' and negate effort of {right} in the driver (it is right as it is)'
+    told['directions'] = listed(facts.direction * signs, '.0f')
+    value = float(-facts.direction[signs < 0.0][0])
+    finding = evidence.found('backwards', chosen.sure, value=value, **told)
     torque = mended.torque * np.where(kept, 1.0, signs)
     return finding, mended.with_rate(mended.rate * signs, torque)
 
@@ -500,11 +462,9 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
     """Return what makes the wheels turn against the gyro: swapped sides or a reversed gyro."""
     imu, facts = evidence.recording.imu, evidence.facts
     assert imu is not None
-    by_heading = _gyro_by_heading(evidence, imu)
-    if by_heading < -LEAST_CORRELATION:
-        told = {'value': -1.0, 'axis': 'z', 'against': 'wheels and heading'}
-        return [evidence.found('gyro_reversed', 0.97, **told)]
-    alone = by_heading > LEAST_CORRELATION
+    heading = _heading(evidence, imu)
+    gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
+    alone = heading is not None and correlation(_turns(evidence, heading), gyro) > LEAST_CORRELATION
     mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
     sides = evidence.found(
         'swapped_sides',
@@ -519,20 +479,6 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
     return [sides, evidence.found('gyro_reversed', 0.5, value=-1.0, axis='z', against=against)]
 
 
-def _gyro_by_heading(evidence: Evidence, imu: ImuSeries) -> float:
-    """Return the correlation of turns by gyro and by orientation [-]; 0 where it tells none."""
-    heading = _heading(evidence, imu)
-    if heading is None:
-        return 0.0
-    gyro = _integrated(evidence, evidence.yaw)
-    return correlation(_turns(evidence, heading), _turns(evidence, gyro))
-
-
-def _integrated(evidence: Evidence, yaw_rate: FloatArray) -> FloatArray:
-    """Return the heading (k,) [rad] of a yaw rate (k,) [rad/s]."""
-    return np.cumsum(yaw_rate * np.diff(evidence.time, prepend=evidence.time[0]))
-
-
 def _turns(evidence: Evidence, heading: FloatArray) -> FloatArray:
     """Return by how much a heading (k,) changes over `HEADING_TIME` [rad]."""
     rows = evidence.rows_in(HEADING_TIME)
@@ -544,8 +490,7 @@ def _heading(evidence: Evidence, imu: ImuSeries) -> FloatArray | None:
     known = np.isfinite(imu.orientation).all(axis=1)
     if known.mean() < 0.9:
         return None
-    x, y, z, w = imu.orientation[known].T
-    heading = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    heading = np.unwrap(heading_of(imu.orientation[known]))
     return np.asarray(np.interp(evidence.time, evidence.seconds(imu)[known], heading))
 
 
@@ -560,8 +505,8 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if reference is not None and reference.stamp.size > 1:
         at = evidence.seconds(reference)
         yaw = np.interp(evidence.time, at, np.nan_to_num(reference.yaw_rate))
-        pairs.append(('twist.angular', _integrated(evidence, yaw)))
-    gyro = _turns(evidence, _integrated(evidence, evidence.yaw))
+        pairs.append(('twist.angular', integrated(evidence.time, yaw)))
+    gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
     for name, other in pairs:
         seen = _turns(evidence, other)
         if correlation(gyro, seen) < SAME_TURNS:
@@ -591,12 +536,11 @@ def _exchanged(
     evidence: Evidence, pair: tuple[int, int], chosen: _Chosen
 ) -> tuple[Finding, Evidence]:
     names = evidence.facts.names
-    order = list(range(len(names)))
-    order[pair[0]], order[pair[1]] = pair[1], pair[0]
-    listed = ', '.join(names[i] for i in order)
-    wheel, sure = ', '.join(names[i] for i in pair), min(chosen.sure, 0.95)
-    told = evidence.found('exchanged', sure, wheel=wheel, trial=chosen.trial, names=listed)
-    return told, evidence.with_rate(evidence.rate[:, order], evidence.torque[:, order])
+    order = Fix((), pair).order(len(names))
+    told = {'wheel': ', '.join(names[i] for i in pair), 'trial': chosen.trial}
+    told['names'] = ', '.join(names[i] for i in order)
+    finding = evidence.found('exchanged', min(chosen.sure, 0.95), **told)
+    return finding, evidence.with_rate(evidence.rate[:, order], evidence.torque[:, order])
 
 
 def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -61,10 +61,6 @@ POSITION_SHARE = 0.8
 """Share of a drive in which what changes is a position [-]."""
 MOST_TURNED_BACK = 0.2
 """How often a position begins to fall or rise; rates do at each change of the speed [1/s]."""
-LEAST_UNIT_TRACK = 0.25
-"""Effective over stated track, below which it is another unit and not another track [-]."""
-FASTEST_RIM = 15.0
-"""Rim speed that no rover of this kind drives [m/s]."""
 FROZEN_TIME = 5.0
 """A rate that does not change in the last digit for this long [s] while the others do."""
 LIVELY = 0.3
@@ -112,11 +108,8 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes: list[Outcome] = []
     whole = stays(evidence, evidence.time, evidence.rate)
     if whole is not None and whole.longest > LONG_FROZEN_TIME:
-        names, how = (
-            ', '.join(evidence.facts.names),
-            f'do not change for up to {whole.longest:.1f} s',
-        )
-        outcomes.append(evidence.found('rate_frozen', 0.97, wheel=names, how=how))
+        names, how = evidence.facts.names, f'do not change for up to {whole.longest:.1f} s'
+        outcomes.append(evidence.found('rate_frozen', 0.97, wheel=', '.join(names), how=how))
         evidence = evidence.with_rate(np.where(whole.rows[:, None], np.nan, evidence.rate))
     for look in (_stands, _stays):  # beside a dead one none is frozen
         mended = evidence.rate.copy()
@@ -161,7 +154,7 @@ def _about_a_side(evidence: Evidence, index: int) -> Mask:
 
 
 def _stays(evidence: Evidence, index: int) -> str:
-    """Return how a rate stays the same while the others change, or repeats itself."""
+    """Return how long a rate stays the same while the others change."""
     rate, moving = evidence.rate, evidence.moving
     known = np.flatnonzero(np.isfinite(rate[:, index]))
     own = np.diff(rate[known, index]) != 0.0
@@ -176,13 +169,7 @@ def _stays(evidence: Evidence, index: int) -> str:
         low, high = np.quantile(others[first:last], (0.05, 0.95))
         if high - low > LEAST_STEPS * np.median(steps[steps > 0.0]):  # more than to and fro
             longest = max(longest, float(moving[known[first : last + 1]].sum()) * evidence.period)
-    if longest > LONG_FROZEN_TIME:
-        return f'does not change for up to {longest:.1f} s'
-    again, usual = _repeats(rate[moving, index]), _repeats(np.delete(rate, index, axis=1)[moving])
-    lasts = moving.sum() * evidence.period > LONG_FROZEN_TIME
-    if not lasts or again < 0.6 or usual > 0.2 or _held(evidence, index, moving):
-        return ''
-    return f'repeats its last value in {100 * again:.0f} % of the messages'
+    return f'does not change for up to {longest:.1f} s' if longest > LONG_FROZEN_TIME else ''
 
 
 def _repeats(rate: FloatArray) -> float:
@@ -210,7 +197,7 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         noise = np.array([robust_std(column) for column in steps.T])
         wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
         if LEAST_WILD <= wild.sum() < MOST_WILD * wild.size:
-            wheels = ', '.join(evidence.facts.names[i] for i in np.flatnonzero(wild.any(axis=0)))
+            wheels = evidence.facts.named(wild.any(axis=0))
             told = {'field': name, 'count': int(wild.sum()), 'most': float(off[wild].max())}
             outcomes.append(evidence.found('wild', 0.97, wheel=wheels, **told))
             table = np.where(wild, np.nan, table)
@@ -295,21 +282,11 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             ratio = float(np.median(np.abs(odometry.velocity[rows, 0]) / rim[rows]))
     track = turning.track_ratio(evidence)
     if ratio is None and track is None:
-        fastest = evidence.working_rate * float(np.nanmean(facts.radius))
-        how = f'rim speed above {FASTEST_RIM:.0f} m/s'
-        units = {u: f for u, f in RATE_UNITS.items() if fastest * f < FASTEST_RIM < fastest}
-        if not units:
-            reason = 'wheel rates: neither reference nor turn in it; drive a circle'
-            return [NotChecked('unit', reason)], evidence
-        return _unit_findings(evidence, units, how)
+        reason = 'wheel rates: neither reference nor turn in it; drive a circle'
+        return [NotChecked('unit', reason)], evidence
     turns = track is not None and abs(track) > LEAST_ROLLING_TRACK  # as rad/s do
     rim_unit = {} if turns else _rim_unit(float(np.nanmean(facts.radius)))
     units = _fitting_units(ratio, track, {**RATE_UNITS, **rim_unit})
-    if units and ratio is None and LEAST_UNIT_TRACK < abs(track or 0.0) < 1.0:
-        reason = (
-            f'turns need {abs(track or 0.0):.2f} of the stated track: another unit or another track'
-        )
-        return [NotChecked('unit', f'wheel rates: {reason}; drive straight')], evidence
     doubtful = False  # no unit with a usual slip, and perhaps counts
     if ratio is not None and ratio < MOST_COUNT and units:
         doubtful = not UNIT_BAND[0] < ratio / min(units.values()) < OUTRUN
