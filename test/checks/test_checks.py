@@ -162,7 +162,8 @@ def test_a_small_tilt_is_told_by_full_turns():
 
 
 def test_a_zero_of_the_accelerometer_is_no_tilt_the_gyro_does_not_see_it():
-    finding = only(checked(imu=replace(WHOLE.imu, force=WHOLE.imu.force + [0.6, 0.0, 0.0])), 'zero')
+    off = WHOLE.imu.force + np.array([0.6, 0.0, 0.0])
+    finding = only(checked(imu=replace(WHOLE.imu, force=off)), 'zero')
     assert (finding.fault, finding.parameter) == ('force_bias', 'sensors.specific_force_bias')
     x, y, z = (float(v) for v in finding.cure.partition('[')[2].rstrip(']').split(','))
     assert (x, y, z) == pytest.approx((0.6, 0.0, 0.0), abs=0.05)

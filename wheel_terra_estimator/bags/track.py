@@ -91,7 +91,7 @@ class TrackRecorder:
         # Both are learned by one factor; either may be 0.
         self._modulus = max(moduli.items(), key=lambda item: abs(item[1]))
         self._attitude_stamps: list[int] = []
-        self._attitudes: list[tuple[float, float]] = []  # heading [rad], sine of the climb (nose up)
+        self._attitudes: list[tuple[float, float]] = []  # heading [rad], sine of the climb
         self._rows = ThinnedRows(MOST_POINTS)
         self._origin = self._stamp = self._noted = 0
         self._place = [0.0, 0.0, 0.0]

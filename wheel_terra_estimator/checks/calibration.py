@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.checks import geometry, imu, torque, turning
-from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, Evidence
 from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
 from wheel_terra_estimator.checks.run import configured_mounting, examine
 from wheel_terra_estimator.checks.series import Recording
@@ -141,7 +141,7 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
     rotation, std = evidence.rotation, told.std if told is not None else None
     source = told.words if told is not None else 'mean specific force'
     tilt = imu.small_tilt(evidence)
-    if tilt is not None and tilt.std < imu.EVEN_GROUND_STD:
+    if tilt is not None and tilt.std < EVEN_GROUND_STD:
         if tilt.sigmas > CLEAR and tilt.sure > LEAST_SURE:
             rotation = tilt.taken_off(rotation)
         std = math.degrees(tilt.std)

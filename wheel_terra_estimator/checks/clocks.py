@@ -52,8 +52,6 @@ LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1}
 APART = 0.2
 """Lags of two halves or of two kinds of motion that differ by less agree [s]; also 3 deviations."""
 SIGMAS = 4.0
-WITNESS = 0.25
-"""Deviation of the lag of a third sensor over one, with which it tells whose stamps are off [-]."""
 BETWEEN = 0.25
 """Part of a period that a lag is not known to, one deviation [-]."""
 SLOWEST = 1.5
@@ -156,7 +154,7 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
         return late
     for name, told in late.items():
         other = next((lag for key, lag in lags.items() if key != name), None)
-        if other is not None and other.steady and other.std < WITNESS * abs(told.value):
+        if other is not None and other.steady:
             wheels = abs(other.value - told.value) < abs(other.value)
         else:
             by_arrival = _by_arrival(evidence, name, told.value)
@@ -237,14 +235,6 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
     if best is None:
         reason = 'IMU against wheels: no clear turns in it; drive a circle'
         return NotChecked('delay', reason)
-    if turned is not None and started is not None and started.steady:
-        apart = abs(turned.value - started.value)
-        if apart > max(APART, 3.0 * math.hypot(turned.std, started.std)):
-            return NotChecked(
-                'delay',
-                f'IMU against wheels: turns are {turned.value:+.2f} s apart, starts and stops '
-                f'{started.value:+.2f} s: no offset of stamps does that',
-            )
     evidence.figures['imu.delay_s'] = round(best.value, 3)
     return best
 

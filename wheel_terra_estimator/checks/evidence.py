@@ -44,6 +44,8 @@ SHORTEST_FREE = 3.0
 """Wheels that turn so long while the rover stands may be in the air [s]."""
 LEAST_MOVING_ROWS = 30
 """Fewer rows of driving than these tell nothing."""
+EVEN_GROUND_STD = math.radians(0.8)
+"""Deviation of a tilt seen in circles [rad] above which they lay on no plane."""
 AROUND = 0.25
 """Half of the time around a velocity that rim speeds are averaged over [s]."""
 

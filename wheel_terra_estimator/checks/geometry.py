@@ -70,8 +70,6 @@ DEEPEST = 0.3
 LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
-MOST_NOT_ROLLING = 0.04
-"""Distance of speed over rim speed from 1 on straights with which turns tell the track [-]."""
 STEERED_STD = 0.04
 """Slip of steered wheels in curves, as a share of the track, one deviation [-]."""
 CLEAR_TURN = 0.95
@@ -421,14 +419,8 @@ def rolling_track(evidence: Evidence) -> Told | NotChecked:
     speeds, ratio = _straight_speeds(evidence), told.ratio
     if speeds is None:
         return told._replace(alone=False)
-    rolling = speeds.ratio.value
-    if abs(rolling - 1.0) > MOST_NOT_ROLLING and abs(ratio.value - 1.0) > LEAST_TRACK_ERROR:
-        reason = (
-            f'turns need {ratio.value:.2f} of the track where straights need {rolling:.2f} of the '
-            'radius: slip or a radius may be both; drive circles and straight on firm ground'
-        )
-        return NotChecked('track', reason)
-    return told._replace(ratio=Estimate(ratio.value, math.hypot(ratio.std, rolling - 1.0)))
+    std = math.hypot(ratio.std, speeds.ratio.value - 1.0)
+    return told._replace(ratio=Estimate(ratio.value, std))
 
 
 def check_track(evidence: Evidence) -> list[Outcome]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, Evidence
 from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
 from wheel_terra_estimator.checks.felt_motion import (
     LEAST_YAW,
@@ -72,8 +72,6 @@ ALONG_AXIS = math.cos(math.radians(25.0))
 """Cosine of the angle to an axis within which that axis is meant [-]."""
 EVEN = 0.6
 """Length of the mean direction of the headings in turns, 0 where all occur alike, at most [-]."""
-EVEN_GROUND_STD = math.radians(0.8)
-"""Deviation of a tilt [rad] above which the ground was no plane."""
 NOISE_FACTOR = 4.0
 """Noise above so many times the stated one is a finding."""
 DEGREES = (0.15, 4.0)
@@ -544,6 +542,8 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sure = confidence(tilt.sigmas) * max(tilt.sure, 1.0 - tilt.sure)
     if tilt.sure < 0.5:
         words['rival'] = ', or its axes are tilted' if tilt.sure > 1.0 - NO_ZERO else ''
+        worst = int(np.argmax(np.abs(off)))
+        words |= {'value': round(float((biases + off)[worst]), 3), 'std': gravity * tilt.std}
         told_of = evidence.found('force_bias', sure, **words)
         return [told_of], replace(evidence, force=evidence.force - off)
     if tilt.sure < NO_ZERO:

@@ -76,12 +76,8 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         velocity = reference.velocity * np.where(rim < 0.0, -1.0, 1.0)[:, None]
         mended = evidence.with_channel('reference', velocity=velocity)
         return [evidence.found('reference_unsigned', 0.95)], mended
-    ways = [way for way in (forward > least, forward < -least) if way.mean() > SELDOM_NEGATIVE]
-    followed = [
-        np.median(np.abs(forward[way] / np.maximum(np.abs(rim[way]), 1e-9))) for way in ways
-    ]
-    told = len(ways) == 2 and not _sideways(reference) and _without_sign(rim, forward)
-    if told and min(followed) > 0.5 and max(followed) < 2.0:
+    both = min(np.mean(forward > least), np.mean(forward < -least)) > SELDOM_NEGATIVE
+    if both and not _sideways(reference) and _without_sign(rim, forward):
         calm = moving_mean(forward, LEAST_ROWS)
         sense = np.sign(np.interp(evidence.time, evidence.seconds(reference), calm))
         mended = evidence.with_rate(evidence.rate * sense[:, None])

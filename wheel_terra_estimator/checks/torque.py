@@ -11,6 +11,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import (
+    EVEN_GROUND_STD,
     LEAST_MOVING_ROWS,
     SETTLING,
     Evidence,
@@ -18,7 +19,6 @@ from wheel_terra_estimator.checks.evidence import (
 )
 from wheel_terra_estimator.checks.faults import listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
-from wheel_terra_estimator.checks.imu import EVEN_GROUND_STD
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
     block_fit,
@@ -55,14 +55,12 @@ GAIN_MODEL_STD = 0.05
 """What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
 SLOPE_TIME = 2.0
 """Forces are averaged over this for a slope that a sign is told on [s]."""
-MOST_UNLIKE_SHARES = 1.8
+MOST_UNLIKE_SHARES = 2.5
 """Most over least that slopes cost of the torques of single wheels [-]."""
 SMOOTH_ROWS = 20
 """Rows over which slopes are averaged."""
 LEAST_BACK_ROWS = 10
 """Rows of wheels turning back in the air that tell zero and friction apart."""
-LEAST_BOTH_WAYS = 3.0
-"""Straight drive each way that zeros are told on [s]."""
 RUTS = 0.3
 """Half of the difference of resistance one way and back over its mean, one deviation [-]."""
 RUT_TILT = 0.5
@@ -192,7 +190,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     open_to = 1.0 + 3.0 * float(facts.configuration.sensors.torque_gain_std)
     if size >= LEAST_TRACTION and traction <= MOST_TRACTION * open_to:
         return [], evidence
-    fit = _slope_fit(evidence)
+    fit = slope_fit(evidence)
     told: dict[str, Any] = {'gains': '...'}
     if fit is not None and fit.gain.value > GAIN_SIGMAS * max(fit.gain.std, fit.trial.after):
         whole = whole_gain(evidence, fit.gain.value)
@@ -223,11 +221,10 @@ class _Slopes(NamedTuple):
     unlike: bool
 
 
-def _slope_fit(evidence: Evidence) -> _Slopes | None:
+def slope_fit(evidence: Evidence) -> _Slopes | None:
     """Return the scale of the torques by slopes, and its trial on halves; None without slopes."""
-    assert evidence.force is not None
     rows = evidence.straight
-    if rows.sum() < 3 * LEAST_MOVING_ROWS:
+    if evidence.force is None or rows.sum() < 3 * LEAST_MOVING_ROWS:
         return None
     # Noise of a regressor makes a slope look flat: both sides are means over the same time.
     along = moving_mean(evidence.force[:, 0], SMOOTH_ROWS)[rows]
@@ -238,9 +235,6 @@ def _slope_fit(evidence: Evidence) -> _Slopes | None:
     if scatter < LEAST_SLOPE_STD or max(down, -up) > -UP_AND_DOWN:
         return None
     columns = [evidence.facts.mass * along, sense]
-    across = moving_mean(evidence.force[:, 1], SMOOTH_ROWS)[rows]
-    if float(np.std(across)) > LEAST_SLOPE_STD:  # an IMU that is turned about z feels it along x
-        columns.append(across)
     if (sense > 0).any() and (sense < 0).any():
         columns.append(np.ones(along.size))
     design = np.column_stack(columns)
@@ -275,7 +269,7 @@ def whole_zeros(evidence: Evidence, left: list[Estimate]) -> list[Estimate]:
 
 def torque_gain(evidence: Evidence) -> _Slopes | NotChecked:
     """Return the scale of the torques against mass times specific force, model error included."""
-    fit = _slope_fit(evidence)
+    fit = slope_fit(evidence)
     if fit is None:
         return NotChecked('gain', 'torque: no slopes in it; drive up and down 5 to 10 degrees')
     traction = evidence.figures.get('torque.level_traction', 1.0)
@@ -361,8 +355,7 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     smooth = moving_mean(evidence.common_rate, evidence.rows_in(SETTLING))
     rows = evidence.straight & (np.abs(smooth) > 0.5 * evidence.working_rate)
     sense = np.sign(smooth[rows])
-    least = max(2 * LEAST_MOVING_ROWS, evidence.rows_in(LEAST_BOTH_WAYS))
-    if min((sense > 0).sum(), (sense < 0).sum()) < least:
+    if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
         return None
     slopes = _calm_force(evidence)[rows]  # along both axes: the IMU may be turned about z
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]

@@ -32,9 +32,9 @@ from wheel_terra_estimator.checks.statistics import (
     confidence,
     correlation,
     integrated,
-    moving_mean,
     robust_std,
 )
+from wheel_terra_estimator.checks.torque import slope_fit
 from wheel_terra_estimator.checks.trial import Trial, halves, worst
 from wheel_terra_estimator.estimation.measurements import heading_of
 
@@ -313,10 +313,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if (signs < 0.0).any():
         finding, mended = _backwards(evidence, mended, signs, chosen)
         outcomes.append(finding)
-    if turn < 0.0 and not _lasting(mended, there, rows, signs):
-        reason = 'wheels turn against the gyro now and then: slip; drive a circle both ways'
-        outcomes.append(NotChecked('swapped_sides', reason))
-    elif turn < 0.0:
+    if turn < 0.0:
         outcomes += _swapped(evidence)
         mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
     if blame == 'reference' and evidence.recording.reference is not None:
@@ -358,14 +355,6 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     if best.fix.exchanged is not None:
         exchanged = int(there[best.fix.exchanged[0]]), int(there[best.fix.exchanged[1]])
     return _Chosen(signs, turn, exchanged, trial, 0.99 if best.trial.passes else 0.5)
-
-
-def _lasting(evidence: Evidence, there: NDArray[np.intp], rows: Mask, signs: FloatArray) -> bool:
-    """Whether the turns of both halves are those of an ordinary track, the sides swapped."""
-    stretch = stretch_of(evidence, there, rows & evidence.turning)
-    fix = Fix(tuple(int(sign) for sign in signs[there]))
-    tracks = [fit_of(fix, stretch.rows(half)).clear_track for half in halves(stretch.yaw**2)]
-    return all(track < 0.0 and ordinary_track(track) for track in tracks)
 
 
 def _told(fix: Fix, names: Sequence[str]) -> str:
@@ -422,20 +411,15 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
         forward = np.clip(forward, -most, most)  # but for jumps
         fit = float(sense @ forward) / max(float(np.abs(forward).sum()), 1e-12)
         by_reference = fit if abs(fit) > SAME_SENSE else None
-    if evidence.force is not None and evidence.time.size > 100:
-        width = evidence.rows_in(0.4)
-        change = np.gradient(moving_mean(speed, width), evidence.period)
-        force = moving_mean(evidence.force[:, 0], width)
-        force = force - moving_mean(force, 10 * width)
-        parts = np.array([part.sum() for part in np.array_split(change * force, 10)])
-        spread = float(np.linalg.norm(parts - parts.mean()))
-        fit = correlation(change, force)
-        if abs(parts.sum()) > 3.0 * spread and abs(fit) > 0.15:
-            by_force = fit
-        elif (felt := felt_motion(evidence.with_rate(evidence.rate * signs))) is not None:
-            yaw = yaw_of_motion(*felt)
-            if yaw is not None and abs(math.cos(yaw.value)) > CLEAR_DIRECTION:
-                by_force = math.cos(yaw.value)
+    signed = evidence.with_rate(evidence.rate * signs, evidence.torque * signs)
+    if (felt := felt_motion(signed)) is not None:
+        yaw = yaw_of_motion(*felt)
+        if yaw is not None and abs(math.cos(yaw.value)) > CLEAR_DIRECTION:
+            by_force = math.cos(yaw.value)
+    if by_force is None and np.nansum(signed.torque * signed.rate) > 0.0:
+        slopes = slope_fit(signed)  # torques that carry the rover up or down them
+        if slopes is not None and slopes.gain.sigmas_from(0.0) > SCALE_SIGMAS:
+            by_force = float(np.sign(slopes.gain.value))
     return _Told(by_reference, by_force)
 
 

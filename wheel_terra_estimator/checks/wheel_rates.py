@@ -67,9 +67,8 @@ LIVELY = 0.3
 """Rate of the other wheels beside which a wheel does not stand, over the working rate [-]."""
 GOES_ON = 0.75
 """Speed over that of the rims of the other side of a rover that does not turn about one [-]."""
-SAME_SPEED, ROLLING_SPEED = 0.05, 0.3
-"""Speed of a side against the middle, as a share of it, in which all wheels roll as the gyro says
-[-]; of wheels that need not skid in turns."""
+SAME_SPEED = 0.05
+"""Speed of a side against the middle, as a share of it, in which all wheels roll alike [-]."""
 LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0
 """Speed of an odd wheel over that of the others [ln]: least, most of a radius; over scatter [-]."""
 WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0
@@ -207,14 +206,11 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels that turn faster or slower than all others all along, made alike."""
-    facts = evidence.facts
-    speed = np.abs(
-        evidence.speed + np.where(facts.known, evidence.yaw, 0.0)[:, None] * facts.lateral
-    )
-    middle, straight = row_medians(speed), SAME_SPEED if turning.skids(evidence) else ROLLING_SPEED
+    facts, speed = evidence.facts, np.abs(evidence.speed)
+    middle = row_medians(speed)
     rows = evidence.steady & (middle > 0.5 * evidence.working_rate * np.nanmean(evidence.radius))
     if evidence.gyro is not None:
-        rows &= np.abs(evidence.yaw) * np.abs(facts.lateral).max() < straight * middle
+        rows &= np.abs(evidence.yaw) * np.abs(facts.lateral).max() < SAME_SPEED * middle
     few = rows.sum() < 2 * LEAST_MOVING_ROWS or speed.shape[1] < 3
     if few or facts.configuration is None:
         return [], evidence
@@ -224,7 +220,7 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes, rate, rolling = list[Outcome](), evidence.rate.copy(), facts.radius.copy()
     for i, name in enumerate(facts.names):
         beside = max(float(np.nanmax(np.abs(np.delete(whole, i)))), abs(first[i] - second[i]))
-        if not abs(whole[i]) > max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LIVELY):
+        if not abs(whole[i]) > max(LEAST_ODD, ODD * beside):
             continue
         times = math.exp(whole[i])
         told = {'times': times, 'by': 1.0 / times}
