@@ -235,6 +235,15 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
     if best is None:
         reason = 'IMU against wheels: no clear turns in it; drive a circle'
         return NotChecked('delay', reason)
+    if turned is not None and started is not None and started.steady:
+        apart = abs(turned.value - started.value)
+        if apart > max(APART, 3.0 * math.hypot(turned.std, started.std)):
+            reason = (
+                f'turns are {turned.value:+.2f} s apart, starts and stops {started.value:+.2f} s'
+            )
+            return NotChecked(
+                'delay', f'IMU against wheels: {reason}: no offset of stamps does that'
+            )
     evidence.figures['imu.delay_s'] = round(best.value, 3)
     return best
 
