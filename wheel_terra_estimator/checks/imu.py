@@ -408,20 +408,28 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     if evidence.facts.configuration is not None:
         sensors = evidence.facts.configuration.sensors
         floor = math.hypot(floor, sensors.specific_force_bias_std / evidence.facts.gravity)
-    # A body that turns on a plane turns about its own axis: an IMU that is tilted has part of the
-    # turns on x and y, a zero of the accelerometer leaves them there as they are.
     turns = np.column_stack([yaw, np.ones(yaw.size)])[turning, : 2 if seen is None else 1]
-    axis = [block_fit(turns, column)[0] for column in evidence.gyro[turning, :2].T]
-    both = np.array([along.value, across.value]), np.array([a.value for a in axis])
-    var = max(a.std for a in axis) ** 2 + CROSS_AXIS**2 + floor**2
-    odds = (both[0] @ both[1] - 0.5 * both[0] @ both[0]) / var
+    tilt = np.array([along.value, across.value])
     # A sensor whose x axis points up by p reads +g sin p on x; one rolled by q reads -g sin q on y.
     return Mounting(
-        sure=probability(math.log(TILT_IS_MOUNTING / (1.0 - TILT_IS_MOUNTING)) + float(odds)),
+        sure=_is_mounting(tilt, floor, turns, evidence.gyro[turning, :2]),
         roll=Estimate(across.value, math.hypot(across.std, floor)),
         pitch=Estimate(-along.value, math.hypot(along.std, floor)),
         turn=covered,
     )
+
+
+def _is_mounting(tilt: FloatArray, floor: float, turns: FloatArray, gyro: FloatArray) -> float:
+    """Return the probability that what circles show is the mounting, no zero [-].
+
+    A body that turns on a plane turns about its own axis: of an IMU that is tilted (2,) [rad] the
+    gyro (k, 2) has as much of the turns (k, 1) on x and y, beside a zero nothing of them.
+    """
+    fits = [block_fit(turns, column)[0] for column in gyro.T]
+    var = max(fit.std for fit in fits) ** 2 + CROSS_AXIS**2 + floor**2
+    seen = np.array([fit.value for fit in fits])
+    odds = float(tilt @ (seen - 0.5 * tilt)) / var
+    return probability(math.log(TILT_IS_MOUNTING / (1.0 - TILT_IS_MOUNTING)) + odds)
 
 
 def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
