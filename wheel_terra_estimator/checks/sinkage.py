@@ -40,7 +40,7 @@ ALIKE_SHARE = 0.4
 """Share by which the offset of a wheel may change over a drive to count as its zero [-]."""
 DEEP_STD = 0.02
 """Deviation of a zero of all wheels: their true sinkage [m]."""
-ODD_ZERO = 0.015
+ODD_ZERO = 0.01
 """A wheel that reads this much less or more than every other of its side [m] is odd."""
 
 ORDER = NotChecked(
