@@ -57,9 +57,7 @@ Given = TypeVar('Given')
 
 
 def check_recording(
-    recording: Recording,
-    configuration: Configuration | None,
-    remapped: Sequence[str] = (),
+    recording: Recording, configuration: Configuration | None, remapped: Sequence[str] = ()
 ) -> CheckReport:
     """Run all checks.
 
@@ -76,9 +74,7 @@ def check_recording(
 
 
 def examine(
-    recording: Recording,
-    configuration: Configuration | None,
-    remapped: Sequence[str] = (),
+    recording: Recording, configuration: Configuration | None, remapped: Sequence[str] = ()
 ) -> tuple[CheckReport, Evidence | None]:
     """Run all checks and return the evidence with everything mended that was found."""
     report = CheckReport()

@@ -12,20 +12,10 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
-from wheel_terra_estimator.checks.evidence import (
-    LEAST_MOVING_ROWS,
-    Evidence,
-    Mask,
-    row_medians,
-)
+from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask, row_medians
 from wheel_terra_estimator.checks.faults import RATE_UNITS, listed
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
-from wheel_terra_estimator.checks.reference import (
-    LEAST_ROWS,
-    ahead,
-    either_unit,
-    hardly_moves,
-)
+from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, either_unit, hardly_moves
 from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import (
     correlation,
@@ -220,7 +210,7 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes, rate, rolling = list[Outcome](), evidence.rate.copy(), facts.radius.copy()
     for i, name in enumerate(facts.names):
         beside = max(float(np.nanmax(np.abs(np.delete(whole, i)))), abs(first[i] - second[i]))
-        if not abs(whole[i]) > max(LEAST_ODD, ODD * beside):
+        if not abs(whole[i]) > max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LIVELY):
             continue
         times = math.exp(whole[i])
         told = {'times': times, 'by': 1.0 / times}
