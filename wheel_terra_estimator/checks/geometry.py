@@ -233,7 +233,8 @@ def _resistance(evidence: Evidence, seen: float) -> Estimate | NotChecked:
     sensors = facts.configuration.sensors
     arm = len(facts.names) / float(np.mean(facts.radius)) / (facts.mass * facts.gravity)
     std = math.hypot(float(sensors.torque_zero_std) * arm, float(sensors.torque_gain_std) * seen)
-    if abs(seen - RESISTANCE.value) > 3.0 * math.hypot(std, RESISTANCE.std):
+    unlike = abs(seen - RESISTANCE.value) > 3.0 * math.hypot(std, RESISTANCE.std)
+    if unlike or seen > SOFT_TRACTION:
         return NotChecked(
             'radius',
             f'the torques ask for {seen:.2f} of the weight on the level: soft ground, or their '
