@@ -70,7 +70,7 @@ LEAST_GAIN_ERROR = 0.15
 GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
 ZERO_SIGMAS = 5.0
-ALIKE_ZEROS = 0.25
+ALIKE_ZEROS = 0.6
 """Scatter of zeros over the radius, as a share of their mean, within which they are one [-]."""
 
 
