@@ -194,7 +194,8 @@ class Forward:
         by : sequence, optional
             Coordinates of each hypothesis by which to differentiate (default: all).
         known : numpy.ndarray, optional
-            (N, 4) outputs of all hypotheses where ``start`` is the solution: nothing is solved.
+            (N, 4) outputs of all hypotheses where ``start`` is the solution: nothing is solved, and
+            the derivatives by the angle are those of one of them.
         """
         if by is None:
             by = [range(len(h)) for h in hypotheses]
@@ -215,7 +216,8 @@ class Forward:
             angle, outputs = start, np.broadcast_to(known, (*start.shape, len(QUANTITIES)))
         if not jacobian:
             return State([np.asarray(x) for x in u], angle, outputs, [], [])
-        return self._differences(hypotheses, u, by, columns, angle, outputs)
+        alike = known is not None
+        return self._differences(hypotheses, u, by, columns, angle, outputs, alike)
 
     def _acting_on_stress(self, hypothesis: Sequence[Coordinate]) -> frozenset[str]:
         """Terms of the hypothesis that work at every node of the quadrature, at a price."""
@@ -259,37 +261,41 @@ class Forward:
         columns: Sequence[dict[str, float]],
         angle: FloatArray,
         outputs: FloatArray,
+        alike: bool,
     ) -> State:
-        """Jacobians (implicit functions): dy/du at fixed angle, then along the balance."""
-        copies: list[dict[str, float]] = []
-        owner: list[int] = []
+        """Jacobians (implicit functions): dy/du at fixed angle, then along the balance.
+
+        Hypotheses that are all ``alike`` at ``u`` share one plain copy.
+        """
+        plain = columns[:1] if alike else columns
+        copies = list(plain)
+        owner = list(range(len(plain)))
         for b, (hypothesis, values) in enumerate(zip(hypotheses, u, strict=True)):
-            copies.append(columns[b])
-            owner.append(b)
             for c, x in ((hypothesis[k], values[k]) for k in by[b]):
                 copies.append({**columns[b], c.key: float(c.value(x + self._step(c, x)))})
                 owner.append(b)
         # Once more the plain copies, for the derivative along the angle.
         step = 1e-6
-        contact, terms = self._contact(hypotheses, [*copies, *columns])
+        contact, terms = self._contact(hypotheses, [*copies, *plain])
         residual, shifted = self._response(
-            contact, terms, np.concatenate([angle[owner], angle + step])
+            contact, terms, np.concatenate([angle[owner], angle[: len(plain)] + step])
         )
         beyond, moved = residual[len(copies) :], shifted[len(copies) :]
-        jacobians, slopes, at = [], [], 0
+        jacobians, slopes, at = [], [], len(plain)
         for b, hypothesis in enumerate(hypotheses):
             count = len(by[b])
             steps = np.array([self._step(hypothesis[k], u[b][k]) for k in by[b]])
-            base_r, base_y = residual[at], shifted[at]
-            by_angle = (beyond[b] - base_r) / step
-            y_by_angle = (moved[b] - base_y) / step
-            direct_r = (residual[at + 1 : at + 1 + count] - base_r) / steps[:, None]
-            direct_y = (shifted[at + 1 : at + 1 + count] - base_y) / steps[:, None, None]
+            own = 0 if alike else b
+            base_r, base_y = residual[own], shifted[own]
+            by_angle = (beyond[own] - base_r) / step
+            y_by_angle = (moved[own] - base_y) / step
+            direct_r = (residual[at : at + count] - base_r) / steps[:, None]
+            direct_y = (shifted[at : at + count] - base_y) / steps[:, None, None]
             angle_by_u = -direct_r / by_angle
             total = direct_y + y_by_angle[None] * angle_by_u[:, :, None]
             jacobians.append(np.moveaxis(total, 0, -1))
             slopes.append(angle_by_u.T)
-            at += count + 1
+            at += count
         return State([np.asarray(x) for x in u], angle, outputs, jacobians, slopes)
 
     @staticmethod
