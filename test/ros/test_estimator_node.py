@@ -182,19 +182,11 @@ def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, paramete
     assert 'listening to /drive/joints, /imu/data' in process.stop(signal.SIGTERM)[1]
 
 
-@pytest.mark.parametrize(
-    ('override', 'words'),
-    [
-        ('rover.mas:=20.0', 'rover.mass'),
-        ('rover.mass:=-1.0', 'rover.mass'),
-        ('wheels.radius:=[0.1, 0.1]', 'wheels.radius'),
-        ('slip_radius:=tip', 'lug_tip'),
-    ],
-)
-def test_wrong_parameters_end_the_node_with_one_line(start, parameters, override, words):
-    status, said = start('estimator_node', *ROVER, parameters, '-p', override).end()
+def test_wrong_parameters_end_the_node_with_one_line(start, parameters):
+    """Which are wrong is tested where they are read, in configuration."""
+    status, said = start('estimator_node', *ROVER, parameters, '-p', 'rover.mas:=20.0').end()
     assert status == 2
-    assert words in said
+    assert 'rover.mass' in said
     assert 'Traceback' not in said
 
 

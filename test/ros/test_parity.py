@@ -15,6 +15,8 @@ from recordings import beginning
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 
+SECONDS = 6.0
+"""Of a recording that is played."""
 DEMO = Path(__file__).resolve().parents[2] / 'data' / 'demo'
 
 
@@ -88,21 +90,21 @@ def test_live_and_replayed_numbers_are_the_same_bits(bag, tmp_path):
     How many sets a busy machine gives is not the point: what comes must be the same.
     """
     live, again, arrival = tmp_path / 'live', tmp_path / 'again', tmp_path / 'arrival.txt'
-    source = beginning(DEMO / bag, tmp_path / 'source', 10.0)
+    source = beginning(DEMO / bag, tmp_path / 'source', SECONDS)
     logged = ['--arrival', str(arrival), *REPLAY[bag]]
     run_live(source, live, '--rate', '4', *logged)
     assert main(['replay', str(source), '-o', str(again), *logged]) == 0
-    assert_same_bits(live, again, least=20)
+    assert_same_bits(live, again, least=12)
 
 
 @pytest.mark.usefixtures('forked_node')
 def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
     """A frequent topic does not fall behind the others, so no log of arrivals is needed."""
     live, again = tmp_path / 'live', tmp_path / 'again'
-    source = beginning(DEMO / 'pathfinder', tmp_path / 'source', 10.0)
+    source = beginning(DEMO / 'pathfinder', tmp_path / 'source', SECONDS)
     run_live(source, live, *REPLAY['pathfinder'])
     assert main(['replay', str(source), '-o', str(again), *REPLAY['pathfinder']]) == 0
-    assert_same_bits(live, again, least=90)
+    assert_same_bits(live, again, least=50)
 
 
 def test_ctrl_c_ends_a_live_drive_without_a_traceback(own_domain, tmp_path):

@@ -3,12 +3,15 @@
 """Wiring of the limiter over DDS; what passes is tested in estimation/test_limiter_cases."""
 
 import json
+import re
 import signal
 import time
 from pathlib import Path
 
 import pytest
 from test_estimator_node import ROVER, parameters, wheel_message
+
+from wheel_terra_estimator.errors import UserError
 
 __all__ = ['parameters']
 
@@ -202,15 +205,24 @@ def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
         ('critical_slip:=0.1', 'must be below'),
         ('creep_scale:=.nan', 'out of range'),
         ('stamped:=7', 'stamped'),
-        ('creep:=0.5', "the nearest known one is 'creep_scale'"),
     ],
 )
-def test_what_cannot_be_used_is_refused_at_the_start(start, parameters, parameter, said):
+def test_what_cannot_be_used_is_refused_at_the_start(listener, parameters, parameter, said):
+    """With an error of which `run_node` makes one line and an exit status."""
+    from rclpy.exceptions import ParameterException
+
+    from wheel_terra_estimator.ros.limiter_node import TractionLimiter
+
     before = Path(parameters).read_text()
-    parameter = parameter.format(rover=parameters)
-    status, words = start('traction_limiter_node', '--ros-args', '-p', parameter).end()
-    assert status == 2 and said in words and 'Traceback' not in words, words
+    arguments = ['--ros-args', '-p', parameter.format(rover=parameters)]
+    with pytest.raises((UserError, ParameterException), match=re.escape(said)):
+        TractionLimiter(context=listener[0].context, cli_args=arguments)
     assert Path(parameters).read_text() == before
+
+
+def test_what_is_refused_ends_the_process_with_one_line(start):
+    status, words = start('traction_limiter_node', '--ros-args', '-p', 'creep:=0.5').end()
+    assert status == 2 and "'creep_scale'" in words and 'Traceback' not in words, words
 
 
 def test_one_limiter_keeps_its_stop_and_the_other_says_so_until_the_first_has_ended(
