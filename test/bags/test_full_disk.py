@@ -146,7 +146,7 @@ def everything(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize('command', ['replay', 'replay two', 'diagnose', 'predict'])
 def test_a_disk_that_fills_up_at_any_file_leaves_the_earlier_output(
-    make_bag, rover, tmp_path, capsys, undrawn, command
+    make_bag, drive, rover, tmp_path, capsys, undrawn, command
 ):
     """Whichever file is the first without room: the output of the run before stands, whole."""
     read, out = tmp_path / 'read', tmp_path / 'out'
@@ -155,7 +155,7 @@ def test_a_disk_that_fills_up_at_any_file_leaves_the_earlier_output(
     table, few = read / 't.csv', ['--slip', '0.05:0.6:8', '--load', '35,70']
     model = ['--config', 'hit_wh1_lug10', '--config', 'hit_lss1']  # its own rows agree
     assert main(['predict', *model, *few, '-o', str(table)]) == 0
-    bags = [str(make_bag(name=name)) for name in ('one', 'two')]
+    bags = [str(make_bag(drive[: len(drive) // 4], name=name)) for name in ('one', 'two')]
     config = ['--config', str(read / 'rover.yaml')]
     line = {
         'replay': ['replay', bags[0], *config, '-o'],

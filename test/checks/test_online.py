@@ -102,7 +102,6 @@ FAULTS = {
     ),
     'sides': (swap_sides, 'swapped_sides', 'joint_states', 'wheels.names', STRAIGHT),
     'rpm': (on_wheels(30.0 / np.pi), 'unit', 'joint_states', '0.10472', REST),
-    'degrees': (on_wheels(180.0 / np.pi), 'unit', 'joint_states', '0.0174533', REST),
     'thousand': (on_wheels(200.0 / 0.5), 'unit', 'joint_states', 'rad/s', REST),
     'upside_down': (on_imu(UPSIDE_DOWN, UPSIDE_DOWN), 'mounting', 'imu/data', '180', 0.0),
     'g': (on_imu(1.0 / 9.80665), 'unit', 'imu/data', '9.80', 0.0),

@@ -252,7 +252,7 @@ def simulated():
     stairs = scenario.load(
         {
             'configuration': ['generic_six_wheel'],
-            'duration': 70.0,
+            'duration': 60.0,
             'drive.time': [0.0],
             'drive.forward': [0.08],
             'slope.position': [0.0, 1.6, 1.8],

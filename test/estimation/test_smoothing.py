@@ -78,7 +78,7 @@ def test_a_linear_drive_smoothed_is_its_least_squares_solution():
 
 @pytest.fixture(scope='module')
 def drive():
-    return simulate(load('climb_soft_patch'), seed=1025, duration=18.0)
+    return simulate(load('climb_soft_patch'), seed=1025, duration=14.0)
 
 
 def run(drive, measurements):
@@ -163,14 +163,14 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
     scenario = load(
         {
             'configuration': ['generic_six_wheel', 'hit_lss1'],
-            'duration': 12.0,
+            'duration': 9.5,
             'slope.angle_deg': [6.0],
-            'drive.time': [0.0, 8.0, 9.0],
+            'drive.time': [0.0, 6.0, 7.0],
             'drive.forward': [0.05, 0.05, -0.05],
         }
     )
     drive = simulate(scenario, 1)
-    turned = drive.truth.stamp[0] + round(8.6e9)  # the commands cross zero at 8.5 s
+    turned = drive.truth.stamp[0] + round(6.6e9)  # the commands cross zero at 6.5 s
 
     def slips(until):
         smoother = DriveSmoother(drive.configuration)
@@ -184,7 +184,7 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
         return {s.stamp: s.slip for s in sets if s.stamp < turned - round(2e9)}
 
     whole, climb = slips(drive.truth.stamp[-1]), slips(turned)
-    assert len(whole) > 50
+    assert len(whole) > 40
     for stamp, slip in climb.items():
         np.testing.assert_allclose(whole[stamp], slip, atol=0.01)
 

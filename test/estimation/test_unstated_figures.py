@@ -145,7 +145,7 @@ def rolling(rng, seconds):
 def test_sinkage_readings_below_their_zero_stop_no_rover_on_hard_ground(seed):
     core = EstimatorCore(reader.from_parameters(TEN_LINES))
     sets = []
-    for measurement in rolling(np.random.default_rng(seed), 30.0):
+    for measurement in rolling(np.random.default_rng(seed), 20.0):
         sets += core.add(measurement)
     sets += core.flush()
     assert not any(s.stuck for s in sets)

@@ -55,7 +55,7 @@ def plain_drive():
     return drive()
 
 
-def drive(duration=12.0, seed=3, **keys):
+def drive(duration=9.0, seed=3, **keys):
     base = {
         'configuration': SAND,
         'duration': duration,
@@ -74,7 +74,7 @@ def drive_of(kind, duration):
 
 @pytest.fixture(scope='module')
 def climb():
-    return drive(**{'slope.angle_deg': [8.0]})
+    return drive(12.0, **{'slope.angle_deg': [8.0]})
 
 
 @pytest.fixture(scope='module')
@@ -98,7 +98,7 @@ def last(values, seconds=5):
     ],
 )
 def test_each_quadrant_has_the_right_signs(slope, speed):
-    run = drive(**{'slope.angle_deg': [slope], 'drive.forward': [speed]})
+    run = drive(12.0, **{'slope.angle_deg': [slope], 'drive.forward': [speed]})
     sets, truth = estimate(run), run.truth
     pull = last([s.drawbar_pull for s in sets])
     slip = last([s.slip for s in sets])
@@ -333,7 +333,7 @@ def test_nothing_drifts_along_the_ridge_of_slip_and_strength(kind, mode, most):
 def test_a_wheel_sunk_to_its_hub_is_followed():
     d = plain_drive()
     sunk = 0.98 * float(d.configuration.wheels.radius[0])
-    half = d.arrivals[0].measurement.stamp + 8_000_000_000
+    half = d.arrivals[0].measurement.stamp + 5_000_000_000
     estimator = WheelSoilEstimator(d.configuration)
     for stamp, inputs in merged(inputs_of_mode(d.arrivals, 'reference')):
         if inputs.sinkage is not None and stamp > half:
@@ -395,7 +395,8 @@ def test_a_jolt_at_the_start_does_not_stop_the_speed_without_a_reference():
 
 def test_the_zero_of_the_pitch_gyro_does_not_reach_the_pulls():
     # 0.02 rad/s at 2 cm/s would be ground that curves by 1 rad/m.
-    run = drive(**{'drive.time': [0.0, 4.0, 5.0], 'drive.forward': [0.0, 0.0, 0.02]})
+    profile = {'drive.time': [0.0, 4.0, 5.0], 'drive.forward': [0.0, 0.0, 0.02]}
+    run = drive(12.0, **profile)
 
     def turned(reading, time):
         zero = np.array([0.0, 0.02, 0.0])
@@ -413,10 +414,10 @@ def test_a_steered_rover_is_judged_along_its_wheels():
         'drive__forward': [0.05, 0.05, 0.05],
         'drive__turn_rate': [0.0, 0.0, 0.05],
     }
-    drive = simulate(load('steered_turns', **arcs), 4, duration=19.0)
+    drive = simulate(load('steered_turns', **arcs), 4, duration=15.0)
     truth, configuration = drive.truth, drive.configuration
     turning = np.abs(truth.yaw_rate) > 0.03
-    assert turning.sum() > 100
+    assert turning.sum() > 70
     errors = []
     for told in (True, False):
         core, found = EstimatorCore(configuration), {}

@@ -152,7 +152,7 @@ def test_what_cannot_be_done_is_said_first(
 def test_ctrl_c_leaves_whole_outputs_and_the_next_run_goes_on(
     make_bag, make_drive, config, tmp_path
 ):
-    long = make_bag(make_drive(300), name='long')
+    long = make_bag(make_drive(150), name='long')
     short = make_bag(name='short')
     out = tmp_path / 'out'
     program = [sys.executable, '-m', 'wheel_terra_estimator.cli.main']

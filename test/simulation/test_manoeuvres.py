@@ -18,7 +18,7 @@ LEVEL, STOPS = MANOEUVRES[0], MANOEUVRES[6]
 
 @pytest.fixture(autouse=True)
 def shorter(monkeypatch):
-    monkeypatch.setattr(manoeuvres, 'DURATION', 10.0)
+    monkeypatch.setattr(manoeuvres, 'DURATION', 7.0)
 
 
 @pytest.fixture(scope='module')
