@@ -48,8 +48,8 @@ class Parameter:
         Per-wheel list, list of that length (0: any length), or a scalar.
     lower, upper : float
         Allowed range of each number.
-    open_lower, open_upper : bool
-        Whether the bound itself is excluded.
+    open_lower : bool
+        Whether the lower bound itself is excluded.
     choices : tuple of str
         Allowed texts, if not any.
     aliases : tuple of str
@@ -69,7 +69,6 @@ class Parameter:
     lower: float = -inf
     upper: float = inf
     open_lower: bool = False
-    open_upper: bool = False
     choices: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
     required: bool = False
@@ -93,7 +92,7 @@ class Parameter:
         if self.lower > -inf:
             limits.append(f'{"above" if self.open_lower else "at least"} {self.lower:g}')
         if self.upper < inf:
-            limits.append(f'{"below" if self.open_upper else "at most"} {self.upper:g}')
+            limits.append(f'at most {self.upper:g}')
         if limits:
             words += f' ({" and ".join(limits)})'
         return words
@@ -137,7 +136,6 @@ def parameter(
     unit: str | None = None,
     above: float | None = None,
     at_least: float = -inf,
-    below: float | None = None,
     at_most: float = inf,
     choices: Iterable[str] = (),
     aliases: Iterable[str] = (),
@@ -152,9 +150,8 @@ def parameter(
         ('-' if measured else '') if unit is None else unit,
         meaning,
         lower=at_least if above is None else above,
-        upper=at_most if below is None else below,
+        upper=at_most,
         open_lower=above is not None,
-        open_upper=below is not None,
         choices=tuple(choices),
         aliases=tuple(aliases),
         **others,

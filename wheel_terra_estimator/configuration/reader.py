@@ -286,8 +286,7 @@ def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]
     else:
         value = float(value)
     too_low = value <= parameter.lower if parameter.open_lower else value < parameter.lower
-    too_high = value >= parameter.upper if parameter.open_upper else value > parameter.upper
-    if too_low or too_high:
+    if too_low or value > parameter.upper:
         raise refuse(f'{value!r} is out of range')
     return value
 
