@@ -99,12 +99,7 @@ def block_fit(
     edges = np.linspace(0, target.size, BLOCKS + 1).astype(int)[:-1]
     normals = np.add.reduceat(weighted[:, :, None] * design[:, None, :], edges, axis=0)
     rights = np.add.reduceat(weighted * target[:, None], edges, axis=0)
-    left_out = np.array(
-        [
-            _solve(normals.sum(axis=0) - n, rights.sum(axis=0) - r)
-            for n, r in zip(normals, rights, strict=True)
-        ]
-    )
+    left_out = _solve(normals.sum(axis=0) - normals, rights.sum(axis=0) - rights)
     spread = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
     std = np.sqrt((BLOCKS - 1) / BLOCKS * spread)
     return [Estimate(float(v), float(s)) for v, s in zip(whole, std, strict=True)]
@@ -126,10 +121,10 @@ def _huber(
 
 
 def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve normal equations after scaling; a column of nothing gets coefficient 0."""
-    size = np.sqrt(np.maximum(np.abs(np.diag(normal)), 1e-300))
-    scaled = normal / np.outer(size, size) + 1e-12 * np.eye(size.size)
-    return np.asarray(np.linalg.solve(scaled, right / size) / size)
+    """Solve normal equations (..., p, p) after scaling; a column of nothing gets coefficient 0."""
+    size = np.sqrt(np.maximum(np.abs(np.diagonal(normal, axis1=-2, axis2=-1)), 1e-300))
+    scaled = normal / (size[..., :, None] * size[..., None, :]) + 1e-12 * np.eye(size.shape[-1])
+    return np.asarray(np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size)
 
 
 def moving_mean(values: NDArray[Any], width: int) -> NDArray[Any]:
