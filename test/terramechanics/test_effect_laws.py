@@ -127,6 +127,21 @@ def test_soil_carried_round_balances_volume_and_energy():
     assert ours[1] == pytest.approx(pull)
 
 
+@pytest.mark.parametrize('name', ['soil_mound', 'soil_mound:conveyed'])
+def test_the_soil_behind_the_wheel_stands_as_high_as_the_formula_says(name):
+    slip, kappa, band = 0.7, 1.5, 0.003
+    shape = {'band': band} if ':' in name else {'onset': 0.4}
+    settings = {'soil_mound': {'form': name.partition(':')[2] or 'onset', 'kappa': kappa, **shape}}
+    found = state(slip, LOAD, effects=settings)
+    z = found.sinkage[0]
+    conveyed = (WHEEL.lug_height + band) * slip / (1.0 - slip)
+    x = conveyed / (conveyed + z) if ':' in name else (slip - 0.4) / (1.0 - 0.4)
+    base = 1.0 - math.cos(SAND.leaving_angle_ratio * math.acos(1.0 - z / WHEEL.radius))
+    rise = kappa * z / WHEEL.radius * x * x
+    height = base + (1.0 - base) * (1.0 - math.exp(-rise / (1.0 - base)))
+    assert 1.0 - math.cos(found.leaving_angle[0]) == pytest.approx(height, rel=1e-9)
+
+
 ON_STRESS = {'hard_layer', 'hard_layer:bearing', 'multipass:rut', 'soil_adhesion:tension'}
 VARIANTS = [form.name for effect in catalogue().values() for form in effect.forms]
 
