@@ -210,7 +210,7 @@ def test_a_later_wheel_runs_in_the_rut_of_the_first():
     assert np.all(contacts.rut[2:] > 0.3 * contacts.bottom[:2].mean())
 
 
-BEND, SPIN = Phase(4.5, 1.0, 0.3), Phase(4.5, 0.0, 0.0, 0.8)
+BEND, SPIN = Phase(6.5, 1.0, 0.3), Phase(6.5, 0.0, 0.0, 0.8)
 
 
 @pytest.mark.parametrize(
@@ -223,7 +223,7 @@ BEND, SPIN = Phase(4.5, 1.0, 0.3), Phase(4.5, 0.0, 0.0, 0.8)
 )
 def test_positive_turns_go_to_the_left(family, turn):
     rover, motion = rover_on(family, {})
-    course = drive(motion, Driver(rover, (Phase(1.0, 0.0), turn), 0.0), 5.5)
+    course = drive(motion, Driver(rover, (Phase(1.0, 0.0), turn), 0.0), 7.5)
     assert course.yaw[-1] > 0.1
     if turn.turn and rover.steered.any():
         ahead = rover.steered & (rover.x > 0.0)
