@@ -11,7 +11,7 @@ import pytest
 from wheel_terra_estimator.configuration import reader
 
 ROVER = 'generic_six_wheel'
-RATES = {'joint_states': 50.0, 'imu/data': 50.0, 'sinkage': 10.0, 'reference_odom': 5.0}
+RATES = {'joint_states': 100.0, 'imu/data': 100.0, 'sinkage': 10.0, 'reference_odom': 5.0}
 MISSED = 400  # messages: more than the queues hold
 
 
