@@ -19,7 +19,7 @@ from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 
 _LONGEST_STEP = 2.0  # prior standard deviations
-_CLOSE_ENOUGH = 0.02  # in the objective
+CLOSE_ENOUGH = 0.02  # in the objective
 
 
 @dataclass
@@ -123,7 +123,7 @@ def fit(
             current = best[b]
             assert current is not None
             step, expected = _step(current, limits[b], damping[b])
-            if expected < _CLOSE_ENOUGH or (improved and gain < _CLOSE_ENOUGH):
+            if expected < CLOSE_ENOUGH or (improved and gain < CLOSE_ENOUGH):
                 continue
             trial[b] = current.u + step
             if improved:
@@ -140,28 +140,43 @@ def _step(
     current: Fit, limit: tuple[FloatArray, FloatArray], damping: float
 ) -> tuple[FloatArray, float]:
     """Return a bounded Gauss-Newton step and the fall of the objective that it should bring."""
-    lower, upper = limit
-    precision = current.precision()
     gradient = (
         current.jacobian.T @ (current.residual / current.variance) - current.prior * current.u
     )
+    return bounded_step(current.precision(), gradient, current.u, current.prior, limit, damping)
+
+
+def bounded_step(
+    precision: FloatArray,
+    gradient: FloatArray,
+    u: FloatArray,
+    prior: FloatArray,
+    limit: tuple[FloatArray, FloatArray],
+    damping: float,
+) -> tuple[FloatArray, float]:
+    """Return a damped step that stays inside the limits, and the fall that it should bring.
+
+    ``gradient`` points where the objective falls; ``prior`` is the part of the precision that is
+    known beforehand.
+    """
+    lower, upper = limit
     damped = precision + damping * np.diag(np.diag(precision))
-    free = np.ones(len(current.u), dtype=bool)
-    step = np.zeros(len(current.u))
+    free = np.ones(len(u), dtype=bool)
+    step = np.zeros(len(u))
     # Few passes suffice: a coordinate that would leave its range stays at the bound.
     for _ in range(3):
         fixed = ~free
         right = gradient[free] - damped[np.ix_(free, fixed)] @ step[fixed]
         step[free] = np.linalg.solve(damped[np.ix_(free, free)], right)
         # A strength may double, so that an effect of many prior deviations is reached.
-        longest = np.maximum(_LONGEST_STEP, np.where(current.prior < 1.0, np.abs(current.u), 0.0))
+        longest = np.maximum(_LONGEST_STEP, np.where(prior < 1.0, np.abs(u), 0.0))
         step /= max(1.0, float((np.abs(step) / longest).max(initial=0.0)))
-        new = current.u + step
+        new = u + step
         outside = free & ((new < lower) | (new > upper))
         if not outside.any():
             break
-        step[outside] = np.clip(new, lower, upper)[outside] - current.u[outside]
+        step[outside] = np.clip(new, lower, upper)[outside] - u[outside]
         free &= ~outside
-    step = np.clip(current.u + step, lower, upper) - current.u
+    step = np.clip(u + step, lower, upper) - u
     expected = float(gradient @ step - 0.5 * step @ precision @ step)
     return step, expected
