@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recordings import changed
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
@@ -109,6 +110,18 @@ def test_from_a_recording_then_checked_and_calibrated(tmp_path, capsys):
     command = ['calibrate', str(PATHFINDER), '--config', str(output), '-o', str(better)]
     assert main(command) == 0
     assert np.allclose(reader.load([better]).wheels.radius, 0.117, atol=0.001)
+
+
+def test_a_turning_joint_that_is_left_out_is_told(tmp_path, capsys):
+    def rename(topic, message):
+        if topic == '/joint_states':
+            message.name[message.name.index('front_left_wheel_joint')] = 'nose'
+        return message
+
+    bag = changed(PATHFINDER, tmp_path / 'bag', rename)
+    measures = ['--radius', '0.11', '--track', '0.6', '--wheelbase', '0.5', '--mass', '22']
+    assert main(['init', '--bag', str(bag), *measures, '-o', str(tmp_path / 'rover.yaml')]) == 0
+    assert 'not taken for wheels by their names: nose; ' in capsys.readouterr().out
 
 
 def test_all_measures_that_are_missing_are_named_at_once(tmp_path, capsys):

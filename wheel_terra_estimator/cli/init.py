@@ -149,7 +149,13 @@ def _wheels_of(path: Path, limits: Limits) -> list[str]:
         recording = read_series(bag, {}, path.name)
         if recording.joints is None:
             raise UserError(f'{path}: no joint states in it; name the wheels with --wheels')
-    return list(wheel_names(recording.joints.names))
+    joints = recording.joints
+    names = list(wheel_names(joints.names))
+    rates = zip(joints.names, joints.rate.T, strict=True)
+    others = [n for n, rate in rates if n not in names and (abs(rate) > 0.0).any()]
+    if others:
+        print(f'not taken for wheels by their names: {", ".join(others)}; if they are: --wheels')
+    return names
 
 
 def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSketch:
