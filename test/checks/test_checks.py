@@ -287,6 +287,17 @@ def test_a_variance_of_zero_is_right_where_the_rover_file_states_what_is_seen():
     assert [f for f in far.findings if f.kind == 'covariance']
 
 
+def test_values_that_a_log_holds_scatter_as_the_new_ones_do():
+    """A log at five times the rate of the source repeats each reading four times."""
+    reference = rolling.recording().reference
+    step = np.diff(reference.stamp, append=2 * reference.stamp[-1] - reference.stamp[-2]) // 5
+    held = {field: np.repeat(getattr(reference, field), 5, axis=0) for field in SERIES}
+    held['stamp'] = held['stamp'] + np.repeat(step, 5) * np.tile(np.arange(5), step.size)
+    recording = replace(rolling.recording(), reference=replace(reference, **held))
+    told = check_recording(recording, rolling.rover())
+    assert told.figures['reference.noise_m_s'] == pytest.approx(0.01, rel=0.3)  # true: 0.01
+
+
 def test_a_rover_that_starts_and_stops_between_references_scatters_no_reference():
     drive = rolling.ten_minute_drive(turns=False)
     speed = 0.15 + 0.15 * np.sin(2.0 * np.pi / 3.0 * drive.time)

@@ -32,6 +32,7 @@ JUMP_FACTOR = 8.0
 JUMP_SHARE = 0.005
 """Share of jumps that is a fault of the source, not a single wild reading."""
 LEAST_JUMPS = 3
+LEAST_NEW = 0.5  # share of readings that differ from the one before: fewer are held values
 BEYOND = 2.0
 """Speed over the fastest of the rims that is a jump whatever the wheels do [-]."""
 LEAST_JUMP = 0.3
@@ -275,7 +276,13 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     forward = reference.velocity[:, 0]
     if reference.stamp.size < LEAST_REFERENCES or not np.ptp(forward):
         return []  # no reading of a speed
-    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
+    # A log at a higher rate holds each value until the next: only new ones scatter.
+    new = np.append(True, np.diff(forward) != 0.0)
+    if np.mean(new) < LEAST_NEW and new.sum() >= LEAST_REFERENCES:
+        forward = forward[new]
+    else:
+        new[:] = True
+    rim = np.nan_to_num(evidence.rim_at(reference.stamp[new], evidence.rim))
     noise = min(bend_noise(forward), bend_noise(forward - rim))  # wheels start and stop as well
     evidence.figures['reference.noise_m_s'] = float(f'{noise:.3g}')
     stated = reference.variance[np.isfinite(reference.variance)]
