@@ -11,9 +11,11 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.fitting.coordinates import bounds
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import (
-    CLOSE_ENOUGH,
+    LEAST_DAMPING,
     Fit,
     bounded_step,
+    has_settled,
+    next_damping,
 )
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.selection.candidates import Setting
@@ -103,7 +105,7 @@ class _Refit:
         self.fitted = fitted
         self._setting = setting
         self._kept = kept  # (m, m) inverse covariance of the kept cells, 0 at the others
-        self._damping = 1e-6
+        self._damping = LEAST_DAMPING
         self._objective = np.inf
         self.trial = fitted.u
         self.look(fitted.outputs, fitted.sensitivity)
@@ -119,15 +121,13 @@ class _Refit:
             self._u, self.outputs, self._objective = self.trial, outputs, objective
             self._gradient = sensitivity.T @ weighted - prior * self.trial
             self._precision = sensitivity.T @ self._kept @ sensitivity + np.diag(prior)
-            self._damping = max(0.1 * self._damping, 1e-6)
-        else:
-            self._damping = max(30.0 * self._damping, 1.0)
+        self._damping = next_damping(self._damping, gain >= 0.0)
         limits = bounds(self.fitted.coordinates)
         step, expected = bounded_step(
             self._precision, self._gradient, self._u, prior, limits, self._damping
         )
         self.trial = self._u + step
-        self.going = expected >= CLOSE_ENOUGH and not 0.0 <= gain < CLOSE_ENOUGH
+        self.going = not has_settled(expected, gain)
 
 
 def _inverse(problem: Problem, variance: FloatArray) -> FloatArray:

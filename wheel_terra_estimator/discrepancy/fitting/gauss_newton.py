@@ -19,7 +19,9 @@ from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 
 _LONGEST_STEP = 2.0  # prior standard deviations
-CLOSE_ENOUGH = 0.02  # in the objective
+_CLOSE_ENOUGH = 0.02  # in the objective
+LEAST_DAMPING = 1e-6
+"""Share of the precision that is added to its diagonal, at the start."""
 
 
 @dataclass
@@ -83,7 +85,7 @@ def fit(
         np.clip(np.asarray(s, dtype=float), *limit) for s, limit in zip(starts, limits, strict=True)
     ]
     best: list[Fit | None] = [None] * count
-    damping = np.full(count, 1e-6)
+    damping = np.full(count, LEAST_DAMPING)
     angle = None if angles is None else np.array(angles, dtype=float)
     active = list(range(count))
     for _ in range(iterations):
@@ -117,13 +119,11 @@ def fit(
                     objective,
                     priors[b],
                 )
-                damping[b] = max(0.1 * damping[b], 1e-6)
-            else:
-                damping[b] = max(30.0 * damping[b], 1.0)
+            damping[b] = next_damping(damping[b], improved)
             current = best[b]
             assert current is not None
             step, expected = _step(current, limits[b], damping[b])
-            if expected < CLOSE_ENOUGH or (improved and gain < CLOSE_ENOUGH):
+            if has_settled(expected, gain):
                 continue
             trial[b] = current.u + step
             if improved:
@@ -134,6 +134,16 @@ def fit(
         if not active:
             break
     return [f for f in best if f is not None]
+
+
+def next_damping(damping: float, improved: bool) -> float:
+    """Return the damping of the step that follows one that made the fit better, or worse."""
+    return max(0.1 * damping, LEAST_DAMPING) if improved else max(30.0 * damping, 1.0)
+
+
+def has_settled(expected: float, gain: float) -> bool:
+    """Tell whether the next step would fall by too little, or the last one did (< 0: it rose)."""
+    return expected < _CLOSE_ENOUGH or 0.0 <= gain < _CLOSE_ENOUGH
 
 
 def _step(
