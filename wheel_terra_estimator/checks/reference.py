@@ -278,10 +278,9 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
         return []  # no reading of a speed
     # A log at a higher rate holds each value until the next: only new ones scatter.
     new = np.append(True, np.diff(forward) != 0.0)
-    if np.mean(new) < LEAST_NEW and new.sum() >= LEAST_REFERENCES:
-        forward = forward[new]
-    else:
+    if np.mean(new) >= LEAST_NEW or new.sum() < LEAST_REFERENCES:
         new[:] = True
+    forward = forward[new]
     rim = np.nan_to_num(evidence.rim_at(reference.stamp[new], evidence.rim))
     noise = min(bend_noise(forward), bend_noise(forward - rim))  # wheels start and stop as well
     evidence.figures['reference.noise_m_s'] = float(f'{noise:.3g}')

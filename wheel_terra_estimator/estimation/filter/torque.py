@@ -21,8 +21,8 @@ from wheel_terra_estimator.estimation.rover import Rover
 Floats = tuple[float, ...]
 _FLOOR_VARIANCE = 1e-6  # [N^2 m^2]
 _APART_STD = 0.025
-"""What a wheel's torque differs by from the models of all, over their mean: loads and ground of
-each. Tuned without references on simulators A, B and a foreign one."""
+"""By how much torques differ from one another beyond the models, over their mean [-]: each wheel
+has its own load and ground. Tuned without references on simulators A, B and a foreign one."""
 _APART_LENGTH = 5.0  # rim travel over which it lasts [m]
 _LEAST_APART = 2  # wheels that can differ
 
