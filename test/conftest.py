@@ -25,9 +25,12 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
-# The quick tests draw the same in each run; `.ci/slow` draws anew (--hypothesis-profile random).
+# The quick tests draw the same few in each run; `.ci/slow` draws a hundred anew
+# (--hypothesis-profile random).
 hypothesis.settings.register_profile('random', deadline=None, print_blob=True)
-hypothesis.settings.register_profile('same', deadline=None, derandomize=True, database=None)
+hypothesis.settings.register_profile(
+    'same', deadline=None, derandomize=True, database=None, max_examples=30
+)
 hypothesis.settings.load_profile('same')
 
 LONGEST = (

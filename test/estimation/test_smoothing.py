@@ -139,7 +139,7 @@ def test_warnings_and_times_are_those_that_were_given_live(pairs):
 
 def test_a_late_reference_is_smoothed_at_its_own_stamp(drive):
     """However late references come, within the history, the smoothed drive is nearly the same."""
-    early = [a for a in drive.arrivals if a.measurement.stamp < drive.truth.stamp[0] + 8e9]
+    early = [a for a in drive.arrivals if a.measurement.stamp < drive.truth.stamp[0] + 6e9]
 
     def delayed(seconds):
         def arrival(a):

@@ -15,7 +15,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Container, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
@@ -126,18 +126,23 @@ def command_module(name: str) -> Any:
     """
     if name not in LABORATORY:
         return importlib.import_module(f'wheel_terra_estimator.cli.{name}')
-    from importlib.metadata import entry_points  # 30 ms that most commands do without
-
     try:
-        (entry,) = entry_points(group=ENTRY_POINTS, name=name)
-        return entry.load()
-    except (ValueError, ModuleNotFoundError) as error:
+        return _laboratory()[name].load()
+    except (KeyError, ModuleNotFoundError) as error:
         if not (getattr(error, 'name', None) or 'wheel_terra_lab').startswith('wheel_terra_lab'):
             raise
         raise UserError(
             'the laboratory (package wheel_terra_lab) is not installed here; it comes with '
             'wheel_terra_estimator from pip or colcon, unless it was left out'
         ) from None
+
+
+@cache
+def _laboratory() -> dict[str, Any]:
+    """Return the installed entry points of the laboratory's commands by their names."""
+    from importlib.metadata import entry_points  # 30 ms that most commands do without
+
+    return {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
 
 
 def _commands_here() -> Container[str]:

@@ -36,7 +36,7 @@ PLAIN = replace(
 """A soil in which stresses depend on place and sliding only, so that they can be written down."""
 
 
-FIRM = replace(KINDS['firm'], duration=6.0)
+FIRM = replace(KINDS['firm'], duration=4.0)
 
 
 def each(ground, count):
@@ -153,7 +153,7 @@ def straight(rover, share=1.0):
     return command
 
 
-@pytest.mark.parametrize('family', ['four_skid', 'six_rocker', 'eight_skid', 'six_heavy'])
+@pytest.mark.parametrize('family', ['six_rocker', 'eight_skid'])
 def test_loads_at_rest_carry_the_weight_where_its_centre_is(family):
     rover, motion = rover_on(family, {})
     course = drive(motion, straight(rover, 0.0), 2.0)
@@ -215,10 +215,14 @@ BEND, SPIN = Phase(6.5, 1.0, 0.3), Phase(6.5, 0.0, 0.0, 0.8)
 
 @pytest.mark.parametrize(
     ('family', 'turn'),
-    [('four_front', BEND), ('four_skid', SPIN), ('four_all', SPIN), ('six_rocker', BEND)]
+    [('four_skid', SPIN), ('six_rocker', BEND)]
     + [
         pytest.param(family, turn, marks=pytest.mark.slow)
-        for family, turn in (('four_skid', BEND), ('four_all', BEND), ('six_rocker', SPIN))
+        for turn, families in (
+            (BEND, ('four_front', 'four_skid', 'four_all')),
+            (SPIN, ('four_all', 'six_rocker')),
+        )
+        for family in families
     ],
 )
 def test_positive_turns_go_to_the_left(family, turn):
