@@ -222,7 +222,7 @@ def test_a_soil_is_saved_as_it_was(name, tmp_path):
         api.Soil.load('hit_wh3')
 
 
-@pytest.mark.parametrize('name', ['dlr_mss', 'grc1', 'lete_sand', 'hit_fit'])
+@pytest.mark.parametrize('name', ['dlr_mss', 'lete_sand'])
 def test_a_soil_is_found_again_without_its_file(name, monkeypatch):
     """The start may be any other shipped soil; what one wheel width tells is kc/b + kphi."""
     others = [other for other in api.Soil.available() if other != name]
@@ -243,7 +243,7 @@ def test_a_soil_is_found_again_without_its_file(name, monkeypatch):
 
 def test_a_fit_says_what_the_soil_does_not_explain():
     wheel = api.Wheel(0.13, 0.16, 0.01, 24)
-    slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.02, 0.9, 15), [60.0, 90.0]))
+    slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.02, 0.9, 10), [60.0, 90.0]))
     rows = api.Model(wheel, 'dlr_mss').curve(slip, load).columns()
     rows['drawbar_pull'] = rows['drawbar_pull'] + 20.0 * np.sin(7.0 * slip)
     with pytest.warns(UserWarning, match=r'does not explain .*drawbar_pull.*diagnose'):

@@ -44,12 +44,11 @@ def told(recording, since=0.0, until=70.0):
     return first
 
 
-@pytest.mark.parametrize('seed', range(2))
-def test_a_sound_drive_is_silent(seed):
-    assert not told(rolling.recording(motion(), seed))
+def test_a_sound_drive_is_silent():
+    assert not told(rolling.recording(motion()))
 
 
-@pytest.mark.parametrize('degrees', [90.0, -90.0, 180.0])
+@pytest.mark.parametrize('degrees', [-90.0, 180.0])
 def test_an_imu_turned_about_z(degrees):
     whole = rolling.recording(motion())
     turn = Rotation.from_euler('z', degrees, degrees=True).as_matrix()

@@ -69,7 +69,7 @@ def test_it_is_named_with_its_size_and_the_model_file_works(rubbing_table, told)
     assert model.effects['side_drag']['gain'] == pytest.approx(gain['value'], rel=1e-6)
 
 
-def test_without_it_nobody_claims_to_know(rubbing_table, told, own_law):
+def test_without_it_nobody_claims_to_know(rubbing_table, told, own_law, unproposed):
     report = diagnose(rubbing_table[0], 'without')
     assert 'side_drag' not in {effect['name'] for effect in report['effects']}
     assert 'side_drag' not in {candidate['name'] for candidate in report['candidates']}

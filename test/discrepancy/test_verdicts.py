@@ -66,7 +66,7 @@ def test_every_effect_is_named_tried_or_said_not_to_be():
     assert set(catalogue()) <= said
 
 
-def test_a_channel_that_is_off_on_unseen_rows_does_not_agree():
+def test_a_channel_that_is_off_on_unseen_rows_does_not_agree(unproposed):
     """A misfit that any floor up to 20 % would take in, and that no effect accounts for."""
     table, values, *_ = make('sweep40')
     rng = np.random.default_rng(8)
@@ -90,7 +90,7 @@ def test_pulls_of_the_other_sign_are_refused_with_the_cure():
         run(table, values)
 
 
-def test_an_uncertain_leaving_angle_counts_as_noise():
+def test_an_uncertain_leaving_angle_counts_as_noise(unproposed):
     """Angles 2 degrees off: a finding where they are called exact, none where they are not."""
     table, values, *_ = make('lugs48')
     points = operating_points(

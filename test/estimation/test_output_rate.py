@@ -136,7 +136,7 @@ def drive(duration):
     return sorted(stream, key=lambda m: m.stamp)
 
 
-@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('seed', range(2))
 def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(seed):
     """The definition itself, with merged steps: also where late odometry moves their ends."""
     unbounded = {**DEFAULT, 'max_lag': 0.0, 'filter__rerun_rate': 0.0}
@@ -156,7 +156,7 @@ def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(seed):
                 assert essence([estimates]) == essence(expected[-1:])
 
 
-@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('seed', range(2))
 def test_late_inputs_within_the_history_end_in_the_same_state(seed):
     stream, last = drive(1.0), odometry(3.2)
     core, _ = make_core(**DEFAULT)

@@ -159,7 +159,7 @@ def test_a_first_class_3_comes_at_the_dwell_whatever_the_stamps_round_to(start):
     ),
     st.sampled_from((0.02, 0.05, 0.1, 0.2, 0.5)),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_the_class_is_that_of_the_published_slip(stretches, dt):
     """Any slips, deviations and rests, in stretches of some sets."""
     rows = [(slip, std, rest > 0) for slip, std, count, rest in stretches for _ in range(count)]

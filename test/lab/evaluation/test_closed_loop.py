@@ -19,6 +19,7 @@ def radius():
     return load(LIMITER).configuration.wheels.radius[0]
 
 
+@pytest.mark.slow
 def test_with_it_the_rover_stops_in_time(limited, radius):
     assert limited.stopped is not None
     assert limited.sinkage.max() < 0.25 * radius

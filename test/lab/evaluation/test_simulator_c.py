@@ -299,6 +299,7 @@ def trap():
     return simulator.simulate('entrapment_fast', 6)
 
 
+@pytest.mark.slow
 def test_sensors_read_the_truth_with_their_errors(trap):
     found, course, gravity = trap, trap.course, trap.rover.gravity
     inertial = [a.measurement for a in found.arrivals if hasattr(a.measurement, 'specific_force')]
@@ -319,6 +320,7 @@ def test_sensors_read_the_truth_with_their_errors(trap):
     assert torque == pytest.approx(course.torque.mean(axis=0), abs=0.25 * usual.max())
 
 
+@pytest.mark.slow
 def test_an_entrapment_entraps(trap):
     check(trap)
     begun = entrapments_of(trap).begins[0]

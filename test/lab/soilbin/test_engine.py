@@ -155,6 +155,7 @@ def coarse_run(tmp_path_factory):
     return output, cache
 
 
+@pytest.mark.slow
 def test_forces_balance_and_bed_is_plausible(coarse_run):
     output, _ = coarse_run
     data = json.loads((output / 'summary.json').read_text())
@@ -170,6 +171,7 @@ def test_forces_balance_and_bed_is_plausible(coarse_run):
     assert found['entrance_angle'] > 0.3 > -0.1 > found['leaving_angle']
 
 
+@pytest.mark.slow
 def test_contact_sums_agree_with_the_engines_own_body(coarse_run):
     series = np.loadtxt(coarse_run[0] / 'time_series.csv', delimiter=',', skiprows=1)
     torque = series[:, SERIES.index('torque')]
@@ -177,6 +179,7 @@ def test_contact_sums_agree_with_the_engines_own_body(coarse_run):
     assert np.mean(torque) == pytest.approx(series[:, SERIES.index('body_torque')].mean(), rel=0.01)
 
 
+@pytest.mark.slow
 def test_output_folder_is_complete(coarse_run):
     output, cache = coarse_run
     names = {path.name for path in output.iterdir()}
@@ -231,6 +234,7 @@ def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path,
     assert found['net_traction'] == pytest.approx(19.6 * math.sin(math.radians(10)), rel=0.02)
 
 
+@pytest.mark.slow
 def test_imposed_slip_is_kept_and_a_wall_stops_the_wheel(coarse_run, tmp_path, capsys):
     _, cache = coarse_run
     output = tmp_path / 'out'
