@@ -3,8 +3,6 @@
 """A recording over DDS through the real node gives the numbers of a replay, to the bit."""
 
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -107,17 +105,15 @@ def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
     assert_same_bits(live, again, least=50)
 
 
-def test_ctrl_c_ends_a_live_drive_without_a_traceback(own_domain, tmp_path):
-    recording = DEMO / 'pathfinder'
-    command = [sys.executable, '-m', 'wheel_terra_estimator.ros.live_drive', str(recording)]
-    command += ['--config', 'pathfinder', '--rate', '0.1', '-o', str(tmp_path / 'out')]
-    command += ['--arrival', str(tmp_path / 'arrival.txt')]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+def test_ctrl_c_ends_a_live_drive_without_a_traceback(node_server, tmp_path):
+    arguments = [str(DEMO / 'pathfinder'), '--config', 'pathfinder', '--rate', '0.1']
+    arguments += ['-o', str(tmp_path / 'out'), '--arrival', str(tmp_path / 'arrival.txt')]
+    process = node_server.start('live_drive', arguments)
     until = time.monotonic() + 60.0
     while not (tmp_path / 'arrival.txt').is_file() and time.monotonic() < until:
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60.0)
+    said, _ = process.communicate(timeout=60.0)
     assert process.returncode == 130
     assert 'Traceback' not in said and said.endswith('live_drive: interrupted\n')
     assert not (tmp_path / 'out').exists()
