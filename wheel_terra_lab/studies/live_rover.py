@@ -110,7 +110,7 @@ class Rover(Node):
             self.create_subscription(JointState, f'{NODE}/{topic}', self._on_other, 100)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
 
-    def slow_down(self, topic: str, rate: float) -> None:
+    def publish_at(self, topic: str, rate: float) -> None:
         """Publish a topic at another rate [Hz] from now on."""
         self._periods[topic] = 1.0 / rate
 
