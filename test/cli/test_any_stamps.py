@@ -10,7 +10,6 @@ import pytest
 from recordings import changed
 
 from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
-from wheel_terra_estimator.checks import torque
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.simulation import scenario
 from wheel_terra_estimator.simulation.drive import simulate
@@ -73,13 +72,3 @@ def test_without_an_imu_the_first_finding_says_so(drive, tmp_path, capsys):
     assert 'no IMU in the recording' in capsys.readouterr().out.splitlines()[1]
     assert main(['replay', str(bag), *CONFIG]) == 0
     assert 'no IMU in the recording' in capsys.readouterr().out.splitlines()[0]
-
-
-def test_a_check_that_fails_stops_neither_command(drive, monkeypatch, capsys):
-    monkeypatch.setattr(torque, 'check_torque', lambda *arguments: [][0])
-    words = 'gain: internal error, see --debug'
-    assert main(['check', str(drive), *CONFIG]) in (0, 1)
-    assert words in capsys.readouterr().out
-    assert main(['replay', str(drive), *CONFIG]) == 0
-    out, err = capsys.readouterr()
-    assert words in out and 'Traceback' not in out + err

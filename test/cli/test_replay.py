@@ -133,19 +133,6 @@ def test_a_proposed_law_and_errors_of_readings_are_further_configs(make_bag, con
     assert not np.allclose(found['model'], found['plain'])
 
 
-def test_existing_output_is_refused_unless_overwrite(make_bag, config, tmp_path, capsys):
-    bag = str(make_bag())
-    assert main(['replay', bag, *config, '-o', bag]) == 2
-    (tmp_path / 'out').mkdir()
-    (tmp_path / 'out' / 'notes').touch()
-    assert main(['replay', bag, *config, '-o', str(tmp_path / 'out')]) == 2
-    assert 'exists already' in capsys.readouterr().err
-    report = tmp_path / 'r.html'
-    report.write_text('mine')
-    assert main(['replay', bag, *config, '--report', str(report)]) == 2
-    assert report.read_text() == 'mine'
-
-
 @pytest.mark.parametrize(
     ('extra', 'words'),
     [

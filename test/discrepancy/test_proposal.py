@@ -100,12 +100,10 @@ def test_the_file_of_the_law_gives_the_reported_gap(speedy, tmp_path):
     assert report['proposal']['targets'] == list(found.proposal.targets)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('seed', 'design', 'name'),
-    [
-        (500, 'sweep40', 'hump'),
-        pytest.param(504, 'slope48', 'friction_softening', marks=pytest.mark.slow),
-    ],
+    [(500, 'sweep40', 'hump'), (504, 'slope48', 'friction_softening')],
 )
 def test_strangers_of_another_hand_shrink_on_loads_and_lugs_left_out(seed, design, name):
     plan = Plan(hide='outside', names=(name,), noise='mixed')
@@ -124,12 +122,10 @@ def test_strangers_of_another_hand_shrink_on_loads_and_lugs_left_out(seed, desig
     assert np.sqrt(law / refit) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('seed', 'design', 'name'),
-    [
-        pytest.param(507, 'full56', 'side_drag', marks=pytest.mark.slow),
-        (509, 'slope48', 'crosstalk'),
-    ],
+    [(507, 'full56', 'side_drag'), (509, 'slope48', 'crosstalk')],
 )
 def test_strangers_that_listed_effects_imitate_are_not_named_with_confidence(seed, design, name):
     """A drag as a bulldozing with another radius, a crosstalk as a gain: said, but as a guess."""

@@ -66,6 +66,7 @@ def test_every_effect_is_named_tried_or_said_not_to_be():
     assert set(catalogue()) <= said
 
 
+@pytest.mark.slow
 def test_a_channel_that_is_off_on_unseen_rows_does_not_agree(unproposed):
     """A misfit that any floor up to 20 % would take in, and that no effect accounts for."""
     table, values, *_ = make('sweep40')

@@ -274,6 +274,7 @@ def test_three_measurements_are_proposed_however_many_are_worth_it(monkeypatch):
     assert set(Counter(p.separates for p in proposals if p.rows).values()) == {3}
 
 
+@pytest.mark.slow
 def test_where_the_verdict_is_open_the_soil_goes_where_the_rows_pull_it():
     """Side drag pulls the soil far: however the fit gets there, it ends at the same errors."""
     plan = Plan(hide='outside', noise='mixed', names=('side_drag',), least=8.0)
@@ -342,7 +343,8 @@ def test_a_sensor_that_saturates_is_no_set_of_outliers(unproposed):
     assert {row for row, quantity, _ in other.outliers if quantity == 'torque'} == set(rows)
 
 
-@pytest.mark.parametrize('seed', [1, pytest.param(5, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize('seed', [1, 5])
 def test_a_layer_alone_is_not_named_with_a_patch(seed):
     """At whatever depth, and with no zero of sinkage beside it."""
     plan = dataclasses.replace(GROUPS['one'].plan, names=('hard_layer',), least=10.0)

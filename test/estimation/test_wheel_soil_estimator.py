@@ -294,20 +294,6 @@ def test_torques_alone_carry_no_rover_backwards(slide):
     assert np.all(sets[-1].slip_std > 0.15)  # of the slip nothing is known
 
 
-def test_one_wild_reference_in_ten_costs_little(climb):
-    wild = [a.measurement for a in climb.arrivals]
-    references = [i for i, m in enumerate(wild) if isinstance(m, ReferenceVelocity)]
-    i = references[len(references) // 2]
-    wild[i] = ReferenceVelocity(wild[i].stamp, 0.5, wild[i].variance)
-    estimator = WheelSoilEstimator(climb.configuration)
-    speeds = []
-    for stamp, inputs in merged(wild):
-        estimator.step(stamp, inputs)
-        speeds.append(estimator.estimates().forward_velocity)
-    assert max(speeds[100:]) < 0.06
-    assert estimator.health()['rejected_reference'] >= 1
-
-
 @pytest.mark.parametrize(
     ('kind', 'mode', 'most'),
     [

@@ -169,10 +169,8 @@ def test_the_class_is_that_of_the_published_slip(stretches, dt):
     assert contradictions([classes.follow(e) for e in given_sets], judged) == []
 
 
-@pytest.mark.parametrize(
-    ('kind', 'duration'),
-    [('near_stuck', 18.0), pytest.param('turns', 25.0, marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(('kind', 'duration'), [('near_stuck', 18.0), ('turns', 25.0)])
 def test_the_class_is_that_of_the_published_slip_in_drives(kind, duration):
     """References come late, so that the past is estimated anew while the present is published."""
     from wheel_terra_lab.evaluation.kinds import KINDS
