@@ -106,33 +106,6 @@ def test_what_was_learned_is_a_further_config_of_every_command(make_bag, config,
     assert read_values(kept)['sensors.torque_zero'] == [0.0, 0.0]
 
 
-def test_a_proposed_law_and_errors_of_readings_are_further_configs(make_bag, config, tmp_path):
-    """The law of a ``proposal.yaml`` acts on the estimates; a stated gain is taken off once."""
-    law = {
-        'enabled': True,
-        'targets': ['torque', 'exponent'],
-        'features': ['slip', 'slip'],
-        'coefficients': [0.05, 0.4],
-        'coefficients_std': [0.01, 0.1],
-    }
-    values = {f'effects.learned_closure.{key}': value for key, value in law.items()}
-    reader.from_parameters(values, complete=False).write(tmp_path / 'proposal.yaml')
-    model = {'sensors.torque_gain': [1.25]}
-    reader.from_parameters(model, complete=False).write(tmp_path / 'model.yaml')
-    assert set(reader.load([config[1], tmp_path / 'proposal.yaml']).effects) == {'learned_closure'}
-    assert list(reader.load([config[1], tmp_path / 'model.yaml']).sensors.torque_gain) == [1.25] * 2
-    bag = str(make_bag())
-    found = {}
-    for name, files in {'plain': [], 'proposal': ['proposal'], 'model': ['model']}.items():
-        further = [part for file in files for part in ('--config', str(tmp_path / f'{file}.yaml'))]
-        assert main(['replay', bag, *config, *further, '-o', str(tmp_path / name)]) == 0
-        with open_bag(tmp_path / name) as opened:
-            found[name] = read_estimates(opened).values['drawbar_pull']
-    assert np.isfinite(found['proposal']).all()
-    assert not np.allclose(found['proposal'], found['plain'])
-    assert not np.allclose(found['model'], found['plain'])
-
-
 @pytest.mark.parametrize(
     ('extra', 'words'),
     [
@@ -151,34 +124,6 @@ def test_what_cannot_be_used_is_one_line_and_status_2(
     assert words in said
     assert said.count('\n') == 1
     assert not out.exists()
-
-
-def test_bad_values_are_counted_and_the_good_data_is_used(
-    make_bag, config, drive, factory, tmp_path, capsys
-):
-    """NaN rates, infinite forces, zero stamps, a negative variance among a good drive."""
-    rows = []
-    for number, (topic, message, log_time) in enumerate(drive):
-        rows.append((topic, message, log_time))
-        if number % 10 == 5:
-            header = factory.header(message.header.stamp.sec * 10**9 + 1 + number)
-            nan = factory.joint_state(header, ('left', 'right'), velocity=(np.nan, np.inf))
-            rows.append(('/joint_states', nan, log_time + 1))
-            force = factory.imu(header, (np.inf, 0.0, 9.8), (0.0, np.nan, 0.0), None)
-            rows.append(('/imu/data', force, log_time + 2))
-            unstamped = factory.joint_state(factory.header(0), ('left',), velocity=(2.0,))
-            rows.append(('/joint_states', unstamped, log_time + 3))
-            twist = factory.twist_with_covariance(np.nan, 0.0, [-1.0] + [0.0] * 35)
-            rows.append(('/reference_odom', factory.odometry(header, twist), log_time + 4))
-    out = tmp_path / 'out'
-    assert main(['replay', str(make_bag(messages=rows)), *config, '-o', str(out)]) == 0
-    with open_bag(out) as bag:
-        history = read_estimates(bag)
-    assert history.stamp.size >= 40
-    assert all(np.isfinite(values).all() for values in history.values.values())
-    assert_slip_follows_the_reference(history)
-    said = capsys.readouterr().out
-    assert re.search(r'joint_states +\d+ +\d+ x ', said), said
 
 
 def test_interrupted_replay_leaves_a_readable_bag(

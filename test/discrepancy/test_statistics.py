@@ -378,6 +378,8 @@ def test_confidence_follows_what_speaks_for_a_name():
     assert of_name() > 0.95
     behind = of_name(margin=-1.0, margin_of_set=-0.5)
     assert behind < 0.6 < of_name(margin=1.0) < of_name()
+    # Two nats ahead of the next are odds of e^(2/1.5) and no more, whatever else speaks for it.
+    assert of_name(margin=4.0 * np.tanh(2.0 / 8.0)) == pytest.approx(0.791, abs=0.001)
     # A structural error, a second effect and a remainder each leave several times the doubt.
     for change in ({'floor': 1.0}, {'two': 1.0}, {'remainder': 1.0}):
         assert 1.0 - of_name(**change) > 2.0 * (1.0 - of_name())

@@ -151,6 +151,7 @@ def test_a_name_leaves_room_for_an_effect_that_looks_like_it_and_was_not_tried()
     assert not any('not tried' in note for note in free.notes)
 
 
+@pytest.mark.slow
 def test_a_patchwork_of_doubtful_names_is_not_given(monkeypatch):
     """Digging that may not be named: the pair that patches it is less likely right than not."""
     campaign = make_campaign(1070, 'basic16', Plan(noise='mixed', missing=0.03, forms=True))

@@ -62,7 +62,7 @@ def estimates(configuration, stream):
 
 
 def test_a_drive_with_stated_errors_gives_the_estimates_of_the_clean_one(rover):
-    clean = drive(1)
+    clean = drive(1, duration=2.5)
     wrong = [misread(measurement) for measurement in clean]
     expected = estimates(rover, clean)
     corrected = estimates(rover.replace(STATED), wrong)
@@ -150,7 +150,7 @@ OFFSETS = {
 
 def test_stamp_offsets_are_taken_off_before_anything_else(rover):
     """Estimates of late stamps with the offset stated are those of honest ones, to the bit."""
-    honest = drive(3, duration=4.0)
+    honest = drive(3, duration=2.0)
     late = {kind: round(offset * 1e9) for kind, (_, offset) in OFFSETS.items()}
     off = [replace(m, stamp=m.stamp + late[type(m)]) if type(m) in late else m for m in honest]
     stated = {f'sensors.{name}_stamp_offset': offset for name, offset in OFFSETS.values()}

@@ -59,18 +59,6 @@ def test_several_are_what_each_is_alone(bags, config, tmp_path, capsys):
     assert '<td>drive3</td>' in page and 'broken.mcap' in page
 
 
-def test_several_are_smoothed_and_mapped_alike(bags, config, tmp_path):
-    out, alone = tmp_path / 'out', tmp_path / 'alone' / 'drive3'
-    options = [*config, '--smooth', '--track', 'way.csv']
-    assert main(['replay', bags[0], bags[2], *options, '-o', str(out)]) == 0
-    options[-1] = str(tmp_path / 'way.csv')
-    assert main(['replay', bags[0], *options, '-o', str(alone)]) == 0
-    assert estimates(out / 'drive3') == estimates(alone)
-    ways = [path.read_text() for path in (out / 'drive3' / 'way.csv', tmp_path / 'way.csv')]
-    assert ways[0] == ways[1] and ways[0].startswith('stamp [ns],time [s],x [m],y [m]')
-    assert (out / 'drive2' / 'way.csv').is_file()
-
-
 def test_a_restart_passes_over_what_is_done_by_content(bags, config, tmp_path):
     out = tmp_path / 'out'
     good = [bags[0], *bags[2:]]
