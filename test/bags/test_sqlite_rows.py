@@ -79,26 +79,6 @@ def test_the_size_of_pages_is_learnt_where_the_header_is_lost(tmp_path, size, mo
     assert read(path)[0] == Counter(map(tuple, samples))
 
 
-@pytest.mark.parametrize('missing', [1, 700, PAGE, 3 * PAGE + 5])
-def test_rows_behind_missing_bytes_are_found_off_the_raster_of_pages(tmp_path, missing):
-    path = tmp_path / 'a.db3'
-    samples = made(path)
-    content = path.read_bytes()
-    places = sqlite_maker.message_places(content, samples, TYPES)
-    at = places[300][0][0] + 20
-    path.write_bytes(content[:at] + content[at + missing :])
-    intact = Counter(
-        tuple(sample)
-        for sample, pieces in zip(samples, places, strict=True)
-        if all(end <= at or begin >= at + missing for begin, end in pieces)
-    )
-    found, notes = read(path)
-    assert intact.total() > 550
-    assert not intact - found
-    assert (found - Counter(map(tuple, samples))).total() <= 1  # that on which the damage lies
-    assert notes
-
-
 def deleted(path: Path, condition: str) -> None:
     with sqlite3.connect(path) as connection:
         connection.execute('PRAGMA secure_delete=OFF')

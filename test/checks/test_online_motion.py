@@ -75,18 +75,3 @@ def test_a_dead_imu():
     force[at:], turning[at:] = force[at], turning[at]
     first = told(replace(whole, imu=replace(whole.imu, force=force, rate=turning)), 24.0, 60.0)
     assert set(first) == {'sensor_frozen'} and first['sensor_frozen'][0] < DRIVING
-
-
-def test_a_reference_and_a_torque_that_freeze():
-    whole = rolling.recording(motion())
-    since = 24.0
-    velocity, torque = whole.reference.velocity.copy(), whole.joints.torque.copy()
-    at = int(np.argmax(whole.reference.seconds > since))
-    velocity[at:] = velocity[at]
-    first = told(replace(whole, reference=replace(whole.reference, velocity=velocity)), since, 60.0)
-    assert set(first) == {'reference_frozen'} and first['reference_frozen'][0] < DRIVING
-    at = int(np.argmax(whole.joints.seconds > since))
-    torque[at:, 2] = torque[at, 2]
-    first = told(replace(whole, joints=replace(whole.joints, torque=torque)), since, 60.0)
-    assert set(first) == {'torque_frozen'} and first['torque_frozen'][0] < DRIVING
-    assert first['torque_frozen'][1].wheel == 'rear_left'

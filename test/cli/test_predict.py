@@ -118,25 +118,6 @@ def test_rows_that_the_soil_cannot_carry_stay_empty(capsys):
     assert '1 of 2 points left empty' in captured.err
 
 
-def test_noise_makes_virtual_measurements(capsys):
-    arguments = [*BASE, '--slip', '0:0.6:500', '--load', '80']
-    assert main(arguments) == 0
-    exact = table(capsys.readouterr().out)
-    noisy = []
-    for seed in ('1', '1', '2'):
-        assert main([*arguments, '--noise', '0.001,2,0', '--seed', seed]) == 0
-        noisy.append(table(capsys.readouterr().out))
-    for name, std in (('sinkage', 0.001), ('drawbar_pull', 2.0)):
-        error = noisy[0][name] - exact[name]
-        assert error.std() == pytest.approx(std, rel=0.15)
-        assert abs(error.mean()) < 4.0 * std / np.sqrt(500)
-        assert (noisy[0][f'{name}_std'] == std).all()
-        assert (noisy[0][name] == noisy[1][name]).all()
-        assert (noisy[0][name] != noisy[2][name]).all()
-    assert (noisy[0]['torque'] == exact['torque']).all()
-    assert 'torque_std' not in noisy[0], 'a deviation of 0 is no statement about a reading'
-
-
 @pytest.mark.parametrize('noise', ['0.001', '0.001,1', '0.001,-1,0.1', 'a,b,c'])
 def test_noise_that_makes_no_sense(noise, capsys):
     assert main([*BASE, '--slip', '0.1', '--load', '80', f'--noise={noise}']) == 2
