@@ -25,6 +25,11 @@ from wheel_terra_estimator.estimation.contacts.linearisation import (
     Linearisation,
 )
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
+from wheel_terra_estimator.estimation.contacts.measured_wheels import (
+    SpeedAndVariance,
+    intersected,
+    slip_of_torque,
+)
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.contacts.ruts import Ruts, contact_depths, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
@@ -133,9 +138,9 @@ class Instant(NamedTuple):
     time: float  # [s] since the start of the run
     motion: BodyMotion
     sources: Sources
-    """Mean and covariance of the filter left out: they are the smoother's business."""
-    cycle_speed: float  # [m/s] of the filter at its last cycle
-    cycle_variance: float
+    """Speed as filtered; mean and covariance left out: they are the smoother's business."""
+    cycle: SpeedAndVariance  # of the filter at its last cycle
+    usual: SpeedAndVariance | None  # by the slip that is usual at such torques
 
 
 class _Clock(NamedTuple):
@@ -145,7 +150,7 @@ class _Clock(NamedTuple):
     stamp: int = 0
     time: float = 0.0  # [s] since the origin
     assessment: StuckAssessment = StuckAssessment()  # of the last stamp that was judged
-    speed: tuple[float, float] | None = None  # and variance, where this stamp was judged
+    speed: SpeedAndVariance | None = None  # where this stamp was judged
 
 
 class _Cycle(NamedTuple):
@@ -217,6 +222,7 @@ class WheelSoilEstimator:
         self._ruts = Ruts(rover)
         self._unloaded = UnloadedWheels(rover, sensors)
         self._demand = Demand()
+        self._torque_coefficient = Demand()
         self._climb = SteepestClimb()
         angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
         self._linearisation = Linearisation(rover, layout, models, angle_std)
@@ -257,6 +263,7 @@ class WheelSoilEstimator:
             self._ruts,
             self._unloaded,
             self._demand,
+            self._torque_coefficient,
             self._climb,
             self._linearisation,
             self._pulls,
@@ -381,6 +388,9 @@ class WheelSoilEstimator:
         cycle = self._begin_cycle(time)
         sinkage_before = ekf.mean[layout.sinkage].copy()
 
+        self._torque_coefficient.update(
+            self._torque_over_load(cycle), cycle.dt, settled=self._contact_age.settled
+        )
         self._predict(cycle)
         if not cycle.reference_known and not self._contact_age.settled:
             self._speed.remove_start_transient(
@@ -497,6 +507,25 @@ class WheelSoilEstimator:
             reference_known=reference_known,
             demand_change=demand_change,
         )
+
+    def _torque_over_load(self, cycle: _Cycle) -> float:
+        """Return the torques over loads times radii, positive where they drive; nan = none [-]."""
+        told = [
+            (torque - zero, load * radius)
+            for torque, zero, load, radius, turns in zip(
+                cycle.torque,
+                self._torque.zeros(self._ekf.mean),
+                cycle.loads.load,
+                self._rover.slip_radius,
+                cycle.turns,
+                strict=True,
+            )
+            if turns and not isnan(torque)
+        ]
+        most = sum(lever for _, lever in told)
+        if most <= 0.0:
+            return NAN
+        return self._contact_age.state.direction * sum(torque for torque, _ in told) / most
 
     def _note_climb(self, demand: float, rim: float, dt: float, *, told: bool) -> None:
         """Note what is asked and the slip, where a reference tells it and the rover rolls on."""
@@ -732,7 +761,9 @@ class WheelSoilEstimator:
                 or sides_oppose(rims, body.headings.by_yaw_rate),
             ),
         )
-        self._clock = self._clock._replace(assessment=assessment, speed=(speed, variance))
+        self._clock = self._clock._replace(
+            assessment=assessment, speed=SpeedAndVariance(speed, variance)
+        )
         if self._margin.due(time):
             direction = self._contact_age.state.direction or 1.0
             self._margin.update(time, self._wheel_states(loads), direction * loads.slope_share)
@@ -814,21 +845,45 @@ class WheelSoilEstimator:
     def _instant(self, time: float, body: BodyMotion) -> Instant:
         """Return what a smoother judges anew."""
         ekf, nothing = self._ekf, np.empty(0)
-        sources = self._sources()._replace(mean=nothing, covariance=nothing)
-        return Instant(
-            time, body, sources, float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
+        rims = self._wheels.rim_speeds(time)
+        speed, variance = self._filtered_speed(rims)
+        sources = self._sources()._replace(
+            mean=nothing, covariance=nothing, speed=speed, speed_variance=variance
         )
+        cycle = SpeedAndVariance(float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED]))
+        return Instant(time, body, sources, cycle, self._usual_speed(rims))
 
-    def _present_speed(self, rims: Floats) -> tuple[float, float]:
+    def _present_speed(self, rims: Floats) -> SpeedAndVariance:
         """Return speed [m/s] and variance at the present stamp."""
+        filtered, usual = self._filtered_speed(rims), self._usual_speed(rims)
+        return filtered if usual is None else intersected(filtered, usual)
+
+    def _filtered_speed(self, rims: Floats) -> SpeedAndVariance:
+        """Return speed [m/s] and variance of the filter, carried on from its last cycle."""
         time = self._clock.time
-        return self._speed.present(
+        speed, variance = self._speed.present(
             self._ekf,
             time,
             RimSpeeds.of(rims, self._turning.state.yaw_rate, self._steering.state.headings),
             self._trusted(self._inertial.state.window, time),
             inflated=self._reference.known(time),
         )
+        return SpeedAndVariance(speed, variance)
+
+    def _usual_speed(self, rims: Floats) -> SpeedAndVariance | None:
+        """Return speed [m/s] and variance by the slip that is usual at such torques.
+
+        None with a reference velocity, without torques, and where wheels do not roll on straight.
+        """
+        time, turning = self._clock.time, self._turning.state
+        straight = turning.lateral_motion <= _SHARP_TURN and self._contact_age.settled
+        if self._reference.known(time) or not (straight and self._wheels.torque_known(time)):
+            return None
+        usual = slip_of_torque(self._torque_coefficient.state)
+        rim = RimSpeeds.of(rims, turning.yaw_rate, self._steering.state.headings).typical
+        if isnan(usual.slip) or not abs(rim) >= self._rover.low_rim:
+            return None
+        return SpeedAndVariance((1.0 - usual.slip) * rim, (usual.std * rim) ** 2)
 
     # -- Outputs ---------------------------------------------------------------------------------
 

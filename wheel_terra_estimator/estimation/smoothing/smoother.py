@@ -26,6 +26,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
+from wheel_terra_estimator.estimation.contacts.measured_wheels import SpeedAndVariance, intersected
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.filter.force_balance import rut_tilt
@@ -203,9 +204,11 @@ class _Judges:
         """Return what is smoothed of an instant."""
         # Between two cycles the speed is carried on from the state; so is its correction.
         given = instant.sources
-        speed = given.speed + float(now.mean[SPEED]) - instant.cycle_speed
-        carried = max(given.speed_variance - instant.cycle_variance, 0.0)
+        speed = given.speed + float(now.mean[SPEED]) - instant.cycle.speed
+        carried = max(given.speed_variance - instant.cycle.variance, 0.0)
         variance = float(now.covariance[SPEED, SPEED]) + carried
+        if instant.usual is not None:
+            speed, variance = intersected(SpeedAndVariance(speed, variance), instant.usual)
         heard = known(given.rims)
         typical = sum(map(abs, heard)) / len(given.rims)
         least = max(

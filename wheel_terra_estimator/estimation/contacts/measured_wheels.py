@@ -1,0 +1,71 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Slip that goes with a torque on loose soil, whatever the soil: as of wheels that were measured.
+
+Over load and radius, the torque of wheels on very different soils follows one curve of the form of
+Janosi and Hanamoto (1961), u = u_max (1 - exp(-s / s_0)). HIT's smooth and lugged wheel (Ding et
+al. 2011) and KLS-1's two (Wang and Han 2016) have u_max of 0.42 to 0.62 and s_0 of 0.05 to 0.18.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.scalars import NAN, clipped
+
+
+@dataclass(frozen=True)
+class MeasuredWheelsTuning:
+    """The curve and its spread, with that of wheels in three simulators of different laws."""
+
+    greatest_torque: float = 0.55  # u_max, over load times radius [-]
+    greatest_torque_std: float = 0.17  # [ln]
+    slip_scale: float = 0.17  # s_0 [-]
+    slip_scale_std: float = 0.6  # [ln]
+    least_std: float = 0.04  # of the slip [-]: the torque of rolling without pull
+    most_mobilised: float = 0.96  # of the greatest torque: beyond, the slip is open
+    most_torque: float = 1.2  # beyond, no wheel was measured [-]
+
+
+class SlipOfTorque(NamedTuple):
+    """Slip and its standard deviation [-]; nan = nothing is known."""
+
+    slip: float
+    std: float
+
+
+def slip_of_torque(
+    coefficient: float, tuning: MeasuredWheelsTuning = MeasuredWheelsTuning()
+) -> SlipOfTorque:
+    """Return the slip of measured wheels at a torque over load times radius [-], nan = unknown.
+
+    Negative where the wheels brake. Valid on loose soil, for wheels that roll straight.
+    """
+    if isnan(coefficient) or abs(coefficient) > tuning.most_torque:
+        return SlipOfTorque(NAN, NAN)
+    share = clipped(abs(coefficient) / tuning.greatest_torque, 0.0, tuning.most_mobilised)
+    slip = -tuning.slip_scale * math.log(1.0 - share)
+    by_greatest = tuning.slip_scale * share / (1.0 - share) * tuning.greatest_torque_std
+    std = math.hypot(tuning.slip_scale_std * slip, by_greatest, tuning.least_std)
+    return SlipOfTorque(math.copysign(slip, coefficient), std)
+
+
+class SpeedAndVariance(NamedTuple):
+    """An estimate of the body speed."""
+
+    speed: float  # [m/s]
+    variance: float
+
+
+def intersected(one: SpeedAndVariance, other: SpeedAndVariance) -> SpeedAndVariance:
+    """Return what two estimates that rest on the same readings say together.
+
+    Covariance intersection with equal weights (Julier and Uhlmann 1997): consistent however
+    strongly their errors are correlated.
+    """
+    both = one.variance + other.variance
+    mean = (one.speed * other.variance + other.speed * one.variance) / both
+    return SpeedAndVariance(mean, 2.0 * one.variance * other.variance / both)
