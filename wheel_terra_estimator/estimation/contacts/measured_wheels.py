@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
-from wheel_terra_estimator.estimation.scalars import NAN, clipped
+from wheel_terra_estimator.estimation.scalars import NAN
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,7 @@ class MeasuredWheelsTuning:
     slip_scale: float = 0.17  # s_0 [-]
     slip_scale_std: float = 0.6  # [ln]
     least_std: float = 0.04  # of the slip [-]: the torque of rolling without pull
-    most_mobilised: float = 0.96  # of the greatest torque: beyond, the slip is open
-    most_torque: float = 1.2  # beyond, no wheel was measured [-]
+    most_mobilised: float = 0.9  # of the greatest torque: beyond, it tells nothing of the slip
 
 
 class SlipOfTorque(NamedTuple):
@@ -42,11 +41,12 @@ def slip_of_torque(
 ) -> SlipOfTorque:
     """Return the slip of measured wheels at a torque over load times radius [-], nan = unknown.
 
-    Negative where the wheels brake. Valid on loose soil, for wheels that roll straight.
+    Negative where the wheels brake. Valid on loose soil, for wheels that roll straight; near the
+    greatest torque, and beyond, nothing is returned.
     """
-    if isnan(coefficient) or abs(coefficient) > tuning.most_torque:
+    share = abs(coefficient) / tuning.greatest_torque
+    if isnan(coefficient) or share > tuning.most_mobilised:
         return SlipOfTorque(NAN, NAN)
-    share = clipped(abs(coefficient) / tuning.greatest_torque, 0.0, tuning.most_mobilised)
     slip = -tuning.slip_scale * math.log(1.0 - share)
     by_greatest = tuning.slip_scale * share / (1.0 - share) * tuning.greatest_torque_std
     std = math.hypot(tuning.slip_scale_std * slip, by_greatest, tuning.least_std)
