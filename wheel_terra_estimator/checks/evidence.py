@@ -239,10 +239,9 @@ class Evidence:
         return _shared(_row_means(speed[:, right]) - _row_means(speed[:, left]))
 
     @cached_property
-    def straight(self) -> Mask:
-        """Steady rows without a turn, neither by the gyro nor by the wheels."""
-        rim = np.abs(self.rim)
-        rows = self.steady.copy()
+    def unturned(self) -> Mask:
+        """Rows of driving without a turn, neither by the gyro nor by the wheels."""
+        rim, rows = np.abs(self.rim), self.moving.copy()
         difference = self.side_difference
         if np.isfinite(difference).any():
             rows &= np.abs(moving_mean(difference, self.rows_in(SETTLING))) < STRAIGHT_SHARE * rim
@@ -250,6 +249,11 @@ class Evidence:
             yaw = np.abs(self.gyro[:, 2] - np.median(self.gyro[:, 2]))
             rows &= yaw * float(np.abs(self.facts.lateral).max()) < STRAIGHT_SHARE * rim
         return _shared(rows)
+
+    @cached_property
+    def straight(self) -> Mask:
+        """Steady rows without a turn."""
+        return _shared(self.steady & self.unturned)
 
     @cached_property
     def turning(self) -> Mask:

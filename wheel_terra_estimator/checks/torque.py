@@ -15,29 +15,23 @@ from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
     SETTLING,
     Evidence,
-    row_medians,
 )
 from wheel_terra_estimator.checks.faults import listed
+from wheel_terra_estimator.checks.felt_motion import felt_motion, yaw_of_motion
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
     block_fit,
     confidence,
-    correlation,
     moving_mean,
     runs,
 )
 from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
-UPHILL_ENOUGH = -0.02
-"""Specific force along the drive, in g, above which a driven wheel takes power."""
-AS_MUCH = 3.0
-"""Torque of a wheel over that of the others, and the reverse, that is alike [-]."""
-ALIKE = 0.5
-"""Correlation of the changes of two torques that have the same sign [-]."""
-WRONG_SIGN = -0.4
-"""Correlation of torque and rate below which the sign is wrong."""
+SIGN_SIGMAS = 4.0
+LEAST_ANSWER = 0.3
+"""Answer of a torque to slopes and starts over that of the others that tells its sign [-]."""
 MOST_TRACTION = 0.85
 """Sum of T/r over the weight that no soil gives on the level (tangent of 40 degrees)."""
 UNIT_TRACTION = 15.0
@@ -111,55 +105,57 @@ def _not_told(reason: str) -> list[Outcome]:
 
 
 def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    facts = evidence.facts
-    # In turns wheels push against each other: there one that brakes is no wonder.
-    straight = evidence.straight.sum() > LEAST_MOVING_ROWS
-    rows = evidence.straight.copy() if straight else evidence.moving.copy()
-    if evidence.force is not None:
-        # Vibration is no slope.
-        along = moving_mean(evidence.force[:, 0], evidence.rows_in(SLOPE_TIME))
-        along = along * np.sign(evidence.common_rate) / facts.gravity
-        rows &= along > UPHILL_ENOUGH
-    if rows.sum() < LEAST_MOVING_ROWS:
-        return [NotChecked('sign', 'torque: no stretch on the level or uphill')], evidence
-    driven, rates = evidence.torque[rows], evidence.rate[rows]
-    fits = [_sign_fit(driven, rates[:, i], i) for i in range(len(facts.names))]
-    wrong = [(i, fit) for i, (fit, _) in enumerate(fits) if fit < WRONG_SIGN]
-    unsure = []
-    if len(wrong) < len(fits):
-        taken = np.nanmean(driven * np.sign(rates), axis=0)
-        for i, _ in wrong:
-            beside = float(np.median(np.delete(taken, i)))
-            # One way only it may be a zero, unless the changes are opposed; on firm ground wheels
-            # push against each other: what is reversed takes as much as the others.
-            opposed = straight and not fits[i][1] > -ALIKE
-            if not opposed or not 1.0 < -taken[i] / beside * AS_MUCH < AS_MUCH**2:
-                unsure.append(facts.names[i])
-        wrong = [(i, fit) for i, fit in wrong if facts.names[i] not in unsure]
-    if not wrong:
-        reason = (
-            f'torque of {", ".join(unsure)}: sign or zero, or wheels push against each other; '
-            'drive both ways'
-        )
-        return [NotChecked(kind, reason) for kind in ('sign', 'zero') if unsure], evidence
-    torque = evidence.torque.copy()
-    torque[:, [i for i, _ in wrong]] *= -1.0
-    sure = confidence(4.0 * min(abs(fit) for _, fit in wrong))
-    names = ', '.join(facts.names[i] for i, _ in wrong)
-    finding = evidence.found('torque_sign', sure, wheel=names, value=-1.0)
-    return [finding], evidence.with_rate(evidence.rate, torque)
+    """Return torques of the wrong sign: by what slopes, starts and stops change in them.
 
-
-def _sign_fit(torque: FloatArray, rate: FloatArray, index: int) -> tuple[float, float]:
-    """Return the correlations of a torque with the rate, and with the torques of other wheels.
-
-    A zero is taken off where both ways tell it; the second, of changes alone, is nan then.
+    The mean alone does not tell: a wheel whose radius is a little smaller is dragged by the others.
     """
-    own, others = torque[:, index], row_medians(np.delete(torque, index, axis=1))
-    if min(int((rate > 0.0).sum()), int((rate < 0.0).sum())) > LEAST_MOVING_ROWS:
-        middle = 0.5 * (np.nanmean(own[rate > 0.0]) + np.nanmean(own[rate < 0.0]))
-        return correlation(own - middle, rate), math.nan
-    return correlation(own, rate), correlation(own - np.nanmean(own), others - others.mean())
+    facts, told = evidence.facts, answers(evidence)
+    if told is None:
+        return [NotChecked('sign', 'torque: neither slope nor start without a turn')], evidence
+    usual = float(np.median([abs(answer.value) for answer, _ in told]))
+    wrong, unsure = [], []
+    for i, (answer, level) in enumerate(told):
+        clear = max(answer.sigmas_from(0.0), -level.value / level.std) > SIGN_SIGMAS
+        if answer.value < -LEAST_ANSWER * usual and clear:
+            wrong.append(i)
+        elif -level.value / level.std > SIGN_SIGMAS:
+            unsure.append(facts.names[i])
+    reason = f'torque of {", ".join(unsure)}: zero, or wheels push against each other; stop and go'
+    outcomes: list[Outcome] = [NotChecked('sign', reason)] if unsure else []
+    if not wrong:
+        return outcomes, evidence
+    torque = evidence.torque.copy()
+    torque[:, wrong] *= -1.0
+    sure = confidence(min(max(one.sigmas_from(0.0) for one in told[i]) for i in wrong))
+    names = ', '.join(facts.names[i] for i in wrong)
+    outcomes.append(evidence.found('torque_sign', sure, wheel=names, value=-1.0))
+    return outcomes, evidence.with_rate(evidence.rate, torque)
+
+
+def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
+    """Return how each torque answers to the force along the drive, and its level; None for nothing.
+
+    Starts and stops of the wheels tell which way the IMU feels forward, else the mean torque does.
+    """
+    rows, sense = evidence.unturned, np.sign(evidence.common_rate)
+    if evidence.force is None or rows.sum() < LEAST_MOVING_ROWS:
+        return None
+    felt = felt_motion(evidence)
+    yaw = yaw_of_motion(*felt) if felt is not None else None
+    width = evidence.rows_in(SETTLING)
+    along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
+    if yaw is not None:
+        along = along * math.cos(yaw.value) + across * math.sin(yaw.value)
+    design = np.column_stack([along, sense, np.ones(sense.size)])[rows]
+    table = np.column_stack([moving_mean(np.nan_to_num(t), width) for t in evidence.torque.T])
+    fits = [block_fit(design, column)[:2] for column in table[rows].T]
+    forward = 1.0
+    if yaw is None:
+        shares = np.array([answer.value * level.value for answer, level in fits])
+        if shares.sum() * np.median(shares) <= 0.0:
+            return None
+        forward = float(np.sign(shares.sum()))
+    return [(Estimate(forward * answer.value, answer.std), level) for answer, level in fits]
 
 
 def thrust(evidence: Evidence) -> FloatArray:
