@@ -242,6 +242,30 @@ def test_a_diameter_for_a_radius_is_one_finding():
     assert report.findings[0].value == pytest.approx(rolling.RADIUS, rel=0.03)
 
 
+def test_rates_before_a_gear_are_no_track():
+    """Speeds and turns ask for the same factor, which no radius makes."""
+    fast = replace(WHOLE.joints, rate=4.0 * WHOLE.joints.rate)
+    report = checked(joints=fast)
+    assert faults(report) == ['rate_unit'] and 'before a gear' in report.findings[0].words
+    assert report.findings[0].value == pytest.approx(0.25, rel=0.03)
+
+
+@pytest.mark.parametrize('reversed_wheel', [False, True])
+def test_a_wheel_that_the_others_drag_keeps_the_sign_of_its_torque(reversed_wheel):
+    """On firm ground a smaller radius brakes both ways by more than rolling costs."""
+    dragged = 1.6 * rolling.RESISTANCE * rolling.MASS * rolling.GRAVITY / 4 * rolling.RADIUS
+    torque = WHOLE.joints.torque - np.sign(np.round(WHOLE.joints.rate, 1)) * [dragged, 0, 0, 0]
+    torque *= [1.0, -1.0 if reversed_wheel else 1.0, 1.0, 1.0]
+    report = checked(joints=replace(WHOLE.joints, torque=torque))
+    told = [f.wheel for f in report.findings if f.fault == 'torque_sign']
+    assert told == (['front_right'] if reversed_wheel else [])
+
+
+def test_an_imu_that_states_no_acceleration_is_told():
+    blind = replace(WHOLE.imu, force=np.full_like(WHOLE.imu.force, np.nan))
+    assert 'force_missing' in faults(checked(imu=blind))
+
+
 def test_steps_of_an_accelerometer_are_noise():
     coarse = replace(WHOLE.imu, force=np.round(WHOLE.imu.force))
     told = [f for f in checked(imu=coarse).findings if f.fault == 'imu_noise']

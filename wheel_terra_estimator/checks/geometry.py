@@ -27,17 +27,13 @@ from wheel_terra_estimator.checks.statistics import (
 )
 from wheel_terra_estimator.checks.torque import SOFT_TRACTION, thrust
 from wheel_terra_estimator.checks.trial import Trial, tried
-from wheel_terra_estimator.checks.wheel_rates import rounding
+from wheel_terra_estimator.checks.wheel_rates import OF_RADII, rounding
 
 LEAST_RADIUS_ERROR = 0.025
 """Share by which a radius is wrong before it is a finding [-]."""
 RADIUS_SIGMAS = 4.0
 LEAST_OF_SIDES = 0.05
 """Share by which the radii of the sides differ, at least [-]; a cross slope makes a side slip."""
-LEAST_RATIO = 0.3
-"""Speed over rim speed below which a rover is stuck, or its reference dead [-]."""
-MOST_RATIO = 1.4
-"""The same, or its inverse, that no wrong radius makes [-]."""
 OUTRUN_STD = 0.01
 """Slip that is left open where a rover outruns its wheels [-]."""
 PRIOR_OF_RADIUS = 0.85
@@ -143,7 +139,7 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
     bound = bend_noise(speeds.forward) / max(float(np.linalg.norm(speeds.rim)), 1e-6)
     figures['rover.radius_bound_by_reference_m'] = round(bound * float(np.mean(facts.radius)), 5)
     figures['rover.speed_over_rim_speed'] = round(plain.value, 4)
-    if not LEAST_RATIO < plain.value < MOST_RATIO:
+    if not OF_RADII[0] < plain.value < OF_RADII[1]:
         reason = f'speed over rim speed is {plain.value:.2f}: stuck, or signs, unit or scale'
         return NotChecked('radius', reason)
     ratio = _without_slip(evidence, speeds, plain)

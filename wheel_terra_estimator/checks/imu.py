@@ -9,6 +9,7 @@ turns into ``base_link``.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -149,7 +150,7 @@ def check_imu(state: ImuState) -> Judged:
     """Return what the IMU says against itself, and the recording with that mended."""
     if state.recording.imu is None or state.imu.stamp.size < LEAST_MESSAGES:
         none: list[Outcome] = [
-            NotChecked(kind, 'no IMU in the recording') for kind in ('mounting', 'gravity')
+            NotChecked(kind, 'hardly any IMU message in it') for kind in ('mounting', 'gravity')
         ]
         return none, replace(state, usable_force=False, usable_gyro=False)
     outcomes, state = _placeholders(state)
@@ -196,6 +197,8 @@ def _placeholders(state: ImuState) -> Judged:
         usable[f'usable_{name}'] = bool(np.any(np.nan_to_num(values)))
         if there and not usable[f'usable_{name}']:
             outcomes.append(state.found('force_zero', 0.999, field=field))
+        elif not there and name == 'force':
+            outcomes.append(state.found('force_missing', 0.999))
     state = replace(state, **usable)
     known = np.isfinite(imu.orientation).all(axis=1)
     orientation = imu.orientation[known]
@@ -565,7 +568,9 @@ def mounting_angles(rotation: FloatArray) -> list[float]:
     """Return roll, pitch, yaw [deg] of a rotation (fixed axes x, then y, then z, as in URDF)."""
     from scipy.spatial.transform import Rotation  # heavy
 
-    angles: list[float] = Rotation.from_matrix(rotation).as_euler('xyz', degrees=True).tolist()
+    with warnings.catch_warnings():  # of an IMU on its side yaw is left at 0
+        warnings.simplefilter('ignore', UserWarning)
+        angles: list[float] = Rotation.from_matrix(rotation).as_euler('xyz', degrees=True).tolist()
     return angles
 
 

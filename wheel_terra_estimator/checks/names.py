@@ -86,7 +86,11 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         outcomes.append(_missing(joints.topic, gone, 'in no message'))
     mute = [name for name in facts.names if name in silent]
     if mute:
-        outcomes.append(_missing(joints.topic, mute, 'without a rate in every message'))
+        outcomes.append(
+            _missing(
+                joints.topic, mute, 'without a rate: velocity is empty, or not as long as name'
+            )
+        )
     for name in spare:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
             outcomes.append(found('spare_joint', joints.topic, 0.7, wheel=name))

@@ -29,6 +29,8 @@ from wheel_terra_estimator.checks.statistics import (
 from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
+UPHILL_ENOUGH = -0.02
+"""Specific force along the drive, in g, above which a driven wheel takes power."""
 SIGN_SIGMAS = 4.0
 LEAST_ANSWER = 0.3
 """Answer of a torque to slopes and starts over that of the others that tells its sign [-]."""
@@ -113,12 +115,14 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if told is None:
         return [NotChecked('sign', 'torque: neither slope nor start without a turn')], evidence
     usual = float(np.median([abs(answer.value) for answer, _ in told]))
+    agree = all(answer.value * level.value > 0.0 for answer, level in told)
     wrong, unsure = [], []
     for i, (answer, level) in enumerate(told):
-        clear = max(answer.sigmas_from(0.0), -level.value / level.std) > SIGN_SIGMAS
+        brakes = -level.value / level.std > SIGN_SIGMAS
+        clear = answer.sigmas_from(0.0) > SIGN_SIGMAS or (brakes and agree)
         if answer.value < -LEAST_ANSWER * usual and clear:
             wrong.append(i)
-        elif -level.value / level.std > SIGN_SIGMAS:
+        elif brakes:
             unsure.append(facts.names[i])
     reason = f'torque of {", ".join(unsure)}: zero, or wheels push against each other; stop and go'
     outcomes: list[Outcome] = [NotChecked('sign', reason)] if unsure else []
@@ -148,14 +152,20 @@ def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
         along = along * math.cos(yaw.value) + across * math.sin(yaw.value)
     design = np.column_stack([along, sense, np.ones(sense.size)])[rows]
     table = np.column_stack([moving_mean(np.nan_to_num(t), width) for t in evidence.torque.T])
-    fits = [block_fit(design, column)[:2] for column in table[rows].T]
-    forward = 1.0
-    if yaw is None:
-        shares = np.array([answer.value * level.value for answer, level in fits])
-        if shares.sum() * np.median(shares) <= 0.0:
-            return None
-        forward = float(np.sign(shares.sum()))
-    return [(Estimate(forward * answer.value, answer.std), level) for answer, level in fits]
+    told = [block_fit(design, column)[0] for column in table[rows].T]
+    rows = rows & (along * sense > UPHILL_ENOUGH * evidence.facts.gravity)
+    if rows.sum() < LEAST_MOVING_ROWS:
+        return None
+    way = np.column_stack([sense, np.ones(sense.size)])[rows]
+    levels = [block_fit(way, column)[0] for column in table[rows].T]
+    if yaw is not None:
+        return list(zip(told, levels, strict=True))
+    shares = [answer.value * level.value for answer, level in zip(told, levels, strict=True)]
+    if sum(shares) * np.median(shares) <= 0.0:
+        return None
+    forward = math.copysign(1.0, sum(shares))
+    told = [Estimate(forward * answer.value, answer.std) for answer in told]
+    return list(zip(told, levels, strict=True))
 
 
 def thrust(evidence: Evidence) -> FloatArray:

@@ -39,6 +39,10 @@ LEAST_BAND, OUTRUN = 0.4, 1.05
 """The same of units that may be counts as well: least, and most without doubt [-]."""
 TELLING = 0.15
 """Difference of two units' distances from a ratio of speeds [ln] that tells them apart."""
+SAME_SCALE = 0.1
+"""Share by which the scales of rates by speeds and by turns differ of a rover that rolls [-]."""
+OF_RADII = (0.3, 1.4)
+"""Speed over rim speed of a wrong radius; below it a rover is stuck, or its reference dead [-]."""
 LEAST_ROLLING_TRACK = 0.9
 """Effective over stated track of a rover whose rates are in rad/s; skidding makes it larger [-]."""
 LARGE_WHEEL = 0.6
@@ -273,6 +277,10 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     turns = track is not None and abs(track) > LEAST_ROLLING_TRACK  # as rad/s do
     rim_unit = {} if turns else _rim_unit(float(np.nanmean(facts.radius)))
     units = _fitting_units(ratio, track, {**RATE_UNITS, **rim_unit})
+    rolls = ratio and track and abs(ratio * track - 1.0) < SAME_SCALE
+    scaled = ratio is not None and ratio > MOST_COUNT and not OF_RADII[0] < ratio < OF_RADII[1]
+    if track and rolls and scaled and not units:
+        units, how = {f'rad/s before a gear of {track:.3g}': 1.0 / track}, 'speeds and turns'
     doubtful = False  # no unit with a usual slip, and perhaps counts
     if ratio is not None and ratio < MOST_COUNT and units:
         doubtful = not UNIT_BAND[0] < ratio / min(units.values()) < OUTRUN
