@@ -263,7 +263,9 @@ def test_a_wheel_that_the_others_drag_keeps_the_sign_of_its_torque(reversed_whee
 
 def test_an_imu_that_states_no_acceleration_is_told():
     blind = replace(WHOLE.imu, force=np.full_like(WHOLE.imu.force, np.nan))
-    assert 'force_missing' in faults(checked(imu=blind))
+    report = checked(imu=blind)
+    assert any('no linear_acceleration' in n.reason for n in report.not_checked)
+    assert not {f.kind for f in report.findings} & {'placeholder', 'gravity'}
 
 
 def test_steps_of_an_accelerometer_are_noise():
