@@ -845,7 +845,7 @@ class WheelSoilEstimator:
     def _instant(self, time: float, body: BodyMotion) -> Instant:
         """Return what a smoother judges anew."""
         ekf, nothing = self._ekf, np.empty(0)
-        rims = self._wheels.rim_speeds(time)
+        rims = self._yaw_compensated(self._wheels.rim_speeds(time))
         speed, variance = self._filtered_speed(rims)
         sources = self._sources()._replace(
             mean=nothing, covariance=nothing, speed=speed, speed_variance=variance
@@ -855,35 +855,39 @@ class WheelSoilEstimator:
 
     def _present_speed(self, rims: Floats) -> SpeedAndVariance:
         """Return speed [m/s] and variance at the present stamp."""
-        filtered, usual = self._filtered_speed(rims), self._usual_speed(rims)
+        rolling = self._yaw_compensated(rims)
+        filtered, usual = self._filtered_speed(rolling), self._usual_speed(rolling)
         return filtered if usual is None else intersected(filtered, usual)
 
-    def _filtered_speed(self, rims: Floats) -> SpeedAndVariance:
+    def _yaw_compensated(self, rims: Floats) -> RimSpeeds:
+        return RimSpeeds.of(rims, self._turning.state.yaw_rate, self._steering.state.headings)
+
+    def _filtered_speed(self, rims: RimSpeeds) -> SpeedAndVariance:
         """Return speed [m/s] and variance of the filter, carried on from its last cycle."""
         time = self._clock.time
         speed, variance = self._speed.present(
             self._ekf,
             time,
-            RimSpeeds.of(rims, self._turning.state.yaw_rate, self._steering.state.headings),
+            rims,
             self._trusted(self._inertial.state.window, time),
             inflated=self._reference.known(time),
         )
         return SpeedAndVariance(speed, variance)
 
-    def _usual_speed(self, rims: Floats) -> SpeedAndVariance | None:
+    def _usual_speed(self, rims: RimSpeeds) -> SpeedAndVariance | None:
         """Return speed [m/s] and variance by the slip that is usual at such torques.
 
         None with a reference velocity, without torques, and where wheels do not roll on straight.
         """
-        time, turning = self._clock.time, self._turning.state
-        straight = turning.lateral_motion <= _SHARP_TURN and self._contact_age.settled
+        time, turns = self._clock.time, self._turning.state.lateral_motion > _SHARP_TURN
+        straight = self._contact_age.settled and not turns
         if self._reference.known(time) or not (straight and self._wheels.torque_known(time)):
             return None
         usual = slip_of_torque(self._torque_coefficient.state)
-        rim = RimSpeeds.of(rims, turning.yaw_rate, self._steering.state.headings).typical
-        if isnan(usual.slip) or not abs(rim) >= self._rover.low_rim:
+        if isnan(usual.slip) or not abs(rims.typical) >= self._rover.low_rim:
             return None
-        return SpeedAndVariance((1.0 - usual.slip) * rim, (usual.std * rim) ** 2)
+        speed = (1.0 - usual.slip) * rims.typical
+        return SpeedAndVariance(speed, (usual.std * rims.typical) ** 2)
 
     # -- Outputs ---------------------------------------------------------------------------------
 
