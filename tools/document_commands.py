@@ -30,19 +30,17 @@ environment `eval "$(wheel-terra --print-completion bash)"` turns it on. How a c
 _LABORATORY = """## Of the laboratory
 
 Options: `wheel-terra COMMAND --help-all`.
-
-| command | does |
-|---|---|"""
+"""
 
 
 def page() -> str:
     """Return the page as Markdown."""
-    lines = [_INTRODUCTION, '| in many commands (see `--help`) | meaning |', '|---|---|']
+    lines = [_INTRODUCTION, 'In many commands (see `--help`):\n']
     lines += [*_common().values(), '']
     others = []
     for name, parser in sub_parsers().items():
         if name in LABORATORY:
-            others.append(f'| `wheel-terra {name}` | {parser.description} |')
+            others.append(f'- `wheel-terra {name}`: {parser.description}')
         else:
             lines += _section(parser, f'wheel-terra {name}', 2)
     lines += [_LABORATORY, *others]
@@ -71,7 +69,7 @@ def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
     for group, actions in parser.groups().items():
         rows = [row for action in actions if (row := _row(action)) and row not in _common()]
         if rows:
-            yield '\n'.join([f'| {group} | meaning |', '|---|---|', *rows, ''])
+            yield '\n'.join([f'{group.capitalize()}:\n', *rows, ''])
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             helps = {choice.dest: choice.help or '' for choice in action._choices_actions}
@@ -96,7 +94,7 @@ def _row(action: argparse.Action) -> str:
     names = ', '.join(f'{option} {value}'.strip() for option in action.option_strings) or value
     words = (action.help or '').replace('%%', '%').replace('%(default)s', str(action.default))
     required = ' (required)' if action.option_strings and action.required else ''
-    return f'| `{names}`{required} | {words} |'
+    return f'- `{names}`{required}: {words}'
 
 
 def _sentence(words: str) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from wheel_terra_estimator.cli.effects import left_aside, prior_in_words, touched
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
-from wheel_terra_estimator.terramechanics.effects import Effect, catalogue
+from wheel_terra_estimator.terramechanics.effects import Effect, EffectParameter, catalogue
 from wheel_terra_estimator.terramechanics.effects import learned_closure as law
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -78,31 +78,33 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         '<!-- Written by `python tools/document_effects.py`; do not edit. -->',
         '',
         'Every physical or instrument effect that the models know. Each is off unless a model file '
-        'has `effects.<name>.enabled: true`; `effects.<name>.form` chooses one of its forms. '
-        'Figures: first parameter, wheel of 157 mm radius with 10 mm lugs, 80 N, HIT-LSS1 sand.',
+        'has `effects.<name>.enabled: true`; `effects.<name>.form` chooses one of its forms. What '
+        'a further form shares with the first is not repeated. `wheel-terra effects` prints one '
+        'line for each. Figures: first parameter, wheel of 157 mm radius with 10 mm lugs, 80 N, '
+        'HIT-LSS1 sand.',
         '',
-        '| effect | stands for | touches |',
-        '|---|---|---|',
+        'By the outputs that they change:',
+        '',
     ]
+    by_touch: dict[str, list[str]] = {}
     for effect in effects.values():
-        claim = _in_a_cell(effect.claim)
-        lines.append(f'| [`{effect.name}`](#{effect.name}) | {claim} | {touched(effect)} |')
+        by_touch.setdefault(touched(effect), []).append(f'[`{effect.name}`](#{effect.name})')
+    lines += [f'- {what}: {", ".join(names)}' for what, names in by_touch.items()]
     for effect in effects.values():
-        several = len(effect.forms) > 1
         lines += ['', f'## {effect.name}', '']
+        said: set[str] = set()
         for form in effect.forms:
-            if several:
+            if len(effect.forms) > 1:
                 first = ' (default)' if form is effect.forms[0] else ''
                 lines += [f'**`form: {form.form}`**{first}', '']
             lines += [f'{form.claim[0].upper()}{form.claim[1:]}.', '', f'    {form.symbol}', '']
-            lines += _law_table() if form.sparse else _parameter_table(form)
-            if form.touches != effect.touches:
-                lines.append(f'- Touches: {touched(form)}.')
-            if form.needs:
-                lines.append(f'- Must vary in a table: {", ".join(form.needs)}.')
-            lines += [f'- Valid: {form.validity}.', f'- Source: {form.source}.', '']
-        for other, separates in effect.confounded_with.items():
-            lines.append(f'- Confounded with `{other}`; separated by: {separates}.')
+            lines += _law_table() if form.sparse else []
+            facts = [fact for fact in _facts(effect, form) if fact not in said]
+            said.update(facts)
+            lines += [*facts, '']
+        others = ', '.join(f'`{other}` ({by})' for other, by in effect.confounded_with.items())
+        if others:
+            lines.append(f'- Confounded with (separated by): {others}.')
         if effect.incompatible_with:
             lines.append(f'- Not together with: {", ".join(sorted(effect.incompatible_with))}.')
         lines += [f'- {text[0].upper()}{text[1:]}.' for text in left_aside(effect)]
@@ -111,6 +113,16 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         if not effect.sparse:
             lines.append(f'![{effect.name}](models/effects/{effect.name}.svg)')
     return '\n'.join(lines) + '\n'
+
+
+def _facts(effect: Effect, form: Effect) -> list[str]:
+    """Return what a form's numbers are, what it needs, where it holds and where it comes from."""
+    facts = [] if form.sparse else [_parameter(p) for p in form.parameters]
+    if form.touches != effect.touches:
+        facts.append(f'- Touches: {touched(form)}.')
+    if form.needs:
+        facts.append(f'- Must vary in a table: {", ".join(form.needs)}.')
+    return [*facts, f'- Valid: {form.validity}.', f'- Source: {form.source}.']
 
 
 def _law_table() -> list[str]:
@@ -126,32 +138,30 @@ def _law_table() -> list[str]:
         how = 'factor exp(x)' if target.factor else f'added{unit}'
         lines.append(f'| `{name}` | {target.meaning} | {how} | {target.bound:g} |')
     lines += ['', '| feature | value | varies with |', '|---|---|---|']
+    products = {name: f for name, f in law.FEATURES.items() if '_times_' in name}
     for name, feature in law.FEATURES.items():
+        if name in products:
+            continue
         columns = ', '.join(feature.columns) or '-'
         targets = ', '.join(f'`{t}`' for t in feature.targets)
-        only = ' \\*' if '_times_' in name else f' ({targets} only)' if targets else ''
+        only = f' ({targets} only)' if targets else ''
         lines.append(f'| `{name}` | {_in_a_cell(feature.meaning)}{only} | {columns} |')
-    products = {f.targets for name, f in law.FEATURES.items() if '_times_' in name}
-    (targets,) = products  # all the same
-    return [*lines, '', f'\\* {", ".join(f"`{t}`" for t in targets)} only', '']
+    (targets_of_all,) = {f.targets for f in products.values()}  # all the same
+    names, targets = (', '.join(f'`{n}`' for n in some) for some in (products, targets_of_all))
+    return [*lines, '', f'Products of two features, for {targets} only: {names}.', '']
 
 
 def _in_a_cell(text: str) -> str:
     return text.replace('|', '&#124;')
 
 
-def _parameter_table(form: Effect) -> list[str]:
-    lines = [
-        '| parameter | unit | meaning | default | range | prior |',
-        '|---|---|---|---|---|---|',
-    ]
-    for p in form.parameters:
-        note = '' if p.free else ' (not fitted)'
-        lines.append(
-            f'| `{p.name}` | {p.unit} | {_in_a_cell(p.meaning)}{note} | {p.default:g} '
-            f'| {p.lower:g} to {p.upper:g} | {prior_in_words(p)} |'
-        )
-    return [*lines, '']
+def _parameter(p: EffectParameter) -> str:
+    unit = '' if p.unit == '-' else f' [{p.unit}]'
+    note = '' if p.free else ', not fitted'
+    return (
+        f'- `{p.name}`{unit}: {p.meaning}; {p.default:g} by default, {p.lower:g} to {p.upper:g}, '
+        f'prior {prior_in_words(p)}{note}'
+    )
 
 
 def main() -> None:
