@@ -19,7 +19,7 @@ Written by `python tools/document_parameters.py` from the declared table; do not
 
 Keys of [configuration files](configuration.md). A list per wheel has one entry for each of
 `wheels.names`, in that order. An integer will do where a number is wanted, though not inside a list
-(`[0.0, 0.5]`, not `[0, 0.5]`: ROS refuses mixed lists).
+(`[0.0, 0.5]`, not `[0, 0.5]`: ROS refuses mixed lists). Every `_std` is one standard deviation.
 """
 
 _SECTIONS = {
@@ -31,6 +31,14 @@ _SECTIONS = {
     'filter': 'Filter',
 }
 _SIGNS = {
+    'list of numbers, one': 'one',
+    'list of integers, one': 'integer, one',
+    'list of text, one': 'one',
+    'list of text': 'texts',
+    'list of ': '',
+    'number (': '',
+    ' (': ', ',
+    ')': '',
     'at least ': '≥ ',
     ' and at most ': ', ≤ ',
     'at most ': '≤ ',
@@ -52,7 +60,7 @@ def page() -> str:
     table = list(declared().values())
     for section, title in _SECTIONS.items():
         lines += [f'## {title}', '']
-        lines += ['| key | default | unit | allowed | meaning |', '|---|---|---|---|---|']
+        lines += ['| key | default | allowed | meaning |', '|---|---|---|---|']
         for parameter in table:
             head = parameter.key.split('.')[0] if '.' in parameter.key else ''
             if head == section:
@@ -63,15 +71,14 @@ def page() -> str:
 
 def _row(parameter: Parameter) -> str:
     default = '*required*' if parameter.required else f'`{format_value(parameter.default)}`'
-    if parameter.size == 'wheels' and not parameter.required:
-        default += ' each'
     meaning = parameter.meaning.replace('|', '\\|')
     if parameter.aliases:
         meaning += ' (also ' + ', '.join(f'`{alias}`' for alias in parameter.aliases) + ')'
-    unit = parameter.unit if parameter.unit not in ('', '-') else ''
-    return (
-        f'| `{parameter.key}` | {default} | {unit} | {_in_short(parameter.allowed)} | {meaning} |'
-    )
+    if parameter.unit not in ('', '-'):
+        default += f' {parameter.unit}'
+    if parameter.size == 'wheels' and not parameter.required:
+        default += ' each'
+    return f'| `{parameter.key}` | {default} | {_in_short(parameter.allowed)} | {meaning} |'
 
 
 def _in_short(allowed: str) -> str:
