@@ -36,7 +36,7 @@ SMALL = 0.1  # of the sinkage: "relatively small"
 SPEED = 0.01  # [m/s] of the wheel's centre
 RIPPLE = 20.0  # [N]
 RIPPLE_LUGS = (30, 24, 15)
-NOT_FIXED = 'the moduli are not printed: stiffness and angles are free for the two stated sinkages'
+NOT_FIXED = 'no moduli are printed: stiffness and angles are fitted to these two'
 
 
 def statements(count: int = integration.POINTS) -> list[Statement]:
@@ -81,7 +81,7 @@ def _sinkages(model: Model) -> list[Statement]:
         bearing = curve[[0, -1]] + support
         most = (RATIO[1] * bearing[0] - bearing[1]) / (RATIO[1] - 1.0)
         why = (
-            f'the printed support of {support:g} mm leaves {curve[0]:.1f} mm at rest to divide by; '
+            f'the printed support of {support:g} mm leaves {curve[0]:.1f} mm at rest; '
             f'{most:.1f} mm would give {RATIO[1]:g}'
         )
         what, place = f'Wh3, h = {1e3 * height:.0f} mm', 'figure 4' if height else 'text'
@@ -97,9 +97,8 @@ def _lugs(model: Model) -> list[Statement]:
         more, deeper = 1e3 * (SUPPORT[high] - SUPPORT[low]), 1e3 * (high - low)
         if not holds:
             why += (
-                f'; with the printed h s - dz4 the two cross at {more:g}/{deeper:g} = '
-                f'{more / deeper:.2f} on any soil, but for friction on the rim; '
-                f'{ding_curves.CROSSING:g} asks for supports dz4 that are '
+                f'; the printed h s - dz4 cross at {more:g}/{deeper:g} = {more / deeper:.2f} on '
+                f'any soil; {ding_curves.CROSSING:g} asks for supports dz4 '
                 f'{ding_curves.CROSSING * deeper:g} mm apart, printed are {more:g}'
             )
         what = f'slip above which {1e3 * high:.0f} mm lugs sink more than {1e3 * low:.0f} mm'
@@ -154,7 +153,7 @@ def _flow(model: Model) -> list[Statement]:
         what = f'{wheel}: share of n1 s (lateral flow) in the growth [%]'
         holds = share > 50.0
         found.append(Statement('figure 10', what, 'a primary part', f'{share:.0f}', holds))
-    why = 'the paper itself sets them aside: the angles in them are difficult to determine'
+    why = 'the paper sets them aside: their angles are difficult to determine'
     what = 'longitudinal slip-sinkage from the slip lines'
     found.append(Statement('equations 3 to 8', what, '-', '-', None, why))
     return found
@@ -177,9 +176,6 @@ def _ripple(model: Model) -> list[Statement]:
     ripple = [0.5 * value * 2.0 * step / float(high - low) for value in rise]
     what = 'ripple of the load with 30, 24, 15 lugs [N]'
     told = ', '.join(f'+-{value:.0f}' for value in ripple)
-    why = (
-        'the model is a mean over a lug; ours: an axle that cannot rise while the wheel stands on '
-        'one lug, then on two, at rest'
-    )
+    why = 'the model is a mean over a lug; ours: at rest on one lug, then on two, the axle held'
     found.append(Statement('text', what, f'about +-{RIPPLE:g}', told, None, why))
     return found

@@ -36,7 +36,7 @@ SERIES = {
 }
 STATED = (0.05, 0.6)  # slip ratios over which errors of their earlier model are below 10 %
 ALLOWED = 0.10  # of the pull
-USABLE = 'usable to slip 0.6 (asked here: 10 %)'
+USABLE = 'usable (here: 10 %)'
 LEAST_PULL = 0.1
 """Pull over load below which a relative error says nothing."""
 CLASSES = ((0.3, 'low'), (0.6, 'moderate'), (0.9, 'high'))
@@ -49,20 +49,17 @@ ANGLES = {
 }
 REFUSED = 10.0  # relative error of angles that no contact has
 WHY_UNFITTED = {
-    'HIT_Wh34_smooth': 'above slip 0.3 the stress moves forward more than the fixed angles: too '
-    'much pull; next row',
-    'KLS1_lug10': 'the torque of this rig holds 1 N m and more that no contact stress gives; next '
-    'row',
+    'HIT_Wh34_smooth': 'above slip 0.3 the stress moves forward more than the fixed angles',
+    'KLS1_lug10': 'the torque of this rig holds 1 N m and more that no contact stress gives',
 }
 WHY_FITTED = {
-    'HIT_Wh34_smooth': 'a line c1 + c2 s for the peak: the rows ask for one that moves forward up '
-    'to slip 0.3 and back at 0.6; digitised to 1 N, which is 7 to 9 %',
-    'KLS1_lug10': 'the measured pull falls from 12.7 to 6.4 N between slip 0.4 and 0.5, which no '
-    'smooth law follows',
+    'HIT_Wh34_smooth': 'the rows ask for a peak that moves forward up to slip 0.3 and back at 0.6, '
+    'not for a line c1 + c2 s; digitised to 1 N, 7 to 9 %',
+    'KLS1_lug10': 'the measured pull falls from 12.7 to 6.4 N between slip 0.4 and 0.5',
 }
 WHY_PRINTED = (
-    'with the printed terms any lug lets the soil shear within itself: pull is too high at every'
-    ' slip, while the measured gain over the smooth rim grows with slip'
+    'with them any lug lets the soil shear within itself at every slip; the measured gain over the '
+    'smooth rim grows with slip'
 )
 SIGMA = (0.0015, 0.5, 0.3)  # weights of sinkage [m], pull [N], torque [N m]: the pull first
 PRIOR = 0.1  # weight of expected values
@@ -114,7 +111,7 @@ def _models() -> list[Statement]:
         depth, _, torque = np.abs(said - measured)[rows].max(axis=0)
         why = f'sinkage within {1e3 * depth:.1f} mm, torque within {torque:.1f} N m'
         why = WHY_PRINTED if worst > ALLOWED else why
-        what = f'{label}: worst error of the modelled pull, slip 0.05 to 0.6 ({fitted})'
+        what = f'{label}, {fitted}: error of the pull'
         told, holds = f'{100 * worst:.0f} %', worst <= ALLOWED
         found.append(Statement('text, earlier model', what, 'below 10 %', told, holds, why))
     why = 'the rows of that wheel (Sutoh et al.) are not public'
@@ -165,9 +162,9 @@ def _pulls() -> list[Statement]:
     for series, label in SERIES.items():
         points, measured = read(ROWS, series)
         rows = _judged(points, measured)
-        what = f'{label}: worst error of the pull from torque, slip 0.05 to 0.6'
+        what = f'{label}: error of the pull from torque'
         if not rows.any():
-            why = 'no pull above a tenth of the load: a relative error says nothing'
+            why = 'no pull above a tenth of the load'
             found.append(Statement('equation 13', what, USABLE, '-', None, why))
             continue
         worst = _worst(pull_from_torque(points, measured), measured, rows)
@@ -241,7 +238,7 @@ def _high_slip() -> list[Statement]:
         )
         for share in (0.1, 1.2)
     ]
-    what = 'equivalent contact: pull where the soil behind stands at 0.1 and 1.2 of the sinkage'
+    what = 'equivalent contact: pull with the soil behind at 0.1 and 1.2 of the sinkage'
     ours = f'{values[0]:.0f} N, {values[1]:.0f} N'
     found.append(Statement('equation 13', what, 'more with a mound', ours, values[1] > values[0]))
     return found

@@ -58,7 +58,7 @@ def statements(count: int = POINTS) -> list[Statement]:
         ):
             most = 100 * np.quantile(error, 0.95)
             told = f'95 % below {most:.3f}, worst {100 * error.max():.2f}'
-            what = f'{label}, {name}: error of load or pull [% of load]'
+            what = f'{label}, {name}: error [% of load]'
             found.append(Statement('equation 19', what, '-', told, None, 'accuracy of ours'))
     return found
 

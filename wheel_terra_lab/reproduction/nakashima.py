@@ -40,12 +40,12 @@ RELATIVE_DENSITY = 17.4  # [%]
 LIGHT = {9.8: (1.46, 1.18, 0.572), 14.7: (2.18, 1.59, 0.574)}
 """Of wheel 2 on 25 degrees by load [N]: R_r [N], z_a [cm], H/W (section 5.3)."""
 WHY_Z_A = (
-    'seven wheels lie within 0.2 cm in the paper, our beds scatter by 0.05 to 0.15 cm: that alone '
-    'would leave 0.70 (0.37 to 0.92)'
+    'seven wheels lie within 0.2 cm, our beds scatter by 0.05 to 0.15 cm: that alone leaves 0.70 '
+    '(0.37 to 0.92)'
 )
 TWO_STARTS = (
-    'with grains x2 a wheel that stands before it turns has 82 % and 2.4 cm, one that is held along'
-    ' the slope 98 % and 6.0 cm: the paper, which states no start, lies between'
+    'with grains x2 a wheel that stands first has 82 % and 2.4 cm, one held along the slope 98 % '
+    'and 6.0 cm: the paper, which states no start, lies between'
 )
 """Wheel 5 on 21 degrees in 1/6 g, one bed, `free_sinkage` standing and held."""
 AS_ON = 20.0  # [deg]: what the path on 25 degrees is equal to (section 4.2)
@@ -127,14 +127,14 @@ def _table7(rows: Sequence[Row]) -> list[Statement]:
             )
             if not good and key == 'sinkage_average' and BASE_WHEEL in before:
                 why += (
-                    f'; it sank {before[wheel]:.1f} cm before it turned, from where z_a counts '
-                    f'(wheel {BASE_WHEEL}: {before[BASE_WHEEL]:.1f}); next rows'
+                    f'; it sank {before[wheel]:.1f} cm before it turned '
+                    f'(wheel {BASE_WHEEL}: {before[BASE_WHEEL]:.1f})'
                 )
             elif not good and key == 'motion_resistance':
                 force = 100.0 * off / paper[wheel]['gross_traction']
                 why += (
-                    f'; {off:.2f} N, which H lacks as well, as H - R_r = W sin 25 deg; '
-                    f'they are {force:.0f} % of H'
+                    f'; {off:.2f} N, {force:.0f} % of H, which lacks them too: '
+                    'H - R_r = W sin 25 deg'
                 )
             paper_s, ours_s, what = f'{said:.3g}', f'{have:.3g}', f'{name}, 25 degrees'
             found.append(Statement('table 7', what, paper_s, ours_s, good, why, wheel))
@@ -152,8 +152,8 @@ def _table7(rows: Sequence[Row]) -> list[Statement]:
         together = float(np.corrcoef(misses, [before[w] for w in ours])[0, 1])
         what = 'misses of z_a against what each wheel sank before it turned: correlation'
         why = (
-            'a wheel that stands for 1 s and sinks deep has less left to sink; how the load is put '
-            'on is not stated'
+            'who sinks deep while standing for 1 s has less left to sink; how the load is put on '
+            'is not stated'
         )
         found.append(Statement('table 7', what, '-', f'{together:.2f}', None, why))
     return found
@@ -283,11 +283,9 @@ def _figures(runs: Runs) -> list[Statement]:
         good = abs(ours - AS_ON) <= SLOPE_OFF
         why = f'{abs(ours - AS_ON):.1f} apart, under 14.7 N (the load is not stated), grains x2'
         found.append(Statement('figure 8', what, f'{AS_ON:g}', f'{ours:.1f}', good, why))
-    for place, what in (('10', 'soil that flows'), ('19', 'on the Earth'), ('20', 'on the Moon')):
-        why = 'a picture: `soilbin run` draws bed.png, film.gif'
-        found.append(
-            Statement(f'figure {place}', f'soil under the wheel, {what}', 'picture', '-', None, why)
-        )
+    why = 'a picture: `soilbin run` draws bed.png, film.gif'
+    what, place = 'soil that flows, on the Earth, on the Moon', 'figures 10, 19, 20'
+    found.append(Statement(place, what, 'picture', '-', None, why))
     return found
 
 
@@ -351,14 +349,14 @@ def _moon(rows: Sequence[Row]) -> list[Statement]:
             sunk = 100.0 * np.mean(_moon_values(rows, slope, moon=True, name='sinkage_static'))
             slid = 100.0 * np.mean(_moon_values(rows, slope, moon=True, name='slid_before'))
             why += (
-                f'; it slid {slid:.0f} cm down and sank {sunk:.1f} cm while it stood for 1 s, '
-                f'before z_a counts; {TWO_STARTS}'
+                f'; it slid {slid:.0f} cm down and sank {sunk:.1f} cm while it stood for 1 s; '
+                f'{TWO_STARTS}'
             )
         elif not good:
             told = ' and '.join(f'{100 * value:.0f}' for value in beds)
             why += (
-                f'; {len(beds)} beds ({told} %) differ as much; of our numbers resistance to '
-                'rolling alone moves it, and that was fitted in 1 g'
+                f'; {len(beds)} beds ({told} %) differ as much; only the resistance to rolling, '
+                'fitted in 1 g, moves it'
             )
         what = f'wheel 5, 1/6 g, {slope:g} degrees: {name}'
         found.append(Statement('section 6', what, f'{said:g}', f'{have:.3g}', good, why))
@@ -371,7 +369,7 @@ def _moon(rows: Sequence[Row]) -> list[Statement]:
         ours = 'does not climb' if stuck else f'slip {slip:.0f} %'
         why = (
             f'slides {100 * np.mean(slid):.0f} cm down while it stands, then makes {up:.0f} cm in '
-            '40 s; one that is held along the slope has 98 % on 21 degrees already'
+            '40 s; one held along the slope has 98 % on 21 degrees'
         )
         what = 'wheel 5, 1/6 g, 25 degrees'
         why = '' if stuck else why

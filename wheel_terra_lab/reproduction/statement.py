@@ -12,6 +12,8 @@ HEAD = (
     '',
     '`wheel-terra reproduce all -o DIR` writes this page from installed code and shipped data.',
     '*no test*: an input, a definition, a picture, or an accuracy that the paper does not state.',
+    '*grains x2*: of twice the diameter. *z_a* counts from where the wheel begins to turn. '
+    'Errors of the pull are the worst at slip 0.05 to 0.6, with a pull above a tenth of the load.',
     '',
 )
 
