@@ -79,8 +79,8 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         '',
         'Every physical or instrument effect that the models know. Each is off unless a model file '
         'has `effects.<name>.enabled: true`; `effects.<name>.form` chooses one of its forms. What '
-        'a further form shares with the first is not repeated. `wheel-terra effects` prints one '
-        'line for each. Figures: first parameter, wheel of 157 mm radius with 10 mm lugs, 80 N, '
+        'a further form shares with the first is not repeated. Numbers of a parameter: default '
+        '(range), prior. Figures: first parameter, wheel of 157 mm radius with 10 mm lugs, 80 N, '
         'HIT-LSS1 sand.',
         '',
         'By the outputs that they change:',
@@ -137,15 +137,14 @@ def _law_table() -> list[str]:
         unit = '' if target.unit == '-' else f', in {target.unit}'
         how = 'factor exp(x)' if target.factor else f'added{unit}'
         lines.append(f'| `{name}` | {target.meaning} | {how} | {target.bound:g} |')
-    lines += ['', '| feature | value | varies with |', '|---|---|---|']
+    lines += ['', '| feature | value |', '|---|---|']
     products = {name: f for name, f in law.FEATURES.items() if '_times_' in name}
     for name, feature in law.FEATURES.items():
         if name in products:
             continue
-        columns = ', '.join(feature.columns) or '-'
         targets = ', '.join(f'`{t}`' for t in feature.targets)
         only = f' ({targets} only)' if targets else ''
-        lines.append(f'| `{name}` | {_in_a_cell(feature.meaning)}{only} | {columns} |')
+        lines.append(f'| `{name}` | {_in_a_cell(feature.meaning)}{only} |')
     (targets_of_all,) = {f.targets for f in products.values()}  # all the same
     names, targets = (', '.join(f'`{n}`' for n in some) for some in (products, targets_of_all))
     return [*lines, '', f'Products of two features, for {targets} only: {names}.', '']
@@ -159,8 +158,8 @@ def _parameter(p: EffectParameter) -> str:
     unit = '' if p.unit == '-' else f' [{p.unit}]'
     note = '' if p.free else ', not fitted'
     return (
-        f'- `{p.name}`{unit}: {p.meaning}; {p.default:g} by default, {p.lower:g} to {p.upper:g}, '
-        f'prior {prior_in_words(p)}{note}'
+        f'- `{p.name}`{unit}: {p.meaning}; {p.default:g} ({p.lower:g} to {p.upper:g}), '
+        f'{prior_in_words(p)}{note}'
     )
 
 

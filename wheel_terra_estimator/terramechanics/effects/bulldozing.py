@@ -77,8 +77,8 @@ EFFECT = Effect(
     parameters=(_KB,),
     touches=frozenset({'drawbar_pull'}),
     confounded_with={'pitch_bias': 'three times the load or another wheel; a level check'},
-    validity='sinkage below half the radius; the wedge is taken over the rim width, of a wheel '
-    'that slides sideways over the width that rim and flank show to the motion',
+    validity='sinkage below half the radius; the wedge is as wide as rim and flank are across the '
+    'motion',
     source='Hegedus 1960 (report, no DOI) in the form of Ishigami et al. 2007 '
     '(doi 10.1002/rob.20187; side force turned to the front)',
     on_outputs=_push,

@@ -67,9 +67,8 @@ EFFECT = Effect(
             symbol='p(z) = k z^N + stiffness <z - depth>, behind the peak at the mirrored angle',
             parameters=_PARAMETERS,
             validity='top of the layer not shallower than a few millimetres',
-            source='Wong and Reece 1967 (doi 10.1016/0022-4898(67)90105-X): rear stress is '
-            'the front stress at the mirrored angle, '
-            'with the pressure-sinkage curve of layered ground',
+            source='Wong and Reece 1967 (doi 10.1016/0022-4898(67)90105-X) with the '
+            'pressure-sinkage curve of layered ground',
             on_normal_stress=_bearing,
         ),
     ),

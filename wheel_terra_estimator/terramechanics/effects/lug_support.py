@@ -61,10 +61,9 @@ EFFECT = Effect(
                     free=False,
                 ),
             ),
-            validity='thin lugs; the defaults give the 1.5 mm at 10 mm and 3 mm at 15 mm of the '
-            'source',
-            source='Ding et al. 2010 section 3.2.2 (doi 10.1007/s11771-010-0021-7); straight line '
-            'through its two values',
+            validity='thin lugs; the defaults give the two values of the source',
+            source='straight line through the two values of Ding et al. 2010 '
+            '(doi 10.1007/s11771-010-0021-7)',
             on_outputs=_by_height,
         ),
     ),

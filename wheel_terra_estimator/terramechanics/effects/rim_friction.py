@@ -42,7 +42,8 @@ EFFECT = Effect(
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('lug_height',),
     confounded_with={'cohesion': 'a load series; a lugged wheel'},
-    validity='metal rims in dry sand; the transition between smooth and lugged is assumed',
+    validity='metal rims in dry sand, with the friction of soil on soil as '
+    'soil.friction_angle_deg; the transition between smooth and lugged is assumed',
     source='Ding et al. 2010 section 2.4 in words (doi 10.1007/s11771-010-0021-7; metal-soil '
     'friction is below soil friction); '
     'formula reconstructed',

@@ -79,8 +79,7 @@ EFFECT = Effect(
     parameters=(_KS,),
     touches=frozenset({'lateral_force'}),
     needs=('slip_angle',),
-    validity='flank smooth and upright, sinkage below half the radius; the share that the lateral '
-    'displacement mobilises is taken as that of shear, so that no slip angle gives no force',
+    validity='flank smooth and upright, sinkage below half the radius; mobilised like shear',
     source='Ishigami et al. 2007 eq. 9 and 11 (doi 10.1002/rob.20187), resistance of '
     'Hegedus 1960 (report, no DOI)',
     on_outputs=_push_aside,

@@ -113,8 +113,7 @@ EFFECT = Effect(
                     'gain', '-', 1.0, 0.0, 8.0, 1.0, 'half_normal', 'share of the published growth'
                 ),
             ),
-            validity='published for wheels and tracks, slip 0 to 0.5; the factor on the sinkage is '
-            'exact for small angles without shear',
+            validity='slip 0 to 0.5; the factor is exact for small angles without shear',
             source='Lyasko 2010, Slip sinkage effect in soil-vehicle mechanics, J. Terramech. 47, '
             'as quoted in wheel studies; factor on the modulus derived here',
             on_inputs=_lyasko,

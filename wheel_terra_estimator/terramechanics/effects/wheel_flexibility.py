@@ -60,9 +60,8 @@ EFFECT = Effect(
         'multipass': 'deflection on a hard floor; a load series',
         'hard_layer': 'deflection on a hard floor; a penetrometer',
     },
-    validity='deflection below the sinkage; exponent below 1.3; the sinkage z0 that sets the '
-    'circle is that of the rigid wheel without slip; torque added by drive friction or by soil '
-    'carried round takes the same arm (1 % of it off at most)',
+    validity='deflection below the sinkage; exponent below 1.3; z0 is that of the rigid wheel '
+    'without slip',
     source='substitute circle of a flattened wheel (Bekker; Schmid 1995, J. Terramech. 32): the '
     'chord that both circles share, 2 r (z + f) = 2 r* z; z0 after Bekker 1969 (book, '
     'no DOI)',
