@@ -23,9 +23,9 @@ Written by `python tools/document_commands.py` from the help of the commands; do
 
 `wheel-terra COMMAND --help` says what most runs need, `--help-all` the same as this page. After
 colcon the commands are `ros2 run wheel_terra_estimator wheel-terra COMMAND`. Every command takes
-`--debug` (traceback of an error). Completion in bash and zsh comes with the package; in a virtual
-environment `eval "$(wheel-terra --print-completion bash)"` turns it on. How a command ends:
-[exit status](exit_status.md).
+`--debug` (traceback of an error), every one that writes `--overwrite` (replace an earlier output).
+Completion in bash and zsh comes with the package; in a virtual environment
+`eval "$(wheel-terra --print-completion bash)"` turns it on. [Exit status](exit_status.md).
 """
 _LABORATORY = """## Of the laboratory
 
@@ -55,7 +55,7 @@ def _common() -> dict[str, str]:
         for name, parser in sub_parsers().items()
         if name not in LABORATORY
         for action in parser._actions
-        if action.dest != 'overwrite' and action.option_strings and (row := _row(action))
+        if action.option_strings and (row := _row(action))
     ]
     return {row: row for row, count in Counter(rows).items() if count > 2}
 
@@ -81,7 +81,7 @@ def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
 def _row(action: argparse.Action) -> str:
     if isinstance(action, argparse._SubParsersAction | argparse._HelpAction):
         return ''
-    if action.dest in ('debug', 'help_all') or action.help == argparse.SUPPRESS:
+    if action.dest in ('debug', 'help_all', 'overwrite') or action.help == argparse.SUPPRESS:
         return ''
     value = ''
     if action.nargs != 0:
