@@ -80,8 +80,9 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         'Every physical or instrument effect that the models know. Each is off unless a model file '
         'has `effects.<name>.enabled: true`; `effects.<name>.form` chooses one of its forms. What '
         'a further form shares with the first is not repeated. Numbers of a parameter: default '
-        '(range), prior. Figures: first parameter, wheel of 157 mm radius with 10 mm lugs, 80 N, '
-        'HIT-LSS1 sand.',
+        '(range), prior. *Needs*: columns that must vary in a table. *Confounded with*: in '
+        'brackets what separates the two. Figures: first parameter, wheel of 157 mm radius with '
+        '10 mm lugs, 80 N, HIT-LSS1 sand.',
         '',
         'By the outputs that they change:',
         '',
@@ -104,7 +105,7 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
             lines += [*facts, '']
         others = ', '.join(f'`{other}` ({by})' for other, by in effect.confounded_with.items())
         if others:
-            lines.append(f'- Confounded with (separated by): {others}.')
+            lines.append(f'- Confounded with: {others}.')
         if effect.incompatible_with:
             lines.append(f'- Not together with: {", ".join(sorted(effect.incompatible_with))}.')
         lines += [f'- {text[0].upper()}{text[1:]}.' for text in left_aside(effect)]
@@ -121,7 +122,7 @@ def _facts(effect: Effect, form: Effect) -> list[str]:
     if form.touches != effect.touches:
         facts.append(f'- Touches: {touched(form)}.')
     if form.needs:
-        facts.append(f'- Must vary in a table: {", ".join(form.needs)}.')
+        facts.append(f'- Needs: {", ".join(form.needs)}.')
     return [*facts, f'- Valid: {form.validity}.', f'- Source: {form.source}.']
 
 
