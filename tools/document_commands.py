@@ -49,7 +49,7 @@ def page() -> str:
 
 @functools.cache
 def _common() -> dict[str, str]:
-    """Return the rows that stand in three commands or more."""
+    """Return the rows that stand in three commands or more, by the name of the option."""
     rows = [
         row
         for name, parser in sub_parsers().items()
@@ -57,7 +57,11 @@ def _common() -> dict[str, str]:
         for action in parser._actions
         if action.option_strings and (row := _row(action))
     ]
-    return {row: row for row, count in Counter(rows).items() if count > 2}
+    return {_name(row): row for row, count in Counter(rows).items() if count > 2}
+
+
+def _name(row: str) -> str:
+    return row.partition(': ')[0]
 
 
 def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
@@ -67,7 +71,7 @@ def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
         examples = [line.strip() for line in parser.epilog.splitlines()[1:]]
         yield '\n'.join(['```sh', *examples, '```\n'])
     for group, actions in parser.groups().items():
-        rows = [row for action in actions if (row := _row(action)) and row not in _common()]
+        rows = [row for action in actions if (row := _row(action)) and _name(row) not in _common()]
         if rows:
             yield '\n'.join([f'{group.capitalize()}:\n', *rows, ''])
     for action in parser._actions:

@@ -34,8 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar='F.csv|BAG',
         help='instead of two bags: which law of the contact (predict --law) a table of steady '
-        'measurements speaks for, by evidence, with errors on loads and wheels held out; or a '
-        'recording of a drive, by the likelihood of its readings in a replay with each law',
+        'measurements speaks for, by evidence, or a recording, by the likelihood of its readings',
     )
     parser.add_argument('--truth', type=Path, metavar='BAG', help='recording with ground truth')
     parser.add_argument('--json', action='store_true', help='print the differences as JSON')

@@ -51,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--soil',
         choices=('shared', 'own'),
         default='shared',
-        help='of several tables: diagnosed as one with one soil (default), or each with a soil of '
-        'its own, in a folder of its name, with a summary of which effect they favour together',
+        help='of several tables: diagnosed as one with one soil (default), or each with its own in '
+        'a folder of its name, with a summary of which effect they favour together',
     )
     add_jobs_argument(parser, words='tables with their own soil side by side (default 1)')
     parser.add_argument(
@@ -68,16 +68,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='append',
         default=[],
         metavar='FILE|NAME=COLUMN',
-        help='which column of the table is what, where its title does not say: sinkage=-z (a minus '
-        'turns the sign round), "torque=M [N mm]", or a YAML file of lines NAME: COLUMN',
+        help='which column is what, where its title does not say: sinkage=-z (a minus turns the '
+        'sign round), "torque=M [N mm]", or a YAML file of lines NAME: COLUMN',
     )
     parser.add_argument(
         '--ignore-columns',
         action='append',
         default=[],
         metavar='COLUMN',
-        help='column of numbers that is left out (several with commas between, or all that are not '
-        'understood: all); without it a column that is not used is an error',
+        help='column of numbers that is left out (several with commas between; all: what is not '
+        'understood); without it a column that is not used is an error',
     )
     parser.add_argument(
         '--effects',
@@ -120,8 +120,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--smooth',
         action='store_true',
-        help='for a bag: slip from the fixed-interval smoother, which knows all references of the '
-        'drive and hears neither torque nor sinkage (1.7 times the time of a replay)',
+        help='for a bag: slip from a fixed-interval smoother without torque and sinkage (1.7 times '
+        'the time of a replay)',
     )
     parser.add_argument(
         '--no-pictures', action='store_true', help='write report.json and model.yaml only'

@@ -39,31 +39,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs='+',
         metavar='BAG',
-        help='rosbag2 folder, or a single .mcap or .db3 file; of several, each gets a folder of '
-        'its own below -o, and a run that was interrupted goes on where it was',
+        help='rosbag2 folder, or a single .mcap or .db3 file; of several, each gets a folder below '
+        '-o (--report, --table, --track are names in it), and an interrupted run goes on',
     )
     parser.add_argument(
         '-o',
         dest='output',
         action=Output,
         metavar='DIR',
-        help='rosbag2 folder (MCAP) for the estimates, under the names that the node has; with '
+        help='rosbag2 folder (MCAP) for the estimates, under the names that the node has; of '
         'several recordings a folder of such folders, with summary.csv and summary.html',
     )
     parser.add_argument(
         '--table',
         action=Output,
         metavar='F.csv|F.parquet',
-        help='table of the estimates, one row per set and wheel, units in the header; with several '
-        'recordings a name, for one in the folder of each',
+        help='table of the estimates, one row per set and wheel, units in the header',
     )
     parser.add_argument(
         '--track',
         action=Output,
         metavar='F.csv|F.geojson',
         help='map of the drive: position, slip, class, sinkage, pull margin and learned soil along '
-        'the way, units in the header; with several recordings a name, for one in the folder of '
-        'each',
+        'the way, units in the header',
     )
     parser.add_argument(
         '--track-odometry',
@@ -83,33 +81,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action=Output,
         metavar='F.yaml',
         help='parameter file with the soil and the sensor biases that were learned, a further '
-        '--config for the next drive of this rover; of one recording',
+        '--config for the next drive; of one recording',
     )
     parser.add_argument(
         '--slip-on-slope',
         action=Output,
         metavar='F.csv',
-        help='slip expected on slopes of -20 to 30 degrees on this soil with this rover, with its '
-        'deviation and the probability of entrapment, as learned by the end; of one recording',
+        help='slip expected on slopes of -20 to 30 degrees, with its deviation and the probability '
+        'of entrapment, as learned by the end; of one recording',
     )
     parser.add_argument(
         '--smooth',
         action='store_true',
-        help='estimates of the fixed-interval smoother, which knows the whole drive at each of its '
-        'instants; warnings stay as they were given live',
+        help='estimates of the fixed-interval smoother; warnings stay as they were given live',
     )
     parser.add_argument(
         '--manoeuvres',
         action='store_true',
-        help='say which short drive would teach most of each parameter that this one has not '
-        'taught: simulates eight of them (ten seconds); of one recording',
+        help='say which short drive would teach most of what this one has not taught (ten '
+        'seconds); of one recording',
     )
     parser.add_argument('--json', action='store_true', help='print the summary as JSON')
     parser.add_argument(
         '--report',
         action=Output,
         metavar='F.html',
-        help='report with pictures; with several recordings a name, for one in the folder of each',
+        help='report with pictures',
     )
     add_jobs_argument(parser, words='recordings at a time')
     add_scheduler_argument(parser, what='recordings')
