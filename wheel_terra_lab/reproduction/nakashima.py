@@ -281,7 +281,7 @@ def _figures(runs: Runs) -> list[Statement]:
     else:
         ours = reproduced_figures.equivalent_slope(steepest, path)
         good = abs(ours - AS_ON) <= SLOPE_OFF
-        why = f'{abs(ours - AS_ON):.1f} apart; under 14.7 N (the load is not stated), grains x2'
+        why = f'{abs(ours - AS_ON):.1f} apart; under 14.7 N, no load is stated, grains x2'
         found.append(Statement('figure 8', what, f'{AS_ON:g}', f'{ours:.1f}', good, why))
     why = 'a picture: `soilbin run` draws bed.png, film.gif'
     what, place = 'soil that flows, on the Earth, on the Moon', 'figures 10, 19, 20'

@@ -12,8 +12,8 @@ HEAD = (
     '# Three papers, statement by statement',
     '',
     '`wheel-terra reproduce all -o DIR` writes this page from installed code and shipped data.',
-    'Allowed, where a row says no more: 8 points of slip (section 6: 10 %), 10 % of forces, 15 % of '
-    'sinkages, 25 % of power numbers, 5 % of a density, 2 degrees, a rank correlation of 0.7.',
+    'Allowed, where a row says no more: 8 points of slip (section 6: 10 %), 10 % of forces, 15 % '
+    'of sinkages, 25 % of power numbers, 5 % of a density, 2 degrees, a rank correlation of 0.7.',
     '*no test*: an input, a definition, a picture, or an accuracy that the paper does not state.',
     '*grains x2*: of twice the diameter. *z_a* counts from where the wheel begins to turn. '
     'Errors of the pull are the worst at slip 0.05 to 0.6, with a pull above a tenth of the load.',
