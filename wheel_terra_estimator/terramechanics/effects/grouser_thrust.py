@@ -66,8 +66,8 @@ EFFECT = Effect(
     },
     incompatible_with=frozenset({'lug_shear_radius'}),
     validity='lugs far apart; counts the same thrust as a larger shear radius, hence not with it',
-    source='passive earth pressure on grousers (Bekker 1969, book, no DOI), n_e lugs in the '
-    'contact; after literature read at second hand',
+    source='passive earth pressure on n_e grousers in the contact (Bekker 1969, book, no DOI, read '
+    'at second hand)',
     on_outputs=_thrust,
     other_forms=(
         Form(

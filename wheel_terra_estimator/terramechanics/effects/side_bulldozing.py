@@ -96,8 +96,7 @@ EFFECT = Effect(
             validity='slip angles to 90 degrees, sinkage below one radius; what friction on '
             'the flank carries of the load is left out',
             source='own form: resistance of Hegedus 1960 (report, no DOI) on the outline of the '
-            'flank, friction against the motion of the flank past a rising wedge '
-            '(docs/models/sideways.md)',
+            'flank, and its friction (docs/models/sideways.md)',
             on_outputs=_plate,
         ),
     ),
