@@ -17,9 +17,10 @@ _INTRODUCTION = """# Parameters
 
 Written by `python tools/document_parameters.py` from the declared table; do not edit.
 
-Keys of [configuration files](configuration.md). A list per wheel has one entry for each of
-`wheels.names`, in that order. An integer will do where a number is wanted, though not inside a list
-(`[0.0, 0.5]`, not `[0, 0.5]`: ROS refuses mixed lists). Every `_std` is one standard deviation.
+Keys of [configuration files](configuration.md); in brackets default, unit and what is allowed. A
+list per wheel has one entry for each of `wheels.names`, in that order. An integer will do where a
+number is wanted, though not inside a list (`[0.0, 0.5]`, not `[0, 0.5]`: ROS refuses mixed lists).
+Every `_std` is one standard deviation.
 """
 
 _SECTIONS = {
@@ -60,7 +61,6 @@ def page() -> str:
     table = list(declared().values())
     for section, title in _SECTIONS.items():
         lines += [f'## {title}', '']
-        lines += ['| key | default | allowed | meaning |', '|---|---|---|---|']
         for parameter in table:
             head = parameter.key.split('.')[0] if '.' in parameter.key else ''
             if head == section:
@@ -71,14 +71,14 @@ def page() -> str:
 
 def _row(parameter: Parameter) -> str:
     default = '*required*' if parameter.required else f'`{format_value(parameter.default)}`'
-    meaning = parameter.meaning.replace('|', '\\|')
+    unit = parameter.unit if parameter.unit not in ('', '-') else ''
+    allowed = _in_short(parameter.allowed)
+    quantity = f'{default}, {unit}' if parameter.required and unit else f'{default} {unit}'.strip()
+    facts = quantity if allowed in ('number', 'text', 'true/false') else f'{quantity}, {allowed}'
+    meaning = parameter.meaning.replace('<', '&lt;')
     if parameter.aliases:
         meaning += ' (also ' + ', '.join(f'`{alias}`' for alias in parameter.aliases) + ')'
-    if parameter.unit not in ('', '-'):
-        default += f' {parameter.unit}'
-    if parameter.size == 'wheels' and not parameter.required:
-        default += ' each'
-    return f'| `{parameter.key}` | {default} | {_in_short(parameter.allowed)} | {meaning} |'
+    return f'- `{parameter.key}` ({facts}): {meaning}'
 
 
 def _in_short(allowed: str) -> str:

@@ -16,4 +16,4 @@ def test_every_parameter_is_on_the_page():
     page = documentation.page()
     for key in declared():
         if not key.startswith('effects.'):  # on a page of their own
-            assert f'| `{key}` |' in page
+            assert f'- `{key}` (' in page
