@@ -153,7 +153,7 @@ def _flow(model: Model) -> list[Statement]:
         what = f'{wheel}: share of n1 s (lateral flow) in the growth [%]'
         holds = share > 50.0
         found.append(Statement('figure 10', what, 'a primary part', f'{share:.0f}', holds))
-    why = 'the paper sets them aside: their angles are difficult to determine'
+    why = 'the paper sets them aside'
     what = 'longitudinal slip-sinkage from the slip lines'
     found.append(Statement('equations 3 to 8', what, '-', '-', None, why))
     return found

@@ -53,8 +53,8 @@ WHY_UNFITTED = {
     'KLS1_lug10': 'the torque of this rig holds 1 N m and more that no contact stress gives',
 }
 WHY_FITTED = {
-    'HIT_Wh34_smooth': 'the rows ask for a peak that moves forward up to slip 0.3 and back at 0.6, '
-    'not for a line c1 + c2 s; digitised to 1 N, 7 to 9 %',
+    'HIT_Wh34_smooth': 'the rows ask for a peak that moves forward up to slip 0.3 and back at 0.6; '
+    'digitised to 1 N, 7 to 9 %',
     'KLS1_lug10': 'the measured pull falls from 12.7 to 6.4 N between slip 0.4 and 0.5',
 }
 WHY_PRINTED = (

@@ -150,7 +150,7 @@ def _table7(rows: Sequence[Row]) -> list[Statement]:
             100.0 * (ours[w]['sinkage_average'][0] - paper[w]['sinkage_average']) for w in ours
         ]
         together = float(np.corrcoef(misses, [before[w] for w in ours])[0, 1])
-        what = 'misses of z_a against what each wheel sank before it turned: correlation'
+        what = 'misses of z_a against what each wheel sank before: correlation'
         why = (
             'who sinks deep while standing for 1 s has less left to sink; how the load is put on '
             'is not stated'
@@ -272,10 +272,10 @@ def _figures(runs: Runs) -> list[Statement]:
         holds = None if answer is None else bool(answer)
         why = 'not run' if holds is None else ''
         place, told = f'figure {figure.name}', _told(figure, rows)
-        found.append(Statement(place, figure.statement, 'yes', told or '-', holds, why))
+        found.append(Statement(place, figure.statement, '', told or '-', holds, why))
     steepest = reproduced_figures.STEEPEST
     path = reproduced_figures.paths(rows, runs.folder).get(steepest)
-    what = 'lugs of 20 mm on 25 degrees: the path of the axle is that of a slope of [deg]'
+    what = 'lugs of 20 mm on 25 degrees: path of the axle, as on a slope of [deg]'
     if path is None:
         found.append(Statement('figure 8', what, f'{AS_ON:g}', '-', None, 'not run'))
     else:

@@ -33,9 +33,9 @@ EFFECT = Effect(
     ),
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     confounded_with={
-        'bulldozing': 'load series: cohesion scales with contact area',
-        'grouser_thrust': 'rows with other lugs or none, and a load series',
-        'rim_friction': 'load series; rows with lugs high enough to hold a ring of soil',
+        'bulldozing': 'a load series',
+        'grouser_thrust': 'other lugs or none; a load series',
+        'rim_friction': 'a load series; rows with higher lugs',
     },
     validity='c + delta not below zero',
     source='Mohr-Coulomb strength in Janosi and Hanamoto 1961 (proceedings, no DOI); '

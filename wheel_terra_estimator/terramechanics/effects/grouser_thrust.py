@@ -62,7 +62,7 @@ EFFECT = Effect(
     needs=('slip', 'lug_height'),
     confounded_with={
         'lug_shear_radius': 'torque over pull: the longer arm gains twice as much torque',
-        'cohesion': 'lug height and load series (cohesion acts at h = 0 too)',
+        'cohesion': 'lug height and load series',
     },
     incompatible_with=frozenset({'lug_shear_radius'}),
     validity='lugs far apart; counts the same thrust as a larger shear radius, hence not with it',

@@ -41,7 +41,6 @@ EFFECT = Effect(
     needs=('angular_velocity',),
     confounded_with={'multipass': 'the same speed on virgin soil and in the rut'},
     validity='rim speed 1 mm/s to 1 m/s; no influence where the speed is not recorded',
-    source='power law of strain rate, own choice; Ding et al. 2010 '
-    '(doi 10.1007/s11771-010-0021-7): none below 55 mm/s',
+    source='own power law; Ding et al. 2010 (doi 10.1007/s11771-010-0021-7): none below 55 mm/s',
     on_inputs=_rate,
 )

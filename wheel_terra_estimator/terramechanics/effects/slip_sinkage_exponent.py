@@ -99,9 +99,8 @@ EFFECT = Effect(
     },
     validity='slip 0 to 0.6 in the source, skid to -0.4 against measurements; sinkage well below '
     '1 m, where k z^N has its reference',
-    source='Ding et al. 2010 eq. 13 (doi 10.1007/s11771-010-0021-7); |s| and n2: measured rows of '
-    'a single wheel that brakes, sliding sideways: of one that is dragged at up to 90 degrees '
-    '(docs/models/sideways.md)',
+    source='Ding et al. 2010 eq. 13 (doi 10.1007/s11771-010-0021-7); |s|, n2 and side: measured '
+    'rows of a wheel that brakes or slides sideways (docs/models/sideways.md)',
     on_inputs=_exponent,
     other_forms=(
         Form(

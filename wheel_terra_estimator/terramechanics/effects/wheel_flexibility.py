@@ -62,9 +62,8 @@ EFFECT = Effect(
     },
     validity='deflection below the sinkage; exponent below 1.3; z0 is that of the rigid wheel '
     'without slip',
-    source='substitute circle of a flattened wheel (Bekker; Schmid 1995, J. Terramech. 32): the '
-    'chord that both circles share, 2 r (z + f) = 2 r* z; z0 after Bekker 1969 (book, '
-    'no DOI)',
+    source='substitute circle of a flattened wheel (Schmid 1995, J. Terramech. 32), '
+    '2 r (z + f) = 2 r* z; z0 after Bekker 1969 (book, no DOI)',
     on_inputs=_flatten,
     on_outputs=_arm,
 )
