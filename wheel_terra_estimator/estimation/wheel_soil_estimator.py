@@ -42,6 +42,7 @@ from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_opp
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.filter.consistency import excess
 from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
 from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
@@ -854,10 +855,16 @@ class WheelSoilEstimator:
         return Instant(time, body, sources, cycle, self._usual_speed(rims))
 
     def _present_speed(self, rims: Floats) -> SpeedAndVariance:
-        """Return speed [m/s] and variance at the present stamp."""
+        """Return speed [m/s] and variance at the present stamp.
+
+        Without a reference velocity, torques that no soil of the filter explains widen it.
+        """
         rolling = self._yaw_compensated(rims)
         filtered, usual = self._filtered_speed(rolling), self._usual_speed(rolling)
-        return filtered if usual is None else intersected(filtered, usual)
+        if self._reference.known(self._clock.time):
+            return filtered
+        speed, variance = filtered if usual is None else intersected(filtered, usual)
+        return SpeedAndVariance(speed, variance * excess(self._torque.state))
 
     def _yaw_compensated(self, rims: Floats) -> RimSpeeds:
         return RimSpeeds.of(rims, self._turning.state.yaw_rate, self._steering.state.headings)

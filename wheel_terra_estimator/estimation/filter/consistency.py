@@ -17,6 +17,11 @@ def smoothed_nis(mean: float | None, nis: float) -> float:
     return _KEEP * old + _GAIN * min(nis, _LARGEST)
 
 
+def excess(mean_nis: float | None) -> float:
+    """Return by how much innovations are larger than foreseen, 1 = not at all (Birge 1932)."""
+    return CONSISTENT if mean_nis is None else max(mean_nis, CONSISTENT)
+
+
 def distrusted(variance: float, mean_nis: float) -> float:
     """Return the variance of a channel whose innovations keep being larger than foreseen."""
-    return variance * max(mean_nis, CONSISTENT) ** 2
+    return variance * excess(mean_nis) ** 2
