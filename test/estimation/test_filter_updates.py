@@ -23,7 +23,6 @@ from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProce
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_MODULUS,
-    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
     SPEED,
@@ -348,18 +347,16 @@ def soil_noise(parts, **given):
     return prediction
 
 
-def test_soil_walks_with_travel_and_is_learned_with_a_reference_only(parts):
-    known = soil_noise(parts, reference_known=True, torque_known=True)
-    blind = soil_noise(parts, reference_known=False, torque_known=True)
+def test_soil_walks_with_travel_and_returns_to_the_configured_one(parts):
+    walked = soil_noise(parts, torque_known=True)
     for index, std in ((SHEAR_STRENGTH, 0.1), (SHEAR_MODULUS, 0.1), (SLIP_SINKAGE, 0.05)):
-        assert known.Q[index, index] == pytest.approx(std**2 * 0.5)
-        assert blind.Q[index, index] == 0.0
-    assert known.mean[SHEAR_STRENGTH] == pytest.approx(np.exp(-0.5 / 100.0))
+        assert walked.Q[index, index] == pytest.approx(std**2 * 0.5)
+        assert walked.mean[index] == pytest.approx(np.exp(-0.5 / 100.0))
 
 
 def test_what_all_wheels_share_of_the_shear_error_lasts_longer_than_what_one_has(parts):
     e = parts.layout.shear_error
-    prediction = soil_noise(parts, reference_known=True, torque_known=True)
+    prediction = soil_noise(parts, torque_known=True)
     F, Q = prediction.F[e, e], prediction.Q[e, e]
     alternating = np.array([1.0, -1.0] * 3)
     assert F @ np.ones(6) == pytest.approx(np.exp(-0.5 / 5.0) * np.ones(6))
@@ -372,8 +369,8 @@ def test_what_all_wheels_share_of_the_shear_error_lasts_longer_than_what_one_has
 
 def test_softer_ground_is_weaker_ground_where_no_torque_says_how_weak(parts):
     k, e = parts.layout.stiffness, parts.layout.shear_error
-    assert (soil_noise(parts, reference_known=True, torque_known=True).Q[k, e] == 0.0).all()
-    Q = soil_noise(parts, reference_known=True, torque_known=False).Q
+    assert (soil_noise(parts, torque_known=True).Q[k, e] == 0.0).all()
+    Q = soil_noise(parts, torque_known=False).Q
     own = Q[k, k] - Q[k, k][0, 1]
     error = Q[e, e] - Q[e, e][0, 1]
     correlation = np.diagonal(Q[k, e]) / np.sqrt(np.diagonal(own) * np.diagonal(error))
@@ -560,18 +557,11 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
     layout = parts.layout
 
     def entries(**changes):
-        given = {'reference_known': True, 'settled': True, 'opposes_rims': False, 'unread': []}
+        given = {'settled': True, 'opposes_rims': False, 'unread': []}
         return set(considered_entries(layout, **(given | changes)))
 
     assert entries() == set()
     assert entries(settled=False) == entries(opposes_rims=True) == {SPEED}
-    zeros = range(layout.size)[layout.torque_zero]
-    assert entries(reference_known=False) == {
-        SHEAR_STRENGTH,
-        SHEAR_MODULUS,
-        SHEAR_RADIUS,
-        *zeros,
-    }
     one = entries(unread=[2])
     assert one == {layout.sinkage.start + 2, layout.stiffness.start + 2}
     assert SLIP_SINKAGE in entries(unread=list(range(6)))

@@ -422,7 +422,6 @@ class WheelSoilEstimator:
                 rows += force_rows
         considered = considered_entries(
             layout,
-            reference_known=self._reference.known(time),
             settled=self._contact_age.settled,
             opposes_rims=cycle.yaw_compensated.oppose(float(ekf.mean[SPEED])),
             unread=self._sinkage.unread(time),
@@ -577,12 +576,8 @@ class WheelSoilEstimator:
             self._contact_age.advance(travel)
             self._note_ruts(cycle.dt)
             if travel > 0.0:
-                self._soil_process.predict(
-                    prediction,
-                    travel,
-                    reference_known=cycle.reference_known,
-                    torque_known=self._wheels.torque_known(cycle.time),
-                )
+                told = self._wheels.torque_known(cycle.time)
+                self._soil_process.predict(prediction, travel, torque_known=told)
         self._ekf.predict(prediction.mean, prediction.F, prediction.Q)
 
     def _trusted(self, window: InertialWindow, time: float) -> InertialWindow:

@@ -11,9 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from wheel_terra_estimator.estimation.filter.state import (
-    SHEAR_MODULUS,
-    SHEAR_RADIUS,
-    SHEAR_STRENGTH,
     SLIP_SINKAGE,
     SPEED,
     StateLayout,
@@ -23,7 +20,6 @@ from wheel_terra_estimator.estimation.filter.state import (
 def considered_entries(
     layout: StateLayout,
     *,
-    reference_known: bool,
     settled: bool,
     opposes_rims: bool,
     unread: Sequence[int],
@@ -34,8 +30,6 @@ def considered_entries(
     ----------
     layout : StateLayout
         Of the state.
-    reference_known : bool
-        Without a reference velocity slip and shear strength are not told apart.
     settled : bool
         Whether the contacts are those of a steady drive. The rut that forms at a start, or is left
         behind after a spin on the spot, tells no speed.
@@ -48,9 +42,6 @@ def considered_entries(
     entries = []
     if not settled or opposes_rims:
         entries.append(SPEED)
-    if not reference_known:
-        entries += [SHEAR_STRENGTH, SHEAR_MODULUS, SHEAR_RADIUS]
-        entries += range(layout.size)[layout.torque_zero]
     for part in (layout.sinkage, layout.stiffness):
         entries += [part.start + i for i in unread]
     if len(unread) == layout.wheel_count:

@@ -74,27 +74,21 @@ class SoilProcess:
         self._mean_variance = self._error_variance + n * priors.shear_error_common_std**2
         self._stiffness = tuning.stiffness_walk**2 + self._each * tuning.own_stiffness_walk**2
 
-    def predict(
-        self, prediction: Prediction, travel: float, *, reference_known: bool, torque_known: bool
-    ) -> None:
-        """Add the soil to a prediction over a `travel` [m].
-
-        Without a reference velocity slip and strength are not told apart: what is learned stays.
-        """
+    def predict(self, prediction: Prediction, travel: float, *, torque_known: bool) -> None:
+        """Add the soil to a prediction over a `travel` [m]."""
         tuning, layout = self._tuning, self._layout
         mean, F, Q = prediction
         walk = self._walk * travel
-        learn = walk if reference_known else 0.0
         forget = math.exp(-travel / tuning.memory)
-        for index, std, rate in (
-            (SHEAR_STRENGTH, tuning.strength_walk, learn),
-            (SHEAR_MODULUS, tuning.shear_modulus_walk, learn),
-            (SLIP_SINKAGE, tuning.slip_sinkage_walk, learn),
-            (CENTROID, tuning.centroid_walk, walk),
+        for index, std in (
+            (SHEAR_STRENGTH, tuning.strength_walk),
+            (SHEAR_MODULUS, tuning.shear_modulus_walk),
+            (SLIP_SINKAGE, tuning.slip_sinkage_walk),
+            (CENTROID, tuning.centroid_walk),
         ):
             mean[index] *= forget
             F[index, index] = forget
-            Q[index, index] = std**2 * rate
+            Q[index, index] = std**2 * walk
         Q[MOUND, MOUND] = tuning.mound_walk**2 * walk
         Q[RUT_SHARE, RUT_SHARE] = tuning.rut_share_walk**2 * walk
         keep = math.exp(-travel / tuning.shear_radius_length)
