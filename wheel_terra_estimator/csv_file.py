@@ -26,26 +26,13 @@ _QUOTED = re.compile('"[^"]*"')
 
 @dataclass(frozen=True)
 class CsvFile:
-    """An open table.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    header : list of str
-        Titles of the columns; empty for an empty file.
-    line : int
-        Line of the header.
-    delimiter : str
-        What stands between the cells; where it is no comma, a comma is a decimal mark.
-    rows : iterator of (int, list of str)
-        Line and cells of each row below the header in which something stands.
-    """
+    """An open table."""
 
     path: Path
-    header: list[str]
-    line: int
-    delimiter: str
+    header: list[str]  # titles of the columns; empty for an empty file
+    line: int  # line of the header
+    delimiter: str  # what stands between the cells; where it is no comma, a comma is a decimal mark
+    # Line and cells of each row below the header in which something stands
     rows: Iterator[tuple[int, list[str]]]
 
     @property

@@ -38,13 +38,6 @@ class BagFile:
     inputs : iterable of Path
         What is read meanwhile: the bag is never written into it or over it.
 
-    Attributes
-    ----------
-    messages : MessageFactory
-        Builds what `write` takes.
-    counts : Counter
-        Messages written, by topic.
-
     Raises
     ------
     UserError
@@ -62,7 +55,7 @@ class BagFile:
     ) -> None:
         self.path = path
         self.messages = MessageFactory()
-        self.counts: Counter[str] = Counter()
+        self.counts: Counter[str] = Counter()  # messages written, by topic
         self._topics = dict(topics)
         self._latched = latched
         self._storage = storage

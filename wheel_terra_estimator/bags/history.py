@@ -77,33 +77,19 @@ class StuckWarning:
 
 
 class DriveFigures:
-    """Figures of a whole drive, set by set; per-wheel arrays are (n,).
-
-    Attributes
-    ----------
-    sets : int
-        Number of sets.
-    duration : float
-        From the first set to the latest stamp [s].
-    max_slip : (n,) array
-        Greatest |slip| outside of class unknown [-].
-    max_sinkage, max_sinkage_std : (n,) array
-        Greatest sinkage and its standard deviation [m].
-    least_margin : (n,) array
-        Least pull margin [N].
-    max_lateral_force : (n,) array
-        Greatest size of the lateral force outside of class unknown [N].
-    """
+    """Figures of a whole drive, set by set; per-wheel arrays are (n,)."""
 
     def __init__(self, wheels: int) -> None:
         self.sets = 0
-        self.duration = 0.0
+        self.duration = 0.0  # from the first set to the latest stamp [s]
         self._seconds = np.zeros((len(SlipClass), wheels))
         self._wheel = np.arange(wheels)
-        self.max_slip = np.zeros(wheels)
+        self.max_slip = np.zeros(wheels)  # (n,) greatest |slip| outside of class unknown [-]
+        # ``max_sinkage``, ``max_sinkage_std``: (n,) greatest sinkage and its standard deviation [m]
         self.max_sinkage = np.full(wheels, -np.inf)
         self.max_sinkage_std = np.zeros(wheels)
-        self.least_margin = np.full(wheels, np.inf)
+        self.least_margin = np.full(wheels, np.inf)  # (n,) least pull margin [N]
+        # (n,) greatest size of the lateral force outside of class unknown [N]
         self.max_lateral_force = np.zeros(wheels)
         self._pull = np.zeros(wheels)
         self._known = np.zeros(wheels)

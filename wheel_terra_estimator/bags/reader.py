@@ -64,15 +64,6 @@ class MeasurementReader:
     configuration : Configuration
         Wheels and mounting.
 
-    Attributes
-    ----------
-    topics : dict of str to str
-        Estimator's topic to the bag's, for the topics that are there.
-    absent : list of str
-        Topics that the estimator could use and that are not in the bag.
-    rejected : Counter
-        Messages that could not be used, by (estimator's topic, reason).
-
     Raises
     ------
     UserError
@@ -84,7 +75,9 @@ class MeasurementReader:
         self.bag = bag
         self.converter = InputConverter(input_layout(configuration))
         self._unpack = {name: topic_messages(kind).unpack for name, kind in INPUT_TYPES.items()}
+        # Estimator's topic to the bag's, for the topics that are there
         self.topics: dict[str, str] = {}
+        # Topics that the estimator could use and that are not in the bag
         self.absent: list[str] = []
         for name in self.converter.layout.topics:
             self._find(name, remaps)

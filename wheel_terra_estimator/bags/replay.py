@@ -75,32 +75,17 @@ class Replay:
 
 @dataclass(frozen=True)
 class Options:
-    """Choices of a replay.
-
-    Attributes
-    ----------
-    overwrite : bool
-        Whether an earlier output is replaced.
-    arrival : Path, optional
-        Log of a live node (parameter ``record_arrival``): hear the messages in that order.
-    every_set : bool
-        Whether the history holds every set of a long drive, whatever memory that takes.
-    progress : bool
-        Whether a long drive shows its progress on a terminal.
-    smooth : bool
-        Whether the estimates are those of the fixed-interval smoother.
-    odometry : str
-        Topic of the bag whose positions the track has; empty: it is reckoned.
-    manoeuvres : bool
-        Whether the manoeuvres that would teach more are looked for: ten seconds.
-    """
+    """Choices of a replay."""
 
     overwrite: bool = False
+    # Log of a live node (parameter ``record_arrival``): hear the messages in that order
     arrival: Path | None = None
+    # Whether the history holds every set of a long drive, whatever memory that takes
     every_set: bool = False
     progress: bool = True
-    smooth: bool = False
-    odometry: str = ''
+    smooth: bool = False  # whether the estimates are those of the fixed-interval smoother
+    odometry: str = ''  # topic of the bag whose positions the track has; empty: it is reckoned
+    # Whether the manoeuvres that would teach more are looked for: ten seconds
     manoeuvres: bool = False
 
 

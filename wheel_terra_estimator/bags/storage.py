@@ -45,15 +45,7 @@ class _Source(Protocol):
 
 
 class Bag:
-    """An open recording.
-
-    Attributes
-    ----------
-    topics : dict of str to Topic
-        All topics, by name.
-    limits : Limits
-        What is unpacked and held.
-    """
+    """An open recording."""
 
     def __init__(
         self, path: Path, sources: list[_Source], notes: list[str], limits: Limits = LIMITS

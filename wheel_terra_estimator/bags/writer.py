@@ -38,19 +38,10 @@ _VERSION, _SETTINGS, _RECORDING = (
 
 @dataclass(frozen=True)
 class Origin:
-    """How estimates were made.
+    """How estimates were made."""
 
-    Attributes
-    ----------
-    version : str
-        Version of the package; empty: not stated.
-    settings : dict
-        Configuration key -> value, defaults included.
-    recording : str
-        Name of the recording.
-    """
-
-    version: str = ''
+    version: str = ''  # version of the package; empty: not stated
+    # Configuration key -> value, defaults included
     settings: dict[str, Any] = field(default_factory=dict)
     recording: str = ''
 

@@ -70,21 +70,11 @@ def is_unit(text: str) -> bool:
 
 @dataclass(frozen=True)
 class Entry:
-    """A column of a table as a user names it.
-
-    Attributes
-    ----------
-    column : str
-        Its title.
-    unit : str
-        Its unit; empty: that of the title, else SI.
-    sign : int
-        -1 turns it round.
-    """
+    """A column of a table as a user names it."""
 
     column: str
-    unit: str = ''
-    sign: int = 1
+    unit: str = ''  # its unit; empty: that of the title, else SI
+    sign: int = 1  # -1 turns it round
 
 
 def entry_of(value: Any, where: str) -> Entry:

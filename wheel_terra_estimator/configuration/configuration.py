@@ -127,32 +127,19 @@ class Rover(Section):
 
 @dataclass(frozen=True, eq=False)
 class Configuration:
-    """Everything that files and overrides stated, checked, with defaults filled in.
-
-    Attributes
-    ----------
-    wheels, rover : Wheels, Rover
-        The vehicle.
-    soil, soil_std : Soil, dict
-        Nominal soil, and field of ``Soil`` -> standard deviation in internal units.
-    effects, effects_std : dict
-        Enabled effect -> parameter of its form -> value or stated standard deviation; ``form``
-        is among the values where it is not the first one of the effect.
-    sensors, filter : Section
-        ``sensors.*`` and ``filter.*`` as attributes.
-    slip_radius, wheel_odometry, reference_odom_max_rate, rest_speed, output_rate, max_lag, history,
-    soil_file
-        The parameters that stand in no section.
-    stated : frozenset of str
-        Keys that a file or an override gave, as against defaults.
-    """
+    """Everything that files and overrides stated, checked, with defaults filled in."""
 
     wheels: Wheels
     rover: Rover
+    # ``soil``, ``soil_std``: nominal soil, and field of ``Soil`` -> standard deviation in internal
+    # units
     soil: Soil
     soil_std: dict[str, float]
+    # ``effects``, ``effects_std``: enabled effect -> parameter of its form -> value or stated
+    # standard deviation; ``form`` is among the values where it is not the first one of the effect
     effects: EffectSettings
     effects_std: EffectSettings
+    # ``sensors``, ``filter``: ``sensors.*`` and ``filter.*`` as attributes
     sensors: Section
     filter: Section
     slip_radius: str
@@ -164,7 +151,7 @@ class Configuration:
     history: float  # [s]
     soil_file: str
     provenance: str
-    stated: frozenset[str]
+    stated: frozenset[str]  # keys that a file or an override gave, as against defaults
     _values: Mapping[str, Value]
 
     @property

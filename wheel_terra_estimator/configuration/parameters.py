@@ -30,49 +30,24 @@ Kind: TypeAlias = Literal['number', 'integer', 'flag', 'text']
 
 @dataclass(frozen=True)
 class Parameter:
-    """One declared parameter.
+    """One declared parameter."""
 
-    Attributes
-    ----------
-    key : str
-        Canonical dotted key.
-    kind : str
-        ``number`` (an integer will do), ``integer``, ``flag`` or ``text``.
-    default : bool, int, float, str or list
-        Value where no file states one; a scalar default of a per-wheel key counts for each wheel.
-    unit : str
-        Unit of the value in files.
-    meaning : str
-        One sentence for the documentation and the node's descriptor.
-    size : 'wheels', int or None
-        Per-wheel list, list of that length (0: any length), or a scalar.
-    lower, upper : float
-        Allowed range of each number.
-    open_lower : bool
-        Whether the lower bound itself is excluded.
-    choices : tuple of str
-        Allowed texts, if not any.
-    aliases : tuple of str
-        Other spellings that are accepted.
-    required : bool
-        Whether a complete configuration must state it.
-    one_for_all : bool
-        Whether a per-wheel list of one entry counts for all wheels.
-    """
-
-    key: str
-    kind: Kind
+    key: str  # canonical dotted key
+    kind: Kind  # ``number`` (an integer will do), ``integer``, ``flag`` or ``text``
+    # Value where no file states one; a scalar default of a per-wheel key counts for each wheel
     default: Value
-    unit: str
-    meaning: str
+    unit: str  # unit of the value in files
+    meaning: str  # one sentence for the documentation and the node's descriptor
+    # Per-wheel list, list of that length (0: any length), or a scalar
     size: int | Literal['wheels'] | None = None
+    # ``lower``, ``upper``: allowed range of each number
     lower: float = -inf
     upper: float = inf
-    open_lower: bool = False
-    choices: tuple[str, ...] = ()
-    aliases: tuple[str, ...] = ()
-    required: bool = False
-    one_for_all: bool = False
+    open_lower: bool = False  # whether the lower bound itself is excluded
+    choices: tuple[str, ...] = ()  # allowed texts, if not any
+    aliases: tuple[str, ...] = ()  # other spellings that are accepted
+    required: bool = False  # whether a complete configuration must state it
+    one_for_all: bool = False  # whether a per-wheel list of one entry counts for all wheels
 
     @property
     def allowed(self) -> str:

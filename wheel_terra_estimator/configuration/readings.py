@@ -16,14 +16,9 @@ from wheel_terra_estimator.terramechanics.model import SteadyState
 
 @dataclass(frozen=True)
 class Readings:
-    """Stated gains and zeros of sinkage [m], drawbar pull [N] and torque [N m].
+    """Stated gains and zeros of sinkage [m], drawbar pull [N] and torque [N m]."""
 
-    Attributes
-    ----------
-    gain, zero : numpy.ndarray
-        (3,), or (N, 3) where rows differ.
-    """
-
+    # ``gain``, ``zero``: (3,), or (N, 3) where rows differ
     gain: FloatArray
     zero: FloatArray
 

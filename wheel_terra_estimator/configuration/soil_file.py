@@ -28,24 +28,13 @@ _SECTIONS = ('soil.', 'sensors.')
 
 @dataclass(frozen=True)
 class StuckState:
-    """The stuck warning when it was last written.
+    """The stuck warning when it was last written."""
 
-    Attributes
-    ----------
-    stuck : bool
-        ``~/stuck``.
-    reason : str
-        In words.
-    stamp : int
-        Stamp of the set that raised or lowered it [ns]; 0 = unknown.
-    direction : int
-        ``~/stuck_direction``: of the rims that led to it, 1 forward, -1 backward, 0 none, both or
-        unknown.
-    """
-
-    stuck: bool = False
+    stuck: bool = False  # ``~/stuck``
     reason: str = ''
-    stamp: int = 0
+    stamp: int = 0  # stamp of the set that raised or lowered it [ns]; 0 = unknown
+    # ``~/stuck_direction``: of the rims that led to it, 1 forward, -1 backward, 0 none, both or
+    # unknown
     direction: int = 0
 
 

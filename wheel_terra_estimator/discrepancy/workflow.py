@@ -40,25 +40,17 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 @dataclass(frozen=True)
 class Options:
-    """Choices of a diagnosis.
+    """Choices of a diagnosis."""
 
-    Attributes
-    ----------
-    effects : tuple of str or None
-        Effects that may be named; None = all candidates of the catalogue.
-    floor : float or None
-        Greatest model-error floor, share of each quantity's range; None = as the data ask, to 4 %.
-    allowed_error : float
-        Model error that is no reason for doubt, share of each quantity's range: a channel that is
-        off by more than twice its root sum of squares with the noise does not agree.
-    soil_known_to : float or None
-        Share of its value to which each soil number is known; None = as stated, else by the class
-        of its source.
-    """
-
+    # Effects that may be named; None = all candidates of the catalogue
     effects: tuple[str, ...] | None = None
+    # Greatest model-error floor, share of each quantity's range; None = as the data ask, to 4 %
     floor: float | None = None
+    # Model error that is no reason for doubt, share of each quantity's range: a channel that is off
+    # by more than twice its root sum of squares with the noise does not agree
     allowed_error: float = 0.02
+    # Share of its value to which each soil number is known; None = as stated, else by the class of
+    # its source
     soil_known_to: float | None = None
 
 

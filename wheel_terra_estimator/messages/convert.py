@@ -144,16 +144,11 @@ def input_layout(configuration: Configuration) -> InputLayout:
 
 
 class InputConverter:
-    """Messages to measurements.
-
-    Attributes
-    ----------
-    rejected : Counter
-        Messages that did not fit, by (topic, reason in words).
-    """
+    """Messages to measurements."""
 
     def __init__(self, layout: InputLayout) -> None:
         self.layout = layout
+        # Messages that did not fit, by (topic, reason in words)
         self.rejected: Counter[tuple[str, str]] = Counter()
         self._unknown_names: dict[str, Sequence[str]] = {}  # topic -> names in a message
         self._columns: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}

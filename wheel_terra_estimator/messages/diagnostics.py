@@ -63,14 +63,6 @@ class Diagnostics:
         Returns faults that the sets do not know of, since it was last asked: subject and words.
     node_name : str
         Name of the node with its namespace, for names and hardware ids.
-
-    Attributes
-    ----------
-    clock : callable
-        Stamp of a set [ns] -> time by which faults stand and are cleared [ns]: that stamp itself,
-        or for whoever looks on live the time of a clock.
-    new_faults : list of str
-        Faults that the latest message was the first to tell.
     """
 
     def __init__(
@@ -81,8 +73,10 @@ class Diagnostics:
         node_name: str = NODE,
     ) -> None:
         self.node_name = node_name
+        # Stamp of a set [ns] -> time by which faults stand and are cleared [ns]: that stamp itself,
+        # or for whoever looks on live the time of a clock
         self.clock: Callable[[int], int] = int
-        self.new_faults: list[str] = []
+        self.new_faults: list[str] = []  # faults that the latest message was the first to tell
         self._names = names
         self._counters = counters
         self._faults = faults

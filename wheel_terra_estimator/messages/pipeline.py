@@ -36,18 +36,6 @@ class Pipeline:
         Name of the node with its namespace, for diagnostics.
     estimator : Estimator, optional
         See `EstimatorCore`.
-
-    Attributes
-    ----------
-    received : Counter
-        Messages heard, by input topic.
-    transport_faults, transport_values : callable
-        Return what whoever brings the messages has to say in diagnostics: faults since it was last
-        asked (subject and words), and key-values.
-    on_measurement : callable or None
-        Gets each measurement before the core does.
-    diagnostics : Diagnostics
-        Says what ``/diagnostics`` is to say, and when.
     """
 
     def __init__(
@@ -60,10 +48,13 @@ class Pipeline:
         self.names = configuration.wheels.names
         self.converter = InputConverter(input_layout(configuration))
         self.core = EstimatorCore(configuration, estimator, judged_by=InputJudge)
-        self.received: Counter[str] = Counter()
+        self.received: Counter[str] = Counter()  # messages heard, by input topic
         self.diagnostics = Diagnostics(self.names, self.counters, self._faults, node_name)
+        # ``transport_faults``, ``transport_values``: return what whoever brings the messages has to
+        # say in diagnostics: faults since it was last asked (subject and words), and key-values
         self.transport_faults: Callable[[], Iterable[tuple[str, str]]] = tuple
         self.transport_values: Callable[[], dict[str, Any]] = dict
+        # Gets each measurement before the core does
         self.on_measurement: Callable[[Measurement], object] | None = None
         self._published = 0
         self._refused: Counter[tuple[str, str]] = Counter()  # as told

@@ -30,13 +30,6 @@ class KeptSoil:
     inputs : iterable of Path
         Other files that the node reads.
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    fault : str
-        Why nothing is kept, in words; empty where it is.
-
     Raises
     ------
     UserError
@@ -46,7 +39,7 @@ class KeptSoil:
     def __init__(self, path: Path, inputs: Iterable[Path] = ()) -> None:
         self.path = path.resolve()
         self._state_path = soil_file.state_path(self.path)
-        self.fault = ''
+        self.fault = ''  # why nothing is kept, in words; empty where it is
         self._claim = FileClaim(self.path, 'soil_file')
         self._unusable = ''
         try:

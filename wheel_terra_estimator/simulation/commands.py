@@ -13,33 +13,18 @@ from wheel_terra_estimator.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Command:
-    """Velocity command of the body, as a ``cmd_vel`` message holds it.
+    """Velocity command of the body, as a ``cmd_vel`` message holds it."""
 
-    Attributes
-    ----------
-    forward : float
-        Forward speed [m/s].
-    turn_rate : float
-        Yaw rate, positive to the left [rad/s].
-    """
-
-    forward: float
-    turn_rate: float = 0.0
+    forward: float  # forward speed [m/s]
+    turn_rate: float = 0.0  # yaw rate, positive to the left [rad/s]
 
 
 @dataclass(frozen=True)
 class DriveProfile:
-    """Command over time, linear between knots.
+    """Command over time, linear between knots."""
 
-    Attributes
-    ----------
-    time : numpy.ndarray
-        (k,) knots [s], increasing; two equal ones make a step.
-    forward, turn_rate : numpy.ndarray
-        (k,) forward speed [m/s] and yaw rate [rad/s] there.
-    """
-
-    time: FloatArray
+    time: FloatArray  # (k,) knots [s], increasing; two equal ones make a step
+    # ``forward``, ``turn_rate``: (k,) forward speed [m/s] and yaw rate [rad/s] there
     forward: FloatArray
     turn_rate: FloatArray
 

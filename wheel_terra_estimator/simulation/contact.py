@@ -37,33 +37,17 @@ LEAST_ANGLE = 0.01
 
 @dataclass(frozen=True)
 class SoilForces:
-    """What the soil does to the wheels; shape of the points, in the direction of travel.
+    """What the soil does to the wheels; shape of the points, in the direction of travel."""
 
-    Attributes
-    ----------
-    pull, side_force : numpy.ndarray
-        Net longitudinal and lateral force on the wheel [N].
-    torque : numpy.ndarray
-        Drive torque that holds the wheel against the soil [N m].
-    support_ratio : numpy.ndarray
-        Normal stress over the bearing strength at this sinkage [-].
-    sinkage_exponent : numpy.ndarray
-        N after the effects [-].
-    contact_angle : numpy.ndarray
-        Entrance minus leaving angle [rad].
-    leaving_angle : numpy.ndarray
-        Leaving angle, negative behind the hub [rad].
-    lug_sinkage : numpy.ndarray
-        Sinkage beyond the depth of the stressed contact, from digging and support of lugs [m].
-    """
-
+    # ``pull``, ``side_force``: net longitudinal and lateral force on the wheel [N]
     pull: FloatArray
     side_force: FloatArray
-    torque: FloatArray
-    support_ratio: FloatArray
-    sinkage_exponent: FloatArray
-    contact_angle: FloatArray
-    leaving_angle: FloatArray
+    torque: FloatArray  # drive torque that holds the wheel against the soil [N m]
+    support_ratio: FloatArray  # normal stress over the bearing strength at this sinkage [-]
+    sinkage_exponent: FloatArray  # N after the effects [-]
+    contact_angle: FloatArray  # entrance minus leaving angle [rad]
+    leaving_angle: FloatArray  # leaving angle, negative behind the hub [rad]
+    # Sinkage beyond the depth of the stressed contact, from digging and support of lugs [m]
     lug_sinkage: FloatArray
 
     def first(self) -> SoilForces:

@@ -64,23 +64,6 @@ class Drive:
         The scenario; its command profile is used by ``run`` only.
     seed : int
         Decides all random quantities.
-
-    Attributes
-    ----------
-    plant : RoverPlant
-        The rover.
-    sensors : SensorSuite
-        Its sensors.
-    configuration : Configuration
-        What is true of rover and base soil in this drive.
-    soil_factors : dict of str to float
-        On the base soil, as drawn, by name of `SOIL_QUANTITIES` [-].
-    speed_factor : float
-        Factor on the commands of the scenario, as drawn [-].
-    step_length : float
-        Duration of a step [s].
-    last_truth : Truth
-        Truth at the end of the last step.
     """
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
@@ -97,7 +80,7 @@ class Drive:
             return float(np.exp(deviation * np.clip(variation.standard_normal(), -2.5, 2.5)))
 
         soil = {name: factor(getattr(draw, name)) for name in SOIL_QUANTITIES}
-        self.soil_factors = soil
+        self.soil_factors = soil  # on the base soil, as drawn, by name of `SOIL_QUANTITIES` [-]
         patches = [
             Patch(
                 p.start,
@@ -109,11 +92,13 @@ class Drive:
             for p in scenario.patches
         ]
         slope_shift = draw.slope * variation.standard_normal()
+        # Factor on the commands of the scenario, as drawn [-]
         self.speed_factor = factor(draw.speed)
         changes = {'rover.mass': truth.rover.mass * factor(draw.mass)}
         radius_factor = factor(draw.radius)
         if radius_factor != 1.0:
             changes['wheels.radius'] = (truth.wheels.radius * radius_factor).tolist()
+        # What is true of rover and base soil in this drive
         self.configuration = truth.replace(changes)
         profile = scenario.profile
         fastest = self.speed_factor * float(
@@ -147,8 +132,8 @@ class Drive:
         self.faults = (*scenario.faults, *_random_faults(scenario, noise))
         self.sensors = SensorSuite(scenario, noise, self.faults)
         period = self.sensors.odometry_period
-        self.step_length = period / np.ceil(period / LONGEST_STEP - 1e-9)
-        self.last_truth: Truth = self.plant.truth()
+        self.step_length = period / np.ceil(period / LONGEST_STEP - 1e-9)  # duration of a step [s]
+        self.last_truth: Truth = self.plant.truth()  # truth at the end of the last step
 
     def step(self, command: Command) -> list[Arrival]:
         """Drive under a command for ``step_length`` and return what the sensors say."""

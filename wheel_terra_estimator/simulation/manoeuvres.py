@@ -35,24 +35,12 @@ LEAST_ACCELERATION = 0.1
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A short straight drive.
+    """A short straight drive."""
 
-    Attributes
-    ----------
-    words : str
-        With {distance} [m], where there is one.
-    slope : float
-        Uphill positive [deg].
-    time : tuple of float
-        Knots of the command, as shares of the duration.
-    forward : tuple of float
-        Speed there, over that of the drive.
-    """
-
-    words: str
-    slope: float = 0.0
-    time: tuple[float, ...] = (0.0,)
-    forward: tuple[float, ...] = (1.0,)
+    words: str  # with {distance} [m], where there is one
+    slope: float = 0.0  # uphill positive [deg]
+    time: tuple[float, ...] = (0.0,)  # knots of the command, as shares of the duration
+    forward: tuple[float, ...] = (1.0,)  # speed there, over that of the drive
 
     def keys(self, speed: float) -> dict[str, Any]:
         """Return command and slope as keys of a scenario, for a rover at a `speed` [m/s]."""

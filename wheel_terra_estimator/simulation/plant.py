@@ -36,21 +36,12 @@ MOST_ITERATIONS = 12
 
 @dataclass
 class WheelFaults:
-    """What is wrong with single wheels; may be changed between steps.
+    """What is wrong with single wheels; may be changed between steps."""
 
-    Attributes
-    ----------
-    rate_factor : numpy.ndarray
-        (n,) factor on the commanded rate: above 1 a drive that runs away, 0 a locked one.
-    torque_factor : numpy.ndarray
-        (n,) factor on the torque limit: 0 a wheel that coasts.
-    load_factor : numpy.ndarray
-        (n,) factor on the load: near 0 a wheel that is lifted off.
-    """
-
+    # (n,) factor on the commanded rate: above 1 a drive that runs away, 0 a locked one
     rate_factor: FloatArray
-    torque_factor: FloatArray
-    load_factor: FloatArray
+    torque_factor: FloatArray  # (n,) factor on the torque limit: 0 a wheel that coasts
+    load_factor: FloatArray  # (n,) factor on the load: near 0 a wheel that is lifted off
 
     @classmethod
     def none(cls, count: int) -> WheelFaults:
@@ -80,11 +71,6 @@ class RoverPlant:
         The wheel drives.
     dig_efficiency : float
         Share of the soil between passing lugs that a spinning wheel throws out [-].
-
-    Attributes
-    ----------
-    faults : WheelFaults
-        Faults of single wheels.
     """
 
     def __init__(

@@ -50,38 +50,22 @@ class Fault:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A checked scenario.
+    """A checked scenario."""
 
-    Attributes
-    ----------
-    name : str
-        Where it came from.
-    files, parameters : tuple of str
-        Configuration files and NAME:=VALUE that an estimator of this drive is to be given.
-    configuration : Configuration
-        What these say: rover, nominal soil, sensors.
-    truth : Configuration
-        What holds in the simulation before the variations of a seed.
-    drive, slope, variation, sensors : Section
-        Declared keys of these sections as attributes.
-    profile : DriveProfile
-        The command.
-    patches : tuple of Patch
-        Patches of other soil.
-    faults : tuple of Fault
-        Planned faults.
-    """
-
-    name: str
+    name: str  # where it came from
     description: str
+    # ``files``, ``parameters``: configuration files and NAME:=VALUE that an estimator of this drive
+    # is to be given
     files: tuple[str, ...]
     parameters: tuple[str, ...]
-    configuration: Configuration
-    truth: Configuration
+    configuration: Configuration  # what these say: rover, nominal soil, sensors
+    truth: Configuration  # what holds in the simulation before the variations of a seed
     duration: float
     profile: DriveProfile
     patches: tuple[Patch, ...]
     faults: tuple[Fault, ...]
+    # ``drive``, ``slope``, ``variation``, ``sensors``: declared keys of these sections as
+    # attributes
     drive: Section
     slope: Section
     variation: Section

@@ -44,13 +44,7 @@ class Arrival(NamedTuple):
 
 
 class SensorSuite:
-    """All sensors of a rover, and how they fail; ``random`` is the source of all errors.
-
-    Attributes
-    ----------
-    torque_zero : numpy.ndarray
-        (n,) zeros of the torques, as drawn [N m].
-    """
+    """All sensors of a rover, and how they fail; ``random`` is the source of all errors."""
 
     def __init__(
         self, scenario: Scenario, random: np.random.Generator, faults: Sequence[Fault] = ()
@@ -64,6 +58,7 @@ class SensorSuite:
         self._faults = faults
         n = configuration.wheels.count
         self._scale = scale = scenario.sensors.noise
+        # (n,) zeros of the torques, as drawn [N m]
         self.torque_zero = scale * figures.torque_zero_std * random.standard_normal(n)
         # One current sensor type, one motor constant: most of the gain error is common.
         gain = 0.8 * random.standard_normal() + 0.6 * random.standard_normal(n)

@@ -19,13 +19,7 @@ LEAST_COMMAND = 1e-6
 
 
 class SteeringDrives:
-    """Steering angles of a rover; without steered wheels they stay 0.
-
-    Attributes
-    ----------
-    angle : numpy.ndarray
-        (n,) positive left [rad].
-    """
+    """Steering angles of a rover; without steered wheels they stay 0."""
 
     def __init__(self, configuration: Configuration) -> None:
         wheels = configuration.wheels
@@ -33,7 +27,7 @@ class SteeringDrives:
         self._steered = np.array(wheels.steered)
         # Wheels that do not steer decide about which point the rover can turn without scrubbing.
         self._pivot = 0.0 if self._steered.all() else float(wheels.x[~self._steered].mean())
-        self.angle: FloatArray = np.zeros(wheels.count)
+        self.angle: FloatArray = np.zeros(wheels.count)  # (n,) positive left [rad]
 
     @property
     def any(self) -> bool:

@@ -22,31 +22,18 @@ LEAST_LOAD_SHARE = 0.02
 
 @dataclass(frozen=True)
 class Suspension:
-    """Geometry that decides the wheel loads; frame: ``base_link`` shifted down to the ground.
+    """Geometry that decides the wheel loads; frame: ``base_link`` shifted down to the ground."""
 
-    Attributes
-    ----------
-    x, y : numpy.ndarray
-        (n,) wheel hubs [m].
-    centre_of_gravity : numpy.ndarray
-        (3,) x, y and height above the ground [m].
-    rocker_pivot : tuple of float or None
-        x and height above the ground [m] of the pivots to which chassis and differential are fixed.
-    bogie_pivot : tuple of float or None
-        x and height above the ground [m] of the pivots between rocker and bogie.
-    bogie_wheels : numpy.ndarray
-        (n,) bool: wheels on a bogie.
-    shares : numpy.ndarray or None
-        (n,) given shares of the total load, in place of statics.
-    """
-
+    # ``x``, ``y``: (n,) wheel hubs [m]
     x: FloatArray
     y: FloatArray
-    centre_of_gravity: FloatArray
+    centre_of_gravity: FloatArray  # (3,) x, y and height above the ground [m]
+    # x and height above the ground [m] of the pivots to which chassis and differential are fixed
     rocker_pivot: tuple[float, float] | None = None
+    # x and height above the ground [m] of the pivots between rocker and bogie
     bogie_pivot: tuple[float, float] | None = None
-    bogie_wheels: BoolArray | None = None
-    shares: FloatArray | None = None
+    bogie_wheels: BoolArray | None = None  # (n,) bool: wheels on a bogie
+    shares: FloatArray | None = None  # (n,) given shares of the total load, in place of statics
 
     @cached_property
     def _sides(self) -> tuple[FloatArray, FloatArray]:

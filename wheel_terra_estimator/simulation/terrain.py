@@ -19,23 +19,15 @@ GRID = 0.02
 
 @dataclass(frozen=True)
 class Patch:
-    """A rectangle of ground whose soil differs from the base soil by factors.
+    """A rectangle of ground whose soil differs from the base soil by factors."""
 
-    Attributes
-    ----------
-    start, end : float
-        Extent along x [m].
-    right, left : float
-        Extent along y [m].
-    factors : dict of str to float
-        Factor for each soil quantity named in ``SOIL_QUANTITIES``.
-    """
-
+    # ``start``, ``end``: extent along x [m]
     start: float
     end: float
+    # ``right``, ``left``: extent along y [m]
     right: float
     left: float
-    factors: dict[str, float]
+    factors: dict[str, float]  # factor for each soil quantity named in ``SOIL_QUANTITIES``
 
 
 SOIL_QUANTITIES = ('stiffness', 'cohesion', 'friction', 'shear_modulus', 'slip_sinkage')

@@ -40,28 +40,20 @@ OUTSIDE_VALIDITY = 2
 
 @dataclass(frozen=True)
 class SteadyState:
-    """Steady answer of the soil, one entry per operating point.
+    """Steady answer of the soil, one entry per operating point."""
 
-    Attributes
-    ----------
-    sinkage, drawbar_pull, torque : numpy.ndarray
-        (N,) as the instruments of the model would read them [m], [N], [N m].
-    entrance_angle, peak_stress_angle, leaving_angle : numpy.ndarray
-        (N,) [rad].
-    lateral_force : numpy.ndarray
-        (N,) force of the soil on the wheel, positive left [N]; 0 where the slip angle is.
-    flags : numpy.ndarray
-        (N,) sum of `OVERLOADED` and `OUTSIDE_VALIDITY`.
-    """
-
+    # ``sinkage``, ``drawbar_pull``, ``torque``: (N,) as the instruments of the model would read
+    # them [m], [N], [N m]
     sinkage: FloatArray
     drawbar_pull: FloatArray
     torque: FloatArray
+    # ``entrance_angle``, ``peak_stress_angle``, ``leaving_angle``: (N,) [rad]
     entrance_angle: FloatArray
     peak_stress_angle: FloatArray
     leaving_angle: FloatArray
+    # (N,) force of the soil on the wheel, positive left [N]; 0 where the slip angle is
     lateral_force: FloatArray
-    flags: NDArray[np.int_]
+    flags: NDArray[np.int_]  # (N,) sum of `OVERLOADED` and `OUTSIDE_VALIDITY`
 
     def outputs(self) -> FloatArray:
         """Return (N, 3): sinkage, drawbar pull, torque."""

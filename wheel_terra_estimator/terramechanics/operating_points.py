@@ -18,47 +18,28 @@ SLIP_RADII = ('lug_tip', 'rim', 'shear')
 
 @dataclass(frozen=True)
 class OperatingPoints:
-    """What is known of N steady wheel-soil contacts before the soil answers.
+    """What is known of N steady wheel-soil contacts before the soil answers."""
 
-    Attributes
-    ----------
-    slip : array_like
-        (N,) recorded slip ratio (``kinematics.slip_ratio``), in [-1, 1] [-].
-    normal_load : array_like
-        (N,) load on the wheel as recorded (terrain normal, unless `slope_gravity` is on) [N].
-    wheel : Wheel
-        Floats, or arrays of shape (N,).
-    slope : array_like
-        (N,) slope, positive uphill [rad].
-    slip_radius : str
-        Radius to which `slip` refers: ``lug_tip`` (r + h), ``rim`` (r), or ``shear`` (the model's
-        shear radius: eq. 14 as Ding et al. 2010 print it).
-    gravity : array_like
-        (N,) [m/s^2].
-    angular_velocity : array_like
-        (N,) wheel rate [rad/s], negative in reverse; nan = not recorded (taken as forward).
-    pass_number : array_like
-        (N,) 1 on virgin soil, 2 for the second wheel in the same rut, and so on.
-    leaving_angle : array_like
-        (N,) measured leaving angle [rad], negative behind the hub; nan = not measured.
-    slip_angle : array_like
-        (N,) angle from the wheel's forward axis to the motion of its hub, positive where it slides
-        left, in [-pi, pi] [rad].
-    lateral_speed_ratio : array_like
-        (N,) sideways over rim speed v_y/(r w), r as `slip_radius` says, positive left [-]; nan =
-        from slip and slip angle, (1 - s) tan(slip angle), which says nothing near 90 degrees.
-    """
-
-    slip: Quantity
+    slip: Quantity  # (N,) recorded slip ratio (``kinematics.slip_ratio``), in [-1, 1] [-]
+    # (N,) load on the wheel as recorded (terrain normal, unless `slope_gravity` is on) [N]
     normal_load: Quantity
-    wheel: Wheel
-    slope: Quantity = 0.0
+    wheel: Wheel  # floats, or arrays of shape (N,)
+    slope: Quantity = 0.0  # (N,) slope, positive uphill [rad]
+    # Radius to which `slip` refers: ``lug_tip`` (r + h), ``rim`` (r), or ``shear`` (the model's
+    # shear radius: eq. 14 as Ding et al. 2010 print it).
     slip_radius: str = 'lug_tip'
-    gravity: Quantity = STANDARD_GRAVITY
+    gravity: Quantity = STANDARD_GRAVITY  # (N,) [m/s^2]
+    # (N,) wheel rate [rad/s], negative in reverse; nan = not recorded (taken as forward)
     angular_velocity: Quantity = np.nan
+    # (N,) 1 on virgin soil, 2 for the second wheel in the same rut, and so on
     pass_number: Quantity = 1
+    # (N,) measured leaving angle [rad], negative behind the hub; nan = not measured
     leaving_angle: Quantity = np.nan
+    # (N,) angle from the wheel's forward axis to the motion of its hub, positive where it slides
+    # left, in [-pi, pi] [rad]
     slip_angle: Quantity = 0.0
+    # (N,) sideways over rim speed v_y/(r w), r as `slip_radius` says, positive left [-]; nan = from
+    # slip and slip angle, (1 - s) tan(slip angle), which says nothing near 90 degrees
     lateral_speed_ratio: Quantity = np.nan
 
     def __post_init__(self) -> None:

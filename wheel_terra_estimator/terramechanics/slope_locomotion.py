@@ -25,18 +25,12 @@ LARGEST_SLIP = 0.98
 
 @dataclass(frozen=True)
 class RoverSlopeState:
-    """A rover that climbs steadily, one row per slope, one column per wheel.
+    """A rover that climbs steadily, one row per slope, one column per wheel."""
 
-    Attributes
-    ----------
-    slope, slip : numpy.ndarray
-        (N,) [rad], [-]; the slip is nan where the soil cannot give the pull.
-    normal_load, sinkage, drawbar_pull, torque : numpy.ndarray
-        (N, n) [N], [m], [N], [N m].
-    """
-
+    # ``slope``, ``slip``: (N,) [rad], [-]; the slip is nan where the soil cannot give the pull
     slope: FloatArray
     slip: FloatArray
+    # ``normal_load``, ``sinkage``, ``drawbar_pull``, ``torque``: (N, n) [N], [m], [N], [N m]
     normal_load: FloatArray
     sinkage: FloatArray
     drawbar_pull: FloatArray

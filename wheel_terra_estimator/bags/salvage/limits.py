@@ -18,25 +18,17 @@ UNITS = {  # [byte]
 
 @dataclass(frozen=True)
 class Limits:
-    """Greatest sizes [byte]; what is larger is left out and said, never unpacked.
+    """Greatest sizes [byte]; what is larger is left out and said, never unpacked."""
 
-    Attributes
-    ----------
-    chunk : int
-        One chunk, or one message of the storage, unpacked. Recorders close a chunk at 1 to 4 MB.
-    held : int
-        All messages that are held at once to bring them into the order of their log times.
-    message : int
-        One message that is unpacked into its fields, which take several times its size. The
-        largest that the estimator hears have a few kB.
-    packed_share : int
-        Greatest ratio of unpacked to packed size (sensor data: 2 to 20): of a chunk above
-        `message`, of a whole file above `held`.
-    """
-
+    # One chunk, or one message of the storage, unpacked. Recorders close a chunk at 1 to 4 MB.
     chunk: int = 256 * MEGABYTE
+    # All messages that are held at once to bring them into the order of their log times
     held: int = 1024 * MEGABYTE
+    # One message that is unpacked into its fields, which take several times its size. The largest
+    # that the estimator hears have a few kB.
     message: int = 16 * MEGABYTE
+    # Greatest ratio of unpacked to packed size (sensor data: 2 to 20): of a chunk above `message`,
+    # of a whole file above `held`
     packed_share: int = 100
 
     def unpacked(self, packed: int) -> int:

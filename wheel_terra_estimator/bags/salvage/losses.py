@@ -15,30 +15,18 @@ LONGEST_END = 60_000_000_000  # [ns] behind the last message that was read
 
 @dataclass
 class Losses:
-    """What is known of a file's losses; grows while it is read.
+    """What is known of a file's losses; grows while it is read."""
 
-    Attributes
-    ----------
-    declared : mapping of str to int, or None
-        Messages on each topic, as the file itself states; None where it does not.
-    recovered : dict of str to int
-        Messages on each topic that were read to the end.
-    state : str
-        What is wrong with the file as a whole, empty if nothing is.
-    spans : dict
-        Place of a damage in the file -> log times [ns] between which it lies, None if unknown.
-    doubtful : dict
-        Place of a chunk with a wrong checksum -> number of messages in it.
-    left_out : list of str
-        What was not read on purpose, in words.
-    """
-
+    # Messages on each topic, as the file itself states; None where it does not
     declared: Mapping[str, int] | None = None
+    # Messages on each topic that were read to the end
     recovered: dict[str, int] = field(default_factory=dict)
-    state: str = ''
+    state: str = ''  # what is wrong with the file as a whole, empty if nothing is
+    # Place of a damage in the file -> log times [ns] between which it lies, None if unknown
     spans: dict[int, tuple[int, int] | None] = field(default_factory=dict)
+    # Place of a chunk with a wrong checksum -> number of messages in it
     doubtful: dict[int, int] = field(default_factory=dict)
-    left_out: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)  # what was not read on purpose, in words
     start: int | None = None  # first and last log time that were read [ns]
     last: int | None = None
 

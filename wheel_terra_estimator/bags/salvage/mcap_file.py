@@ -103,13 +103,6 @@ class McapFile:
         Closes it.
     limits : Limits
         What is unpacked and held.
-
-    Attributes
-    ----------
-    topics : list of Topic
-        Topics with the number of messages that can be read (with an index: that it states).
-    losses : Losses
-        What is missing.
     """
 
     def __init__(self, path: Path, stack: ExitStack, limits: Limits = LIMITS) -> None:
@@ -599,6 +592,7 @@ class McapFile:
         for number, (topic, kind) in self.channels.items():
             counts[topic] += self._counts[number]
             types[topic][kind] += 1 + self._counts[number]
+        # With the number of messages that can be read (with an index: that it states)
         self.topics = [
             Topic(topic, types[topic].most_common(1)[0][0], counts[topic]) for topic in counts
         ]

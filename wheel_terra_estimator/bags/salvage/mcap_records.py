@@ -90,20 +90,11 @@ class ChunkHead(NamedTuple):
 
 @dataclass
 class Possible:
-    """What a record can be at some place of the file.
+    """What a record can be at some place of the file."""
 
-    Attributes
-    ----------
-    opcodes : Container of int
-        Kinds of records there.
-    channels : Container of int
-        Known channels; every one is possible while there is none.
-    start, end : int
-        Log times [ns] between which the messages lie.
-    """
-
-    opcodes: Container[int] = range(1, 0x10)
-    channels: Container[int] = ()
+    opcodes: Container[int] = range(1, 0x10)  # kinds of records there
+    channels: Container[int] = ()  # known channels; every one is possible while there is none
+    # ``start``, ``end``: log times [ns] between which the messages lie
     start: int = 0
     end: int = LATEST
     longest: int = 2**32  # message [byte]

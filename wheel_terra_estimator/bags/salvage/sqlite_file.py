@@ -93,13 +93,6 @@ def _with_log(path: Path, stack: ExitStack) -> tuple[Path, Path | None]:
 class _WholeTable:
     """The messages as SQLite gives them.
 
-    Attributes
-    ----------
-    topics : dict
-        Number -> name and type.
-    counts : Counter
-        Messages by number of the topic.
-
     Raises
     ------
     sqlite3.Error or another of `_UNREADABLE`
@@ -131,11 +124,12 @@ class _WholeTable:
             )
             if 'virtual' in (kind.fetchone() or ('virtual',))[0].lower()[:32]:
                 raise sqlite3.DatabaseError(f'no table {table}')
+        # Number -> name and type
         self.topics = {
             number: (str(name), str(kind))
             for number, name, kind in self._run('SELECT id, name, type FROM topics')
         }
-        self.counts = self._survey(losses)
+        self.counts = self._survey(losses)  # messages by number of the topic
 
     def rows(self, wanted: Collection[int]) -> Iterator[_Message]:
         """Yield the messages of some topics in the order of their log times."""

@@ -75,35 +75,23 @@ class _Page(NamedTuple):
 
 @dataclass
 class Rows:
-    """Messages that were found, in the order of their numbers.
+    """Messages that were found, in the order of their numbers."""
 
-    Attributes
-    ----------
-    number, topic, time, begin, size : array of int
-        Numbers of the rows and of their topics, log times [ns], where the data begin and their
-        sizes [byte].
-    further : dict
-        Where data begin -> bytes on the page of the row, begins of the pages on which they go on.
-    topics : dict
-        Number of a topic -> name and type.
-    free_unknown : bool
-        Whether deleted rows may be among them, as the list of free pages is damaged.
-    cut : bool
-        Whether the file is shorter than it states.
-    given_up : bool
-        Whether there was too much at which a row might begin, or be listed, to look at it all.
-    """
-
+    # ``number``, ``topic``, ``time``, ``begin``, ``size``: numbers of the rows and of their topics,
+    # log times [ns], where the data begin and their sizes [byte]
     number: Any
     topic: Any
     time: Any
     begin: Any
     size: Any
+    # Where data begin -> bytes on the page of the row, begins of the pages on which they go on
     further: dict[int, tuple[int, tuple[int, ...]]]
-    topics: dict[int, tuple[str, str]]
+    topics: dict[int, tuple[str, str]]  # number of a topic -> name and type
     usable: int
+    # Whether deleted rows may be among them, as the list of free pages is damaged
     free_unknown: bool
-    cut: bool
+    cut: bool  # whether the file is shorter than it states
+    # Whether there was too much at which a row might begin, or be listed, to look at it all
     given_up: bool
 
     def data(self, content: Buffer, place: int) -> bytes:

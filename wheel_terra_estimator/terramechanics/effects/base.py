@@ -34,37 +34,22 @@ def effect_of(key: str) -> str:
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One number of an effect.
+    """One number of an effect."""
 
-    Attributes
-    ----------
-    name, unit, meaning : str
-        As in the configuration key ``effects.<effect>.<name>``.
-    default : float
-        Value where the effect is switched on and no other value is given.
-    lower, upper : float
-        Allowed range.
-    prior : str
-        ``half_normal`` (on the side of `default` from `prior_mean`) or ``normal``.
-    prior_scale, prior_mean : float
-        Standard deviation and centre of the prior.
-    neutral : float
-        Value at which the term vanishes.
-    free : bool
-        False: kept at its value by the discrepancy workflow.
-    """
-
+    # ``name``, ``unit``, ``meaning``: as in the configuration key ``effects.<effect>.<name>``
     name: str
     unit: str
-    default: float
+    default: float  # value where the effect is switched on and no other value is given
+    # ``lower``, ``upper``: allowed range
     lower: float
     upper: float
+    # ``prior_scale``, ``prior_mean``: standard deviation and centre of the prior
     prior_scale: float
-    prior: str
+    prior: str  # ``half_normal`` (on the side of `default` from `prior_mean`) or ``normal``
     meaning: str
     prior_mean: float = 0.0
-    neutral: float = 0.0
-    free: bool = True
+    neutral: float = 0.0  # value at which the term vanishes
+    free: bool = True  # False: kept at its value by the discrepancy workflow
 
     def __post_init__(self) -> None:
         if self.prior not in PRIORS:
@@ -77,32 +62,22 @@ class EffectParameter:
 
 @dataclass(frozen=True)
 class Form:
-    """Another law for the same effect, beside the one that the effect itself states.
+    """Another law for the same effect, beside the one that the effect itself states."""
 
-    Attributes
-    ----------
-    name : str
-        Value of the configuration key ``effects.<effect>.form``.
-    claim, symbol, parameters, validity, source
-        As for the effect.
-    touches, needs, candidate : frozenset of str, tuple of str, bool or None
-        None: those of the effect.
-    why_aside : str
-        As for the effect, of this form alone.
-    on_inputs, on_contact, on_normal_stress, on_outputs : callable or None
-        The terms of this form; those of the effect itself play no part in it.
-    """
-
-    name: str
+    name: str  # value of the configuration key ``effects.<effect>.form``
+    # ``claim``, ``symbol``, ``parameters``, ``validity``, ``source``: as for the effect
     claim: str
     symbol: str
     parameters: tuple[EffectParameter, ...]
     validity: str
     source: str
+    # ``touches``, ``needs``, ``candidate``: None for those of the effect
     touches: frozenset[str] | None = None
     needs: tuple[str, ...] | None = None
     candidate: bool | None = None
-    why_aside: str = ''
+    why_aside: str = ''  # as for the effect, of this form alone
+    # ``on_inputs``, ``on_contact``, ``on_normal_stress``, ``on_outputs``: the terms of this form;
+    # those of the effect itself play no part in it
     on_inputs: Term | None = None
     on_contact: Term | None = None
     on_normal_stress: Term | None = None
@@ -116,60 +91,34 @@ class Effect:
     The fields state its first form. ``forms`` has all of them, each as an effect of one form:
     the first under the effect's name, another under ``name:form``. These keys stand wherever
     effects are settled by name and value, so that two forms can be weighed side by side.
-
-    Attributes
-    ----------
-    name : str
-        As in docs/effects.md and in configuration keys.
-    claim : str
-        One line: what it stands for.
-    symbol : str
-        The term as a formula.
-    parameters : tuple of EffectParameter
-        At least one; `on_*` receives their values by name.
-    touches : frozenset of str
-        Which of `TOUCHABLE` it is seen by (soil and rim change the lateral force as they do pull).
-    instrument : bool
-        True for an error of the measurement, False for physics of the soil.
-    needs : tuple of str
-        Columns of a table that must be there, and vary, for the effect to be seen.
-    confounded_with : mapping
-        Name of another effect -> what separates the two.
-    incompatible_with : frozenset of str
-        Effects that must not be on at the same time.
-    validity, source : str
-        Where it holds; paper and equation.
-    candidate : bool
-        False: never tried by the discrepancy workflow unless asked for by name.
-    why_aside : str
-        The reason for that.
-    sparse : bool
-        True: parameters that are not given are absent instead of at their defaults, and
-        configuration files state the others as flat lists (``learned_closure``).
-    form : str
-        Name of the first form.
-    other_forms : tuple of Form
-        Further forms; a parameter that several forms share is the same object in each.
-    on_inputs, on_contact, on_normal_stress, on_outputs : callable or None
-        The terms, ``term(contact, parameters)``: see ``Contact`` for what each may change.
     """
 
-    name: str
-    claim: str
-    symbol: str
-    parameters: tuple[EffectParameter, ...]
+    name: str  # as in docs/effects.md and in configuration keys
+    claim: str  # one line: what it stands for
+    symbol: str  # the term as a formula
+    parameters: tuple[EffectParameter, ...]  # at least one; `on_*` receives their values by name
+    # Which of `TOUCHABLE` it is seen by (soil and rim change the lateral force as they do pull)
     touches: frozenset[str]
+    # ``validity``, ``source``: where it holds; paper and equation
     validity: str
     source: str
-    instrument: bool = False
+    instrument: bool = False  # True for an error of the measurement, False for physics of the soil
+    # Columns of a table that must be there, and vary, for the effect to be seen
     needs: tuple[str, ...] = ()
+    # Name of another effect -> what separates the two
     confounded_with: Mapping[str, str] = field(default_factory=dict)
-    incompatible_with: frozenset[str] = frozenset()
+    incompatible_with: frozenset[str] = frozenset()  # effects that must not be on at the same time
+    # False: never tried by the discrepancy workflow unless asked for by name
     candidate: bool = True
-    why_aside: str = ''
+    why_aside: str = ''  # the reason for that
+    # True: parameters that are not given are absent instead of at their defaults, and configuration
+    # files state the others as flat lists (``learned_closure``)
     sparse: bool = False
-    form: str = 'standard'
+    form: str = 'standard'  # name of the first form
+    # Further forms; a parameter that several forms share is the same object in each
     other_forms: tuple[Form, ...] = ()
+    # ``on_inputs``, ``on_contact``, ``on_normal_stress``, ``on_outputs``: the terms,
+    # ``term(contact, parameters)``: see ``Contact`` for what each may change
     on_inputs: Term | None = None
     on_contact: Term | None = None
     on_normal_stress: Term | None = None

@@ -38,53 +38,26 @@ _IN_A_BAND = ('friction', 'torque', 'drawbar_pull', 'sinkage')
 
 @dataclass(frozen=True)
 class Target:
-    """A closure that a law may change.
+    """A closure that a law may change."""
 
-    Attributes
-    ----------
-    factor : bool
-        True: multiplied by exp(x); False: x is added, in ``unit``.
-    bound : float
-        L, the greatest change of the logarithm, or in ``unit``.
-    usual : float
-        Size of a change that would not surprise: scale of the prior.
-    unit, meaning : str
-        For people.
-    """
-
-    factor: bool
-    bound: float
-    usual: float
+    factor: bool  # True: multiplied by exp(x); False: x is added, in ``unit``
+    bound: float  # L, the greatest change of the logarithm, or in ``unit``
+    usual: float  # size of a change that would not surprise: scale of the prior
     unit: str
     meaning: str
 
 
 @dataclass(frozen=True)
 class Feature:
-    """A dimensionless feature of a row.
+    """A dimensionless feature of a row."""
 
-    Attributes
-    ----------
-    value : callable
-        (contact) -> feature.
-    spread : float
-        Range over which it usually varies; the prior of a coefficient is in proportion to 1/spread.
-    columns : tuple of str
-        Columns of a table of which one must vary; none: always available.
-    meaning : str
-        For people.
-    targets : tuple of str
-        Closures that may use it; none: all.
-    factors : tuple of str
-        Names of the two features that a product multiplies.
-    """
-
-    value: Callable[[Contact[Quantity]], Quantity]
+    value: Callable[[Contact[Quantity]], Quantity]  # (contact) -> feature
+    # Range over which it usually varies; the prior of a coefficient is in proportion to 1/spread
     spread: float
-    columns: tuple[str, ...]
+    columns: tuple[str, ...]  # columns of a table of which one must vary; none: always available
     meaning: str
-    targets: tuple[str, ...] = ()
-    factors: tuple[str, ...] = ()
+    targets: tuple[str, ...] = ()  # closures that may use it; none: all
+    factors: tuple[str, ...] = ()  # names of the two features that a product multiplies
 
 
 TARGETS: Mapping[str, Target] = {
