@@ -45,17 +45,8 @@ class CsvFile:
 def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
     """Open a table for one pass over its rows.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    largest : int, optional
-        Greatest size that is read [byte].
-
-    Raises
-    ------
-    UserError
-        Not there, too large, not a CSV text in UTF-8; also while its rows are read.
+    Raises UserError where it is not there, too large, or no CSV text in UTF-8; also while its rows
+    are read.
     """
     check_size(path, largest)
     try:
@@ -100,6 +91,8 @@ def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) 
 def number(cell: Any, where: str, decimal_comma: bool = False) -> float:
     """Return the number in a cell; nan where nothing was measured.
 
+    Raises UserError for what is not a number, or not a finite one.
+
     Parameters
     ----------
     cell : str, or a value of a DataFrame
@@ -108,11 +101,6 @@ def number(cell: Any, where: str, decimal_comma: bool = False) -> float:
         What an error names: file, line, column.
     decimal_comma : bool
         Whether a comma is the decimal mark.
-
-    Raises
-    ------
-    UserError
-        Not a number, or not a finite one.
     """
     value = value_of(cell, decimal_comma)
     if value is None:

@@ -58,17 +58,8 @@ def units_in(table: Any) -> Mapping[str, str]:
 def to_frame(columns: Mapping[str, NDArray[Any]], stamp: IntArray | None = None) -> DataFrame:
     """Return columns as a DataFrame with their units in ``attrs['units']``.
 
-    Parameters
-    ----------
-    columns : mapping of str to numpy.ndarray
-        Columns of one length, in SI units.
-    stamp : numpy.ndarray, optional
-        (N,) ROS time [ns]; becomes the index, as dates (UTC).
-
-    Raises
-    ------
-    UserError
-        If pandas is not installed.
+    ``columns``: columns of one length, in SI units. ``stamp``: (N,) ROS time [ns]; becomes the
+    index, as dates (UTC). Raises UserError if pandas is not installed.
     """
     try:
         from pandas import DataFrame, DatetimeIndex
@@ -86,10 +77,7 @@ def to_frame(columns: Mapping[str, NDArray[Any]], stamp: IntArray | None = None)
 def arrays_of(table: Any, name: str, dtype: type | None = None) -> dict[str, NDArray[Any]]:
     """Return the columns of a DataFrame or mapping as arrays of one length and one type.
 
-    Raises
-    ------
-    UserError
-        For a column that is no list, does not hold that type, or is of another length.
+    Raises UserError for a column that is no list, does not hold that type, or is of another length.
     """
     columns: dict[str, NDArray[Any]] = {}
     for key in table:
@@ -110,18 +98,9 @@ def columns_of(table: Any, name: str) -> dict[str, FloatArray]:
 
     An index of dates or durations of a DataFrame stands for a column ``time`` that is not there.
 
-    Parameters
-    ----------
-    table : DataFrame or mapping of str to array_like
-        The columns, in SI units unless ``attrs['units']`` says otherwise.
-    name : str
-        What messages call it.
-
-    Raises
-    ------
-    UserError
-        For a column that is no list of numbers, of another length than the others, or in a unit
-        that is not known.
+    ``table``: the columns, in SI units unless ``attrs['units']`` says otherwise. Raises UserError
+    for a column that is no list of numbers, of another length than the others, or in a unit that is
+    not known.
     """
     from wheel_terra_estimator.configuration.column_map import UNITS, factor
 

@@ -19,10 +19,7 @@ LARGEST_TABLE = 128 * 2**20
 def check_regular(path: Path) -> int:
     """Return the size of a regular file [byte]; never wait for a pipe, never read a device.
 
-    Raises
-    ------
-    UserError
-        Nothing there, or no regular file.
+    Raises UserError where there is nothing, or no regular file.
     """
     try:
         found = path.stat()
@@ -43,10 +40,7 @@ def check_regular(path: Path) -> int:
 def check_size(path: Path, largest: int | None) -> None:
     """Refuse what is no regular file, or larger than so many bytes (None: of any size).
 
-    Raises
-    ------
-    UserError
-        As said, or nothing there.
+    Raises UserError where it is, and where there is nothing.
     """
     size = check_regular(path)
     if largest is not None and size > largest:
@@ -58,17 +52,7 @@ def check_size(path: Path, largest: int | None) -> None:
 def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
     """Return the text of a file.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    largest : int
-        Greatest size that is read [byte].
-
-    Raises
-    ------
-    UserError
-        Not there, no regular file, too large, not UTF-8.
+    Raises UserError where it is not there, no regular file, too large, or not UTF-8.
     """
     check_size(path, largest)
     try:

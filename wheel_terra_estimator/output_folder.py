@@ -63,6 +63,8 @@ def check_target(
 ) -> None:
     """Decide whether a file (or a folder) may be written at ``path``; the only place that does.
 
+    Raises UserError where it may not: what stands there, and what to do.
+
     Parameters
     ----------
     path : Path
@@ -77,11 +79,6 @@ def check_target(
     foreign : callable, optional
         Takes a file that is there and returns why it is none of this program, empty where it is
         one. Empty files are not asked about: they hold nothing.
-
-    Raises
-    ------
-    UserError
-        It may not: what stands there, and what to do.
     """
     try:
         wrong_kind = not path.is_dir() if folder else not path.is_file()
@@ -104,10 +101,7 @@ def check_target(
 def check_folder(path: Path, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
     """Make sure, before anything is computed, that a folder can be written at ``path``.
 
-    Raises
-    ------
-    UserError
-        It may not be written to, see `check_target`, or it cannot be written.
+    Raises UserError where it may not be written to (`check_target`) or cannot be written.
     """
     check_target(path, overwrite, inputs, folder=True)
     try_to_write(path)
@@ -121,23 +115,14 @@ def check_file(
 ) -> None:
     """Make sure, before anything is computed, that a file can be written at ``path``.
 
-    Raises
-    ------
-    UserError
-        It may not be written to, see `check_target`, or it cannot be written.
+    Raises UserError where it may not be written to (`check_target`) or cannot be written.
     """
     check_target(path, overwrite, inputs, foreign=foreign)
     try_to_write(path)
 
 
 def try_to_write(path: Path) -> None:
-    """Find out whether the nearest folder that exists takes new entries of some size.
-
-    Raises
-    ------
-    UserError
-        It does not.
-    """
+    """Raise UserError if the nearest folder that exists takes no new entries of some size."""
     try:
         place = _absolute(path).parent
         while not place.exists() and place != place.parent:
@@ -154,18 +139,9 @@ def new_folder(
 ) -> Iterator[Path]:
     """Yield an empty folder to be filled; at the end of the block it is at ``path``.
 
-    Parameters
-    ----------
-    path, overwrite, inputs
-        As in `check_target`.
-    keep_partial : bool
-        Whether what was written before an error is put in its place as well, unless an earlier
-        output stands there.
-
-    Raises
-    ------
-    UserError
-        See `check_target`; the disk is full or fails.
+    ``keep_partial``: whether what was written before an error is put in its place as well, unless
+    an earlier output stands there. Raises UserError as `check_target`, and where the disk is full
+    or fails.
     """
     check_target(path, overwrite, inputs, folder=True)
     path = _absolute(path)
@@ -200,12 +176,8 @@ def new_file(
     """Yield the path of a file to be written; at the end of the block it is at ``path``.
 
     Its folder is made if it is missing; in a folder of ours the marker then lists the file. A power
-    cut leaves the old file or the new one.
-
-    Raises
-    ------
-    UserError
-        See `check_target`; the disk is full or fails.
+    cut leaves the old file or the new one. Raises UserError as `check_target`, and where the disk
+    is full or fails.
     """
     check_target(path, overwrite, foreign=foreign)
     path = _absolute(path)
@@ -249,21 +221,8 @@ def working_folder(
     Until the block has ended well, an earlier output stands whole beside it as ``NAME.earlier``;
     where the block ends with no result, the place is again as it was found.
 
-    Parameters
-    ----------
-    path, overwrite
-        As in `check_target`.
-    resume : bool
-        Whether to go on with a folder as it is, where it is one of ours.
-    entries : iterable of str
-        All names that the command may write there, as in `mark`.
-    inputs : iterable of Path
-        As in `check_target`.
-
-    Raises
-    ------
-    UserError
-        See `check_folder`.
+    ``resume``: whether to go on with a folder as it is, where it is one of ours. ``entries``: all
+    names that the command may write there, as in `mark`. Raises UserError as `check_folder`.
     """
     if resume and path.is_dir():
         _refuse_place(path, inputs)
@@ -388,13 +347,7 @@ def cannot_write(path: Path, error: OSError) -> CannotWriteError:
 
 
 def refuse_inputs(path: Path, inputs: Iterable[Path]) -> None:
-    """Refuse a path that is what the command reads, or holds it, or lies in it.
-
-    Raises
-    ------
-    UserError
-        It is.
-    """
+    """Raise UserError for a path that is what the command reads, or holds it, or lies in it."""
     target = _resolved(path)
     for given in inputs:
         try:

@@ -60,7 +60,8 @@ def finished(
     """Run a function on tasks and yield (index, result or exception) in the order of finishing.
 
     A worker that dies (killed, out of memory) takes no other task along: those that it may have
-    worked on are run once more.
+    worked on are run once more. Raises UserError where Dask is not installed or its scheduler does
+    not answer.
 
     Parameters
     ----------
@@ -72,11 +73,6 @@ def finished(
         Processes on this machine.
     address : str
         Of a Dask scheduler; its workers are used in place of processes of this machine.
-
-    Raises
-    ------
-    UserError
-        Dask is not installed or its scheduler does not answer.
     """
     if address:
         return _on_cluster(function, tasks, address)

@@ -21,10 +21,7 @@ from wheel_terra_estimator.errors import UserError
 def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool of processes; after an error in the block its workers are stopped at once.
 
-    Raises
-    ------
-    UserError
-        The machine has no shared memory left for them.
+    Raises UserError where the machine has no shared memory left for them.
     """
     told, tell = multiprocessing.Pipe(duplex=False)
     try:

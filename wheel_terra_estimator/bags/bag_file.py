@@ -21,27 +21,17 @@ Self = TypeVar('Self', bound='BagFile')
 class BagFile:
     """Writes messages to a new bag; a context manager.
 
-    The bag is written beside its place and renamed when it is closed (see `output_folder`).
+    The bag is written beside its place and renamed when it is closed (see `output_folder`). Raises
+    UserError where the path is taken or cannot be written.
 
     Parameters
     ----------
-    path : Path
-        Folder to be made.
     topics : mapping of str to str
         Full topic name to message type.
     latched : collection of str
         Topics offered as transient local with depth 1; all others are volatile with depth 10.
-    overwrite : bool
-        Whether an earlier bag at the same path is replaced.
-    storage : str
-        ``mcap`` or ``sqlite3``.
     inputs : iterable of Path
         What is read meanwhile: the bag is never written into it or over it.
-
-    Raises
-    ------
-    UserError
-        The path is taken or cannot be written.
     """
 
     def __init__(

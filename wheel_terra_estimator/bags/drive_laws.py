@@ -32,10 +32,8 @@ class DriveLaw:
 def rank_laws(bag: Bag, configuration: Configuration, remaps: Mapping[str, str]) -> list[DriveLaw]:
     """Replay a drive with each law; the one to which the readings were likeliest comes first.
 
-    Raises
-    ------
-    UserError
-        If no reference velocity was fused: without it each law makes the slip that suits it.
+    Raises UserError if no reference velocity was fused: without it each law makes the slip that
+    suits it.
     """
     found = []
     for law in LAWS:

@@ -243,10 +243,7 @@ def stuck_reason(reasons: Sequence[str]) -> str:
 def read_estimates(bag: Bag) -> EstimateHistory:
     """Read the estimates out of a bag of the node's outputs.
 
-    Raises
-    ------
-    UserError
-        The bag holds no estimates.
+    Raises UserError where the bag holds no estimates.
     """
     types = {f'/{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
     types[DIAGNOSTICS] = 'diagnostic_msgs/msg/DiagnosticArray'

@@ -55,20 +55,9 @@ def in_one_line(topics: Iterable[tuple[str, str]]) -> str:
 class MeasurementReader:
     """Reads the input topics of the estimator out of an open bag; no other topic is unpacked.
 
-    Parameters
-    ----------
-    bag : Bag
-        The recording.
-    remaps : mapping of str to str
-        Estimator's topic to the bag's, see `parse_remaps`.
-    configuration : Configuration
-        Wheels and mounting.
-
-    Raises
-    ------
-    UserError
-        The wheel odometry, or a topic that was remapped, is not there or has another type; no
-        wheel of the configuration is in the bag.
+    ``remaps``: estimator's topic to the bag's, see `parse_remaps`. Raises UserError where the wheel
+    odometry, or a topic that was remapped, is not there or has another type; no wheel of the
+    configuration is in the bag.
     """
 
     def __init__(self, bag: Bag, remaps: Mapping[str, str], configuration: Configuration) -> None:
@@ -189,10 +178,7 @@ class MeasurementReader:
 def parse_remaps(texts: Iterable[str]) -> dict[str, str]:
     """Return {estimator's topic: bag's topic} of ``FROM:=TO`` texts.
 
-    Raises
-    ------
-    UserError
-        A text of another form, or a topic that the estimator does not listen to.
+    Raises UserError for a text of another form, or a topic that the estimator does not listen to.
     """
     remaps = {}
     for text in texts:

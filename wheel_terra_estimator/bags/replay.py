@@ -101,23 +101,9 @@ def replay(
 ) -> Replay:
     """Run the estimator over an open bag.
 
-    Parameters
-    ----------
-    bag : Bag
-        The recording.
-    configuration : Configuration
-        Rover, soil, sensors, filter.
-    remaps : mapping of str to str
-        Estimator's topic to the bag's.
-    output : Path, optional
-        Folder of the bag that gets the estimates; closed and readable whatever happens.
-    options : Options, optional
-        Further choices.
-
-    Raises
-    ------
-    UserError
-        Input that cannot be used, an output path that is taken.
+    ``remaps``: estimator's topic to the bag's. ``output``: folder of the bag that gets the
+    estimates; closed and readable whatever happens. Raises UserError for input that cannot be used
+    and for an output path that is taken.
     """
     arrival, smooth = options.arrival, options.smooth
     places = read_odometry(bag, options.odometry) if options.odometry else None
@@ -231,8 +217,6 @@ def smoothed(
     ----------
     events : iterator of Event
         Of the forward pass, whose estimator is that of the smoother.
-    smoother : DriveSmoother
-        Keeps them.
     live : HistoryRecorder
         Gets the sets of the filter.
     diagnostics : Diagnostics

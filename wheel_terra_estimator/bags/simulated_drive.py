@@ -38,15 +38,8 @@ TRUTH_TOPICS = {
 def write_simulated_drive(drive: SimulatedDrive, path: Path, overwrite: bool = False) -> BagFile:
     """Write a drive; messages are logged when they arrive, the truth at its own stamps.
 
-    Returns
-    -------
-    BagFile
-        The closed bag, for its counts.
-
-    Raises
-    ------
-    UserError
-        The path is taken or cannot be written.
+    Raises UserError where the path is taken or cannot be written. Returns the closed bag, for its
+    counts.
     """
     inputs = {f'/{name}': kind for name, kind in INPUT_TYPES.items()}
     if not drive.scenario.sensors.leaving_angle:

@@ -94,17 +94,8 @@ def open_bag(path: str | Path, limits: Limits = LIMITS) -> Iterator[Bag]:
 
     A `UserError` that is raised while it is open is completed by what is wrong with the recording.
 
-    Parameters
-    ----------
-    path : str or Path
-        Folder or storage file.
-    limits : Limits
-        What is unpacked and held.
-
-    Raises
-    ------
-    UserError
-        Nothing there, no recording, or one without a single message.
+    ``path``: folder or storage file. Raises UserError where there is nothing, no recording, or one
+    without a single message.
     """
     path = Path(path)
     notes: list[str] = []

@@ -111,10 +111,7 @@ class Converted(NamedTuple):
 def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -> Converted:
     """Write the rows of a CSV file as messages.
 
-    Raises
-    ------
-    UserError
-        Map or table cannot be used; names file, row, column and remedy.
+    Raises UserError where map or table cannot be used: file, row, column and remedy.
     """
     with open_csv(table) as file:
         if not file.header:

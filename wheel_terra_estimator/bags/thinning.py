@@ -16,10 +16,7 @@ MOST_ROWS = 20_000
 class ThinnedRows:
     """Stamped rows; once there are too many, the first of each 2, 4, 8 ... is kept.
 
-    Parameters
-    ----------
-    most : int
-        Greatest number of rows that are kept; even.
+    ``most``: greatest number of rows that are kept; even.
     """
 
     def __init__(self, most: int = MOST_ROWS) -> None:

@@ -184,10 +184,7 @@ class TrackRecorder:
 def read_odometry(bag: Bag, topic: str) -> Track:
     """Read the positions of an odometry (nav_msgs/Odometry) in a recording.
 
-    Raises
-    ------
-    UserError
-        There is none.
+    Raises UserError where there is none.
     """
     if topic not in bag.topics or bag.topics[topic].type != ODOMETRY:
         known = [name for name, there in bag.topics.items() if there.type == ODOMETRY]

@@ -66,23 +66,8 @@ def read_origin(path: Path) -> Origin:
 class EstimateBagWriter(BagFile):
     """Writes estimates as the node would publish them; a context manager that always closes.
 
-    Parameters
-    ----------
-    path : Path
-        Folder to be made.
-    names : tuple of str
-        Wheel names.
-    overwrite : bool
-        Whether an earlier bag at the same path is replaced.
-    statuses : Diagnostics, optional
-        Knows the counters and faults behind the estimates.
-    inputs : iterable of Path
-        See `BagFile`.
-
-    Raises
-    ------
-    UserError
-        The path is taken or cannot be written.
+    ``statuses``: knows the counters and faults behind the estimates. ``inputs``: see `BagFile`.
+    Raises UserError where the path is taken or cannot be written.
     """
 
     def __init__(

@@ -32,6 +32,9 @@ def climb(
 ) -> dict[str, FloatArray]:
     """Return the steady state of free travel on each slope; nan where the slope is too steep.
 
+    Raises UserError for a slope beyond 60 degrees. Raises ValueError for an effect that makes the
+    balance already.
+
     Parameters
     ----------
     who : str
@@ -41,13 +44,6 @@ def climb(
         Weight on the wheel, W [N]: the soil carries W cos(slope), the pull is W sin(slope).
     slopes : numpy.ndarray
         (N,) positive uphill [rad].
-
-    Raises
-    ------
-    UserError
-        For a slope beyond 60 degrees.
-    ValueError
-        For an effect that makes the balance already.
     """
     if np.abs(slopes).max() > STEEPEST:
         raise UserError('--slope: slopes of --climb are at most 1.05 rad (60 degrees)')

@@ -119,10 +119,7 @@ def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, Parser]]:
 def command_module(name: str) -> Any:
     """Return the module of a sub-command.
 
-    Raises
-    ------
-    UserError
-        If it belongs to the laboratory, and that is not installed.
+    Raises UserError if it belongs to the laboratory, and that is not installed.
     """
     if name not in LABORATORY:
         return importlib.import_module(f'wheel_terra_estimator.cli.{name}')

@@ -40,10 +40,7 @@ class Output(argparse.Action):
 def check(arguments: argparse.Namespace) -> None:
     """Refuse outputs that are, or hold, or lie in what the command reads, and those named twice.
 
-    Raises
-    ------
-    UserError
-        An output is one of these, or a parameter file cannot be read.
+    Raises UserError where an output is one of these, or a parameter file cannot be read.
     """
     outputs: dict[str, Path] = getattr(arguments, 'outputs', {})
     if not outputs:

@@ -23,22 +23,9 @@ _EVENTS: Any = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)
 def load(text: str, loader: Any, aliases: bool = False, most: int = MOST_VALUES) -> Any:
     """Return the document in a text.
 
-    Parameters
-    ----------
-    text : str
-        The document; its size is bounded by whoever read it.
-    loader : yaml.Loader class
-        Makes the values.
-    aliases : bool
-        Whether ``*name`` is allowed. ROS parameter files have none, and a few of them can stand
-        for billions of values.
-    most : int
-        Greatest number of keys and values.
-
-    Raises
-    ------
-    yaml.YAMLError
-        No YAML, too deep, too many values, or an alias.
+    ``text``: the document; its size is bounded by whoever read it. ``aliases``: whether ``*name``
+    is allowed. ROS parameter files have none, and a few of them can stand for billions of values.
+    Raises yaml.YAMLError for no YAML, too deep a nest, too many values, or an alias.
     """
     depth = 0
     for count, event in enumerate(yaml.parse(text, Loader=_EVENTS)):  # however deep

@@ -80,10 +80,7 @@ class Entry:
 def entry_of(value: Any, where: str) -> Entry:
     """Return an entry from ``TITLE`` or ``{column: TITLE, unit: mm, sign: -1}``.
 
-    Raises
-    ------
-    UserError
-        It is neither.
+    Raises UserError where it is neither.
     """
     if isinstance(value, str):
         return Entry(value)
@@ -102,10 +99,7 @@ def entry_of(value: Any, where: str) -> Entry:
 def read_map(path: Path) -> Mapping[Any, Any]:
     """Return the entries of a map of columns, a YAML file.
 
-    Raises
-    ------
-    UserError
-        It cannot be read, or is no map.
+    Raises UserError where it cannot be read, or is no map.
     """
     try:
         document = bounded_yaml.load(read_text(path), yaml.SafeLoader)

@@ -83,15 +83,8 @@ def plain_table(path: Path) -> dict[str, Any]:
 def read_table(path: Path) -> tuple[tuple[Parameter, ...], dict[str, str]]:
     """Read a table of declarations.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-        YAML file; `parameters.yaml` says what stands in it.
-
-    Returns
-    -------
-    tuple
-        Parameters in the order of the file; retired keys -> what became of them.
+    ``path``: YAML file; `parameters.yaml` says what stands in it. Returns the parameters in the
+    order of the file, and retired keys -> what became of them.
     """
     table = plain_table(path)
     retired = table.pop('retired', {})

@@ -46,6 +46,8 @@ def load(
 ) -> Configuration:
     """Read parameter files and overrides; later ones win key by key.
 
+    Raises UserError if a file or key cannot be used.
+
     Parameters
     ----------
     files : sequence of str or pathlib.Path
@@ -56,11 +58,6 @@ def load(
         Whether wheels and mass must be stated (not needed where a table brings them).
     allow_effect_files : bool
         Whether the Python file that ``effect_file`` names may be run.
-
-    Raises
-    ------
-    UserError
-        If a file or key cannot be used.
     """
     sourced: list[tuple[str, str, Any]] = []
     for name in files:

@@ -80,10 +80,7 @@ _RosLoader.add_constructor('tag:yaml.org,2002:map', _construct_mapping)
 def plain_scalar(text: str) -> Scalar | _Null:
     """Return the value that ROS gives to an unquoted scalar.
 
-    Returns
-    -------
-    bool, int, float or str
-        The value; numbers as C's ``strtoll`` (base 0) and ``strtod`` read them.
+    Returns the value; numbers as C's ``strtoll`` (base 0) and ``strtod`` read them.
     """
     if text in _NULL:
         return _NO_VALUE
@@ -136,17 +133,8 @@ def read(path: Path) -> dict[str, Value]:
     Sections ``/**``, ``wheel_terra_estimator`` and ``/any/ns/wheel_terra_estimator`` count, in this
     order (the narrower one wins, as in ROS); sections of other nodes are passed over. A file of
     keys alone, dotted or nested, is read as if it stood below ``/**``; the node's ``--params-file``
-    needs the section.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        A ROS parameter file.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read, is not YAML or not a parameter file.
+    needs the section. Raises UserError if the file cannot be read, is not YAML or not a parameter
+    file.
     """
     text = read_text(path)
     try:

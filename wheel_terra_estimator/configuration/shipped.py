@@ -82,6 +82,8 @@ class FileName(str):
 def find(name: str | Path, kind: str = '', folder: Path | None = None) -> Path:
     """Return the file that ``name`` means: a path, or the bare name of a shipped file.
 
+    Raises UserError if nothing or more than one file answers to the name.
+
     Parameters
     ----------
     name : str or pathlib.Path
@@ -90,11 +92,6 @@ def find(name: str | Path, kind: str = '', folder: Path | None = None) -> Path:
         Folder to search (``scenarios``); empty: all.
     folder : pathlib.Path or None
         Where the shipped files lie; None: those of the package.
-
-    Raises
-    ------
-    UserError
-        If nothing or more than one file answers to the name.
     """
     path = Path(name).expanduser()
     if path.is_file():

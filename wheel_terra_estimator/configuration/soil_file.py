@@ -46,10 +46,7 @@ def state_path(soil_file: Path) -> Path:
 def read_values(soil_file: Path) -> dict[str, Any]:
     """Return the parameters in a soil file; none where it is not there yet, or empty.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be read.
+    Raises UserError if the file cannot be read.
     """
     empty = not soil_file.exists() or (soil_file.is_file() and not soil_file.stat().st_size)
     return {} if empty else dict(ros_yaml.read(soil_file))
@@ -76,12 +73,8 @@ def why_foreign(path: Path) -> str:
 def write_values(soil_file: Path, learned: Mapping[str, Any], overwrite: bool = True) -> None:
     """Write what was learned, as far as it has declared keys and lies in their ranges.
 
-    The file is replaced at once and whole: a power cut leaves the old one or the new one.
-
-    Raises
-    ------
-    UserError
-        If there is a file that is none of this program, or it cannot be written.
+    The file is replaced at once and whole: a power cut leaves the old one or the new one. Raises
+    UserError if there is a file that is none of this program, or it cannot be written.
     """
     table = declared()
     values = {
@@ -97,11 +90,7 @@ def read_state(path: Path) -> StuckState:
     """Return the warning as it was last written; none where there is no such file.
 
     A warning stands also where its stamp or its direction cannot be used: these are unknown then.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be used.
+    Raises UserError if the file cannot be used.
     """
     if not path.exists():
         return StuckState()
@@ -122,10 +111,7 @@ def read_state(path: Path) -> StuckState:
 def write_state(path: Path, state: StuckState) -> None:
     """Write the warning, at once and whole.
 
-    Raises
-    ------
-    UserError
-        If there is a file that is no state of the estimator, or it cannot be written.
+    Raises UserError if there is a file that is no state of the estimator, or it cannot be written.
     """
     with new_file(path, overwrite=True, foreign=_why_no_state) as fresh:
         fresh.write_text(json.dumps(asdict(state)) + '\n', encoding='utf-8')

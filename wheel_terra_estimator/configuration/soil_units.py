@@ -20,12 +20,7 @@ LEAST_FRICTION_ANGLE = 0.02  # [rad]; 34 degrees stated in radians are 0.6 degre
 def doubtful_units(soil: Soil, stated: Collection[str]) -> Iterator[tuple[str, str]]:
     """Yield key and words of stated soil numbers that look as if they were in another unit.
 
-    Parameters
-    ----------
-    soil : Soil
-        One soil (floats).
-    stated : collection of str
-        Keys that a file states; of the others nothing is said.
+    ``soil``: one soil (floats). ``stated``: keys that a file states; of the others nothing is said.
     """
     bekker = soil.pressure_law == 'bekker'
     for field, wrong, words in (

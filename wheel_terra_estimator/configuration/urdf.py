@@ -37,6 +37,8 @@ Pose = FloatArray  # (4, 4)
 def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None) -> RoverSketch:
     """Return the rover that a URDF describes.
 
+    Raises UserError for no URDF, no wheels, or a wheel without a radius.
+
     Parameters
     ----------
     path : Path
@@ -45,11 +47,6 @@ def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None)
         Names of the wheel joints; default: continuous joints whose name or link says wheel.
     data : bytes, optional
         The document, where it does not stand in a file; ``path`` then names it in errors.
-
-    Raises
-    ------
-    UserError
-        Not a URDF, no wheels, or a wheel without a radius.
     """
     robot = _parse(path, data)
     joints = {j.get('name', ''): j for j in robot.iter('joint') if j.get('type')}

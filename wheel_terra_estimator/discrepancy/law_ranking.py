@@ -58,12 +58,8 @@ def rank_laws(table: SteadyTable, configuration: Configuration) -> list[RankedLa
 
     Soil and stated effects are free as ``diagnose`` has them; the scale of resistive force theory
     is free around that of the soil's plate. The misfit of each quantity is unknown and integrated
-    out; rows count as independent.
-
-    Raises
-    ------
-    UserError
-        If fewer than four rows are without slip angle, or the wheel is stated nowhere.
+    out; rows count as independent. Raises UserError if fewer than four rows are without slip angle,
+    or the wheel is stated nowhere.
     """
     table = _straight(table)
     if len(table) < _FEWEST_ROWS:

@@ -49,10 +49,7 @@ def render(
 ) -> Diagnosis:
     """Return what is reported of a decision.
 
-    Parameters
-    ----------
-    table, both : SteadyTable
-        The rows under diagnosis, and with those of a reference behind them.
+    ``table``, ``both``: the rows under diagnosis, and with those of a reference behind them.
     """
     findings, after, variance = decision.findings, decision.after, decision.variance
     setting, known, left = findings.setting, catalogue(), decision.verdict.left

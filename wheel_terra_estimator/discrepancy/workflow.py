@@ -62,6 +62,8 @@ def diagnose(
 ) -> Diagnosis:
     """Find where a model and a table disagree, and name the missing effect.
 
+    Raises UserError if the table does not fit the wheel or the soil of the configuration.
+
     Parameters
     ----------
     table : SteadyTable
@@ -71,12 +73,6 @@ def diagnose(
     reference : SteadyTable, optional
         Rows in which the effect in question is absent; fitted first, so that the structural error
         common to both tables cancels.
-    options : Options, optional
-
-    Raises
-    ------
-    UserError
-        If the table does not fit the wheel or the soil of the configuration.
     """
     started = time.perf_counter()
     chosen = options or Options()

@@ -87,21 +87,8 @@ def replay_drive(
 ) -> Drive:
     """Check a recording, run the estimator over it and sum it up.
 
-    Parameters
-    ----------
-    path : Path
-        rosbag2 folder or file.
-    configuration, remaps, output, options
-        See `bags.replay.replay`.
-    limits : Limits
-        What of the recording is unpacked and held.
-    on_checked : callable, optional
-        Called with what the checks found, before the replay begins.
-
-    Raises
-    ------
-    UserError
-        Input that cannot be used, an output path that is taken.
+    ``on_checked``: called with what the checks found, before the replay begins. Raises UserError as
+    `bags.replay.replay`.
     """
     with open_bag(path, limits) as bag:
         checked = check_before(bag, configuration, remaps)

@@ -90,26 +90,10 @@ def replay_bags(
 ) -> list[DriveRow]:
     """Replay recordings into one folder each and write the summary over all.
 
-    Parameters
-    ----------
-    bags : sequence of Path
-        The recordings.
-    settings : Settings
-        What is the same for all.
-    overwrite : bool
-        Whether an earlier output is replaced; else a folder of an earlier run is continued.
-    jobs, scheduler
-        See `scheduler.finished`.
-
-    Returns
-    -------
-    list of DriveRow
-        In the order of `bags`; one that failed has its error.
-
-    Raises
-    ------
-    UserError
-        The output folder cannot be used, or the disk is full: the same call goes on from there.
+    ``overwrite``: whether an earlier output is replaced; else a folder of an earlier run is
+    continued. Raises UserError where the output folder cannot be used, or the disk is full: the
+    same call goes on from there. Returns them in the order of `bags`; one that failed has its
+    error.
     """
     with _folder(settings.output, bags, overwrite):
         settings = replace(settings, output=settings.output.absolute())

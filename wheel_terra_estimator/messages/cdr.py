@@ -159,12 +159,8 @@ class Alike(NamedTuple):
 class TopicMessages:
     """Unpacks the messages of one topic.
 
-    Parameters
-    ----------
-    kind : str
-        Message type, as in ``sensor_msgs/msg/Imu``.
-    whole : callable
-        Unpacks all fields of a message from its bytes, as the library does.
+    ``kind``: message type, as in ``sensor_msgs/msg/Imu``. ``whole``: unpacks all fields of a
+    message from its bytes, as the library does.
     """
 
     def __init__(self, kind: str, whole: Callable[[bytes], Any]) -> None:
@@ -177,10 +173,7 @@ class TopicMessages:
     def unpack(self, data: bytes) -> Any:
         """Return a message.
 
-        Raises
-        ------
-        DamagedMessageError
-            The bytes are no message of the type.
+        Raises DamagedMessageError where the bytes are no message of the type.
         """
         quick = self._quick
         if quick is not None and (known := self._beginning(data)) is not None:

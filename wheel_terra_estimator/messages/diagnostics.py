@@ -55,8 +55,6 @@ class Diagnostics:
 
     Parameters
     ----------
-    names : sequence of str
-        Wheel names.
     counters : callable
         Returns further key-values of the node (unit in the key); asked only when one is due.
     faults : callable
@@ -142,12 +140,7 @@ class Diagnostics:
     def stale(self, words: str, latest: EstimateSet | None = None) -> list[Status]:
         """Return the statuses while there are no estimates; values are held as in the latest set.
 
-        Parameters
-        ----------
-        words : str
-            Why there are none.
-        latest : EstimateSet, optional
-            The latest set, if there ever was one.
+        ``words``: why there are none.
         """
         self.look()
         told = '; '.join([words, *self._log.standing(self.clock(0))])

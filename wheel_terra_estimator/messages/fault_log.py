@@ -37,12 +37,8 @@ class FaultLog:
     def note(self, faults: Iterable[tuple[str, str]], now: int) -> None:
         """Raise faults, or see them again.
 
-        Parameters
-        ----------
-        faults : iterable of (str, str)
-            Subject and words of each.
-        now : int
-            Time [ns], of any clock; a step back begins the 10 s anew.
+        ``faults``: subject and words of each. ``now``: time [ns], of any clock; a step back begins
+        the 10 s anew.
         """
         for subject, words in faults:
             fault = self._faults.setdefault((subject, _NUMBER.sub('#', words)), _Fault(words, now))

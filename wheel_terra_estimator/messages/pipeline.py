@@ -28,14 +28,8 @@ RESET = 'reset'
 class Pipeline:
     """The estimator core with a converter before it.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Rover, soil, sensors, filter.
-    node_name : str
-        Name of the node with its namespace, for diagnostics.
-    estimator : Estimator, optional
-        See `EstimatorCore`.
+    ``node_name``: name of the node with its namespace, for diagnostics. ``estimator``: see
+    `EstimatorCore`.
     """
 
     def __init__(

@@ -82,10 +82,7 @@ def compare(
 ) -> Comparison:
     """Compare two runs over the same drive.
 
-    Raises
-    ------
-    UserError
-        Other wheels, or no common stamps.
+    Raises UserError for other wheels, or without common stamps.
     """
     if first.names != second.names:
         raise UserError(

@@ -31,14 +31,8 @@ _MARKUP = re.compile(r'<(script|style)\b.*?</\1>|<[^>]*>', re.DOTALL)
 def render(template: str, folder: Path = TEMPLATES, **context: Any) -> str:
     """Return the page that a template makes of a context.
 
-    Parameters
-    ----------
-    template : str
-        File name of the template.
-    folder : Path
-        Where it lies; templates of this package are found as well.
-    **context
-        Values for the template; ``version`` is added, and what the words on the page mean.
+    ``folder``: where it lies; templates of this package are found as well. ``**context``: values
+    for the template; ``version`` is added, and what the words on the page mean.
     """
     environment = _environment(folder)
     page = environment.get_template(template).render(version=__version__, **context)

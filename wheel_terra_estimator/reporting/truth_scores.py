@@ -72,14 +72,8 @@ def truth_errors(
 ) -> TruthErrors | None:
     """Compare estimates with the truth.
 
-    Parameters
-    ----------
-    history : EstimateHistory
-        The estimates.
-    truth : Truth
-        What the recording knows.
-    thresholds : numpy.ndarray
-        (3,) upper bounds of the classes low, moderate and high.
+    ``truth``: what the recording knows. ``thresholds``: (3,) upper bounds of the classes low,
+    moderate and high.
     """
     if not history.stamp.size:
         return None

@@ -30,19 +30,9 @@ def why_no_arrival_log(path: Path) -> str:
 class ArrivalLog:
     """Line after line, ``TOPIC STAMP`` or `RESET`, to a file of which this node alone is writer.
 
-    Parameters
-    ----------
-    name : str
-        The file; empty for none.
-    inputs : iterable of Path
-        Files that the node reads.
-    complain : callable
-        Is told, once, why the log ends early: a disk that is full ends the log, not the node.
-
-    Raises
-    ------
-    UserError
-        It may not, or cannot, be written, or another node writes it.
+    ``inputs``: files that the node reads. ``complain``: is told, once, why the log ends early: a
+    disk that is full ends the log, not the node. Raises UserError where it may not, or cannot, be
+    written, or another node writes it.
     """
 
     def __init__(

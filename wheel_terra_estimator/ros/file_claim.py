@@ -29,10 +29,7 @@ class FileClaim:
     def take(self) -> None:
         """Make sure that this node, and no other, writes to the file.
 
-        Raises
-        ------
-        UserError
-            Another node does, or there is no place for the lock.
+        Raises UserError where another node does, or there is no place for the lock.
         """
         if not self._path.parent.is_dir():
             raise UserError(f'{self._path}: there is no folder {self._path.parent}; make it')

@@ -73,8 +73,6 @@ class InputWatch:
 
         Parameters
         ----------
-        topic : str
-            Input topic.
         now : float
             Steady time [s].
         delay : float

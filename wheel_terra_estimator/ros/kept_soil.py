@@ -23,17 +23,8 @@ class KeptSoil:
     never be written to is refused; what may change (a folder that is missing, a disk that is full,
     another node) is told in `fault`, and nothing is written as long as it stands.
 
-    Parameters
-    ----------
-    path : Path
-        The file; a link is followed.
-    inputs : iterable of Path
-        Other files that the node reads.
-
-    Raises
-    ------
-    UserError
-        The file is none of this program, or one of `inputs`.
+    ``inputs``: other files that the node reads. Raises UserError where the file is none of this
+    program, or one of `inputs`.
     """
 
     def __init__(self, path: Path, inputs: Iterable[Path] = ()) -> None:
@@ -77,10 +68,7 @@ class KeptSoil:
     def save(self, learned: Mapping[str, Any], warning: StuckState) -> None:
         """Write what was learned, if anything, and the warning.
 
-        Raises
-        ------
-        UserError
-            It cannot be written, or must not be; also in `fault`.
+        Raises UserError where it cannot be written, or must not be; also in `fault`.
         """
         try:
             self._claim.take()

@@ -110,10 +110,7 @@ class WithInfo:
 class EstimatorNode(LifecycleNode):
     """Managed node around the estimator; with ``autostart`` it makes itself active.
 
-    Raises
-    ------
-    UserError
-        If ``autostart`` is on and a parameter is unknown or its value cannot be used.
+    Raises UserError if ``autostart`` is on and a parameter is unknown or its value cannot be used.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -206,10 +203,7 @@ class EstimatorNode(LifecycleNode):
     def _configure(self) -> None:
         """Read the parameters, make pipeline, publishers, subscriptions and timers.
 
-        Raises
-        ------
-        UserError
-            If a parameter is unknown or its value cannot be used.
+        Raises UserError if a parameter is unknown or its value cannot be used.
         """
         configuration = parameters.configuration(self._given, self.get_logger().warning)
         self._kept = self._kept_over_restart(configuration)
@@ -410,10 +404,7 @@ class EstimatorNode(LifecycleNode):
     def _kept_over_restart(self, configuration: Configuration) -> KeptSoil | None:
         """Return what is kept in the soil file, if there is to be one.
 
-        Raises
-        ------
-        UserError
-            If that file may not be written to.
+        Raises UserError if that file may not be written to.
         """
         if self._kept is not None:
             self._kept.close()  # of a configuration that was refused

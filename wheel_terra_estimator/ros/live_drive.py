@@ -97,24 +97,10 @@ def drive(
 ) -> list[Heard]:
     """Play a bag to a node and return what it published.
 
-    Parameters
-    ----------
-    bag : Bag
-        The recording.
-    configuration : Configuration
-        What the node is to be started with.
-    remaps : mapping of str to str
-        Estimator's topic to the bag's.
-    rate : float
-        Speed, 1 = as recorded, 0 = as fast as the node takes it.
-    arrival : Path, optional
-        Where the node logs its order of arrival. At speed 0 that is the order of the bag: the node
-        takes its topics in turn, so a queue would let rare messages overtake frequent ones.
-
-    Raises
-    ------
-    UserError
-        The node did not come up, or ended on its own.
+    ``rate``: speed, 1 = as recorded, 0 = as fast as the node takes it. ``arrival``: where the node
+    logs its order of arrival. At speed 0 that is the order of the bag: the node takes its topics in
+    turn, so a queue would let rare messages overtake frequent ones. Raises UserError where the node
+    did not come up, or ended on its own.
     """
     topics = MeasurementReader(bag, remaps, configuration).topics
     with TemporaryDirectory() as folder, _context():
@@ -305,16 +291,7 @@ def _must_run(process: subprocess.Popen[bytes]) -> None:
 def record(heard: Sequence[Heard], path: Path, start: int, overwrite: bool = False) -> None:
     """Write outputs of the node to a bag; log times are the stamps of the sets.
 
-    Parameters
-    ----------
-    heard : sequence of Heard
-        Outputs in the order of publication.
-    path : Path
-        Folder to be made.
-    start : int
-        Log time of what came before the first set [ns].
-    overwrite : bool
-        Whether an earlier bag is replaced.
+    ``start``: log time of what came before the first set [ns].
     """
     log_time = start
     with BagFile(path, TOPICS, latched=LATCHED, overwrite=overwrite) as file:

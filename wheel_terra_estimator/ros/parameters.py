@@ -49,10 +49,7 @@ def files(arguments: Sequence[str]) -> list[Path]:
 def configuration(given: Mapping[str, Any], warn: Callable[[str], Any]) -> Configuration:
     """Return the checked configuration; hand what is doubtful in it to ``warn``.
 
-    Raises
-    ------
-    UserError
-        If a parameter is unknown or its value cannot be used.
+    Raises UserError if a parameter is unknown or its value cannot be used.
     """
     with warnings.catch_warnings(record=True) as doubtful:
         warnings.simplefilter('always', ConfigurationWarning)

@@ -66,10 +66,6 @@ class ContactModel:
         Base soil; what is below each wheel differs by factors.
     slip_radius : numpy.ndarray
         (n,) radius that slip refers to [m].
-    effects : mapping
-        Effect name -> parameter -> value, of the enabled effects.
-    gravity : float
-        [m/s^2].
     """
 
     def __init__(
@@ -116,8 +112,8 @@ class ContactModel:
         side_slip : numpy.ndarray
             (..., n) lateral slip velocity over the larger of rim and ground speed [-].
         load, rim_speed, slope, pass_number : numpy.ndarray
-            (n,) load [N], rim speed [m/s], slope in the direction of travel [rad], 1 on virgin
-            soil and more where other wheels ran before.
+            (n,) load [N], rim speed [m/s], slope in the direction of travel [rad], 1 on virgin soil
+            and more where other wheels ran before.
         """
         wheel, soil = self._wheel, self._soil
         ratio = speed_ratio(np.maximum(slip, -0.999))

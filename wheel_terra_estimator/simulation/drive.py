@@ -58,12 +58,7 @@ class SimulatedDrive:
 class Drive:
     """A seeded rover with its sensors, one step at a time.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario; its command profile is used by ``run`` only.
-    seed : int
-        Decides all random quantities.
+    ``scenario``: the scenario; its command profile is used by ``run`` only.
     """
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
@@ -146,12 +141,8 @@ class Drive:
     ) -> SimulatedDrive:
         """Drive the scenario's profile and return everything.
 
-        Parameters
-        ----------
-        duration : float, optional
-            In place of the scenario's [s].
-        progress : callable, optional
-            Called with 1 for each second driven.
+        ``duration``: in place of the scenario's [s]. ``progress``: called with 1 for each second
+        driven.
         """
         duration = self.scenario.duration if duration is None else duration
         profile = self.scenario.profile

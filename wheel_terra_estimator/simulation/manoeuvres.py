@@ -84,20 +84,12 @@ def with_manoeuvres(
 
     Parameters
     ----------
-    taught : sequence of Taught
-        By the drive.
-    configuration : Configuration
-        Rover, soil and sensors of the drive.
-    posterior : FilterMemory
-        State and covariance of the filter at its end.
     soil : mapping
         Configuration key -> value as learned, see `EstimatorCore.learned`; others are ignored.
     speed : float
         That the rover is to drive at [m/s].
     sensors : collection of str
         Which of `SENSORS` there are.
-    candidates : sequence of Manoeuvre
-        To be tried.
     """
     truth = configuration.replace(
         {k: v for k, v in soil.items() if k.startswith('soil.') and '_std' not in k}

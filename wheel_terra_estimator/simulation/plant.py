@@ -61,16 +61,8 @@ class WheelForces(NamedTuple):
 class RoverPlant:
     """A rover on a terrain, driven by velocity commands.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        True rover, true base soil and true effects.
-    terrain : Terrain
-        The ground.
-    drives : Drives
-        The wheel drives.
-    dig_efficiency : float
-        Share of the soil between passing lugs that a spinning wheel throws out [-].
+    ``configuration``: true rover, true base soil and true effects. ``dig_efficiency``: share of the
+    soil between passing lugs that a spinning wheel throws out [-].
     """
 
     def __init__(

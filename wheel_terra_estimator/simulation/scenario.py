@@ -87,6 +87,8 @@ def load(
 ) -> Scenario:
     """Read a scenario.
 
+    Raises UserError for a file, key or value that cannot be used.
+
     Parameters
     ----------
     source : str, pathlib.Path or mapping
@@ -97,11 +99,6 @@ def load(
         Rover file in place of the scenario's own; its soil and ground stay.
     **changes
         Dotted keys of the scenario with ``__`` for the dot, such as ``sensors__reference=False``.
-
-    Raises
-    ------
-    UserError
-        For a file, key or value that cannot be used.
     """
     if isinstance(source, Mapping):
         name, values = 'scenario', dict(source)

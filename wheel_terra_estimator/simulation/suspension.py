@@ -61,8 +61,9 @@ class Suspension:
     ) -> FloatArray:
         """Return the loads perpendicular to the ground.
 
-        With fewer balances than wheels (no pivots named) the loads are those of least norm: a
-        rigid frame on ground that yields evenly.
+        With fewer balances than wheels (no pivots named) the loads are those of least norm: a rigid
+        frame on ground that yields evenly. Returns (n,) loads [N], none below ``LEAST_LOAD_SHARE``
+        of their mean.
 
         Parameters
         ----------
@@ -74,11 +75,6 @@ class Suspension:
             (n,) longitudinal force of the soil [N].
         load_moment : numpy.ndarray
             (n,) moment of the load about the hub, positive where it acts ahead of it [N m].
-
-        Returns
-        -------
-        numpy.ndarray
-            (n,) loads [N], none below ``LEAST_LOAD_SHARE`` of their mean.
         """
         forward, left, up = specific_force
         total = mass * up

@@ -170,12 +170,7 @@ def entrapped(stamp: IntArray, slip: FloatArray) -> BoolArray:
 
     It is free once the median abs(slip) has been below 0.6 for 3 s.
 
-    Parameters
-    ----------
-    stamp : numpy.ndarray
-        (k,) [ns].
-    slip : numpy.ndarray
-        (k, n) slip ratio, nan at rest.
+    ``stamp``: (k,) [ns]. ``slip``: (k, n) slip ratio, nan at rest.
     """
     turning: BoolArray = np.asarray(~np.isnan(slip).all(axis=1))
     median = np.zeros(len(stamp))

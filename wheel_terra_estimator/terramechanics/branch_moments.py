@@ -42,10 +42,7 @@ def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Any, Any, Any]:
     the contact, 1 at the peak, and q = (t1 - tm)/(t1 + tm); its moments, as a series in q
     (exact for N = 1).
 
-    Parameters
-    ----------
-    exponent, skew : float or array_like
-        N and q.
+    ``exponent``, ``skew``: N and q.
 
     Returns
     -------
@@ -70,12 +67,8 @@ class BranchForces:
     little more than sines. Angles below half a turn's quarter are assumed: cosines come from
     sines, cos tm - cos t1 = 2 sin((t1 + tm)/2) sin((t1 - tm)/2).
 
-    Parameters
-    ----------
-    contact : Contact
-        Arrays of one shape, or shapes that broadcast; its angles are not read.
-    peak_share, leaving_share : float or numpy.ndarray
-        tm/t1 and t2/t1 [-].
+    ``contact``: arrays of one shape, or shapes that broadcast; its angles are not read.
+    ``peak_share``, ``leaving_share``: tm/t1 and t2/t1 [-].
     """
 
     __slots__ = (

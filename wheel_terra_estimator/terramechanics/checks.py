@@ -23,14 +23,8 @@ def check_range(
 ) -> None:
     """Raise ``ValueError`` unless every element of `value` lies in the allowed range.
 
-    Parameters
-    ----------
-    quantity : str
-        Name for the message.
-    value : array_like
-        Any shape; infinite values are always refused, nan unless `allow_nan`.
-    lower, upper : float
-        Bounds, in `unit`; `open_lower` excludes the lower one.
+    ``value``: any shape; infinite values are always refused, nan unless `allow_nan`. ``lower``,
+    ``upper``: bounds, in `unit`; `open_lower` excludes the lower one.
     """
     array = numbers(quantity, value)
     good = (array > lower) if open_lower else (array >= lower)
@@ -76,10 +70,8 @@ def numbers(quantity: str, value: ArrayLike) -> NDArray[np.float64]:
 def common_length(columns: Mapping[str, ArrayLike]) -> int:
     """Return the length that all columns share; single values fit any.
 
-    Raises
-    ------
-    ValueError
-        If two lengths differ, or a column has more than one axis; the message names them.
+    Raises ValueError if two lengths differ, or a column has more than one axis; the message names
+    them.
     """
     longest = ''
     shapes = {name: np.shape(value) for name, value in columns.items()}

@@ -80,8 +80,6 @@ class ConditionedForces:
         Switched-on effects.
     slip_radius : str
         ``lug_tip`` or ``rim``: radius of the rim speed in speed ratios.
-    gravity : float
-        [m/s^2].
     """
 
     def __init__(

@@ -46,10 +46,10 @@ def contact_law(
 ) -> ContactLaw:
     """Return a law for the soil as configured.
 
+    Raises ValueError for an unknown name.
+
     Parameters
     ----------
-    name : str
-        One of ``LAWS``.
     soil : Soil
         Floats.
     effects : mapping
@@ -59,11 +59,6 @@ def contact_law(
         moduli, and of the plate that ``resistive_force`` takes its scale from.
     gravity : float
         At which the soil's numbers hold [m/s^2].
-
-    Raises
-    ------
-    ValueError
-        For an unknown name.
     """
     if name == BEKKER_WONG_JANOSI:
         return WheelSoilModel(soil, effects, 'closed_form', strict=strict)

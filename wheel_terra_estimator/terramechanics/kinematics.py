@@ -25,17 +25,9 @@ def slip_ratio(
     direction. If v opposes r w and ``|r w|`` exceeds `rest_speed`, s = 1; a wheel held still while
     the rover moves has s = -1.
 
-    Parameters
-    ----------
-    speed, rim_speed : float or array_like
-        Ground speed v and rim speed r w, any common shape [m/s].
-    rest_speed : float
-        Below it a speed counts as rest [m/s].
-
-    Returns
-    -------
-    numpy.ndarray
-        Slip ratio in [-1, 1]; nan where both speeds are below `rest_speed`.
+    ``speed``, ``rim_speed``: ground speed v and rim speed r w, any common shape [m/s].
+    ``rest_speed``: below it a speed counts as rest [m/s]. Returns the slip ratio in [-1, 1]; nan
+    where both speeds are below `rest_speed`.
     """
     v, rw = np.broadcast_arrays(np.asarray(speed, float), np.asarray(rim_speed, float))
     turning, moving = np.abs(rw) > rest_speed, np.abs(v) > rest_speed

@@ -41,22 +41,10 @@ def balance(
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Solve the closed form's load balance: entrance angle [rad], pull [N], torque [N m].
 
-    The forces at three angles (small angles, a step with the exponent 2 N + 1, the secant)
-    give angle, pull and torque as parabolas of the load's logarithm, read off at the load. No
-    iteration; the few points with a larger error than 1e-10 of the load go to the bracketed solver.
-
-    Parameters
-    ----------
-    form : BranchForces
-        N points.
-    load : numpy.ndarray
-        (N,) [N].
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        (N,) angle, pull, torque, and True where the soil carries the load; `LARGEST_ANGLE`
-        elsewhere.
+    The forces at three angles (small angles, a step with the exponent 2 N + 1, the secant) give
+    angle, pull and torque as parabolas of the load's logarithm, read off at the load. No iteration;
+    the few points with a larger error than 1e-10 of the load go to the bracketed solver. Returns
+    (N,) angle, pull, torque, and True where the soil carries the load; `LARGEST_ANGLE` elsewhere.
     """
     with np.errstate(all='ignore'):
         power = 2.0 * form.exponent + 1.0
@@ -107,12 +95,8 @@ def solve_entrance_angle(
     Load grows nearly like a power of the angle, so Newton runs on logarithms; a bracket catches
     the rest. Points where it fails are scanned for their first crossing.
 
-    Parameters
-    ----------
-    carried : callable
-        (2, N) angles -> (2, N) vertical force [N].
-    load, start : numpy.ndarray
-        (N,) load [N] and first guess [rad].
+    ``carried``: (2, N) angles -> (2, N) vertical force [N]. ``load``, ``start``: (N,) load [N] and
+    first guess [rad].
 
     Returns
     -------

@@ -65,14 +65,12 @@ class WheelSoilModel:
 
     Parameters
     ----------
-    soil : Soil
-        Floats.
     effects : mapping
         Effect name -> parameter -> value, and ``form``; only switched-on effects; what is missing
         takes its default. ``model.effects`` has them by variant (``effects.by_variant``).
     method : str
-        ``quadrature``, ``closed_form`` (branch moments, for on-board use) or ``triangles``
-        (the linearised stresses of the literature, for comparison).
+        ``quadrature``, ``closed_form`` (branch moments, for on-board use) or ``triangles`` (the
+        linearised stresses of the literature, for comparison).
     strict : bool
         True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
         at a sinkage of one radius and flagged.
@@ -103,11 +101,8 @@ class WheelSoilModel:
     def steady_state(self, points: OperatingPoints) -> SteadyState:
         """Solve the load balance and return sinkage, drawbar pull and torque.
 
-        Raises
-        ------
-        ValueError
-            If `strict` and the soil cannot carry the load of a point, or the effects leave no
-            strength; if an array of the soil has another length than the points.
+        Raises ValueError if `strict` and the soil cannot carry the load of a point, or the effects
+        leave no strength; if an array of the soil has another length than the points.
         """
         terms = Terms(self.effects)
         length = common_length(

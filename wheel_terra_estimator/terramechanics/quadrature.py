@@ -34,13 +34,9 @@ def forces(
     """Vertical force, longitudinal force and torque on the wheel, angles given.
 
     Ding et al. 2010 eq. 19 (doi 10.1007/s11771-010-0021-7) for the load, the same integrals for
-    pull and torque:
-    W = b Int (r sigma cos + R tau sin), F = b Int (R tau cos - r sigma sin), T = b R^2 Int tau.
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        W [N], F [N] in the direction of motion, T [N m], in the common shape of the contact.
+    pull and torque: W = b Int (r sigma cos + R tau sin), F = b Int (R tau cos - r sigma sin), T = b
+    R^2 Int tau. Returns W [N], F [N] in the direction of motion, T [N m], in the common shape of
+    the contact.
     """
     weight, cosine, sine = _stressed(contact, terms, nodes)
     angle, normal = contact.angle, contact.normal_stress

@@ -31,17 +31,9 @@ _START = 0.3  # first guess of the entrance angle [rad]
 def stress_maps(tilt: Any, direction: Any) -> tuple[Any, Any]:
     """Vertical and horizontal stress per depth on a plate of the generic medium [N/cm^3].
 
-    Parameters
-    ----------
-    tilt : array_like
-        Of the plate from the horizontal, positive where it rises towards +x [rad].
-    direction : array_like
-        Of its motion, from +x, positive downwards, in [-pi, pi] [rad].
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        The upward stress, and the one towards -x (against a motion towards +x).
+    ``tilt``: of the plate from the horizontal, positive where it rises towards +x [rad].
+    ``direction``: of its motion, from +x, positive downwards, in [-pi, pi] [rad]. Returns the
+    upward stress, and the one towards -x (against a motion towards +x).
     """
     # The maps are measured for motion towards +x; the other half is its mirror image.
     back = np.cos(direction) < 0.0
@@ -60,13 +52,9 @@ class ResistiveForce:
     validity: thirty plates summed as the theory has it, each in the wake of the last, pull more
     than the load (HIT wheel, lugs of 10 mm).
 
-    Parameters
-    ----------
-    scale : float
-        Stress over that of the generic medium [-].
-    strict : bool
-        True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
-        at a sinkage of one radius and flagged.
+    ``scale``: stress over that of the generic medium [-]. ``strict``: True: a soil that cannot
+    carry the load raises ``ValueError``; False: the point is clamped at a sinkage of one radius and
+    flagged.
     """
 
     def __init__(self, scale: float, *, strict: bool = True) -> None:
@@ -76,11 +64,8 @@ class ResistiveForce:
     def steady_state(self, points: OperatingPoints) -> SteadyState:
         """Solve the load balance and return sinkage, drawbar pull and torque.
 
-        Raises
-        ------
-        ValueError
-            Where a wheel slides sideways, the slip refers to a shear radius (this law has none), or
-            `strict` and the soil cannot carry a load.
+        Raises ValueError where a wheel slides sideways, the slip refers to a shear radius (this law
+        has none), or `strict` and the soil cannot carry a load.
         """
         if np.any(points.slip_angle) or np.nan_to_num(points.lateral_speed_ratio).any():
             raise ValueError(
@@ -130,18 +115,9 @@ class ResistiveForce:
 def rim_integrals(motion: FloatArray, entrance_angle: FloatArray) -> FloatArray:
     """Integrate the generic stress over the leading side of a rim of radius 1 m and width 1 m.
 
-    Parameters
-    ----------
-    motion : numpy.ndarray
-        Angle whose tangent is (v/(r w) - 1) over the entrance angle [rad].
-    entrance_angle : numpy.ndarray
-        [rad].
-
-    Returns
-    -------
-    numpy.ndarray
-        (..., 5): lift of the stress normal to the rim and what it pushes back; lift, push ahead
-        and torque of the tangential stress [N/cm^3].
+    ``motion``: angle whose tangent is (v/(r w) - 1) over the entrance angle [rad].
+    ``entrance_angle``: [rad]. Returns (..., 5): lift of the stress normal to the rim and what it
+    pushes back; lift, push ahead and torque of the tangential stress [N/cm^3].
     """
     x, w = np.polynomial.legendre.leggauss(_NODES)
     motion, whole = (v[..., None] for v in np.broadcast_arrays(motion, entrance_angle))

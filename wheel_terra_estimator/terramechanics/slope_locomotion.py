@@ -50,6 +50,7 @@ def rover_climb(
 
     All rims run at one speed and the wheels share the rover's ground speed, so they share the slip
     ratio; what each gives follows from its own load and from how often its track was run over.
+    Raises ValueError if ``slope_gravity`` is on, or shapes do not fit.
 
     Parameters
     ----------
@@ -64,11 +65,6 @@ def rover_climb(
         (N,) positive uphill [rad].
     pass_numbers : array_like
         (n,) 1 for a wheel on virgin soil, 2 for the next one in its track, and so on.
-
-    Raises
-    ------
-    ValueError
-        If ``slope_gravity`` is on, or shapes do not fit.
     """
     if 'slope_gravity' in model.effects:
         raise ValueError('effects.slope_gravity is on; the balance is made here: leave it off')

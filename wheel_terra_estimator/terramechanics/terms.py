@@ -66,12 +66,7 @@ def build_contact(
 ) -> Contact[Quantity]:
     """Return the contacts before the load balance, with stage ``on_inputs`` done.
 
-    Parameters
-    ----------
-    points : OperatingPoints
-        N points.
-    soil : mapping
-        Value of each of `SOIL_NUMBERS`, any shape that broadcasts against (N,).
+    ``soil``: value of each of `SOIL_NUMBERS`, any shape that broadcasts against (N,).
     """
     wheel = points.wheel
     rate = points.angular_velocity

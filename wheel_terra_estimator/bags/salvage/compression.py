@@ -73,15 +73,8 @@ def unpack_message(packed: bytes, limits: Limits = LIMITS) -> bytes:
 def unpack_file(path: Path, target: Path, limits: Limits = LIMITS) -> str:
     """Unpack a ``.zstd`` file into another one, as far as it reaches.
 
-    Returns
-    -------
-    str
-        Why that is not all of it; empty when it is.
-
-    Raises
-    ------
-    UserError
-        It cannot be read or written, or unpacks to far more than recordings do.
+    Raises UserError where it cannot be read or written, or unpacks to far more than recordings do.
+    Returns why that is not all of it; empty when it is.
     """
     written = 0
     allowed = limits.work(path.stat().st_size)

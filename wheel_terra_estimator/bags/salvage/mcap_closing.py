@@ -62,10 +62,7 @@ def add_checksums(path: Path) -> None:
 def close_cut_file(path: Path) -> Kept:
     """Cut a file that could not be written to its end, and close it as the format asks.
 
-    Raises
-    ------
-    OSError
-        There is no whole chunk to be kept, or not even the summary can be written.
+    Raises OSError where there is no whole chunk to be kept, or not even the summary can be written.
     """
     with path.open('r+b') as file:
         size = os.fstat(file.fileno()).st_size

@@ -93,17 +93,7 @@ _ROW_SIZE = 250
 
 
 class McapFile:
-    """One ``.mcap`` file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    stack : ExitStack
-        Closes it.
-    limits : Limits
-        What is unpacked and held.
-    """
+    """One ``.mcap`` file."""
 
     def __init__(self, path: Path, stack: ExitStack, limits: Limits = LIMITS) -> None:
         self.path = path
@@ -337,10 +327,7 @@ class McapFile:
     def _count(self, piece: Piece, again: bool) -> bool:
         """Count the messages of a piece and take its definitions.
 
-        Returns
-        -------
-        bool
-            False if the piece is damaged and has to be read again when all channels are known.
+        Returns False if the piece is damaged and has to be read again when all channels are known.
         """
         content = self._content(piece)
         reading = self._read(piece, content)
@@ -428,14 +415,8 @@ class McapFile:
     ) -> Reading:
         """Read the records of a piece.
 
-        Parameters
-        ----------
-        piece, content : Piece, Content
-            The piece and its bytes.
-        wanted : collection of int
-            Channels whose messages are kept.
-        allowed : int
-            Greatest memory that they may take [byte].
+        ``wanted``: channels whose messages are kept. ``allowed``: greatest memory that they may
+        take [byte].
         """
         head, known = piece.head, self._definitions.numbers()
         if head is None:

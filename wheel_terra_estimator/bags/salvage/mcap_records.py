@@ -294,10 +294,7 @@ def message(content: Buffer, record: Record) -> Message:
 def schema(content: Buffer, record: Record) -> tuple[int, str]:
     """Return identifier and name of a schema.
 
-    Raises
-    ------
-    ValueError
-        The record is damaged (as in the functions below).
+    Raises ValueError where the record is damaged (as in the functions below).
     """
     return _uint16(content, record.begin), _string(content, record.begin + 2, record.end)
 

@@ -36,10 +36,7 @@ _Message = tuple[int, int, bytes]  # number of the topic, log time [ns], data
 class SqliteFile:
     """One ``.db3`` file; attributes as of `McapFile`.
 
-    Raises
-    ------
-    UserError
-        It is no rosbag2 file, or nothing of one is left.
+    Raises UserError where it is no rosbag2 file, or nothing of one is left.
     """
 
     def __init__(self, path: Path, stack: ExitStack, limits: Limits = LIMITS) -> None:
@@ -93,10 +90,8 @@ def _with_log(path: Path, stack: ExitStack) -> tuple[Path, Path | None]:
 class _WholeTable:
     """The messages as SQLite gives them.
 
-    Raises
-    ------
-    sqlite3.Error or another of `_UNREADABLE`
-        The file is damaged, or holds no recording.
+    Raises sqlite3.Error or another of `_UNREADABLE` where the file is damaged, or holds no
+    recording.
     """
 
     def __init__(

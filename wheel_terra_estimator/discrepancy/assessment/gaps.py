@@ -23,10 +23,8 @@ def gaps(
 ) -> dict[str, QuantityGap]:
     """Return the held-out errors of each quantity; cells rejected as outliers do not count.
 
-    Parameters
-    ----------
-    floor, allowed_error : float
-        Model-error floor in use, and model error that is no reason for doubt [share of the range].
+    ``floor``, ``allowed_error``: model-error floor in use, and model error that is no reason for
+    doubt [share of the range].
     """
     std = _cell_noise(findings)
     measured = table.measured.copy()

@@ -39,12 +39,8 @@ def propose(
 ) -> tuple[NextMeasurement, ...]:
     """Rank measurements by how far they would part the chosen explanation from its competitors.
 
-    Parameters
-    ----------
-    chosen, competitors : Fit
-        The best explanation, and those that the rows cannot exclude, most probable first.
-    std : numpy.ndarray
-        (4,) noise of a new row.
+    ``chosen``, ``competitors``: the best explanation, and those that the rows cannot exclude, most
+    probable first. ``std``: (4,) noise of a new row.
     """
     found: list[NextMeasurement] = []
     competitors = competitors[:2]

@@ -55,10 +55,7 @@ class Change:
 def changes_along_rows(table: SteadyTable, predicted: FloatArray, band: FloatArray) -> list[Change]:
     """Return where residuals change along the order of the rows.
 
-    Parameters
-    ----------
-    predicted, band : numpy.ndarray
-        (N, 4) model values and standard deviations of the cells [m, N, N m].
+    ``predicted``, ``band``: (N, 4) model values and standard deviations of the cells [m, N, N m].
     """
     columns = [name for name in ORDER_COLUMNS if name in table.columns]
     columns = [name for name in columns if _apart_from_inputs(table, name)]

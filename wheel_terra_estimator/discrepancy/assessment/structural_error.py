@@ -67,6 +67,7 @@ def structural_error(
 
     In the rotated cells of `problem` covariances are diagonal: with the smooth variance s and the
     noise 1, the share s / (s + 1) of a residual is structural error, and its variance is the same.
+    Returns None where the most probable amplitude is nothing.
 
     Parameters
     ----------
@@ -76,11 +77,6 @@ def structural_error(
         Amplitudes that are possible, with their prior probabilities.
     rows : int
         Number of rows wanted; the rows of a reference table stand behind them.
-
-    Returns
-    -------
-    StructuralError or None
-        None where the most probable amplitude is nothing.
     """
     own, (best, amplitude) = problem, _most_probable(problem, fitted.residual, floors)
     if not any(amplitude):

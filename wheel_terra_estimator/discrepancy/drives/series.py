@@ -83,12 +83,8 @@ class DriveSeries:
 def collect(measurements: Iterable[Measurement], wheels: int, name: str) -> DriveSeries:
     """Sort the measurements of a drive into series.
 
-    They come in any order; ``name`` says where from, for messages.
-
-    Raises
-    ------
-    UserError
-        If a sensor is missing without which no steady row can be had.
+    They come in any order; ``name`` says where from, for messages. Raises UserError if a sensor is
+    missing without which no steady row can be had.
     """
     rate: dict[int, FloatArray] = {}
     torque: dict[int, FloatArray] = {}
@@ -154,11 +150,6 @@ class SpeedSmoother:
     A window holds a few references; the smoother also knows those before and behind it, and how the
     wheels and the accelerometer carry the speed from one to the next. It hears neither torque nor
     sinkage: rows that are to judge a soil model must not be made with what that model says of them.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        Rover and sensors.
     """
 
     def __init__(self, configuration: Configuration) -> None:

@@ -138,6 +138,8 @@ def rows_from_bag(
 ) -> DriveRows:
     """Return the steady rows of a rosbag2.
 
+    Raises UserError if the bag cannot be read, lacks a sensor, or holds no steady window.
+
     Parameters
     ----------
     path : str or pathlib.Path
@@ -149,13 +151,8 @@ def rows_from_bag(
     limits : bags.salvage.limits.Limits, optional
         What of the recording is unpacked and held.
     smooth : bool
-        Whether the slip comes from the fixed-interval smoother in place of the references alone;
-        it takes about 1.7 times as long as a replay.
-
-    Raises
-    ------
-    UserError
-        If the bag cannot be read, lacks a sensor, or holds no steady window.
+        Whether the slip comes from the fixed-interval smoother in place of the references alone; it
+        takes about 1.7 times as long as a replay.
     """
     from wheel_terra_estimator.bags.reader import MeasurementReader
     from wheel_terra_estimator.bags.salvage.limits import LIMITS
@@ -387,11 +384,8 @@ def _drifts(values: FloatArray, allowed: float | np.floating) -> bool:
 def block_moments(length: int, correlation: float) -> tuple[float, float, float]:
     """Moments of a first-order process of variance 1 in a block that lost its mean.
 
-    Returns
-    -------
-    tuple of float
-        Expected sum of products of neighbours, expected sum of squares (both about the block's
-        mean), and the variance of that mean.
+    Returns the expected sum of products of neighbours, the expected sum of squares (both about the
+    block's mean), and the variance of that mean.
     """
     place = np.arange(length)
     covariance = correlation ** np.abs(place[:, None] - place[None, :])

@@ -72,13 +72,9 @@ def evidence(
     Soil as good as stated or worse, and effects small or large, are weighed alike: each floor's
     evidence is the mean over these scales of the priors.
 
-    Parameters
-    ----------
-    noise_freedom : numpy.ndarray
-        (4,) degrees of freedom with which the noise of each quantity is known (inf = given).
-    believed_widths : sequence of (width, share)
-        Widths of the priors of configured numbers in units of their coordinates, with their
-        probabilities.
+    ``noise_freedom``: (4,) degrees of freedom with which the noise of each quantity is known (inf =
+    given). ``believed_widths``: widths of the priors of configured numbers in units of their
+    coordinates, with their probabilities.
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u

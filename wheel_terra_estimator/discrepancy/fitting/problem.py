@@ -71,12 +71,8 @@ class Problem:
     def variance(self, amplitude: ArrayLike, noise: ArrayLike = 1.0) -> FloatArray:
         """Return (m,) variances of the rotated axes.
 
-        Parameters
-        ----------
-        amplitude : float or numpy.ndarray
-            Share of the range; (4,) per quantity, or (F, 4) for (F, m) variances.
-        noise : float or numpy.ndarray
-            Factor on the noise standard deviation; (4,) or (F, 4) per quantity.
+        ``amplitude``: share of the range; (4,) per quantity, or (F, 4) for (F, m) variances.
+        ``noise``: factor on the noise standard deviation; (4,) or (F, 4) per quantity.
         """
         a, k = (np.atleast_1d(np.asarray(x, dtype=float)) for x in (amplitude, noise))
         if (self.block < 0).any():
@@ -123,11 +119,8 @@ def _floor_covariance(
 def slip_features(inputs: FloatArray, slip: int | None) -> FloatArray:
     """(N, N) correlation of a misfit that is narrow in slip and shared along all other inputs.
 
-    Parameters
-    ----------
-    slip : int or None
-        Column of the slip in `inputs`; without it, or without another input, nothing can be shared
-        and the result is zero.
+    ``slip``: column of the slip in `inputs`; without it, or without another input, nothing can be
+    shared and the result is zero.
     """
     if slip is None or inputs.shape[1] < 2:
         return np.zeros((len(inputs), len(inputs)))

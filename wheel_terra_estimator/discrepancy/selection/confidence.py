@@ -99,13 +99,9 @@ def _loosened(squashed: float) -> float:
 def confidence(values: Mapping[str, float], alike: int = 0, odds: float = 1.0) -> Confidence:
     """Map features to probabilities.
 
-    Parameters
-    ----------
-    odds : float
-        By which something that the map does not know speaks for the names.
-    alike : int
-        Effects that are known to look like the name and were not tried: each may be the truth as
-        well, and the set does not have it.
+    ``odds``: by which something that the map does not know speaks for the names. ``alike``: effects
+    that are known to look like the name and were not tried: each may be the truth as well, and the
+    set does not have it.
     """
     weights = _weights()
     vector = np.array([values[name] for name in FEATURES])

@@ -61,10 +61,7 @@ class Remainder:
 def remainder(selection: Selection, index: int, variance_of: Variance) -> Remainder:
     """Test what explanation number ``index`` leaves.
 
-    Parameters
-    ----------
-    variance_of : callable
-        (amplitude, noise factor) -> (m,) variances of the rotated axes.
+    ``variance_of``: (amplitude, noise factor) -> (m,) variances of the rotated axes.
     """
     explanation = selection.explanations[index]
     joint = selection.log_joint[index]

@@ -122,13 +122,9 @@ def signatures(
 def shapes(own: tuple[Coordinate, ...], deepest: float, strength: float) -> list[FloatArray]:
     """Return coordinates of an effect: its strength, with a few values of its shape.
 
-    Parameters
-    ----------
-    deepest : float
-        Greatest rim sinkage of the rows [m]; scales parameters that are depths.
-    strength : float
-        Prior deviations of the first parameter from neutral, on the side where it may go; an effect
-        whose prior sits away from neutral stands at its prior.
+    ``deepest``: greatest rim sinkage of the rows [m]; scales parameters that are depths.
+    ``strength``: prior deviations of the first parameter from neutral, on the side where it may go;
+    an effect whose prior sits away from neutral stands at its prior.
     """
     lower, upper = bounds(own)
     neutral = own[0].coordinate(own[0].neutral)

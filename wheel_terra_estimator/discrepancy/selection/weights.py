@@ -59,10 +59,8 @@ def _everywhere(amplitude: float) -> tuple[float, ...]:
 def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
     """Return the assumptions on the structural error with their priors.
 
-    Parameters
-    ----------
-    greatest : float, optional
-        Amplitude up to which an error counts as floor; given by the user or by a reference table.
+    ``greatest``: amplitude up to which an error counts as floor; given by the user or by a
+    reference table.
     """
     most = math.inf if greatest is None else greatest
     kept = [(a, p) for a, p in _FLOORS if a <= most] or [_FLOORS[0]]

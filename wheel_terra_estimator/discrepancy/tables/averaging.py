@@ -91,10 +91,7 @@ def together(tables: Sequence[SteadyTable]) -> SteadyTable:
 def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, BoolArray]:
     """Return both tables as one, and which rows candidate effects act on.
 
-    Raises
-    ------
-    UserError
-        If the two share no measured quantity, or only one of them states a column.
+    Raises UserError if the two share no measured quantity, or only one of them states a column.
     """
     if not set(table.quantities) & set(reference.quantities):
         raise UserError(

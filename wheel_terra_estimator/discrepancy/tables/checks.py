@@ -49,10 +49,7 @@ def check_table(
 ) -> SteadyTable:
     """Check columns of numbers (SI, nan = not measured) and return them as a table.
 
-    Raises
-    ------
-    UserError
-        As in `read_table`.
+    Raises UserError as `read_table` does.
     """
     arrays = {key: np.asarray(value, dtype=float) for key, value in values.items()}
     for key in ('slip', 'normal_load'):

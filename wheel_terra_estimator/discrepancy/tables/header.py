@@ -118,12 +118,8 @@ class Choice:
     def of(cls, columns: Any, ignored: Sequence[str] = ()) -> Choice:
         """Return the choice in options, or in arguments of Python.
 
-        Parameters
-        ----------
-        columns : path, mapping, or sequence of str
-            ``FILE`` (YAML), ``{NAME: COLUMN}``, or ``NAME=COLUMN`` and files in any number.
-        ignored : sequence of str
-            Titles, also several with commas between.
+        ``columns``: ``FILE`` (YAML), ``{NAME: COLUMN}``, or ``NAME=COLUMN`` and files in any
+        number. ``ignored``: titles, also several with commas between.
         """
         entries: dict[str, Entry] = {}
         if isinstance(columns, Mapping):

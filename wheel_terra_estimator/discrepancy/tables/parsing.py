@@ -44,12 +44,8 @@ def read_table(path: str | Path, choice: Choice | None = None) -> SteadyTable:
 
     Capital letters, names of the field, units beside a name, and decimal commas where cells are
     separated otherwise are read, with a note. ``choice`` says which columns are used and which are
-    not, where the titles do not.
-
-    Raises
-    ------
-    UserError
-        One line with file, row and remedy for everything that makes the table unusable.
+    not, where the titles do not. Raises UserError for everything that makes the table unusable: one
+    line with file, row and remedy.
     """
     lines, values, notes = read_columns(Path(path), choice or Choice(), one_of=ONE_OF)
     return check_table(str(path), values, lines, notes)
@@ -64,12 +60,7 @@ def read_columns(
     """Return the lines of the rows, the wanted columns of a CSV file in SI, and notes.
 
     Of the columns ``one_of`` there has to be one, beside slip and normal load; columns that are not
-    wanted are passed over.
-
-    Raises
-    ------
-    UserError
-        As `read_table`, but for values that cannot be.
+    wanted are passed over. Raises UserError as `read_table`, but for values that cannot be.
     """
     with open_csv(path, LARGEST_TABLE) as file:
         if not file.header:

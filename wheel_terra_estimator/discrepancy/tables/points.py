@@ -35,6 +35,8 @@ def operating_points(
 ) -> OperatingPoints:
     """Return rows as operating points.
 
+    Raises UserError if neither rows nor configuration state the wheel, or a value is out of range.
+
     Parameters
     ----------
     columns : mapping
@@ -45,11 +47,6 @@ def operating_points(
         What an error names.
     wheel : int
         Which wheel of the rover.
-
-    Raises
-    ------
-    UserError
-        If neither rows nor configuration state the wheel, or a value is out of range.
     """
     count, wheels = len(columns['slip']), configuration.wheels
 

@@ -88,12 +88,8 @@ def by_variant(settings: EffectSettings) -> dict[str, dict[str, Any]]:
     """Return the settings with the entry ``form`` put into the key: numbers are all that is left.
 
     ``{'multipass': {'form': 'rut', 'rut': 0.01}}`` becomes ``{'multipass:rut': {'rut': 0.01}}``;
-    the first form keeps the plain name. Keys that name a form already stay.
-
-    Raises
-    ------
-    ValueError
-        For a form that the effect does not have.
+    the first form keeps the plain name. Keys that name a form already stay. Raises ValueError for a
+    form that the effect does not have.
     """
     known = catalogue()
     plain: dict[str, dict[str, Any]] = {}
@@ -116,10 +112,7 @@ def register(effect: Effect) -> Effect:
 def load_file(path: str | Path) -> list[Effect]:
     """Run a Python file and register every ``Effect`` that it defines at its top level.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be run, defines no effect, or uses a name that is taken.
+    Raises ValueError if the file cannot be run, defines no effect, or uses a name that is taken.
     """
     path = Path(path)
     spec = importlib.util.spec_from_file_location(f'{EFFECT_FILE_MODULE}{path.stem}', path)
@@ -156,11 +149,8 @@ def _check_terms(path: Path, effect: Effect) -> None:
 def check_settings(settings: EffectSettings) -> dict[str, dict[str, float]]:
     """Return the settings with defaults filled in, by variant (see ``by_variant``).
 
-    Raises
-    ------
-    ValueError
-        For an unknown effect, form or parameter, a value outside its range, or two effects that
-        must not be on together; the message names them.
+    Raises ValueError for an unknown effect, form or parameter, a value outside its range, or two
+    effects that must not be on together; the message names them.
     """
     known = catalogue()
     full: dict[str, dict[str, float]] = {}

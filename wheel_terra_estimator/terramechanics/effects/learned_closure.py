@@ -206,10 +206,8 @@ def coefficients_of(
 ) -> dict[str, float]:
     """Return parameter -> coefficient of a law given as flat lists.
 
-    Raises
-    ------
-    ValueError
-        For lists of unequal length, a pair that is not allowed, or one that is given twice.
+    Raises ValueError for lists of unequal length, a pair that is not allowed, or one that is given
+    twice.
     """
     if not len(targets) == len(features) == len(coefficients):
         raise ValueError(
