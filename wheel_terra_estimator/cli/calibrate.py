@@ -8,7 +8,7 @@ import argparse
 from pathlib import Path
 
 from wheel_terra_estimator.cli import bag_arguments
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 EXAMPLES = (
@@ -27,14 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='recording of the ten-minute drive (docs/own_rover.md)',
     )
     configuration_reader.add_arguments(parser)
-    parser.add_argument(
-        '-o',
-        dest='output',
-        action=Output,
-        metavar='F',
-        required=True,
-        help='rover file to be written',
-    )
+    add_output(parser, 'rover file to be written', 'F', required=True)
     bag_arguments.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 

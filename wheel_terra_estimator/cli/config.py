@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 import re
 
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import add_output
 
 EXAMPLES = (
     'wheel-terra config list rovers',
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'views', help='write layouts of PlotJuggler and Foxglove for the wheels of a rover file'
     )
     views.add_argument('name', metavar='ROVER', help='rover file, or bare name of a shipped one')
-    views.add_argument('-o', dest='output', action=Output, required=True, metavar='F', help=_VIEWS)
+    add_output(views, _VIEWS, 'F', required=True)
     views.add_argument('--overwrite', action='store_true', help='replace earlier files')
 
 

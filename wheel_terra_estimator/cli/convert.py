@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.errors import UserError
 
 EXAMPLES = (
@@ -22,9 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--columns', type=Path, metavar='MAP.yaml', help='which column is what (see --example)'
     )
-    parser.add_argument(
-        '-o', dest='output', action=Output, metavar='DIR', help='rosbag2 folder (MCAP)'
-    )
+    add_output(parser, 'rosbag2 folder (MCAP)')
     parser.add_argument('--example', action='store_true', help='print a map of columns and stop')
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
 

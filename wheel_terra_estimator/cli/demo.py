@@ -23,7 +23,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, working_folder
 
@@ -72,13 +72,10 @@ DRIVES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument(
-        '-o',
-        dest='output',
-        action=Output,
+    add_output(
+        parser,
+        'folder for estimates, reports and pictures (default demo_output)',
         default=Path('demo_output'),
-        metavar='DIR',
-        help='folder for estimates, reports and pictures (default demo_output)',
     )
     parser.add_argument(
         '--no-node', action='store_true', help='replay the drives even where rclpy is at hand'

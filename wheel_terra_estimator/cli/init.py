@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.cli import bag_arguments
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
@@ -27,13 +27,11 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument(
-        '-o',
-        dest='output',
-        action=Output,
-        metavar='F',
+    add_output(
+        parser,
+        'rover file to be written; views for PlotJuggler and Foxglove are written beside it',
+        'F',
         required=True,
-        help='rover file to be written; views for PlotJuggler and Foxglove are written beside it',
     )
     source = parser.add_mutually_exclusive_group()
     source.add_argument('--urdf', type=Path, metavar='F', help='robot description (URDF)')

@@ -37,6 +37,13 @@ class Output(argparse.Action):
         namespace.outputs = {**getattr(namespace, 'outputs', {}), self.dest: values}
 
 
+def add_output(
+    parser: argparse.ArgumentParser, words: str, metavar: str = 'DIR', **settings: Any
+) -> None:
+    """Declare ``-o``, the file or folder that the command is run for."""
+    parser.add_argument('-o', dest='output', action=Output, metavar=metavar, help=words, **settings)
+
+
 def check(arguments: argparse.Namespace) -> None:
     """Refuse outputs that are, or hold, or lie in what the command reads, and those named twice.
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.cli.climb import WHO, climb
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label
@@ -132,13 +132,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--seed', type=int, default=1, metavar='N', help='draws the noise (default 1)'
     )
     parser.add_argument('--angles', action='store_true', help='add the contact angles [rad]')
-    parser.add_argument(
-        '-o',
-        dest='output',
-        action=Output,
-        metavar='FILE',
-        help='write a picture (.png, .svg, .pdf) or a table (.csv) instead',
-    )
+    add_output(parser, 'write a picture (.png, .svg, .pdf) or a table (.csv) instead', 'FILE')
     parser.add_argument('--overwrite', action='store_true', help='replace an existing FILE')
     configuration_reader.add_arguments(parser)
 

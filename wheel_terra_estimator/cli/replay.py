@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wheel_terra_estimator.cli import bag_arguments
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import Output, add_output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.errors import UserError
@@ -42,12 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='rosbag2 folder, or a single .mcap or .db3 file; of several, each gets a folder below '
         '-o (--report, --table, --track are names in it), and an interrupted run goes on',
     )
-    parser.add_argument(
-        '-o',
-        dest='output',
-        action=Output,
-        metavar='DIR',
-        help='rosbag2 folder (MCAP) for the estimates, under the names that the node has; of '
+    add_output(
+        parser,
+        'rosbag2 folder (MCAP) for the estimates, under the names that the node has; of '
         'several recordings a folder of such folders, with summary.csv and summary.html',
     )
     parser.add_argument(
@@ -268,9 +265,8 @@ def _run_several(arguments: argparse.Namespace) -> int:
 
     if not arguments.output:
         raise UserError('several recordings need a folder for their outputs: add -o DIR')
-    if arguments.arrival:
-        raise UserError('--arrival: belongs to one recording; replay that one by itself')
     for option, given in (
+        ('--arrival', arguments.arrival),
         ('--save-soil', arguments.save_soil),
         ('--slip-on-slope', arguments.slip_on_slope),
         ('--manoeuvres', arguments.manoeuvres),

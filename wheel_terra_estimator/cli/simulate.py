@@ -9,7 +9,7 @@ import shlex
 import sys
 from pathlib import Path
 
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.errors import UserError
 
@@ -44,9 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--duration', type=float, metavar='S', help="length of the drive in place of the scenario's"
     )
-    parser.add_argument(
-        '-o', dest='output', action=Output, metavar='DIR', help='rosbag2 folder (MCAP)'
-    )
+    add_output(parser, 'rosbag2 folder (MCAP)')
     configuration_reader.add_arguments(parser)
     parser.add_argument(
         '--overwrite', action='store_true', help='replace an earlier bag of the same name'
