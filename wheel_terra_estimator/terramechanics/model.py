@@ -119,30 +119,22 @@ class WheelSoilModel:
             and bool(np.isnan(points.leaving_angle).all())
         )
         if explicit:
-            form = closed_form.proportional_forces(contact)
-            angle, pull, torque, carries = balance(form, load)
+            angle, pull, torque, carries = balance(closed_form.proportional_forces(contact), load)
         else:
             angle, carries = self._entrance_angle(contact, load, points, terms)
         if self.strict and not carries.all():
             worst = int(np.flatnonzero(~carries)[0])
-            limit = np.broadcast_to(
-                self._response(contact, np.full_like(angle, np.pi / 2), points, terms)[0]
-                + contact.normal_load,
-                angle.shape,
-            )[worst]
+            set_angles(contact, np.full_like(angle, np.pi / 2), points.leaving_angle, terms)
+            limit = np.broadcast_to(self._forces(contact, terms)[0], angle.shape)[worst]
             raise ValueError(
                 f'normal load is {load[worst]:g} N (entry {worst}); this soil carries at most '
                 f'about {limit:.3g} N at a sinkage of one radius'
             )
-        outputs: Sequence[Quantity]
-        if explicit:
-            set_angles(contact, angle, None, terms)
-            contact.lateral_force = self._lateral_force(contact, terms)
-            outputs = self._outputs(contact, angle, pull, torque, terms)
-        else:
-            set_angles(contact, angle, points.leaving_angle, terms)
-            contact.lateral_force = self._lateral_force(contact, terms)
-            _, *outputs = self._response(contact, angle, points, terms)
+        set_angles(contact, angle, None if explicit else points.leaving_angle, terms)
+        contact.lateral_force = self._lateral_force(contact, terms)
+        if not explicit:
+            _, pull, torque = self._forces(contact, terms)
+        outputs = self._outputs(contact, angle, pull, torque, terms)
         return self._pack(contact, points, angle, carries, outputs)
 
     def _check(self, contact: Contact[Quantity]) -> None:
@@ -185,14 +177,6 @@ class WheelSoilModel:
         if self.method == 'closed_form':
             return closed_form.lateral_force(contact, terms)
         return closed_form.triangle_lateral_force(contact, terms)
-
-    def _response(
-        self, contact: Contact[Quantity], angle: FloatArray, points: OperatingPoints, terms: Terms
-    ) -> tuple[Quantity, Quantity, Quantity, Quantity]:
-        """Balance W(t1) - load, and the three outputs, at given entrance angles."""
-        set_angles(contact, angle, points.leaving_angle, terms)
-        load, pull, torque = self._forces(contact, terms)
-        return load - contact.normal_load, *self._outputs(contact, angle, pull, torque, terms)
 
     @staticmethod
     def _outputs(
