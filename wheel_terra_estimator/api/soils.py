@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wheel_terra_estimator.configuration import reader, ros_yaml, shipped
-from wheel_terra_estimator.configuration.configuration import SOIL_FIELDS, Configuration
+from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import declared, nearest
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_file, new_file
@@ -22,6 +22,7 @@ from wheel_terra_estimator.terramechanics import soil as terramechanics_soil
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
+from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 if TYPE_CHECKING:
@@ -212,7 +213,7 @@ class Soil(terramechanics_soil.Soil):
         soil = configuration.soil
         stated = {
             name: configuration.soil_std[name]
-            for name in SOIL_FIELDS
+            for name in SOIL_NUMBERS
             if configuration.stated & {f'soil.{name}_std', f'soil.{name}_std_deg'}
         }
         numbers = {f.name: getattr(soil, f.name) for f in fields(soil)}
@@ -220,7 +221,7 @@ class Soil(terramechanics_soil.Soil):
 
     def __repr__(self) -> str:
         """Return the numbers with their units in four lines."""
-        shown = [self._shown(name) for name in SOIL_FIELDS]
+        shown = [self._shown(name) for name in SOIL_NUMBERS]
         lines = (shown[:3], shown[3:6], shown[6:])
         return '\n  '.join(
             [f'Soil, pressure law {self.pressure_law}', *(', '.join(line) for line in lines)]
@@ -247,7 +248,7 @@ def parameters_of(soil: terramechanics_soil.Soil) -> dict[str, ros_yaml.Value]:
     std: Mapping[str, float] = {}
     if isinstance(soil, Soil):
         std, values['soil.source'] = soil.std, soil.source
-    for name in SOIL_FIELDS:
+    for name in SOIL_NUMBERS:
         ending, factor = ('_deg', math.degrees(1.0)) if name == 'friction_angle' else ('', 1.0)
         values[f'soil.{name}{ending}'] = factor * float(getattr(soil, name))
         if name in std:

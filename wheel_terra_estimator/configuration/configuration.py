@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -17,22 +17,12 @@ from wheel_terra_estimator.configuration import ros_yaml
 from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 EffectSettings: TypeAlias = dict[str, dict[str, Any]]
 
 _SOIL_LABELS = ('soil.name', 'soil.source')
-SOIL_FIELDS = (
-    'cohesive_modulus',
-    'frictional_modulus',
-    'sinkage_exponent',
-    'cohesion',
-    'friction_angle',
-    'shear_modulus',
-    'peak_stress_ratio',
-    'leaving_angle_ratio',
-    'density',
-)
 
 
 class Section:
@@ -168,27 +158,21 @@ class Configuration:
     def from_values(cls, values: Mapping[str, Value], stated: Iterable[str]) -> Configuration:
         """Build from checked values of all declared keys (see ``reader``)."""
         effects, effects_std = _effects(values)
-        soil = _soil(values)
+        single: dict[str, Any] = {f.name: values[f.name] for f in fields(cls) if f.name in values}
+        section = Section(values, 'soil.')
+        soil = _soil(section)
         return cls(
             wheels=Wheels(values),
             rover=Rover(values),
             soil=soil,
-            soil_std=_soil_std(values, soil),
+            soil_std=_soil_std(section, soil),
             effects=effects,
             effects_std=effects_std,
             sensors=Section(values, 'sensors.'),
             filter=Section(values, 'filter.'),
-            slip_radius=str(values['slip_radius']),
-            wheel_odometry=str(values['wheel_odometry']),
-            reference_odom_max_rate=_number(values, 'reference_odom_max_rate'),
-            rest_speed=_number(values, 'rest_speed'),
-            output_rate=_number(values, 'output_rate'),
-            max_lag=_number(values, 'max_lag'),
-            history=_number(values, 'history'),
-            soil_file=str(values['soil_file']),
-            provenance=str(values['provenance']),
             stated=frozenset(stated),
             _values=dict(values),
+            **single,
         )
 
     def flat(self) -> dict[str, Value]:
@@ -232,24 +216,17 @@ def _number(values: Mapping[str, Value], key: str) -> float:
     return float(value)
 
 
-def _soil(values: Mapping[str, Value]) -> Soil:
-    fields = {
-        field: math.radians(_number(values, 'soil.friction_angle_deg'))
-        if field == 'friction_angle'
-        else _number(values, f'soil.{field}')
-        for field in SOIL_FIELDS
-    }
-    return Soil(**fields, pressure_law=str(values['soil.pressure_law']))
+def _soil(section: Section) -> Soil:
+    return Soil(**{field.name: getattr(section, field.name) for field in fields(Soil)})
 
 
-def _soil_std(values: Mapping[str, Value], soil: Soil) -> dict[str, float]:
-    section = Section(values, 'soil.')
+def _soil_std(section: Section, soil: Soil) -> dict[str, float]:
     return {
         field: float(
             getattr(section, f'{field}_std')
             or section.relative_std * abs(float(getattr(soil, field)))
         )
-        for field in SOIL_FIELDS
+        for field in SOIL_NUMBERS
     }
 
 
@@ -264,7 +241,7 @@ def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSetting
     for name in enabled:
         effect, prefix = catalogue()[name], f'effects.{name}'
         if effect.sparse:
-            settings[name], deviations[name] = _law(values, prefix)
+            settings[name], deviations[name] = law(values, prefix)
             continue
         form = str(values.get(f'{prefix}.form', effect.form))
         chosen = effect.in_form(form).parameters
@@ -275,8 +252,11 @@ def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSetting
     return settings, deviations
 
 
-def _law(values: Mapping[str, Value], prefix: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Return coefficients and deviations of a law by the name of each term."""
+def law(values: Mapping[str, Value], prefix: str) -> tuple[dict[str, float], dict[str, float]]:
+    """Return coefficients and deviations of a law by the name of each term.
+
+    Raises ValueError for terms that there are not, see `coefficients_of`.
+    """
     from wheel_terra_estimator.terramechanics.effects.learned_closure import coefficients_of
 
     lists: dict[str, Any] = {

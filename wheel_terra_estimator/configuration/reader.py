@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.configuration import ros_yaml, shipped
-from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.configuration import Configuration, law
 from wheel_terra_estimator.configuration.parameters import (
     RETIRED,
     Parameter,
@@ -240,9 +240,7 @@ def checked_value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:
     def refuse(problem: str) -> UserError:
         return UserError(f'{source}: {parameter.key}: {problem}; allowed: {parameter.allowed}')
 
-    if isinstance(value, (list, tuple)) or (
-        hasattr(value, '__iter__') and not isinstance(value, str)
-    ):
+    if hasattr(value, '__iter__') and not isinstance(value, str):
         if parameter.size is None:
             raise refuse('is a list')
         items = [_scalar(parameter, item, refuse) for item in value]
@@ -347,25 +345,12 @@ def _check_effects(
                     f'effects.{name}.enabled', f'cannot be on together with effects.{other}'
                 )
         if effects[name].sparse:
-            _check_law(name, values, refuse)
+            try:
+                law(values, f'effects.{name}')
+            except ValueError as error:
+                raise refuse(f'effects.{name}.targets', str(error)) from None
         else:
             _check_form(effects[name], values, stated, refuse)
-
-
-def _check_law(
-    name: str, values: Mapping[str, Any], refuse: Callable[[str, str], UserError]
-) -> None:
-    from wheel_terra_estimator.terramechanics.effects.learned_closure import coefficients_of
-
-    prefix = f'effects.{name}'
-    lists = [values[f'{prefix}.{key}'] for key in ('targets', 'features', 'coefficients')]
-    stds = values[f'{prefix}.coefficients_std']
-    try:
-        coefficients_of(lists[0], lists[1], lists[2])
-        if len(stds) > 1:
-            coefficients_of(lists[0], lists[1], stds)
-    except ValueError as error:
-        raise refuse(f'{prefix}.targets', str(error)) from None
 
 
 def _check_form(

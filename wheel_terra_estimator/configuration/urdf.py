@@ -48,9 +48,8 @@ def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None)
     data : bytes, optional
         The document, where it does not stand in a file; ``path`` then names it in errors.
     """
-    robot = _parse(path, data)
-    joints = {j.get('name', ''): j for j in robot.iter('joint') if j.get('type')}
-    links = {link.get('name', ''): link for link in robot.iter('link')}
+    robot = _Robot(path, _parse(path, data))
+    joints = robot.joints
     names = list(wheels) or [name for name, joint in joints.items() if _is_wheel(name, joint)]
     missing = [name for name in names if name not in joints]
     if missing or not names:
@@ -59,24 +58,23 @@ def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None)
             f'{path}: {"no joint " + missing[0] if missing else "no joint named as a wheel"}; give '
             f'the wheels, of its turning joints: --wheels {",".join(turning) or "(none)"}'
         )
-    base = _base(links, joints)
-    placed = [(name, _pose(joints[name], joints, base, path)) for name in names]
+    placed = [(name, robot.pose(joints[name])) for name in names]
     placed.sort(key=lambda item: (-round(item[1][0, 3], 3), -item[1][1, 3]))
     names = [name for name, _ in placed]
     poses = [pose for _, pose in placed]
-    shapes = [_cylinder(links, joints[name], path) for name in names]
+    shapes = [robot.cylinder(joints[name]) for name in names]
     guessed = {'wheels.width'} if any(width is None for _, width in shapes) else set()
     radius = [r for r, _ in shapes]
-    steering = [_steering_joint(joints[name], joints, base, path) for name in names]
+    steering = [robot.steering_joint(joints[name]) for name in names]
     if any(axis < 0.0 for _, axis in steering):
         guessed.add('wheels.steering_joints')
-    mass, centre = _mass(links, joints, base, path)
+    mass, centre = robot.mass()
     if not mass:
         guessed |= {'rover.mass', 'rover.centre_of_gravity'}
         ground = min(float(p[2, 3]) - r for p, r in zip(poses, radius, strict=True))
         centre = [0.0, 0.0, round(ground + CENTRE_HEIGHT * max(radius), 4)]
     return RoverSketch(
-        name=robot.get('name', path.stem),
+        name=robot.name,
         wheels=names,
         radius=radius,
         width=[w if w is not None else DEFAULT_WIDTH_SHARE * r for r, w in shapes],
@@ -88,7 +86,7 @@ def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None)
         direction=[_direction(joints[n], p, path) for n, p in zip(names, poses, strict=True)],
         steering_joints=[joint for joint, _ in steering],
         guessed=frozenset(guessed),
-        source=f'{path.name}, relative to {base}',
+        source=f'{path.name}, relative to {robot.base}',
     )
 
 
@@ -136,15 +134,6 @@ def _named(element: ElementTree.Element, tag: str, attribute: str) -> str:
     return found.get(attribute, '') if found is not None else ''
 
 
-def _base(links: dict[str, ElementTree.Element], joints: dict[str, ElementTree.Element]) -> str:
-    for name in BASE_LINKS:
-        if name in links:
-            return name
-    children = {_child(joint) for joint in joints.values()}
-    roots = [name for name in links if name not in children]
-    return roots[0] if roots else next(iter(links), '')
-
-
 def _numbers(text: str | None, default: tuple[float, ...], path: Path) -> list[float]:
     try:
         values = [float(item) for item in text.split()] if text else list(default)
@@ -171,60 +160,9 @@ def _origin(element: ElementTree.Element | None, path: Path) -> Pose:
     return pose
 
 
-def _link_pose(
-    link: str, joints: dict[str, ElementTree.Element], base: str, path: Path
-) -> Pose | None:
-    """Return the pose of a link in the base; None if they hang on nothing in common."""
-    top, pose = _climbed(link, base, joints, path)
-    if top == base:
-        return pose
-    root, to_base = _climbed(base, top, joints, path)  # both below a root, such as a footprint
-    return np.asarray(np.linalg.inv(to_base) @ pose) if root == top else None
-
-
-def _climbed(
-    link: str, end: str, joints: dict[str, ElementTree.Element], path: Path
-) -> tuple[str, Pose]:
-    """Go up from a link as far as `end`, else to its root; return where that is, and the pose."""
-    above = {_child(joint): joint for joint in joints.values()}
-    start, pose = link, np.eye(4)
-    for _ in range(DEEPEST_CHAIN):
-        joint = above.get(link)
-        if link == end or joint is None:
-            return link, pose
-        pose = _origin(joint, path) @ pose
-        link = _parent(joint)
-    raise UserError(f'{path}: the joints of link {start} form a loop')
-
-
-def _pose(
-    joint: ElementTree.Element, joints: dict[str, ElementTree.Element], base: str, path: Path
-) -> Pose:
-    pose = _link_pose(_child(joint), joints, base, path)
-    if pose is None:
-        raise UserError(f'{path}: joint {joint.get("name")} does not hang on {base}')
-    return pose
-
-
-def _cylinder(
-    links: dict[str, ElementTree.Element], joint: ElementTree.Element, path: Path
-) -> tuple[float, float | None]:
-    """Return radius and width of a wheel from its collision or visual shape."""
-    link = links.get(_child(joint))
-    for kind in ('collision', 'visual'):
-        for part in link.iter(kind) if link is not None else ():
-            for cylinder in part.iter('cylinder'):
-                radius = _numbers(cylinder.get('radius'), (0.0,), path)[0]
-                length = _numbers(cylinder.get('length'), (0.0,), path)[0]
-                if radius > 0.0:
-                    return radius, length or None
-            for sphere in part.iter('sphere'):
-                radius = _numbers(sphere.get('radius'), (0.0,), path)[0]
-                if radius > 0.0:
-                    return radius, None
-    raise UserError(
-        f'{path}: wheel {joint.get("name")} has no cylinder to take its radius from; give --radius'
-    )
+def _axis(joint: ElementTree.Element, path: Path) -> FloatArray:
+    axis = joint.find('axis')
+    return np.array(_numbers(axis.get('xyz') if axis is not None else None, (1.0, 0, 0), path))
 
 
 def _direction(joint: ElementTree.Element, pose: Pose, path: Path) -> int:
@@ -232,47 +170,91 @@ def _direction(joint: ElementTree.Element, pose: Pose, path: Path) -> int:
     return -1 if float((pose[:3, :3] @ _axis(joint, path))[1]) < -0.1 else 1
 
 
-def _steering_joint(
-    wheel: ElementTree.Element, joints: dict[str, ElementTree.Element], base: str, path: Path
-) -> tuple[str, float]:
-    """Return the joint that steers a wheel, and the z of its axis in the base: -1 counts right.
+class _Robot:
+    """A document with its links and joints by name, and the link that all poses are given in."""
 
-    It is the nearest turning joint above the wheel whose axis is upright; '' and 0 for none.
-    """
-    above = {_child(joint): joint for joint in joints.values()}
-    joint = above.get(_parent(wheel))
-    for _ in range(DEEPEST_CHAIN):
-        if joint is None or _child(joint) == base:
-            break
-        if joint.get('type') in ('revolute', 'continuous'):
-            up = float((_pose(joint, joints, base, path)[:3, :3] @ _axis(joint, path))[2])
-            if abs(up) > _UPRIGHT:
-                return joint.get('name', ''), up
-        joint = above.get(_parent(joint))
-    return '', 0.0
+    def __init__(self, path: Path, root: ElementTree.Element) -> None:
+        self.path = path
+        self.name = root.get('name', path.stem)
+        self.joints = {j.get('name', ''): j for j in root.iter('joint') if j.get('type')}
+        self._links = {link.get('name', ''): link for link in root.iter('link')}
+        self._above = {_child(joint): joint for joint in self.joints.values()}  # by their children
+        roots = [name for name in self._links if name not in self._above]
+        named = [name for name in BASE_LINKS if name in self._links]
+        self.base = next(iter((*named, *roots, *self._links)), '')
 
+    def pose(self, joint: ElementTree.Element) -> Pose:
+        """Return the pose of the link that hangs on a joint."""
+        pose = self._link_pose(_child(joint))
+        if pose is None:
+            raise UserError(f'{self.path}: joint {joint.get("name")} does not hang on {self.base}')
+        return pose
 
-def _axis(joint: ElementTree.Element, path: Path) -> FloatArray:
-    axis = joint.find('axis')
-    return np.array(_numbers(axis.get('xyz') if axis is not None else None, (1.0, 0, 0), path))
+    def _link_pose(self, link: str) -> Pose | None:
+        """Return the pose of a link in the base; None if they hang on nothing in common."""
+        top, pose = self._climbed(link, self.base)
+        if top == self.base:
+            return pose
+        root, to_base = self._climbed(self.base, top)  # both below a root, such as a footprint
+        return np.asarray(np.linalg.inv(to_base) @ pose) if root == top else None
 
+    def _climbed(self, link: str, end: str) -> tuple[str, Pose]:
+        """Go up from a link as far as `end`, else to its root; return that link and the pose."""
+        start, pose = link, np.eye(4)
+        for _ in range(DEEPEST_CHAIN):
+            joint = self._above.get(link)
+            if link == end or joint is None:
+                return link, pose
+            pose = _origin(joint, self.path) @ pose
+            link = _parent(joint)
+        raise UserError(f'{self.path}: the joints of link {start} form a loop')
 
-def _mass(
-    links: dict[str, ElementTree.Element],
-    joints: dict[str, ElementTree.Element],
-    base: str,
-    path: Path,
-) -> tuple[float, list[float]]:
-    """Return the mass of all links and their centre of gravity in the base."""
-    total, moment = 0.0, np.zeros(3)
-    for name, link in links.items():
-        inertial = link.find('inertial')
-        if inertial is None or inertial.find('mass') is None:
-            continue
-        mass = _numbers(inertial.find('mass').get('value'), (0.0,), path)[0]  # type: ignore[union-attr]
-        pose = _link_pose(name, joints, base, path)
-        if pose is not None and mass > 0.0:
-            total += mass
-            moment += mass * (pose @ _origin(inertial, path))[:3, 3]
-    centre = moment / total if total else moment
-    return total, [round(float(value), 4) for value in centre]
+    def cylinder(self, joint: ElementTree.Element) -> tuple[float, float | None]:
+        """Return radius and width of a wheel from its collision or visual shape."""
+        link = self._links.get(_child(joint))
+        for kind in ('collision', 'visual'):
+            for part in link.iter(kind) if link is not None else ():
+                for cylinder in part.iter('cylinder'):
+                    radius = _numbers(cylinder.get('radius'), (0.0,), self.path)[0]
+                    length = _numbers(cylinder.get('length'), (0.0,), self.path)[0]
+                    if radius > 0.0:
+                        return radius, length or None
+                for sphere in part.iter('sphere'):
+                    radius = _numbers(sphere.get('radius'), (0.0,), self.path)[0]
+                    if radius > 0.0:
+                        return radius, None
+        raise UserError(
+            f'{self.path}: wheel {joint.get("name")} has no cylinder to take its radius from; give '
+            '--radius'
+        )
+
+    def steering_joint(self, wheel: ElementTree.Element) -> tuple[str, float]:
+        """Return the joint that steers a wheel, and the z of its axis in the base: -1 counts right.
+
+        It is the nearest turning joint above the wheel whose axis is upright; '' and 0 for none.
+        """
+        joint = self._above.get(_parent(wheel))
+        for _ in range(DEEPEST_CHAIN):
+            if joint is None or _child(joint) == self.base:
+                break
+            if joint.get('type') in ('revolute', 'continuous'):
+                up = float((self.pose(joint)[:3, :3] @ _axis(joint, self.path))[2])
+                if abs(up) > _UPRIGHT:
+                    return joint.get('name', ''), up
+            joint = self._above.get(_parent(joint))
+        return '', 0.0
+
+    def mass(self) -> tuple[float, list[float]]:
+        """Return the mass of all links and their centre of gravity in the base."""
+        total, moment = 0.0, np.zeros(3)
+        for name, link in self._links.items():
+            mass_of = link.find('inertial/mass')
+            if mass_of is None:
+                continue
+            mass = _numbers(mass_of.get('value'), (0.0,), self.path)[0]
+            pose = self._link_pose(name)
+            if pose is not None and mass > 0.0:
+                total += mass
+                moment += mass * (pose @ _origin(link.find('inertial'), self.path))[:3, 3]
+        centre = moment / total if total else moment
+        return total, [round(float(value), 4) for value in centre]

@@ -242,26 +242,20 @@ def changes(
 
 
 _BEFORE = tuple(name for name in TARGETS if name not in OUTPUTS)
+_IN_CONTACT = {'bearing_pressure': 'bearing_modulus', 'friction': 'tan_friction'}
 
 
 def _change_closures(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     for target, x in changes(contact, p, _BEFORE).items():
-        if target == 'bearing_pressure':
-            contact.bearing_modulus = contact.bearing_modulus * np.exp(x)
-        elif target == 'exponent':
+        if target == 'exponent':
             contact.sinkage_exponent = np.maximum(contact.sinkage_exponent + x, 0.1)
         elif target == 'peak_angle':
             contact.peak_ratio = contact.peak_ratio + x
         elif target == 'leaving_angle':
             contact.leaving_ratio = np.minimum(contact.leaving_ratio + x, 0.0)
-        elif target == 'friction':
-            contact.tan_friction = contact.tan_friction * np.exp(x)
-        elif target == 'cohesion':
-            contact.cohesion = contact.cohesion * np.exp(x)
-        elif target == 'shear_modulus':
-            contact.shear_modulus = contact.shear_modulus * np.exp(x)
-        elif target == 'shear_radius':
-            contact.shear_radius = contact.shear_radius * np.exp(x)
+        else:
+            name = _IN_CONTACT.get(target, target)
+            setattr(contact, name, getattr(contact, name) * np.exp(x))
 
 
 def _change_outputs(contact: Contact[Quantity], p: SimpleNamespace) -> None:
