@@ -194,7 +194,7 @@ def events(
         if count == 0:
             yield Event(log_time)
         if name == RESET:
-            pipeline.reset()
+            pipeline.core.reset()
             yield Event(log_time)
             continue
         for estimates in pipeline.hear(name, message):

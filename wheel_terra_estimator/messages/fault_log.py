@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 MEMORY = 10_000_000_000
 """How long a fault stands in words after it was last seen [ns]."""
@@ -13,15 +14,13 @@ MEMORY = 10_000_000_000
 _NUMBER = re.compile(r'[0-9]+(\.[0-9]+)?')
 
 
+@dataclass(slots=True)
 class _Fault:
     """A fault as it was last seen."""
 
-    __slots__ = ('published', 'seen', 'words')
-
-    def __init__(self, words: str, seen: int) -> None:
-        self.words = words
-        self.seen = seen
-        self.published = False
+    words: str
+    seen: int
+    published: bool = False
 
 
 class FaultLog:

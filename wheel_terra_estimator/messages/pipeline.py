@@ -66,10 +66,6 @@ class Pipeline:
         self._published += len(sets)
         return sets
 
-    def process_pending(self) -> None:
-        """Do beforehand what the next set would wait for; changes no number."""
-        self.core.process_pending()
-
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message of an input topic that could not even be unpacked."""
         self.received[topic] += 1
@@ -80,10 +76,6 @@ class Pipeline:
         sets = self.core.flush()
         self._published += len(sets)
         return sets
-
-    def reset(self) -> None:
-        """Forget the state, keep the parameters."""
-        self.core.reset()
 
     def retune(self, configuration: Configuration) -> None:
         """Go on with other tuning; wheels, sensors and soil must be the same."""

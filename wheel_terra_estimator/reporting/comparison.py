@@ -58,8 +58,8 @@ class Comparison:
     sets: tuple[int, int]
     differences: tuple[Difference, ...]
     same_class: float
-    warnings: tuple[tuple[float, ...], tuple[float, ...]]
-    errors: tuple[truth_scores.TruthErrors | None, truth_scores.TruthErrors | None]
+    warnings: tuple[tuple[float, ...], ...]  # starts [s], of A and of B
+    errors: tuple[truth_scores.TruthErrors | None, ...]
     origins: tuple[Origin, Origin] = (Origin(), Origin())
 
     @property
@@ -95,25 +95,21 @@ def compare(
             f'{names[1]}: no stamp in common with {names[0]}; compare estimates of one drive'
         )
     thresholds = np.array(declared()['filter.class_thresholds'].default, dtype=float)
-    recorded = [
-        name
+    runs = first, second
+    differences = tuple(
+        _difference(name, first, second, a, b)
         for name in COMPARED
-        if not any(np.isnan(run.values[name]).all() for run in (first, second))
-    ]
-    differences = tuple(_difference(name, first, second, a, b) for name in recorded)
+        if not any(np.isnan(run.values[name]).all() for run in runs)
+    )
     return Comparison(
         names=(names[0], names[1]),
         common=int(a.size),
         sets=(first.stamp.size, second.stamp.size),
         differences=differences,
         same_class=float(np.mean(first.slip_class[a] == second.slip_class[b])),
-        warnings=(
-            tuple(round(start, 3) for start, _ in first.warning_times),
-            tuple(round(start, 3) for start, _ in second.warning_times),
-        ),
-        errors=(
-            truth_scores.truth_errors(first, truth, thresholds) if truth else None,
-            truth_scores.truth_errors(second, truth, thresholds) if truth else None,
+        warnings=tuple(tuple(round(start, 3) for start, _ in r.warning_times) for r in runs),
+        errors=tuple(
+            truth_scores.truth_errors(run, truth, thresholds) if truth else None for run in runs
         ),
         origins=origins,
     )

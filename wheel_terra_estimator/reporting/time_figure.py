@@ -60,14 +60,18 @@ class Mark:
 
 @dataclass(frozen=True)
 class Curve:
-    """A path of a panel: its CSS classes, name, colours on light and dark pages."""
+    """A path of a panel: its CSS classes, name, colour on a light page."""
 
     path: str
     classes: str
     name: str = ''
     light: str = ''
-    dark: str = ''
     width: float = 1.4
+
+    @property
+    def dark(self) -> str:
+        """Colour on a dark page."""
+        return DARK.get(self.light, self.light)
 
 
 @dataclass(frozen=True)
@@ -95,15 +99,6 @@ class _Line:
 
 
 @dataclass
-class _Strip:
-    panel: int
-    stretches: list[tuple[float, float, int]]  # from, to, row
-    name: str
-    colour: str
-    height: float
-
-
-@dataclass
 class TimeFigure:
     """Collects lines, bands, strips and shaded stretches of panels under one another.
 
@@ -125,7 +120,7 @@ class TimeFigure:
     axis: str
     shaded: list[tuple[float, float]] = field(default_factory=list)
     _lines: list[_Line] = field(default_factory=list)
-    _strips: list[_Strip] = field(default_factory=list)
+    _strips: list[tuple[int, Curve]] = field(default_factory=list)  # with their panels
 
     def line(
         self,
@@ -169,13 +164,16 @@ class TimeFigure:
         *, slender: bool = False,
     ) -> None:  # fmt: skip
         """Add the stretches (k, n) of n strips that belong to one class, first strip on top."""
-        found = []
+        rows, share = len(self.panels[panel].strips), THIN_STRIP if slender else STRIP
+        height = share * HEIGHT / rows
+        parts = []
         for row in range(member.shape[1]):
+            top = HEIGHT * (row + 0.5 * (1.0 - share)) / rows
             edges = np.flatnonzero(np.diff(np.concatenate(([0], member[:, row], [0]))))
             for start, end in edges.reshape(-1, 2):
-                found.append((float(x[start]), float(x[min(end, x.size - 1)]), row))
-        height = THIN_STRIP if slender else STRIP
-        self._strips.append(_Strip(panel, found, name, colour, height))
+                left, right = float(x[start]), float(x[min(end, x.size - 1)])
+                parts.append(f'M{left:.6g} {top:.1f}H{right:.6g}v{height:.1f}H{left:.6g}z')
+        self._strips.append((panel, Curve(''.join(parts), 'strip', name, colour)))
 
     def shade(self, start: float, end: float) -> None:
         """Shade a stretch of all panels; it gets the next number, from 1."""
@@ -209,27 +207,17 @@ class TimeFigure:
         mine = [line for line in self._lines if line.panel == number]
         low, high = panel.limits or limits(*(line.y for line in mine if line.y.ndim == 1))
         curves = tuple(
-            Curve(_path(line, low, high), line.classes, line.name, line.colour,
-                  DARK.get(line.colour, line.colour), line.width)
+            Curve(_path(line, low, high), line.classes, line.name, line.colour, line.width)
             for line in mine
-        )  # fmt: skip
+        )
         ticks = tuple(Mark(text, (high - value) / (high - low)) for value, text in nice(low, high))
         return Drawn(panel.title, panel.share, low, high, curves, ticks, strips=False)
 
     def _strip_panel(self, number: int, panel: Panel) -> Drawn:
         rows = len(panel.strips)
-        curves = []
-        for strip in (strip for strip in self._strips if strip.panel == number):
-            above, high = 0.5 * (1.0 - strip.height), strip.height * HEIGHT / rows
-            path = ''.join(
-                f'M{begin:.6g} {HEIGHT * (row + above) / rows:.1f}'
-                f'H{end:.6g}v{high:.1f}H{begin:.6g}z'
-                for begin, end, row in strip.stretches
-            )
-            dark = DARK.get(strip.colour, strip.colour)
-            curves.append(Curve(path, 'strip', strip.name, strip.colour, dark))
+        curves = tuple(curve for place, curve in self._strips if place == number)
         ticks = tuple(Mark(name, (row + 0.5) / rows) for row, name in enumerate(panel.strips))
-        return Drawn(panel.title, panel.share, 0.0, 1.0, tuple(curves), ticks, strips=True)
+        return Drawn(panel.title, panel.share, 0.0, 1.0, curves, ticks, strips=True)
 
 
 def _path(line: _Line, low: float, high: float) -> str:

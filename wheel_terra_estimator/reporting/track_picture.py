@@ -14,7 +14,7 @@ from wheel_terra_estimator.arrays import BoolArray
 from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS
-from wheel_terra_estimator.reporting.style import DARK, RIM_COLOUR
+from wheel_terra_estimator.reporting.style import RIM_COLOUR
 from wheel_terra_estimator.reporting.time_figure import Curve, nice
 
 LEAST_EXTENT = 0.5
@@ -87,9 +87,8 @@ def _map(track: Track, kinds: list[tuple[str, BoolArray, str]]) -> Map:
             if member[a]
         )
         unknown = name == SlipClass.UNKNOWN.name.lower()
-        dark = DARK.get(colour, colour)
         if path:
-            curves.append(Curve(path, 'way', name, colour, dark, 1.5 if unknown else 4.0))
+            curves.append(Curve(path, 'way', name, colour, 1.5 if unknown else 4.0))
     across = [value for value, _ in nice(left, left + width)]
     down = np.arange(
         math.ceil((top - height) / (across[1] - across[0])) * (across[1] - across[0]),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 PERIODS_TO_SILENCE = 3.0
@@ -21,33 +22,19 @@ START = 1.0  # [s] in which the process may be late
 _SMOOTHING = 0.1
 
 
+@dataclass(slots=True)
 class _Topic:
     """What is known of one topic."""
 
-    __slots__ = (
-        'ahead',
-        'delay',
-        'heard',
-        'latest',
-        'lost',
-        'number',
-        'period',
-        'received',
-        'stamp',
-        'told',
-    )
-
-    def __init__(self) -> None:
-        self.received = 0
-        self.heard = 0.0
-        self.period = 0.0
-        self.delay = 0.0
-        self.ahead = 0.0  # least of what the stamps were before the clock
-        self.latest = -math.inf  # greatest delay since this was last asked
-        self.stamp = 0
-        self.number: int | None = None  # of the publisher's last message
-        self.lost = 0
-        self.told = 0  # of these
+    received: int = 0
+    heard: float = 0.0
+    period: float = 0.0
+    delay: float = 0.0
+    ahead: float = 0.0  # least of what the stamps were before the clock
+    latest: float = -math.inf  # greatest delay since this was last asked
+    number: int | None = None  # of the publisher's last message
+    lost: int = 0
+    told: int = 0  # of these
 
 
 class InputWatch:

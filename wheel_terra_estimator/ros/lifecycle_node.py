@@ -318,7 +318,7 @@ class EstimatorNode(LifecycleNode):
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)
         if topic not in FREQUENT:  # often late: run through now, the next set is there sooner
-            pipeline.process_pending()
+            pipeline.core.process_pending()
 
     def _take(self, estimates: EstimateSet, now: float) -> None:
         assert self._pipeline is not None and self._publisher is not None
@@ -359,7 +359,7 @@ class EstimatorNode(LifecycleNode):
             response.success, response.message = False, 'not configured: there is no state'
             return response
         self._arrival.write(RESET)
-        self._pipeline.reset()
+        self._pipeline.core.reset()
         self._latest = None
         self._started = self._seconds()
         self._warned = self._pipeline.core.warning.state

@@ -14,13 +14,14 @@ and Hanamoto acts along it.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.terramechanics import effects as effect_catalogue
-from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.conditioned import contacts_as_built
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement, speed_ratio
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.stresses import front_stress
@@ -76,12 +77,10 @@ class ContactModel:
         effects: Mapping[str, Mapping[str, float]],
         gravity: float,
     ) -> None:
-        self._wheel = wheel
+        self._as_built = contacts_as_built(wheel, soil, gravity)
         self._soil = soil
         self._tan_friction = float(np.tan(soil.friction_angle))
-        self._modulus, self._reference_depth = soil.bearing(wheel.width, gravity)
         self._slip_radius = slip_radius
-        self._gravity = gravity
         self._terms = Terms(effect_catalogue.check_settings(effects))
         # Squared towards the ends of the contact, where the stress starts like a root.
         nodes, weights = np.polynomial.legendre.leggauss(NODES)
@@ -115,35 +114,16 @@ class ContactModel:
             (n,) load [N], rim speed [m/s], slope in the direction of travel [rad], 1 on virgin soil
             and more where other wheels ran before.
         """
-        wheel, soil = self._wheel, self._soil
+        soil, contact = self._soil, copy(self._as_built)
         ratio = speed_ratio(np.maximum(slip, -0.999))
-        contact = Contact(
-            slip=slip,
-            velocity_ratio=ratio * self._slip_radius,
-            normal_load=load,
-            stated_load=load,
-            slope=slope,
-            gravity=self._gravity,
-            rim_speed=rim_speed,
-            direction=1.0,
-            pass_number=pass_number,
-            radius=wheel.radius,
-            width=wheel.width,
-            lug_height=wheel.lug_height,
-            lug_count=wheel.lug_count,
-            lug_thickness=wheel.lug_thickness,
-            shear_radius=wheel.radius,
-            bearing_modulus=self._modulus * factors['stiffness'],
-            reference_depth=self._reference_depth,
-            sinkage_exponent=soil.sinkage_exponent,
-            cohesion=soil.cohesion * factors['cohesion'],
-            tan_friction=self._tan_friction * factors['friction'],
-            shear_modulus=soil.shear_modulus * factors['shear_modulus'],
-            peak_ratio=soil.peak_stress_ratio,
-            leaving_ratio=soil.leaving_angle_ratio,
-            density=soil.density,
-            rim_radius=wheel.radius,
-        )
+        contact.slip, contact.velocity_ratio = slip, ratio * self._slip_radius
+        contact.normal_load = contact.stated_load = load
+        contact.rim_speed, contact.slope, contact.direction = rim_speed, slope, 1.0
+        contact.pass_number = pass_number
+        contact.bearing_modulus = contact.bearing_modulus * factors['stiffness']
+        contact.cohesion = soil.cohesion * factors['cohesion']
+        contact.tan_friction = self._tan_friction * factors['friction']
+        contact.shear_modulus = soil.shear_modulus * factors['shear_modulus']
         self._terms.apply('on_inputs', contact)
         contact.sinkage_exponent = soil.sinkage_exponent + factors['slip_sinkage'] * (
             contact.sinkage_exponent - soil.sinkage_exponent
@@ -175,7 +155,7 @@ class ContactModel:
         frictional = contact.tan_friction * normal
 
         # Load balance, linear in the factor on the normal stress.
-        radius, width, cohesion = contact.radius, wheel.width, contact.cohesion
+        radius, width, cohesion = contact.radius, self._as_built.width, contact.cohesion
         from_cohesion = shear_radius * cohesion * (mobilised_along * sine).sum(0)
         from_stress = radius * (weights * normal * cosine).sum(0) + shear_radius * (
             mobilised_along * frictional * sine
