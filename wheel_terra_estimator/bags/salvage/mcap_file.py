@@ -107,7 +107,7 @@ class McapFile:
         self._work = 0  # [byte] unpacked and looked at in this pass
         self._size = path.stat().st_size
         self._map = self._open(stack)
-        if self._map is None:
+        if not self._size:
             self.losses.state = 'is empty'
         elif self._map[: len(mcap.MAGIC)] != mcap.MAGIC and not self._looks_like_one():
             self.losses.state = 'does not begin as an MCAP file'
@@ -135,9 +135,9 @@ class McapFile:
             yield RawMessage(log_time, topic, data)
         self.losses.recovered.update(counts)
 
-    def _open(self, stack: ExitStack) -> mmap.mmap | None:
+    def _open(self, stack: ExitStack) -> mcap.Buffer:
         if not self._size:
-            return None
+            return b''
         file = stack.enter_context(self.path.open('rb'))
         found = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         stack.callback(_close, found)
@@ -145,7 +145,6 @@ class McapFile:
 
     def _looks_like_one(self) -> bool:
         """Whether a file whose first bytes are damaged ends, or goes on, as an MCAP file."""
-        assert self._map is not None
         if self._map[-len(mcap.MAGIC) :] == mcap.MAGIC:
             return True
         near = mcap.Possible(opcodes=(mcap.CHUNK, mcap.SCHEMA, mcap.CHANNEL))
@@ -157,7 +156,6 @@ class McapFile:
     def _read_index(self) -> bool:
         """Take pieces and channels from the summary; False unless it is surely right."""
         content = self._map
-        assert content is not None
         foot = self._size - _FOOTER
         if foot < len(mcap.MAGIC) or content[-len(mcap.MAGIC) :] != mcap.MAGIC:
             return False
@@ -189,7 +187,6 @@ class McapFile:
         return True
 
     def _indexed_piece(self, chunk: mcap.IndexedChunk) -> Piece:
-        assert self._map is not None
         end = chunk.begin + chunk.length
         if end > self._size:
             raise ValueError('the index points behind the file')
@@ -202,7 +199,6 @@ class McapFile:
 
     def _survey(self) -> None:
         content = self._map
-        assert content is not None
         closed = content[-len(mcap.MAGIC) :] == mcap.MAGIC
         begin = len(mcap.MAGIC) if content[: len(mcap.MAGIC)] == mcap.MAGIC else 0
         end = self._size - len(mcap.MAGIC) if closed and self._size > begin else self._size
@@ -231,7 +227,6 @@ class McapFile:
     def _take_records(self, begin: int, end: int, gaps: list[mcap.Gap]) -> None:
         """Note what stands between two places, and the gaps."""
         content = self._map
-        assert content is not None
         possible = mcap.Possible(longest=self._limits.chunk)
         for item in mcap.records(content, begin, end, possible):
             self._forget(item.end - item.begin)
@@ -254,7 +249,6 @@ class McapFile:
 
     def _take_headless_chunks(self, gaps: list[mcap.Gap]) -> None:
         """Note packed chunks in gaps: they say themselves where they begin and end."""
-        assert self._map is not None
         left = _MOST_HEADLESS
         for gap in gaps:
             found = _PACKED.finditer(self._map, gap.begin, gap.end)
@@ -270,7 +264,6 @@ class McapFile:
 
     def _look_inside(self, piece: Piece, gaps: list[mcap.Gap]) -> None:
         """Find what a packed chunk seems to hold that reaches too far, as it lost bytes."""
-        assert self._map is not None
         if piece.head is None or not piece.head.codec or not self._content(piece).damage:
             return
         at = mcap.next_outside(self._map, piece.head.begin, piece.end, self._size)
@@ -279,7 +272,6 @@ class McapFile:
             self._take_records(at, end, gaps)
 
     def _add_chunk(self, record: mcap.Record) -> None:
-        assert self._map is not None
         at = record.begin - mcap.HEAD
         head = mcap.chunk_head(self._map, at, self._size)
         assert head is not None
@@ -289,7 +281,6 @@ class McapFile:
 
     def _add_message_index(self, record: mcap.Record, gaps: list[mcap.Gap]) -> None:
         """Add to what the last chunk should hold; an index of other messages is a damage."""
-        assert self._map is not None
         head = self._pieces[-1].head if self._pieces else None
         try:
             times = mcap.indexed_times(self._map, record)
@@ -302,7 +293,6 @@ class McapFile:
 
     def _add_loose(self, record: mcap.Record) -> None:
         """Lengthen the last stretch of messages, or begin a new one."""
-        assert self._map is not None
         time = mcap.message(self._map, record).log_time
         at = record.begin - mcap.HEAD
         last = self._pieces[-1] if self._pieces else None
@@ -318,7 +308,6 @@ class McapFile:
             self._pieces.append(Piece(at, record.end, None, time, time))
 
     def _define(self, record: mcap.Record, gaps: list[mcap.Gap]) -> None:
-        assert self._map is not None
         try:
             self._definitions.add(self._map, record)
         except ValueError:
@@ -399,7 +388,6 @@ class McapFile:
 
     def _content(self, piece: Piece) -> Content:
         """Return the bytes of a piece; a copy, so that nothing of the file stays in memory."""
-        assert self._map is not None
         head = piece.head
         self._forget(piece.end - piece.begin)
         if head is None:
@@ -555,7 +543,7 @@ class McapFile:
         """Let go of the pages of the file that were looked at: they count as memory of ours."""
         self._touched += count
         if self._touched > _FORGET_AFTER and hasattr(mmap, 'MADV_DONTNEED'):
-            assert self._map is not None
+            assert isinstance(self._map, mmap.mmap)
             self._map.madvise(mmap.MADV_DONTNEED)
             self._touched = 0
 
