@@ -54,31 +54,21 @@ LARGEST_MARKER = 16 * 2**20
 
 
 def check_target(
-    path: Path,
-    overwrite: bool,
+    path: Path,  # what is to be written
+    overwrite: bool,  # whether what is there may be replaced
+    # What the command reads; the output may neither be it, nor hold it, nor lie in it
     inputs: Iterable[Path] = (),
     *,
+    # Whether a folder is to be written; of one that is there only what an earlier run listed is
+    # ever replaced
     folder: bool = False,
+    # Takes a file that is there and returns why it is none of this program, empty where it is one.
+    # Empty files are not asked about: they hold nothing.
     foreign: Callable[[Path], str] = lambda path: '',
 ) -> None:
     """Decide whether a file (or a folder) may be written at ``path``; the only place that does.
 
     Raises UserError where it may not: what stands there, and what to do.
-
-    Parameters
-    ----------
-    path : Path
-        What is to be written.
-    overwrite : bool
-        Whether what is there may be replaced.
-    inputs : iterable of Path
-        What the command reads; the output may neither be it, nor hold it, nor lie in it.
-    folder : bool
-        Whether a folder is to be written; of one that is there only what an earlier run listed is
-        ever replaced.
-    foreign : callable, optional
-        Takes a file that is there and returns why it is none of this program, empty where it is
-        one. Empty files are not asked about: they hold nothing.
     """
     try:
         wrong_kind = not path.is_dir() if folder else not path.is_file()
@@ -285,21 +275,13 @@ def _holds(entry: Path) -> bool:
 
 def mark(
     folder: Path,
+    # Names relative to the folder, added to those listed already; a name that ends in ``/`` stands
+    # for a folder with all that it holds. Default: everything that is there now.
     entries: Iterable[str] | None = None,
+    # What the command wants to know when it meets the folder again, see `facts_of`
     facts: Mapping[str, Any] | None = None,
 ) -> None:
-    """List files in the marker of a folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Output folder.
-    entries : iterable of str, optional
-        Names relative to the folder, added to those listed already; a name that ends in ``/``
-        stands for a folder with all that it holds. Default: everything that is there now.
-    facts : mapping, optional
-        What the command wants to know when it meets the folder again, see `facts_of`.
-    """
+    """List files in the marker of a folder."""
     if entries is None:
         entries = (name for name in _files(folder) if name != MARKER)
     earlier = _listed(folder) if (folder / MARKER).is_file() else ()

@@ -23,24 +23,17 @@ class BagFile:
 
     The bag is written beside its place and renamed when it is closed (see `output_folder`). Raises
     UserError where the path is taken or cannot be written.
-
-    Parameters
-    ----------
-    topics : mapping of str to str
-        Full topic name to message type.
-    latched : collection of str
-        Topics offered as transient local with depth 1; all others are volatile with depth 10.
-    inputs : iterable of Path
-        What is read meanwhile: the bag is never written into it or over it.
     """
 
     def __init__(
         self,
         path: Path,
-        topics: Mapping[str, str],
+        topics: Mapping[str, str],  # full topic name to message type
+        # Topics offered as transient local with depth 1; all others are volatile with depth 10
         latched: Collection[str] = (),
         overwrite: bool = False,
         storage: str = 'mcap',
+        # What is read meanwhile: the bag is never written into it or over it
         inputs: Iterable[Path] = (),
     ) -> None:
         self.path = path

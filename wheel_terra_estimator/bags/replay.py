@@ -206,22 +206,12 @@ def events(
 
 
 def smoothed(
-    events: Iterator[Event],
+    events: Iterator[Event],  # of the forward pass, whose estimator is that of the smoother
     smoother: DriveSmoother,
-    live: HistoryRecorder,
-    diagnostics: Diagnostics,
+    live: HistoryRecorder,  # gets the sets of the filter
+    diagnostics: Diagnostics,  # asked set by set, as the live node asks it
 ) -> Iterator[Event]:
-    """Yield the events of a drive with the sets of its smoother, once all have come.
-
-    Parameters
-    ----------
-    events : iterator of Event
-        Of the forward pass, whose estimator is that of the smoother.
-    live : HistoryRecorder
-        Gets the sets of the filter.
-    diagnostics : Diagnostics
-        Asked set by set, as the live node asks it.
-    """
+    """Yield the events of a drive with the sets of its smoother, once all have come."""
     starts: list[Event] = []
     for event in events:
         if event.estimates is None:

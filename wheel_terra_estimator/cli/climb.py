@@ -24,26 +24,19 @@ STEEPEST = np.radians(60.0)  # [rad]
 
 def climb(
     configuration: Configuration,
+    # ``wheel``: one wheel under ``weight``; ``rover``: all wheels, their loads moved by the slope
+    # as the suspension does it; one row per slope and wheel, in the order of ``wheels.names``
     who: str,
     wheel: int,
+    # Weight on the wheel, W [N]: the soil carries W cos(slope), the pull is W sin(slope)
     weight: float,
-    slopes: FloatArray,
+    slopes: FloatArray,  # (N,) positive uphill [rad]
     method: str,
 ) -> dict[str, FloatArray]:
     """Return the steady state of free travel on each slope; nan where the slope is too steep.
 
     Raises UserError for a slope beyond 60 degrees. Raises ValueError for an effect that makes the
     balance already.
-
-    Parameters
-    ----------
-    who : str
-        ``wheel``: one wheel under ``weight``; ``rover``: all wheels, their loads moved by the slope
-        as the suspension does it; one row per slope and wheel, in the order of ``wheels.names``.
-    weight : float
-        Weight on the wheel, W [N]: the soil carries W cos(slope), the pull is W sin(slope).
-    slopes : numpy.ndarray
-        (N,) positive uphill [rad].
     """
     if np.abs(slopes).max() > STEEPEST:
         raise UserError('--slope: slopes of --climb are at most 1.05 rad (60 degrees)')

@@ -38,26 +38,17 @@ _Sourced = dict[str, tuple[Any, str]]
 
 
 def load(
-    files: Sequence[str | Path] = (),
-    overrides: Sequence[str] = (),
+    files: Sequence[str | Path] = (),  # paths, or bare names of shipped files
+    overrides: Sequence[str] = (),  # ``NAME:=VALUE``
     *,
+    # Whether wheels and mass must be stated (not needed where a table brings them)
     complete: bool = True,
+    # Whether the Python file that ``effect_file`` names may be run
     allow_effect_files: bool = False,
 ) -> Configuration:
     """Read parameter files and overrides; later ones win key by key.
 
     Raises UserError if a file or key cannot be used.
-
-    Parameters
-    ----------
-    files : sequence of str or pathlib.Path
-        Paths, or bare names of shipped files.
-    overrides : sequence of str
-        ``NAME:=VALUE``.
-    complete : bool
-        Whether wheels and mass must be stated (not needed where a table brings them).
-    allow_effect_files : bool
-        Whether the Python file that ``effect_file`` names may be run.
     """
     sourced: list[tuple[str, str, Any]] = []
     for name in files:
@@ -88,22 +79,13 @@ def files_behind(name: str | Path) -> list[Path]:
 
 
 def from_parameters(
-    parameters: Mapping[str, Any],
+    parameters: Mapping[str, Any],  # key -> scalar or sequence; arrays of any kind will do
     *,
-    source: str = 'parameters',
+    source: str = 'parameters',  # what messages name in place of the file
+    # As for ``load``. An effect file may be run: a program that makes a mapping is trusted.
     complete: bool = True,
 ) -> Configuration:
-    """Check parameters that came without a file (the node's overrides, a caller's mapping).
-
-    Parameters
-    ----------
-    parameters : mapping
-        Key -> scalar or sequence; arrays of any kind will do.
-    source : str
-        What messages name in place of the file.
-    complete : bool
-        As for ``load``. An effect file may be run: a program that makes a mapping is trusted.
-    """
+    """Check parameters that came without a file (the node's overrides, a caller's mapping)."""
     sourced = [
         (key, source, value.tolist() if hasattr(value, 'tolist') else value)
         for key, value in parameters.items()

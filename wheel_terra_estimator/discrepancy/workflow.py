@@ -55,24 +55,17 @@ class Options:
 
 
 def diagnose(
-    table: SteadyTable,
+    table: SteadyTable,  # checked rows (``tables.parsing.read_table``)
+    # The model believed in: soil, effects that are on, the wheel where the table has none
     configuration: Configuration,
+    # Rows in which the effect in question is absent; fitted first, so that the structural error
+    # common to both tables cancels
     reference: SteadyTable | None = None,
     options: Options | None = None,
 ) -> Diagnosis:
     """Find where a model and a table disagree, and name the missing effect.
 
     Raises UserError if the table does not fit the wheel or the soil of the configuration.
-
-    Parameters
-    ----------
-    table : SteadyTable
-        Checked rows (``tables.parsing.read_table``).
-    configuration : Configuration
-        The model believed in: soil, effects that are on, the wheel where the table has none.
-    reference : SteadyTable, optional
-        Rows in which the effect in question is absent; fitted first, so that the structural error
-        common to both tables cancels.
     """
     started = time.perf_counter()
     chosen = options or Options()

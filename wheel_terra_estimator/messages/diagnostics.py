@@ -51,24 +51,16 @@ class Status(NamedTuple):
 
 
 class Diagnostics:
-    """Decides for each estimate set whether a message is due, and what it says.
-
-    Parameters
-    ----------
-    counters : callable
-        Returns further key-values of the node (unit in the key); asked only when one is due.
-    faults : callable
-        Returns faults that the sets do not know of, since it was last asked: subject and words.
-    node_name : str
-        Name of the node with its namespace, for names and hardware ids.
-    """
+    """Decides for each estimate set whether a message is due, and what it says."""
 
     def __init__(
         self,
         names: Sequence[str],
+        # Returns further key-values of the node (unit in the key); asked only when one is due
         counters: Callable[[], Mapping[str, Any]] = dict,
+        # Returns faults that the sets do not know of, since it was last asked: subject and words
         faults: Callable[[], Iterable[tuple[str, str]]] = tuple,
-        node_name: str = NODE,
+        node_name: str = NODE,  # name of the node with its namespace, for names and hardware ids
     ) -> None:
         self.node_name = node_name
         # Stamp of a set [ns] -> time by which faults stand and are cleared [ns]: that stamp itself,

@@ -100,24 +100,13 @@ class _Line:
 
 @dataclass
 class TimeFigure:
-    """Collects lines, bands, strips and shaded stretches of panels under one another.
+    """Collects lines, bands, strips and shaded stretches of panels under one another."""
 
-    Parameters
-    ----------
-    panels : sequence of Panel
-        From top to bottom; other methods count them from 0.
-    switches : sequence of Switch
-        Boxes above the figure. A curve is drawn while all switches that it names are on.
-    end : float
-        Last value on the axis, which begins at 0.
-    axis : str
-        Title of the axis, with unit.
-    """
-
-    panels: Sequence[Panel]
+    panels: Sequence[Panel]  # from top to bottom; other methods count them from 0
+    # Boxes above the figure. A curve is drawn while all switches that it names are on.
     switches: Sequence[Switch]
-    end: float
-    axis: str
+    end: float  # last value on the axis, which begins at 0
+    axis: str  # title of the axis, with unit
     shaded: list[tuple[float, float]] = field(default_factory=list)
     _lines: list[_Line] = field(default_factory=list)
     _strips: list[tuple[int, Curve]] = field(default_factory=list)  # with their panels

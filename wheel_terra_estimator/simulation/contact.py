@@ -57,23 +57,13 @@ class SoilForces:
 
 
 class ContactModel:
-    """Soil forces of n wheels with given depths.
-
-    Parameters
-    ----------
-    wheel : Wheel
-        (n,) geometry.
-    soil : Soil
-        Base soil; what is below each wheel differs by factors.
-    slip_radius : numpy.ndarray
-        (n,) radius that slip refers to [m].
-    """
+    """Soil forces of n wheels with given depths."""
 
     def __init__(
         self,
-        wheel: Wheel,
-        soil: Soil,
-        slip_radius: FloatArray,
+        wheel: Wheel,  # (n,) geometry
+        soil: Soil,  # base soil; what is below each wheel differs by factors
+        slip_radius: FloatArray,  # (n,) radius that slip refers to [m]
         effects: Mapping[str, Mapping[str, float]],
         gravity: float,
     ) -> None:
@@ -89,31 +79,21 @@ class ContactModel:
 
     def forces(
         self,
+        # Name of ``terrain.SOIL_QUANTITIES`` -> (n,) factor on the base soil below the wheels
         factors: Mapping[str, FloatArray],
-        depth: FloatArray,
+        depth: FloatArray,  # (n,) depth of the stressed contact r (1 - cos t1) [m]
+        # (..., n) slip ratio, positive when driving in the direction of travel [-]
         slip: FloatArray,
+        # (..., n) lateral slip velocity over the larger of rim and ground speed [-]
         side_slip: FloatArray,
+        # ``load``, ``rim_speed``, ``slope``, ``pass_number``: (n,) load [N], rim speed [m/s], slope
+        # in the direction of travel [rad], 1 on virgin soil and more where other wheels ran before
         load: FloatArray,
         rim_speed: FloatArray,
         slope: FloatArray,
         pass_number: FloatArray,
     ) -> SoilForces:
-        """Return the forces, seen in the direction of travel.
-
-        Parameters
-        ----------
-        factors : mapping
-            Name of ``terrain.SOIL_QUANTITIES`` -> (n,) factor on the base soil below the wheels.
-        depth : numpy.ndarray
-            (n,) depth of the stressed contact r (1 - cos t1) [m].
-        slip : numpy.ndarray
-            (..., n) slip ratio, positive when driving in the direction of travel [-].
-        side_slip : numpy.ndarray
-            (..., n) lateral slip velocity over the larger of rim and ground speed [-].
-        load, rim_speed, slope, pass_number : numpy.ndarray
-            (n,) load [N], rim speed [m/s], slope in the direction of travel [rad], 1 on virgin soil
-            and more where other wheels ran before.
-        """
+        """Return the forces, seen in the direction of travel."""
         soil, contact = self._soil, copy(self._as_built)
         ratio = speed_ratio(np.maximum(slip, -0.999))
         contact.slip, contact.velocity_ratio = slip, ratio * self._slip_radius

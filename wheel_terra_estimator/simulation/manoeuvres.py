@@ -75,22 +75,13 @@ def with_manoeuvres(
     configuration: Configuration,
     posterior: FilterMemory,
     *,
+    # Configuration key -> value as learned, see `EstimatorCore.learned`; others are ignored
     soil: Mapping[str, Any],
-    speed: float,
-    sensors: Collection[str],
+    speed: float,  # that the rover is to drive at [m/s]
+    sensors: Collection[str],  # which of `SENSORS` there are
     candidates: Sequence[Manoeuvre] = MANOEUVRES,
 ) -> tuple[Taught, ...]:
-    """Return what was taught with the manoeuvre that would teach most of what was not learned.
-
-    Parameters
-    ----------
-    soil : mapping
-        Configuration key -> value as learned, see `EstimatorCore.learned`; others are ignored.
-    speed : float
-        That the rover is to drive at [m/s].
-    sensors : collection of str
-        Which of `SENSORS` there are.
-    """
+    """Return what was taught with the manoeuvre that would teach most of what was not learned."""
     truth = configuration.replace(
         {k: v for k, v in soil.items() if k.startswith('soil.') and '_std' not in k}
     )

@@ -78,27 +78,21 @@ class Scenario:
 
 
 def load(
+    # A path, the bare name of a shipped scenario, or dotted keys with values
     source: str | Path | Mapping[str, Any] = DEFAULT,
     *,
+    # ``files``, ``parameters``: further configuration files and NAME:=VALUE, known to simulation
+    # and estimator
     files: Sequence[str | Path] = (),
     parameters: Sequence[str] = (),
+    # Rover file in place of the scenario's own; its soil and ground stay
     rover: str | Path | None = None,
+    # Dotted keys of the scenario with ``__`` for the dot, such as ``sensors__reference=False``
     **changes: Any,
 ) -> Scenario:
     """Read a scenario.
 
     Raises UserError for a file, key or value that cannot be used.
-
-    Parameters
-    ----------
-    source : str, pathlib.Path or mapping
-        A path, the bare name of a shipped scenario, or dotted keys with values.
-    files, parameters : sequence
-        Further configuration files and NAME:=VALUE, known to simulation and estimator.
-    rover : str or pathlib.Path, optional
-        Rover file in place of the scenario's own; its soil and ground stay.
-    **changes
-        Dotted keys of the scenario with ``__`` for the dot, such as ``sensors__reference=False``.
     """
     if isinstance(source, Mapping):
         name, values = 'scenario', dict(source)

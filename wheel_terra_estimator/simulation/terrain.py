@@ -44,45 +44,30 @@ def smooth_noise(random: np.random.Generator, count: int, correlation_length: fl
 
 
 class Terrain:
-    """Slope, height and soil factors at any point.
-
-    Parameters
-    ----------
-    slope_position, slope_angle : numpy.ndarray
-        (k,) knots of the slope along x [m], [rad], positive uphill; linear between.
-    side_slope : float
-        Slope along y [rad], positive when the left side is higher.
-    patches : list of Patch
-        Later ones lie over earlier ones.
-    border : float
-        Length over which the soil changes at the border of a patch [m].
-    base_factors : dict of str to float
-        Factors of the whole ground (the error of the nominal soil).
-    undulation, undulation_length : float
-        Standard deviation [rad] and correlation length [m] of the slope's unevenness.
-    patchiness, patchiness_length : float
-        Standard deviation of the logarithm and correlation length [m] of the stiffness, drawn for
-        the left and the right half of the ground.
-    extent : tuple of float
-        Least and greatest x [m]; beyond, the values of the ends hold.
-    random : numpy.random.Generator
-        Source of the unevenness.
-    """
+    """Slope, height and soil factors at any point."""
 
     def __init__(
         self,
+        # ``slope_position``, ``slope_angle``: (k,) knots of the slope along x [m], [rad], positive
+        # uphill; linear between
         slope_position: FloatArray,
         slope_angle: FloatArray,
-        side_slope: float,
-        patches: list[Patch],
-        border: float,
+        side_slope: float,  # slope along y [rad], positive when the left side is higher
+        patches: list[Patch],  # later ones lie over earlier ones
+        border: float,  # length over which the soil changes at the border of a patch [m]
+        # Factors of the whole ground (the error of the nominal soil)
         base_factors: dict[str, float],
+        # ``undulation``, ``undulation_length``: standard deviation [rad] and correlation length [m]
+        # of the slope's unevenness
         undulation: float,
         undulation_length: float,
+        # ``patchiness``, ``patchiness_length``: standard deviation of the logarithm and correlation
+        # length [m] of the stiffness, drawn for the left and the right half of the ground
         patchiness: float,
         patchiness_length: float,
+        # Least and greatest x [m]; beyond, the values of the ends hold
         extent: tuple[float, float],
-        random: np.random.Generator,
+        random: np.random.Generator,  # source of the unevenness
     ) -> None:
         self._x = np.arange(extent[0], extent[1] + GRID, GRID)
         slope = np.interp(self._x, slope_position, slope_angle)

@@ -68,25 +68,14 @@ class ConditionedInputs(NamedTuple):
 
 
 class ConditionedForces:
-    """Torque and pull given slip, sinkage and load.
-
-    Parameters
-    ----------
-    wheel : Wheel
-        Floats, or (n,) arrays for n wheels.
-    soil : Soil
-        Floats; cohesion, friction and K are given anew with each call.
-    effects : mapping
-        Switched-on effects.
-    slip_radius : str
-        ``lug_tip`` or ``rim``: radius of the rim speed in speed ratios.
-    """
+    """Torque and pull given slip, sinkage and load."""
 
     def __init__(
         self,
-        wheel: Wheel,
-        soil: Soil,
-        effects: EffectSettings | None = None,
+        wheel: Wheel,  # floats, or (n,) arrays for n wheels
+        soil: Soil,  # floats; cohesion, friction and K are given anew with each call
+        effects: EffectSettings | None = None,  # switched-on effects
+        # ``lug_tip`` or ``rim``: radius of the rim speed in speed ratios
         slip_radius: str = 'lug_tip',
         gravity: float = STANDARD_GRAVITY,
     ) -> None:

@@ -37,28 +37,19 @@ class ContactLaw(Protocol):
 
 def contact_law(
     name: str,
-    soil: Soil,
+    soil: Soil,  # floats
+    # Switched-on effects, a ``learned_closure`` among them; ``resistive_force`` has none
     effects: EffectSettings,
+    # Width at which the laws have the same pressure [m]: where ``wong_reece`` takes over Bekker's
+    # moduli, and of the plate that ``resistive_force`` takes its scale from
     width: float,
     *,
-    gravity: float = STANDARD_GRAVITY,
+    gravity: float = STANDARD_GRAVITY,  # at which the soil's numbers hold [m/s^2]
     strict: bool = True,
 ) -> ContactLaw:
     """Return a law for the soil as configured.
 
     Raises ValueError for an unknown name.
-
-    Parameters
-    ----------
-    soil : Soil
-        Floats.
-    effects : mapping
-        Switched-on effects, a ``learned_closure`` among them; ``resistive_force`` has none.
-    width : float
-        Width at which the laws have the same pressure [m]: where ``wong_reece`` takes over Bekker's
-        moduli, and of the plate that ``resistive_force`` takes its scale from.
-    gravity : float
-        At which the soil's numbers hold [m/s^2].
     """
     if name == BEKKER_WONG_JANOSI:
         return WheelSoilModel(soil, effects, 'closed_form', strict=strict)

@@ -38,21 +38,11 @@ def digging_per_turn(wheel: Wheel, efficiency: float = DIGGING_EFFICIENCY) -> Qu
 
 
 def digging_rate(
-    slip: Quantity,
-    wheel: Wheel,
-    angular_velocity: Quantity,
+    slip: Quantity,  # slip ratio, positive when driving; a braking wheel does not dig itself in
+    wheel: Wheel,  # its radius and lugs count
+    angular_velocity: Quantity,  # [rad/s], either sign
     efficiency: float = DIGGING_EFFICIENCY,
 ) -> Quantity:
-    """Rate at which a driving wheel digs itself in, beyond its steady sinkage [m/s].
-
-    Parameters
-    ----------
-    slip : float or array_like
-        Slip ratio, positive when driving; a braking wheel does not dig itself in.
-    wheel : Wheel
-        Its radius and lugs count.
-    angular_velocity : float or array_like
-        [rad/s], either sign.
-    """
+    """Rate at which a driving wheel digs itself in, beyond its steady sinkage [m/s]."""
     turns = np.abs(angular_velocity) / (2.0 * np.pi)
     return digging_per_turn(wheel, efficiency) * turns * digging_share(slip)

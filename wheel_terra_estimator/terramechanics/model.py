@@ -61,31 +61,22 @@ class SteadyState:
 
 
 class WheelSoilModel:
-    """Steady wheel-soil contact with a set of effects.
-
-    Parameters
-    ----------
-    effects : mapping
-        Effect name -> parameter -> value, and ``form``; only switched-on effects; what is missing
-        takes its default. ``model.effects`` has them by variant (``effects.by_variant``).
-    method : str
-        ``quadrature``, ``closed_form`` (branch moments, for on-board use) or ``triangles`` (the
-        linearised stresses of the literature, for comparison).
-    strict : bool
-        True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
-        at a sinkage of one radius and flagged.
-    nodes : int
-        Quadrature nodes on each side of the peak stress.
-    """
+    """Steady wheel-soil contact with a set of effects."""
 
     def __init__(
         self,
         soil: Soil,
+        # Effect name -> parameter -> value, and ``form``; only switched-on effects; what is missing
+        # takes its default. ``model.effects`` has them by variant (``effects.by_variant``).
         effects: EffectSettings | None = None,
+        # ``quadrature``, ``closed_form`` (branch moments, for on-board use) or ``triangles`` (the
+        # linearised stresses of the literature, for comparison)
         method: str = 'quadrature',
         *,
+        # True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
+        # at a sinkage of one radius and flagged
         strict: bool = True,
-        nodes: int = quadrature.NODES,
+        nodes: int = quadrature.NODES,  # quadrature nodes on each side of the peak stress
     ) -> None:
         if method not in METHODS:
             raise ValueError(f'method is {method!r}; allowed is one of {METHODS}')

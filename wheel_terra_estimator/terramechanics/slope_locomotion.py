@@ -38,10 +38,13 @@ class RoverSlopeState:
 
 
 def rover_climb(
-    model: WheelSoilModel,
-    wheels: Wheel,
+    model: WheelSoilModel,  # without the effect that tilts the load: the balance is made here
+    wheels: Wheel,  # (n,) arrays, or floats for n equal wheels
+    # (N, n) load on each wheel on each slope, terrain normal, load transfer included [N]; or (n,)
+    # loads on level ground, which then fall with the cosine of the slope
     normal_loads: ArrayLike,
-    slopes: ArrayLike,
+    slopes: ArrayLike,  # (N,) positive uphill [rad]
+    # (n,) 1 for a wheel on virgin soil, 2 for the next one in its track, and so on
     pass_numbers: ArrayLike = 1.0,
     slip_radius: str = 'lug_tip',
     gravity: float = STANDARD_GRAVITY,
@@ -51,20 +54,6 @@ def rover_climb(
     All rims run at one speed and the wheels share the rover's ground speed, so they share the slip
     ratio; what each gives follows from its own load and from how often its track was run over.
     Raises ValueError if ``slope_gravity`` is on, or shapes do not fit.
-
-    Parameters
-    ----------
-    model : WheelSoilModel
-        Without the effect that tilts the load: the balance is made here.
-    wheels : Wheel
-        (n,) arrays, or floats for n equal wheels.
-    normal_loads : array_like
-        (N, n) load on each wheel on each slope, terrain normal, load transfer included [N]; or (n,)
-        loads on level ground, which then fall with the cosine of the slope.
-    slopes : array_like
-        (N,) positive uphill [rad].
-    pass_numbers : array_like
-        (n,) 1 for a wheel on virgin soil, 2 for the next one in its track, and so on.
     """
     if 'slope_gravity' in model.effects:
         raise ValueError('effects.slope_gravity is on; the balance is made here: leave it off')

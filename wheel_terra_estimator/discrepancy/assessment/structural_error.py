@@ -56,10 +56,10 @@ class StructuralError:
 
 def structural_error(
     problem: Problem,
-    inputs: FloatArray,
+    inputs: FloatArray,  # (N, d) inputs of the rows, each scaled to a range of 1
     fitted: Fit,
-    floors: Sequence[Floor],
-    rows: int,
+    floors: Sequence[Floor],  # amplitudes that are possible, with their prior probabilities
+    rows: int,  # number of rows wanted; the rows of a reference table stand behind them
     *,
     beyond_law: bool = False,
 ) -> StructuralError | None:
@@ -68,15 +68,6 @@ def structural_error(
     In the rotated cells of `problem` covariances are diagonal: with the smooth variance s and the
     noise 1, the share s / (s + 1) of a residual is structural error, and its variance is the same.
     Returns None where the most probable amplitude is nothing.
-
-    Parameters
-    ----------
-    inputs : numpy.ndarray
-        (N, d) inputs of the rows, each scaled to a range of 1.
-    floors : sequence of Floor
-        Amplitudes that are possible, with their prior probabilities.
-    rows : int
-        Number of rows wanted; the rows of a reference table stand behind them.
     """
     own, (best, amplitude) = problem, _most_probable(problem, fitted.residual, floors)
     if not any(amplitude):

@@ -129,30 +129,18 @@ class DriveRows:
 
 
 def rows_from_bag(
-    path: str | Path,
-    configuration: Configuration,
-    remaps: Mapping[str, str] | None = None,
-    limits: Limits | None = None,
+    path: str | Path,  # folder, or a single ``.mcap`` or ``.db3``
+    configuration: Configuration,  # wheels, mass and load model
+    remaps: Mapping[str, str] | None = None,  # estimator's topic -> the bag's
+    limits: Limits | None = None,  # what of the recording is unpacked and held
     *,
+    # Whether the slip comes from the fixed-interval smoother in place of the references alone; it
+    # takes about 1.7 times as long as a replay
     smooth: bool = False,
 ) -> DriveRows:
     """Return the steady rows of a rosbag2.
 
     Raises UserError if the bag cannot be read, lacks a sensor, or holds no steady window.
-
-    Parameters
-    ----------
-    path : str or pathlib.Path
-        Folder, or a single ``.mcap`` or ``.db3``.
-    configuration : Configuration
-        Wheels, mass and load model.
-    remaps : mapping, optional
-        Estimator's topic -> the bag's.
-    limits : bags.salvage.limits.Limits, optional
-        What of the recording is unpacked and held.
-    smooth : bool
-        Whether the slip comes from the fixed-interval smoother in place of the references alone; it
-        takes about 1.7 times as long as a replay.
     """
     from wheel_terra_estimator.bags.reader import MeasurementReader
     from wheel_terra_estimator.bags.salvage.limits import LIMITS

@@ -180,23 +180,15 @@ class Forward:
         self,
         hypotheses: Sequence[Sequence[Coordinate]],
         u: Sequence[FloatArray],
-        start: FloatArray | None = None,
+        start: FloatArray | None = None,  # (B, N) or (N,) entrance angles near the solution [rad]
         jacobian: bool = True,
+        # Coordinates of each hypothesis by which to differentiate (default: all)
         by: Sequence[Sequence[int]] | None = None,
+        # (N, 4) outputs of all hypotheses where ``start`` is the solution: nothing is solved, and
+        # the derivatives by the angle are those of one of them
         known: FloatArray | None = None,
     ) -> State:
-        """Solve the load balance of every hypothesis; with Jacobians by u unless told otherwise.
-
-        Parameters
-        ----------
-        start : numpy.ndarray, optional
-            (B, N) or (N,) entrance angles near the solution [rad].
-        by : sequence, optional
-            Coordinates of each hypothesis by which to differentiate (default: all).
-        known : numpy.ndarray, optional
-            (N, 4) outputs of all hypotheses where ``start`` is the solution: nothing is solved, and
-            the derivatives by the angle are those of one of them.
-        """
+        """Solve the load balance of every hypothesis; with Jacobians by u unless told otherwise."""
         if by is None:
             by = [range(len(h)) for h in hypotheses]
         if start is not None:

@@ -131,28 +131,16 @@ def slip_features(inputs: FloatArray, slip: int | None) -> FloatArray:
 
 
 def build_problem(
+    # ``measured``, ``std``: (N, 4); nan = not measured
     measured: FloatArray,
     std: FloatArray,
-    inputs: FloatArray,
-    scale: FloatArray,
-    outliers: Sequence[tuple[int, int]] = (),
+    inputs: FloatArray,  # (N, d) inputs for the floor, scaled to a range of 1
+    scale: FloatArray,  # (4,) range of each quantity
+    outliers: Sequence[tuple[int, int]] = (),  # cells rejected
+    # Errors of inputs (slip, leaving angle), common to the quantities of a row
     common: Sequence[CommonError] = (),
 ) -> Problem:
-    """Return the problem of an (N, 4) table.
-
-    Parameters
-    ----------
-    measured, std : numpy.ndarray
-        (N, 4); nan = not measured.
-    inputs : numpy.ndarray
-        (N, d) inputs for the floor, scaled to a range of 1.
-    scale : numpy.ndarray
-        (4,) range of each quantity.
-    outliers : sequence of (row, quantity)
-        Cells rejected.
-    common : sequence of CommonError
-        Errors of inputs (slip, leaving angle), common to the quantities of a row.
-    """
+    """Return the problem of an (N, 4) table."""
     row, quantity = np.nonzero(np.isfinite(measured))
     deviation = std[row, quantity].copy()
     apart = np.zeros(len(row), dtype=bool)

@@ -88,27 +88,17 @@ _LEVEL_INPUTS = (
 
 
 def propose(
-    table: SteadyTable,
+    table: SteadyTable,  # the rows under diagnosis (a reference not among them)
     findings: Findings,
+    # As reported: ``before``, ``noise`` and the range of each quantity are taken from it
     gap: Mapping[str, QuantityGap],
-    variance: FloatArray,
+    variance: FloatArray,  # (m,) of the rotated axes, for the predictions of what was left out
     *,
+    # Hold the soil where it can be believed, in the refit as well: where only another soil leaves
+    # no gap, the law has to do without it, or is none
     hold_soil: bool = False,
 ) -> Proposal | None:
-    """Return the law that the rows ask for; None where none predicts what was left out.
-
-    Parameters
-    ----------
-    table : SteadyTable
-        The rows under diagnosis (a reference not among them).
-    gap : mapping
-        As reported: ``before``, ``noise`` and the range of each quantity are taken from it.
-    variance : numpy.ndarray
-        (m,) of the rotated axes, for the predictions of what was left out.
-    hold_soil : bool
-        Hold the soil where it can be believed, in the refit as well: where only another soil leaves
-        no gap, the law has to do without it, or is none.
-    """
+    """Return the law that the rows ask for; None where none predicts what was left out."""
     # A large smooth error would take up what the law is to say.
     floors = tuple(floor for floor in findings.setting.floors if floor.largest <= _SMALL_FLOOR)
     setting = replace(findings.setting, effects=_terms(table), floors=floors)

@@ -56,23 +56,14 @@ class Verdict:
 
 def choose(
     selection: Selection,
-    variance_of: Variance,
+    variance_of: Variance,  # (amplitude, noise factor) -> (m,) variances of the rotated axes
     *,
+    # Unseen rows are off by more than noise and the allowed model error: then a floor is no reason
+    # to ask a name for higher odds, and nothing "agrees"
     off: bool = False,
-    excluded: Collection[int] = (),
+    excluded: Collection[int] = (),  # explanations that may not be named: they are too doubtful
 ) -> Verdict:
-    """Return the verdict on a selection.
-
-    Parameters
-    ----------
-    variance_of : callable
-        (amplitude, noise factor) -> (m,) variances of the rotated axes.
-    off : bool
-        Unseen rows are off by more than noise and the allowed model error: then a floor is no
-        reason to ask a name for higher odds, and nothing "agrees".
-    excluded : collection of int
-        Explanations that may not be named: they are too doubtful.
-    """
+    """Return the verdict on a selection."""
     joint, unexplained = selection.log_joint, selection.unexplained
     total = np.asarray(log_sum(joint, axis=1))
     nothing = selection.nothing
