@@ -4,16 +4,16 @@
 
 Every command that writes, and the node, uses this module. A folder::
 
-    check_folder(arguments.output, arguments.overwrite, inputs=[arguments.bag])  # before computing
+    check_folder(arguments.output, arguments.overwrite)  # before computing
     ...
-    with new_folder(arguments.output, arguments.overwrite, inputs=[arguments.bag]) as folder:
+    with new_folder(arguments.output, arguments.overwrite) as folder:
         (folder / 'report.json').write_text(...)  # `folder` is empty and lies beside the place
 
 When the block ends, everything in ``folder`` is listed in its marker (``.wheel-terra.json``) and
 the folder is renamed to its place; after an error nothing is left and an earlier output stands
 as it was. A file::
 
-    check_file(arguments.report, arguments.overwrite, inputs=[arguments.bag])
+    check_file(arguments.report, arguments.overwrite)
     ...
     with new_file(arguments.report, arguments.overwrite) as path:
         path.write_text(...)
@@ -302,9 +302,14 @@ def facts_of(folder: Path, only_whole: bool = False) -> dict[str, Any]:
 
 def remove_leftovers(folder: Path, name: str) -> None:
     """Remove what a killed run left of ``folder/name`` beside its place."""
-    for left in folder.glob(f'.{glob.escape(name)}.wheel-terra-*'):
-        if left.is_dir() and not left.is_symlink():
-            shutil.rmtree(left, ignore_errors=True)
+    for left in _left_behind(folder / name):
+        shutil.rmtree(left, ignore_errors=True)
+
+
+def _left_behind(path: Path) -> list[Path]:
+    """Return the hidden folders beside ``path`` in which a run was writing it."""
+    found = path.parent.glob(f'.{glob.escape(path.name)}.wheel-terra-*')
+    return [place for place in found if place.is_dir() and not place.is_symlink()]
 
 
 def is_ours(folder: Path) -> bool:
@@ -367,12 +372,11 @@ def _refuse_place(path: Path, inputs: Iterable[Path]) -> None:
 
 def _remove_left_behind(path: Path) -> None:
     """Remove the hidden folders of earlier runs that were killed while they wrote ``path``."""
-    for found in path.parent.glob(f'.{glob.escape(path.name)}.wheel-terra-*'):
-        if found.is_dir() and not found.is_symlink():
-            held = _hold(found)
-            if held is not None:
-                shutil.rmtree(found, ignore_errors=True)
-                os.close(held)
+    for found in _left_behind(path):
+        held = _hold(found)
+        if held is not None:
+            shutil.rmtree(found, ignore_errors=True)
+            os.close(held)
 
 
 def _hold(folder: Path) -> int | None:

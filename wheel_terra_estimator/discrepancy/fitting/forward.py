@@ -54,47 +54,33 @@ class State:
     angle_slope: list[FloatArray]
 
 
+@dataclass(eq=False)
 class Forward:
     """Contact model of N operating points as a function of free coordinates."""
 
-    def __init__(
-        self,
-        points: OperatingPoints,
-        soil: Soil,
-        base_effects: Mapping[str, Mapping[str, float]],
-        catalogue: Mapping[str, Effect],
-        nodes: int = NODES,
-        active: BoolArray | None = None,
-        readings: Readings | None = None,
-    ) -> None:
-        self.points = points
-        self.soil = soil
-        self.base_effects = by_variant(base_effects)
-        self.catalogue = catalogue
-        self.nodes = nodes
-        self.active = active
-        self.readings = readings
-        measured = np.asarray(points.leaving_angle, dtype=float)
+    points: OperatingPoints
+    soil: Soil
+    base_effects: Mapping[str, Mapping[str, float]]
+    catalogue: Mapping[str, Effect]
+    nodes: int = NODES
+    active: BoolArray | None = None
+    readings: Readings | None = None
+
+    def __post_init__(self) -> None:
+        self.base_effects = by_variant(self.base_effects)
+        measured = np.asarray(self.points.leaving_angle, dtype=float)
         self._leaving_angle = None if np.isnan(measured).all() else measured
 
     def at(self, points: OperatingPoints, other_rows: bool = False) -> Forward:
         """Return the same model at other points; ``other_rows`` are none of the table's."""
-        return Forward(
-            points,
-            self.soil,
-            self.base_effects,
-            self.catalogue,
-            self.nodes,
-            None if other_rows else self.active,
-            None if other_rows else self.readings,
-        )
+        if other_rows:
+            return replace(self, points=points, active=None, readings=None)
+        return replace(self, points=points)
 
     def without(self, name: str) -> Forward:
         """Return the same model with an effect switched off, whichever its form."""
         rest = {key: v for key, v in self.base_effects.items() if effect_of(key) != name}
-        return Forward(
-            self.points, self.soil, rest, self.catalogue, self.nodes, self.active, self.readings
-        )
+        return replace(self, base_effects=rest)
 
     def _contact(
         self, hypotheses: Sequence[Sequence[Coordinate]], columns: Sequence[Mapping[str, float]]
