@@ -21,42 +21,22 @@ class Soil:
     """Soil parameters as the model without any effect uses them.
 
     Every number is a float, or an array that broadcasts against the operating points.
-
-    Attributes
-    ----------
-    cohesive_modulus : float or numpy.ndarray
-        kc [N/m^(n+1)] in p = (kc/b + kphi) z^n (Bekker); kc' [-] in
-        p = (c kc' + density g b kphi') (z/b)^n (Reece).
-    frictional_modulus : float or numpy.ndarray
-        kphi [N/m^(n+2)] (Bekker) or kphi' [-] (Reece).
-    sinkage_exponent : float or numpy.ndarray
-        n0 [-].
-    cohesion : float or numpy.ndarray
-        c [Pa].
-    friction_angle : float or numpy.ndarray
-        phi [rad].
-    shear_modulus : float or numpy.ndarray
-        K, shear deformation modulus of Janosi and Hanamoto [m].
-    peak_stress_ratio : float or numpy.ndarray
-        c1 = angle of greatest stress over entrance angle at zero slip [-].
-    leaving_angle_ratio : float or numpy.ndarray
-        c3 = leaving angle over entrance angle [-], zero or negative.
-    density : float or numpy.ndarray
-        Bulk density [kg/m^3].
-    pressure_law : str
-        ``bekker`` or ``reece``; says how the two moduli are read.
     """
 
+    # kc [N/m^(n+1)] in p = (kc/b + kphi) z^n (Bekker); kc' [-] in p = (c kc' + density g b kphi')
+    # (z/b)^n (Reece)
     cohesive_modulus: Quantity
-    frictional_modulus: Quantity
-    sinkage_exponent: Quantity
-    cohesion: Quantity
-    friction_angle: Quantity
-    shear_modulus: Quantity
+    frictional_modulus: Quantity  # kphi [N/m^(n+2)] (Bekker) or kphi' [-] (Reece)
+    sinkage_exponent: Quantity  # n0 [-]
+    cohesion: Quantity  # c [Pa]
+    friction_angle: Quantity  # phi [rad]
+    shear_modulus: Quantity  # K, shear deformation modulus of Janosi and Hanamoto [m]
+    # c1 = angle of greatest stress over entrance angle at zero slip [-]
     peak_stress_ratio: Quantity = 0.4
+    # c3 = leaving angle over entrance angle [-], zero or negative
     leaving_angle_ratio: Quantity = 0.0
-    density: Quantity = 1600.0
-    pressure_law: str = 'bekker'
+    density: Quantity = 1600.0  # bulk density [kg/m^3]
+    pressure_law: str = 'bekker'  # ``bekker`` or ``reece``; says how the two moduli are read
 
     def __post_init__(self) -> None:
         if self.pressure_law not in PRESSURE_LAWS:
