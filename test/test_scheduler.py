@@ -9,6 +9,7 @@ import socket
 import time
 from pathlib import Path
 from threading import Thread
+from types import SimpleNamespace
 
 import pytest
 
@@ -79,6 +80,21 @@ def test_a_cluster_without_workers_is_said_and_given_up(monkeypatch, capsys):
         list(finished(root, [1.0, 4.0], address=cluster.scheduler_address))
     said = capsys.readouterr().err
     assert said.count(f'start one with: dask worker {cluster.scheduler_address}') == 1
+
+
+def test_workers_are_waited_for_from_when_the_last_one_went(monkeypatch, capsys):
+    now, workers = [50.0], {}
+    client = SimpleNamespace(sync=lambda *_, **__: workers, scheduler=SimpleNamespace(ncores=None))
+    monkeypatch.setattr(scheduler.time, 'monotonic', lambda: now[0])
+    watch = scheduler._ClusterWatch(client, 'tcp://here:1')
+    for seconds, there in ((0.0, 0), (0.9, 0), (1.8, 2), (2.7, 0), (3.6, 0)):
+        now[0] = 50.0 + seconds * scheduler.WORKER_TIMEOUT
+        workers = {'one': there} if there else {}
+        watch.look(1, 3)
+    assert capsys.readouterr().err.count('has no workers') == 2
+    now[0] = 50.0 + 3.8 * scheduler.WORKER_TIMEOUT
+    with pytest.raises(UserError, match=r'tcp://here:1: it has no workers.* 1 of 3 tasks are done'):
+        watch.look(1, 3)
 
 
 def test_an_empty_address_is_refused(capsys):

@@ -52,6 +52,17 @@ def test_reading_it_back_gives_the_measurements(bag_path, drive):
             np.testing.assert_array_equal(a.torque, b.torque)
 
 
+def test_variances_of_the_imu_are_those_of_its_sensors(bag_path, drive):
+    unpack, sensors = topic_messages(INPUT_TYPES['imu/data']).unpack, drive.configuration.sensors
+    with open_bag(bag_path) as bag:
+        message = unpack(next(iter(bag.messages(('/imu/data',))))[2])
+    for name in ('orientation', 'angular_rate', 'specific_force'):
+        field = {'angular_rate': 'angular_velocity', 'specific_force': 'linear_acceleration'}
+        stated = getattr(message, f'{field.get(name, name)}_covariance')
+        wanted = getattr(sensors, f'{name}_std') ** 2 * np.eye(3)
+        np.testing.assert_allclose(np.reshape(stated, (3, 3)), wanted, err_msg=name)
+
+
 def test_truth_in_the_bag_is_that_of_the_drive(bag_path, drive):
     with open_bag(bag_path) as bag:
         truth = read_truth(bag, {}, drive.configuration)

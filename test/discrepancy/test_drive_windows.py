@@ -12,7 +12,7 @@ import pytest
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.drives import windows
-from wheel_terra_estimator.discrepancy.drives.series import SpeedSmoother, collect
+from wheel_terra_estimator.discrepancy.drives.series import Channel, SpeedSmoother, collect
 from wheel_terra_estimator.discrepancy.drives.windows import (
     GOOD,
     SMOOTHED,
@@ -406,6 +406,12 @@ def test_two_readings_of_each_sensor_are_a_drive_and_one_is_none():
         first = next(m for m in drive if isinstance(m, kind))
         with pytest.raises(UserError, match=topic):
             collect([m for m in drive if m is not first], 4, 'a drive')
+    # Two of four references state a variance: their errors are apart, the smoother's are one.
+    values = np.array([[0.1, 4e-4], [0.1, 0.0], [0.1, 4e-4], [0.1, np.nan]])
+    stated = replace(found, reference=Channel(np.arange(4.0), values))
+    assert stated.speed_std(0.0, 9.0) == pytest.approx(0.02 / np.sqrt(2.0))
+    assert replace(stated, smoothed=stated.reference).speed_std(0.0, 9.0) == pytest.approx(0.02)
+    assert stated.speed_std(1.0, 2.0) == 0.0
 
 
 @pytest.mark.parametrize(

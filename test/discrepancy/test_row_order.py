@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from test_workflow import make, run
 
+from wheel_terra_estimator.discrepancy.assessment import order
 from wheel_terra_estimator.discrepancy.assessment.order import changes_along_rows
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
@@ -39,6 +40,16 @@ def test_a_reading_that_drifts_is_found_and_says_along_what():
     assert (change.column, change.quantity) == ('row_order', 'drawbar_pull')
     assert change.p_value < 0.01
     assert 'drawbar pull change along row order' in change.text
+    # Two quantities along two columns are four chances to be wrong.
+    rng, _ = columns(40, 7)
+    more = {'torque': rng.normal(20.0, 1.0, 40), 'trial': rng.permutation(np.arange(40.0) % 4)}
+    (same,) = changes(values | more)
+    assert same.p_value == pytest.approx(4.0 * change.p_value)
+
+
+def test_the_share_between_groups_is_that_of_an_analysis_of_variance():
+    residuals, key = np.array([[0.0, 2.0, 3.0, 5.0]]) - 1.0, np.array([4.0, 4.0, 7.0, 7.0])
+    assert order._between(residuals, key) == pytest.approx([1.0 - 4.0 / 13.0])
 
 
 def test_an_order_that_is_that_of_the_slips_says_nothing():

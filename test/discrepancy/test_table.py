@@ -105,6 +105,9 @@ def test_capitals_units_and_semicolons_are_read_with_a_note(tmp_path):
     np.testing.assert_allclose(found.measured, plain.measured, rtol=1e-5)
     np.testing.assert_allclose(found.columns['slip'], plain.columns['slip'], rtol=1e-5)
     assert any("';'" in note for note in found.notes)
+    stated = read_table(write(tmp_path, 'sep=;\n' + header + '\n' + '\n'.join(body)))
+    np.testing.assert_array_equal(stated.measured, found.measured)
+    assert stated.lines[0] == found.lines[0] + 1
     assert any("'sinkage [mm]' as sinkage (times 0.001)" in note for note in found.notes)
 
 

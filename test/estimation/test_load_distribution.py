@@ -11,6 +11,7 @@ from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.simulation.suspension import suspension_of
 
 THREE = np.array([[1.0, 0.5], [1.0, -0.5], [-1.0, 0.0]])
+SIX = np.array([[x, y] for x in (0.6, 0.0, -0.6) for y in (0.4, -0.4)])
 
 
 def distribution(position=THREE, height=0.4, contact_height=0.0, suspension='rigid', **more):
@@ -67,7 +68,15 @@ def test_rocker_bogie_agrees_with_the_simulators_statics():
         assert ours.loads(force, pull, moment) == pytest.approx(expected, rel=1e-6)
 
 
-def test_rocker_bogie_needs_three_wheels_a_side():
-    pivots = {'rocker_pivot': [0.0, 0.3], 'bogie_pivot': [0.0, 0.2]}
-    with pytest.raises(ValueError, match='three wheels'):
-        distribution(suspension='rocker_bogie', **pivots)
+@pytest.mark.parametrize(
+    ('position', 'bogie', 'words'),
+    [
+        (THREE, 0.0, 'three wheels'),
+        (SIX, 0.1, 'between the bogie wheels'),
+        (SIX, -0.7, 'between the bogie wheels'),
+    ],
+)
+def test_a_rocker_bogie_that_cannot_be_is_refused(position, bogie, words):
+    pivots = {'rocker_pivot': [0.1, 0.3], 'bogie_pivot': [bogie, 0.2]}
+    with pytest.raises(ValueError, match=words):
+        distribution(position, suspension='rocker_bogie', bogie_wheels='rear', **pivots)

@@ -55,3 +55,6 @@ def test_intersected_variance_covers_any_correlation(correlation):
     error = weight * one + (1.0 - weight) * other
     stated = intersected(SpeedAndVariance(0.0, 0.01), SpeedAndVariance(0.0, 0.09)).variance
     assert np.mean(error**2) <= 1.02 * stated
+    # The mean is that of inverse variances, as if the errors were apart.
+    both = intersected(SpeedAndVariance(0.2, 0.01), SpeedAndVariance(0.6, 0.09))
+    assert both.speed == pytest.approx((0.2 / 0.01 + 0.6 / 0.09) / (1 / 0.01 + 1 / 0.09))

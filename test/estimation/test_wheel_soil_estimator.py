@@ -206,17 +206,17 @@ def test_locked_wheels_that_slide_have_slip_minus_one():
 
 def test_wheel_without_load_is_found_by_its_torque_and_taken_back():
     run = drive(
-        duration=20.0,
+        duration=15.0,
         **{
             'slope.angle_deg': [5.0],
             'faults.kind': ['lifted'],
             'faults.wheel': ['front_left'],
-            'faults.start': [8.0],
-            'faults.end': [14.0],
+            'faults.start': [5.0],
+            'faults.end': [10.0],
         },
     )
     sets, truth = estimate(run), run.truth
-    lifted, after = slice(105, 135), slice(165, 195)
+    lifted, after = slice(70, 95), slice(122, 145)
     for part in (lifted, after):
         load = np.mean([s.normal_load for s in sets[part]], axis=0)
         assert load == pytest.approx(truth.normal_load[part].mean(axis=0), abs=25.0)

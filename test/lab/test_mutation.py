@@ -22,6 +22,7 @@ def test_half(sound):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('asked', 'fixture', 'file', 'said'),
     [
@@ -29,8 +30,8 @@ def test_half(sound):
         ('HALF > 0.0', 'True', 'test_half.py', 'survived'),
         ('True', 'HALF == 0.5', 'test_half.py', 'error'),  # no test of its own failed
         # Fails without the mutant, too.
-        pytest.param('HALF == 0.7', 'True', 'test_half.py', 'error', marks=pytest.mark.slow),
-        pytest.param('True', 'True', 'test_gone.py', 'error', marks=pytest.mark.slow),
+        ('HALF == 0.7', 'True', 'test_half.py', 'error'),
+        ('True', 'True', 'test_gone.py', 'error'),
     ],
 )
 def test_a_mutant_is_caught_by_a_test_that_fails_because_of_it(

@@ -32,10 +32,12 @@ def levels(statuses: Any) -> list[int]:
 
 
 def test_one_status_for_the_node_and_one_per_wheel_with_units_in_the_keys():
-    found = Diagnostics(NAMES, lambda: {'imu/data_received': 7}).due(at(0.0))
+    counters = {'imu/data_received': 7, 'below_N': -7.25, 'dust_s': -1e-14}
+    found = Diagnostics(NAMES, lambda: counters).due(at(0.0))
     assert [status.name.rpartition(': ')[2] for status in found] == ['estimator', 'left', 'right']
     assert all(status.hardware_id for status in found)
-    assert dict(found[0].values)['imu/data_received'] == '7'
+    told = dict(found[0].values)
+    assert [told[key] for key in counters] == ['7', '-7.25', '0']
     wheel = dict(found[1].values)
     assert {'stuck_probability', 'time_to_stuck_s', 'reason', 'drawbar_pull_N'} <= wheel.keys()
     assert wheel['reason'] == 'slip 0.10 +- 0.05'

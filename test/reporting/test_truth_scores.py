@@ -65,13 +65,19 @@ def test_lead_of_a_warning_and_one_that_was_wrong():
     assert calm.warnings[0][1].outcome is Outcome.FALSE and calm.entrapped is None
     assert 'did not pass' in as_lines(calm)[-1]
     assert '3.0 s before the rover was entrapped' in as_lines(errors)[-1]
+    unseen = truth_errors(history(true), truth(true), THRESHOLDS)
+    assert as_lines(unseen)[-1].endswith('no warning, though the rover was entrapped at 7.0 s')
+    nothing = truth_errors(history(0.0 * true), truth(0.0 * true), THRESHOLDS)
+    assert not any('warning' in line for line in as_lines(nothing))
 
 
 def test_a_set_is_stuck_while_a_warning_stands():
     over = StuckWarning(int(STAMP[20]), int(STAMP[30]), '')
     standing = StuckWarning(int(STAMP[90]), None, '')
-    found = history(np.zeros((100, 2)), warnings=(over, standing)).stuck
-    assert np.flatnonzero(found).tolist() == [*range(20, 30), *range(90, 100)]
+    found = history(np.zeros((100, 2)), warnings=(over, standing))
+    assert np.flatnonzero(found.stuck).tolist() == [*range(20, 30), *range(90, 100)]
+    assert found.seconds == pytest.approx(0.1 * np.arange(100))
+    assert found.warning_times == [(pytest.approx(2.0), pytest.approx(3.0)), (9.0, None)]
 
 
 def test_comparison():

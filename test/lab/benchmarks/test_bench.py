@@ -46,7 +46,8 @@ def test_the_ratio_is_the_median_of_the_pairs():
     assert figure.as_dict()['real_time_factor'] == 10.0
 
 
-@pytest.mark.parametrize('processes', [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize('processes', [False, True])
 def test_it_runs(capsys, monkeypatch, processes):
     started = []
     if not processes:

@@ -92,6 +92,7 @@ def climb():
     return drive_b.simulate('climb', 1001, 15.0)
 
 
+@pytest.mark.slow
 def test_forces_close_and_no_wheel_gives_energy(climb):
     t, rover = climb.truth, climb.draw.vehicle
     time = (t.stamp - sensing.START) * 1e-9
@@ -117,6 +118,7 @@ def test_steady_slip_grows_with_the_slope():
     assert np.all(np.diff(slopes) > 0.0)
 
 
+@pytest.mark.slow
 def test_drive_is_the_same_for_the_same_seed_and_measurements_are_of_the_rover(climb):
     again = drive_b.simulate('climb', 1001, 15.0)
     assert [a.arrival for a in again.arrivals] == [a.arrival for a in climb.arrivals]
@@ -153,6 +155,7 @@ def test_truth_knows_rest_and_classes():
     )
 
 
+@pytest.mark.slow
 def test_steered_wheels_roll_round_where_they_are_told():
     drive = drive_b.simulate('steered', 1002, 30.0)
     rover, t, c = drive.draw.vehicle, drive.truth, drive.course

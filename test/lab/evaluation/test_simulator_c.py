@@ -109,6 +109,7 @@ def test_forces_are_those_of_scipy_quad():
         assert forces.pull[i] == pytest.approx(pull, abs=0.02 * 80.0)
 
 
+@pytest.mark.slow
 def test_the_friction_circle_bounds_pull_and_side_force():
     ground, count = each(replace(PLAIN, cohesion=1e-3), 4), 4
     contacts = Contacts(wheels(count), EARTH)
@@ -121,6 +122,7 @@ def test_the_friction_circle_bounds_pull_and_side_force():
     assert np.all(np.hypot(forces.torque / 0.15, forces.side) < most)
 
 
+@pytest.mark.slow
 def test_a_spinning_wheel_digs_itself_in_and_loses_its_pull():
     soil = soils.draw_soil(np.random.default_rng(1))
     contacts = Contacts(wheels(3, lug=0.01), EARTH)
@@ -153,6 +155,7 @@ def straight(rover, share=1.0):
     return command
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('family', ['six_rocker', 'eight_skid'])
 def test_loads_at_rest_carry_the_weight_where_its_centre_is(family):
     rover, motion = rover_on(family, {})
@@ -165,9 +168,8 @@ def test_loads_at_rest_carry_the_weight_where_its_centre_is(family):
     assert loads @ rover.y / weight == pytest.approx(rover.centre[1] - lever[1], abs=0.01)
 
 
-@pytest.mark.parametrize(
-    'family', [pytest.param('four_skid', marks=pytest.mark.slow), 'six_rocker']
-)
+@pytest.mark.slow
+@pytest.mark.parametrize('family', ['four_skid', 'six_rocker'])
 def test_the_pull_in_a_steady_climb_is_the_weight_along_the_slope(family):
     tangent = 0.15
     rover, motion = rover_on(family, {'slope': tangent, 'slope_start': -50.0})
@@ -182,6 +184,7 @@ def test_the_pull_in_a_steady_climb_is_the_weight_along_the_slope(family):
     assert rim_power[late].sum(axis=1).mean() > needed * course.velocity[late, 0].mean()
 
 
+@pytest.mark.slow
 def test_free_rolling_on_hard_ground_has_no_slip():
     rover, motion = rover_on('four_tyres', {'hard': True})
     course = drive(motion, straight(rover), 8.0)
@@ -202,6 +205,7 @@ def test_a_border_at_an_angle_is_met_by_one_wheel_after_the_other():
     assert np.diff(np.sort(first)).min() > 0.01
 
 
+@pytest.mark.slow
 def test_a_later_wheel_runs_in_the_rut_of_the_first():
     rover, motion = rover_on('six_rocker', {})
     drive(motion, straight(rover), 8.0)
@@ -213,16 +217,12 @@ def test_a_later_wheel_runs_in_the_rut_of_the_first():
 BEND, SPIN = Phase(6.5, 1.0, 0.3), Phase(6.5, 0.0, 0.0, 0.8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('family', 'turn'),
-    [('four_skid', SPIN), ('six_rocker', BEND)]
-    + [
-        pytest.param(family, turn, marks=pytest.mark.slow)
-        for turn, families in (
-            (BEND, ('four_front', 'four_skid', 'four_all')),
-            (SPIN, ('four_all', 'six_rocker')),
-        )
-        for family in families
+    [
+        *((family, BEND) for family in ('four_front', 'four_skid', 'four_all', 'six_rocker')),
+        *((family, SPIN) for family in ('four_skid', 'four_all', 'six_rocker')),
     ],
 )
 def test_positive_turns_go_to_the_left(family, turn):
@@ -250,6 +250,7 @@ def firm():
         return simulator.simulate('firm', 1)
 
 
+@pytest.mark.slow
 def test_a_drive_is_the_same_for_the_same_seed(firm, monkeypatch):
     driven = simulator._driven('firm', FIRM, 1)
     assert np.array_equal(firm.course.rate, driven[2].rate)
@@ -287,6 +288,7 @@ def entrapments_of(drive):
     return entrapments(drive.truth.stamp * 1e-9, drive.truth.slip)
 
 
+@pytest.mark.slow
 def test_firm_ground_slips_little(firm):
     check(firm)
     moving = np.abs(firm.truth.wheel_rate * firm.configuration.wheels.slip_radius) > 0.02

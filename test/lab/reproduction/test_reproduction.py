@@ -60,6 +60,7 @@ def test_one_figure_alone_and_one_that_is_not_there(tmp_path, capsys, undrawn):
     assert main(['reproduce', 'guo', '--run', '-o', str(tmp_path / 'c')]) == 2
 
 
+@pytest.mark.slow
 def test_known_misses_are_told_and_other_rows_change_the_verdict():
     missed = [s.what for s in ding.statements(0) if s.holds is False]
     assert len(missed) == 3 and any('h = 15 mm' in what for what in missed)
@@ -76,6 +77,7 @@ def test_known_misses_are_told_and_other_rows_change_the_verdict():
     assert {s.place for s in figures} == {'figure 13(a)', 'figure 13(b)'}
 
 
+@pytest.mark.slow
 def test_runs_of_this_command_write_the_statements_of_the_rows_that_are_there(
     tmp_path, monkeypatch, undrawn
 ):

@@ -71,6 +71,7 @@ def run_discs(tmp_path, *setups):
     return [json.loads((folder / 'found.json').read_text()) for folder in folders]
 
 
+@pytest.mark.slow
 def test_force_between_two_discs_is_the_papers_law_up_to_friction(tmp_path):
     mass, overlap, approach, spin = 1e-3, 1e-5, 0.02, 3.0
     case = files.load(['published', 'wheel_2'])
@@ -108,6 +109,7 @@ def test_force_between_two_discs_is_the_papers_law_up_to_friction(tmp_path):
     assert abs(last[1]) == pytest.approx(0.3 * abs(last[0]), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('ratio', [0.05, 1.0])
 def test_engine_grows_beyond_the_largest_time_step(tmp_path, ratio):
     # A disc on one fixed disc of the floor is a single mode: K / m, C / m.

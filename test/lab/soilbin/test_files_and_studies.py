@@ -126,6 +126,7 @@ def test_a_changed_case_is_run_again():
     assert one.key == renamed.key
 
 
+@pytest.mark.slow
 def test_reproduction_covers_the_papers_tables():
     arguments = argparse.Namespace(part=None, seeds=3, grain_scale=0.0)
     found = reproduction.jobs(arguments)

@@ -52,6 +52,7 @@ def test_the_diagnosis_reads_nothing_but_table_and_rig(tmp_path):
     assert outcome.hidden == 'none'
 
 
+@pytest.mark.slow
 def test_the_same_seed_draws_the_same_and_lots_cover_all_kinds():
     first, again = trial.draw(8, None), trial.draw(8, None)
     assert first.hidden == again.hidden
@@ -73,6 +74,7 @@ def test_the_shipped_trial_is_sealed_and_a_draw_of_its_seed(tmp_path):
     np.testing.assert_allclose(*tables, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_score_over_many_has_an_interval(tmp_path, capsys):
     assert run(tmp_path / 'many', '--seed', 20, '--many', 2, '--effect', 'none') == 0
     said = capsys.readouterr().out
