@@ -95,6 +95,20 @@ def test_no_check_fails(any_recording, with_rover):
         assert 'nan' not in finding.words.split()
 
 
+@pytest.mark.parametrize('value', [np.nan, 0.0, np.inf])
+@pytest.mark.parametrize(
+    ('channel', 'field'),
+    [('joints', 'rate'), ('joints', 'torque'), ('imu', 'force'), ('imu', 'orientation')],
+)
+def test_no_check_fails_where_one_wheel_or_axis_tells_nothing(channel, field, value):
+    told = getattr(WHOLE, channel)
+    dead = getattr(told, field).copy()
+    dead[:, 0] = value
+    changed = replace(WHOLE, **{channel: replace(told, **{field: dead})})
+    report = check_recording(changed, CONFIGURATION)
+    assert not [entry for entry in report.not_checked if entry.reason == INTERNAL_ERROR]
+
+
 @pytest.fixture(scope='module')
 def one_backwards():
     """A short drive with one wheel that counts backwards: the only finding."""

@@ -253,6 +253,11 @@ def test_torque_scale_is_a_gain_or_a_mass():
 def test_torque_sign_of_one_wheel():
     torque = WHOLE.joints.torque * [1.0, -1.0, 1.0, 1.0]
     only(checked(joints=replace(WHOLE.joints, torque=torque)), 'sign', 'front_right')
+    torque = WHOLE.joints.torque * [1.0, np.nan, 1.0, 1.0]  # without it nobody knows the sum
+    report = checked(joints=replace(WHOLE.joints, torque=1.5 * torque))
+    assert not report.findings
+    untold = {o.kind for o in report.not_checked if 'a wheel without torque' in o.reason}
+    assert untold == {'gain', 'mass'}
 
 
 @pytest.mark.parametrize(('share', 'soft'), [(0.1, False), (0.2, True)])

@@ -173,7 +173,8 @@ def _up_by_orientation(state: ImuState) -> Judged:
     from scipy.spatial.transform import Rotation  # heavy
 
     imu = state.imu
-    known = np.flatnonzero(np.linalg.norm(np.nan_to_num(imu.orientation), axis=1) > 0.5)
+    norm = np.linalg.norm(imu.orientation, axis=1)
+    known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
     if known.size < LEAST_MESSAGES:
         return [], state
     some = known[np.linspace(0, known.size - 1, min(known.size, MOST_COMPARED)).astype(int)]
@@ -539,7 +540,7 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     evidence.figures['imu.tilt_roll_deg'] = round(math.degrees(tilt.roll.value), 3)
     evidence.figures['imu.tilt_pitch_deg'] = round(math.degrees(tilt.pitch.value), 3)
     evidence.figures['imu.tilt_std_deg'] = round(std, 3)
-    if tilt.std > EVEN_GROUND_STD:
+    if not tilt.std <= EVEN_GROUND_STD:  # nan: an axis without a number
         reason = 'the circles lie on uneven ground or on the edge of a slope; drive them on a plane'
         return [NotChecked('mounting', reason)], evidence
     size = math.hypot(tilt.roll.value, tilt.pitch.value)

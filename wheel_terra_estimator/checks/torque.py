@@ -118,7 +118,7 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     agree = all(answer.value * level.value > 0.0 for answer, level in told)
     wrong, unsure = [], []
     for i, (answer, level) in enumerate(told):
-        brakes = -level.value / level.std > SIGN_SIGMAS
+        brakes = -level.value > SIGN_SIGMAS * level.std
         clear = answer.sigmas_from(0.0) > SIGN_SIGMAS or (brakes and agree)
         if answer.value < -LEAST_ANSWER * usual and clear:
             wrong.append(i)
