@@ -15,6 +15,7 @@ from scipy.stats import chi2, kstest, multivariate_normal
 from wheel_terra_estimator.discrepancy.assessment import held_out
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.where import locate
+from wheel_terra_estimator.discrepancy.decision import _strength
 from wheel_terra_estimator.discrepancy.fitting import noise, outliers
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     EFFECT_SCALES,
@@ -383,6 +384,18 @@ def test_confidence_follows_what_speaks_for_a_name():
     # A structural error, a second effect and a remainder each leave several times the doubt.
     for change in ({'floor': 1.0}, {'two': 1.0}, {'remainder': 1.0}):
         assert 1.0 - of_name(**change) > 2.0 * (1.0 - of_name())
+
+
+def test_the_strength_of_a_name_is_how_far_it_is_from_doing_nothing():
+    coordinates = (
+        Coordinate('soil', 'cohesion', 200.0, 50.0),
+        Coordinate('lug_digging', 'kd', 1.0, 0.5, role='strength', neutral=0.0),
+        Coordinate('soil_mound', 'onset', 0.0, 1.0, role='strength'),
+        Coordinate('lug_digging', 'form', 0.0, 1.0, role='shape'),
+    )
+    fitted = SimpleNamespace(coordinates=coordinates, u=np.array([9.0, 1.0, 7.0, 8.0]))
+    for name, deviations_off in (('lug_digging', 3.0), ('soil_mound', 7.0), ('cohesion', 0.0)):
+        assert _strength(fitted, name) == pytest.approx(np.log1p(deviations_off))
 
 
 def test_chi_square_is_that_of_the_best_parameters(setting):
