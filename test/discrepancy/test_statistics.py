@@ -356,6 +356,9 @@ def test_repeats_give_the_noise():
     std, freedom = noise.repeats(table, 2)
     assert freedom == 32
     assert std == pytest.approx(0.05, rel=0.3)
+    wild = table.measured.copy()
+    wild[7, 2] += 5.0
+    assert noise.repeats(replace(table, measured=wild), 2)[0] < 1.6 * std
     found = noise.stated_noise(table, np.ones(len(QUANTITIES)))
     assert found.origin == {'torque': 'repeats'} and found.repeatability == {'torque': (std, 32)}
     for stated, notes in ((0.02, 1), (0.05, 0), (0.2, 1)):

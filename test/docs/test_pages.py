@@ -86,30 +86,6 @@ def test_no_source_that_readers_cannot_open(name):
         assert not re.search(words, text), f'{name}: {words}'
 
 
-DIARY = (
-    r'\b(in|on) (\w+ )?tuning (seeds|drives)\b',
-    r'\bTried(:| besides| and left out)',
-    r'\bfilter before\b',
-    r'\b\d{1,2} (Jan|Febr)uary|\b\d{1,2} (March|April|May|June|July|August)\b',
-    r'\b\d{1,2} (Septem|Octo|Novem|Decem)ber\b',
-    r'\b20\d\d-\d\d-\d\d\b',
-)
-"""Pages say what is so; what was tried stands in the conclusions of the studies."""
-STUDIES = 'laboratory/conclusions.md'
-
-
-@pytest.mark.parametrize('name', [name for name in NAMES if name != STUDIES])
-def test_pages_say_what_is_so(name):
-    text = text_without_code(DOCS / name)
-    for words in DIARY:
-        found = re.search(words, text)
-        assert not found, f'{name}: {text[max(found.start() - 60, 0) : found.end()]!r}'
-
-
-def test_the_conclusions_carry_no_date():
-    assert not re.search('|'.join(DIARY[-3:]), text_without_code(DOCS / STUDIES))
-
-
 def test_the_map_of_the_code_is_short_and_leads_to_files():
     text = (DOCS / 'architecture.md').read_text(encoding='utf-8')
     assert len(text.split()) <= 1500

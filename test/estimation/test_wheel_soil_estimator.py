@@ -163,6 +163,9 @@ def test_new_run_keeps_the_soil_only_when_asked(climb):
     start = estimator.estimates().soil
     estimate(climb, estimator=estimator)
     learned = estimator.estimates()
+    climbed = estimator._climb.state  # what the ground was seen to carry, and at which slip
+    assert climbed.demand == pytest.approx(np.sin(np.radians(8.0)), rel=0.1)
+    assert climbed.slip == pytest.approx(last(climb.truth.slip).mean(), abs=0.15)
     estimator.begin_run(learned.stamp + 10**9, keep_soil=True)
     kept = estimator.estimates()
     assert kept.soil == pytest.approx(learned.soil)

@@ -90,6 +90,7 @@ def test_written_in_its_place(tmp_path, monkeypatch):
     assert entries[0]['rows'] == readme_figures.table(rows())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not readme_figures.RESULTS.is_file(), reason='the study was not run yet')
 def test_the_pages_show_the_committed_results():
     with readme_figures.RESULTS.open(encoding='utf-8', newline='') as stream:
