@@ -177,6 +177,7 @@ def test_an_error_of_a_reading_that_was_an_effect_moves_to_the_sensors(tmp_path)
     assert error == pytest.approx(found.gap['torque'].fitted, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_friction_of_rows_that_turn_both_ways_stays_a_friction():
     table, values, *_ = make('full56', ('drivetrain_friction',), 2.0)
     back = np.arange(len(table['slip'])) % 2 == 1

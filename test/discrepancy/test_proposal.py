@@ -61,6 +61,7 @@ def test_the_law_is_found_and_said_in_words(speedy):
         assert quantities['torque'].law < quantities['torque'].refit
 
 
+@pytest.mark.slow
 def test_what_acts_only_where_two_things_meet_is_a_product():
     """Torque that grows with slip, the faster the more: one term, where single ones need three."""
     table, values, *_ = make('full56')

@@ -326,6 +326,7 @@ def test_a_soil_that_nobody_can_believe_is_no_agreement(unproposed):
     assert 'friction_angle' in ' '.join(diagnosis.notes)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_saturates_is_no_set_of_outliers(unproposed):
     table, values, *_ = make('sweep40')
     top = np.sort(table['torque'])[-4]
@@ -381,6 +382,7 @@ def test_reference_cancels_a_common_structural_error():
     assert diagnosis.gap['torque'].after < diagnosis.gap['torque'].refit
 
 
+@pytest.mark.slow
 def test_same_table_same_report_whatever_the_order_of_rows():
     table, values, *_ = make('basic16', ('bulldozing',), 2.0)
     first = run(table, values).to_dict()

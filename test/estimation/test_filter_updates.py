@@ -274,14 +274,16 @@ def test_a_wheel_far_from_the_configured_soil_is_believed_by_its_second_reading(
     assert found == [0.01, pytest.approx(0.1, abs=0.002)]
 
 
-def sinkage_predicted(parts, x, loads=None, angle=NAN, angle_std=0.0, reference_known=True):
+def sinkage_predicted(
+    parts, x, loads=None, angle=NAN, angle_std=0.0, reference_known=True, rims=FORWARD
+):
     """Return the prediction over a tenth of a second, and the travel."""
     prediction = Prediction.unchanged(x)
     travel = SinkageProcess(parts.rover, parts.layout, parts.models, angle_std).predict(
         prediction,
         x,
         0.1,
-        rims=FORWARD,
+        rims=rims,
         loads=loads or WheelLoads(parts.rover).state.load,
         yaw_rate=0.0,
         headings=straight_headings(parts.rover),
@@ -309,6 +311,20 @@ def test_the_sinkage_relaxes_over_travel_to_where_the_bearing_law_carries_the_lo
     assert found == pytest.approx(at_rest, rel=0.05)
     halfway, _, _ = relaxed(parts, ekf, 1.0, start=0.05)
     assert ((at_rest < halfway) & (halfway < 0.05)).all()
+
+
+def test_wheels_sink_backwards_as_they_do_forwards(parts, ekf):
+    found = []
+    for way in (1.0, -1.0):
+        x = ekf.mean.copy()
+        x[SPEED], x[parts.layout.sinkage] = 0.03 * way, 0.05
+        rims = tuple(way * rim for rim in FORWARD)
+        prediction, travel = sinkage_predicted(parts, x, rims=rims)
+        of_sinkage = np.diagonal(prediction.F)[parts.layout.sinkage]
+        found.append([prediction.mean[parts.layout.sinkage], of_sinkage, np.diagonal(prediction.Q)])
+        assert travel > 0.0 and (found[-1][0] < 0.05).all()
+    for forward, backward in zip(*found, strict=True):
+        np.testing.assert_array_equal(forward, backward)
 
 
 def test_the_error_of_a_measured_leaving_angle_loosens_the_sinkage(parts, ekf):

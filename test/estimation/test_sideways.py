@@ -125,9 +125,8 @@ def test_it_is_never_nan(missing):
         assert np.isfinite(value).all()
 
 
-@pytest.mark.parametrize(
-    ('name', 'side'), [('firm_drive', 8.0), pytest.param('turns', None, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(('name', 'side'), [('firm_drive', 8.0), ('turns', None)])
 def test_slip_angles_of_simulated_drives_lie_within_their_deviations(name, side):
     """Against hubs of the simulated rigid body; no reference velocity at all."""
     scenario = scenarios.load(name)

@@ -141,7 +141,8 @@ def rolling(rng, seconds):
             yield ReferenceVelocity(stamp, speed + 0.01 * rng.standard_normal(), 1e-4)
 
 
-@pytest.mark.parametrize('seed', [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize('seed', [1, 2])
 def test_sinkage_readings_below_their_zero_stop_no_rover_on_hard_ground(seed):
     core = EstimatorCore(reader.from_parameters(TEN_LINES))
     sets = []
