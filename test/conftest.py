@@ -6,11 +6,14 @@ from __future__ import annotations
 
 import gc
 import io
+import logging
 import os
 import signal
 import threading
+import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import hypothesis
@@ -256,13 +259,37 @@ def filter_failures() -> Iterator[list[str]]:
         yield found
 
 
+@pytest.fixture(scope='session')
+def check_failures() -> Iterator[list[str]]:
+    """Errors of checks anywhere in this process: a recording is judged by the others."""
+    from wheel_terra_estimator.checks import input_judge, run
+
+    found: list[str] = []
+
+    def watched(logger: logging.Logger) -> Any:
+        def debug(*arguments: Any, **options: Any) -> None:
+            found.append(traceback.format_exc(-1))
+            logger.debug(*arguments, **options)
+
+        return SimpleNamespace(debug=debug)
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (run, input_judge):
+            patch.setattr(module, '_LOGGER', watched(module._LOGGER))
+        yield found
+
+
 @pytest.fixture(autouse=True)
-def no_filter_fails(request: pytest.FixtureRequest, filter_failures: list[str]) -> Iterator[None]:
-    """No test may start a filter anew without saying so: the handler would hide its error."""
-    before = len(filter_failures)
+def nothing_fails_unseen(
+    request: pytest.FixtureRequest, filter_failures: list[str], check_failures: list[str]
+) -> Iterator[None]:
+    """No test may start a filter anew or lose a check unsaid: handlers would hide the error."""
+    watched = {'filter_fails': filter_failures, 'check_fails': check_failures}
+    before = {mark: len(failures) for mark, failures in watched.items()}
     yield
-    failures = filter_failures[before:]
-    if request.node.get_closest_marker('filter_fails') is None:
-        assert not failures, f'a filter was started anew: {failures[:3]}'
-    else:
-        assert failures, 'no filter was started anew, so the mark filter_fails is wrong'
+    for mark, failures in watched.items():
+        new = failures[before[mark] :]
+        if request.node.get_closest_marker(mark) is None:
+            assert not new, f'{mark}: {new[:3]}'
+        else:
+            assert new, f'nothing failed, so the mark {mark} is wrong'

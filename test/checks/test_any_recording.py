@@ -134,6 +134,7 @@ CHECKS = [
 ]
 
 
+@pytest.mark.check_fails
 @pytest.mark.parametrize(
     ('module', 'name'), CHECKS, ids=lambda part: getattr(part, '__name__', part)
 )
