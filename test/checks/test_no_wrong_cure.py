@@ -315,4 +315,8 @@ def test_turns_on_the_spot_are_a_drive():
     """The mean of the rims is nothing."""
     time = np.arange(0.0, 80.0, 1.0 / rolling.RATE)
     spot = rolling.Motion(time, 0.0 * time, 0.3 * (time % 20.0 > 6.0), 0.0 * time)
-    assert faults(checked(whole=rolling.recording(spot))) == []
+    whole = rolling.recording(spot)
+    assert faults(checked(whole=whole)) == []
+    way = np.cumsum(whole.joints.rate, axis=0) / rolling.RATE
+    positions = replace(whole, joints=replace(whole.joints, rate=way))
+    assert 'rate_positions' in faults(checked(whole=positions))
