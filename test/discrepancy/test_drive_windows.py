@@ -160,7 +160,7 @@ def test_deviations_cover_the_truth():
     covered = np.mean(np.abs(deviations) < 2, axis=0)
     assert len(deviations) > 40
     assert np.all(covered > 0.85), covered
-    assert np.all(np.std(deviations, axis=0) > 0.25), 'deviations are uselessly wide'
+    assert np.all(np.std(deviations, axis=0) > 0.7), 'deviations are uselessly wide'
 
 
 def test_shared_instrument_errors_do_not_average_out():
