@@ -126,10 +126,10 @@ def test_sensor_faults_come_and_go():
             EXACT
             | {
                 'duration': 12.0,
-                'faults.kind': ['no_sinkage', 'no_wheel_odometry', 'zero_stamps'],
-                'faults.wheel': ['front_left', '', ''],
-                'faults.start': [2.0, 4.0, 8.0],
-                'faults.end': [3.0, 6.0, 9.0],
+                'faults.kind': ['no_sinkage', 'no_wheel_odometry', 'zero_stamps', 'no_reference'],
+                'faults.wheel': ['front_left', '', '', ''],
+                'faults.start': [2.0, 4.0, 8.0, 1.2],
+                'faults.end': [3.0, 6.0, 9.0, 7.0],
             }
         )
     )
@@ -141,6 +141,13 @@ def test_sensor_faults_come_and_go():
     times = (stamps[stamps > 0] - START) * 1e-9
     assert not ((times >= 4.0) & (times < 5.99)).any()
     assert 5 < (stamps == 0).sum() < 15
+    references = [(m.stamp - START) * 1e-9 for m in kind(drive, ReferenceVelocity) if m.stamp]
+    assert {t < 1.2 for t in references} == {True, False}
+    assert not any(1.2 <= t < 6.99 for t in references)
+    without = {'duration': 1.5, 'sensors.reference': False, 'sensors.torque': False}
+    never = simulate(load(EXACT | without))
+    assert not kind(never, ReferenceVelocity)
+    assert np.isnan([m.torque for m in kind(never, WheelOdometry)]).all()
 
 
 def test_wheel_faults_concern_their_wheel():

@@ -129,6 +129,9 @@ def test_the_hysteresis_is_what_keeps_a_flicker_out():
     flicker = [0.29] * 5 + [0.309, 0.309, 0.309, 0.309, 0.291, 0.291, 0.291, 0.291] * 5
     assert set(run(flicker)) == {0}
     assert set(run(flicker, filter__class_hysteresis=0.0)) == {0, 1}
+    # Half of it on each side of a border.
+    assert run([0.25] * 5 + [0.308] * 10)[-1] == 0 and run([0.25] * 5 + [0.312] * 10)[-1] == 1
+    assert run([0.35] * 5 + [0.292] * 10)[-1] == 1 and run([0.35] * 5 + [0.288] * 10)[-1] == 0
 
 
 def test_braking_and_sliding_back_are_class_3():
