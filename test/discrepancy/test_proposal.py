@@ -220,6 +220,7 @@ def test_a_factor_is_bounded_and_no_law_is_the_plain_model():
     ('lists', 'part'),
     [
         ((['torque'], ['slip', 'load'], [0.1]), '1 targets, 2 features'),
+        ((['torque', 'sinkage'], ['slip'], [0.1]), '2 targets, 1 features'),
         ((['sinkage'], ['depth'], [0.1]), 'cannot change sinkage by depth'),
         ((['torque', 'torque'], ['slip', 'slip'], [0.1, 0.2]), 'twice'),
         ((['thrust'], ['slip'], [0.1]), 'nearest is'),
