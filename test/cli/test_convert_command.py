@@ -144,3 +144,41 @@ def test_a_row_that_was_cut_short_is_told(files, capsys):
     said = capsys.readouterr().out
     assert '/joint_states 3, /imu/data 2' in said
     assert 'a row ends before the last column of the map (first: line 4)' in said
+
+
+def test_a_held_reading_is_written_once(files, capsys):
+    """A logger at 20 Hz repeats a speed at 2 Hz; a rounded speed at 20 Hz is no held one."""
+    rng = np.random.default_rng(1)
+    speeds = 0.4 + 0.05 * rng.standard_normal(40)
+    speeds[20:30] = 0.0  # it stands
+
+    def lines(values):
+        rows = [
+            f'{100.0 + 0.05 * k:.2f},60,-60,1,-1,0,0,1,0,0,0,12,{value}'
+            for k, value in enumerate(values)
+        ]
+        return '\n'.join([HEADER, *rows])
+
+    def read(text):
+        (files / 'log.csv').write_text(text)
+        assert main([*command(files), '--overwrite']) == 0
+        with open_bag(files / 'bag') as bag:
+            return read_series(bag, {}, 'bag').reference, capsys.readouterr().out
+
+    held, said = read(lines(np.repeat(speeds.round(4), 10)))
+    assert held.velocity[:, 0] == pytest.approx(speeds, abs=1e-4)
+    assert np.diff(held.stamp) * 1e-9 == pytest.approx(0.5, abs=1e-6)
+    assert 'note: /reference_odom repeats each reading over about 10 rows' in said
+    rounded, said = read(lines((0.4 + 0.05 * rng.standard_normal(400)).round(1)))
+    assert len(rounded.stamp) == 400 and '/reference_odom repeats' not in said
+
+
+def test_the_orientation_of_the_example_reaches_the_recording(files):
+    columns = (files / 'map.yaml').read_text()
+    (files / 'map.yaml').write_text(columns.replace('\n# orientation', '\n  orientation'))
+    rows = [f'{HEADER},qx,qy,qz,qw', f'{ROWS[0]},0,0,0.6,0.8', f'{ROWS[1]},0,0,0,1']
+    (files / 'log.csv').write_text('\n'.join(rows))
+    assert main(command(files)) == 0
+    with open_bag(files / 'bag') as bag:
+        told = read_series(bag, {}, 'bag').imu.orientation
+    assert np.allclose(told, [[0, 0, 0.6, 0.8], [0, 0, 0, 1]])

@@ -11,6 +11,7 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,6 +42,10 @@ imu/data:                                 # leave out what there is not
   angular_velocity.x: {column: gx, unit: deg/s}  # rad/s or deg/s
   angular_velocity.y: {column: gy, unit: deg/s}
   angular_velocity.z: {column: gz, unit: deg/s}
+# orientation.x: {column: qx}             # the quaternion, all four of x, y, z, w, if there is one
+# orientation.y: {column: qy}
+# orientation.z: {column: qz}
+# orientation.w: {column: qw}
 sinkage:
   front_left: {column: sinkage_fl, unit: mm}     # m, cm or mm
 reference_odom:
@@ -79,6 +84,10 @@ BASELINE = 1.0
 """Positions so far apart [s] make a speed: closer ones are noise."""
 _JOINT = {'velocity': 'rate', 'effort': 'torque', 'position': 'angle'}
 _TOPICS = ('joint_states', 'imu/data', 'sinkage', 'reference_odom')
+REGULAR = 0.8
+"""Share of the runs of one value as long as the others of a sensor whose value is held [-]."""
+LEAST_RUNS = 10
+"""Runs of one value that tell it."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +115,7 @@ class Converted(NamedTuple):
 
     counts: dict[str, int]  # messages by topic
     short: list[int]  # lines that end before a column of the map
+    held: dict[str, int]  # rows that each reading of a topic is repeated over, where it is
 
 
 def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -> Converted:
@@ -118,13 +128,36 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
             raise UserError(f'{table}: empty; the first line must name the columns')
         layout = _read_map(columns, file.header, table)
         topics = {f'/{name}': INPUT_TYPES[name] for name in _used(layout)}
+        held = _held(table, layout)
         with BagFile(output, topics, overwrite=overwrite, inputs=[table, columns]) as bag:
-            sender = _Sender(bag, layout, table, file.decimal_comma)
+            sender = _Sender(bag, layout, table, file.decimal_comma, held)
             for line, row in file.rows:
                 sender.send(line, row)
             if not sender.sent:
                 raise UserError(f'{table}: no rows below the header')
-        return Converted(bag.counts, list(sender.short))
+        return Converted(bag.counts, list(sender.short), held)
+
+
+def _held(table: Path, layout: ColumnMap) -> dict[str, int]:
+    """Return over how many rows each reading of a slow sensor is repeated, where it is held.
+
+    A logger that writes all at the fastest rate repeats the last value; one that is rounded, or
+    stands, stays for as long as it happens to.
+    """
+    held = {}
+    for topic, columns in (('/sinkage', layout.sinkage), ('/reference_odom', layout.reference)):
+        with open_csv(table) as file:
+            cells = (_cells(row, columns) for _, row in file.rows)
+            runs = [len(list(same)) for _, same in groupby(cells)]
+        usual = sorted(runs)[len(runs) // 2] if len(runs) >= LEAST_RUNS else 1
+        alike = sum(abs(run - usual) <= 1 for run in runs)
+        if usual > 1 and alike > REGULAR * len(runs):
+            held[topic] = usual
+    return held
+
+
+def _cells(row: list[str], columns: Mapping[str, Column]) -> list[str]:
+    return [row[column.index] for column in columns.values() if column.index < len(row)]
 
 
 def _used(layout: ColumnMap) -> list[str]:
@@ -220,9 +253,15 @@ class _Sender:
     """Writes the messages of each row, at its own stamp."""
 
     def __init__(
-        self, bag: BagFile, layout: ColumnMap, table: Path, decimal_comma: bool = False
+        self,
+        bag: BagFile,
+        layout: ColumnMap,
+        table: Path,
+        decimal_comma: bool,
+        held: Mapping[str, int],
     ) -> None:
-        self.bag, self.layout, self.table = bag, layout, table
+        self.bag, self.layout, self.table, self.held = bag, layout, table, held
+        self.last: dict[str, tuple[list[str], int]] = {}  # a reading, and rows since
         self.decimal_comma = decimal_comma
         self.make = bag.messages
         self.sent = 0
@@ -251,9 +290,18 @@ class _Sender:
             )
             self.bag.write('/joint_states', message, stamp)
         self._imu(line, row, stamp)
-        self._sinkage(line, row, stamp)
-        self._reference(line, row, stamp, -1.0 if _mean(rates) < 0.0 else 1.0)
+        if self._is_new('/sinkage', _cells(row, self.layout.sinkage)):
+            self._sinkage(line, row, stamp)
+        if self._is_new('/reference_odom', _cells(row, self.layout.reference)):
+            self._reference(line, row, stamp, -1.0 if _mean(rates) < 0.0 else 1.0)
         self.sent += 1
+
+    def _is_new(self, topic: str, cells: list[str]) -> bool:
+        """Return whether a row holds a reading of its own, not a held one."""
+        before, rows = self.last.get(topic, ([], 0))
+        new = cells != before or rows >= self.held.get(topic, 1)
+        self.last[topic] = (cells, 1 if new else rows + 1)
+        return new
 
     def value(self, line: int, row: list[str], column: Column | None) -> float:
         if column is None:

@@ -51,5 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
             f'note: {rows} before the last column of the map (first: line {written.short[0]}); '
             'what is missing there is left out'
         )
+    for topic, count in written.held.items():
+        print(f'note: {topic} repeats each reading over about {count} rows; it is written once')
     print(f'next: wheel-terra check {arguments.output} --config ROVER')
     return 0
