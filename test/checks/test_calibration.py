@@ -86,7 +86,7 @@ def test_the_gravity_of_another_planet_is_mended():
 
 def test_a_reference_whose_noise_alone_is_too_much_is_said():
     rough = rolling.recording().reference
-    noise = 0.06 * np.random.default_rng(3).standard_normal(rough.velocity.shape[0])
+    noise = 0.03 * np.random.default_rng(3).standard_normal(rough.velocity.shape[0])
     velocity = rough.velocity + np.column_stack([noise, 0.0 * noise, 0.0 * noise])
     calibration, configuration = calibrated(reference=replace(rough, velocity=velocity))
     radius = next(c for c in calibration.changes if c.key == 'wheels.radius')

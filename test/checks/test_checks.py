@@ -319,8 +319,14 @@ def test_a_rover_that_starts_and_stops_between_references_scatters_no_reference(
 def test_sinkage():
     sinkage = WHOLE.sinkage
     only(checked(sinkage=replace(sinkage, sinkage=1000.0 * sinkage.sinkage)), 'unit')
-    deep = sinkage.sinkage * (1.0 + 3.0 * (np.arange(sinkage.stamp.size) % 100 < 25))[:, None]
-    only(checked(sinkage=replace(sinkage, sinkage=-deep)), 'sign')
+    spells = (np.arange(sinkage.stamp.size) % 100 < 25).astype(float)  # and what they cost
+    deep = sinkage.sinkage * (1.0 + 3.0 * spells)[:, None]
+    costs = 2.0 * np.interp(WHOLE.joints.stamp, sinkage.stamp, spells)[:, None]
+    torque = WHOLE.joints.torque + costs * np.sign(WHOLE.joints.rate)
+    dragged = replace(WHOLE, joints=replace(WHOLE.joints, torque=torque))
+    for wrong, kind in ((-deep, 'sign'), (deep - 0.06, 'zero')):
+        told = only(checked(whole=dragged, sinkage=replace(sinkage, sinkage=wrong)), kind)
+        assert told.confidence >= 0.8
     for even in (-sinkage.sinkage, sinkage.sinkage - 0.02):  # no deep spell: which, nothing tells
         told = checked(sinkage=replace(sinkage, sinkage=even)).findings
         assert [finding.kind for finding in told] == ['sign', 'zero']

@@ -28,8 +28,6 @@ LEAST_SURE = 0.8
 """Confidence from which a cure is written [-]."""
 CLEAR = 2.0
 """Deviations by which a number is off, from which another is written [-]."""
-CLEAR_RADIUS = 3.0
-"""The same of a radius, for firm ground slips by a per cent or two [-]."""
 BLUNT_REFERENCE = 0.005
 """Deviation of the radius by the noise of the reference alone, as a share, that is told [-]."""
 
@@ -204,7 +202,7 @@ def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evide
     if isinstance(told, NotChecked) or rival:
         return evidence
     ratio, radius = told.ratio, float(np.mean(evidence.facts.radius))
-    if ratio.sigmas_from(1.0) < CLEAR_RADIUS and not found:
+    if not found and 'radius' not in names:
         return evidence
     rolling = evidence.facts.radius * ratio.value
     assert evidence.recording.reference is not None

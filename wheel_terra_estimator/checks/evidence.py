@@ -46,6 +46,8 @@ LEAST_MOVING_ROWS = 30
 """Fewer rows of driving than these tell nothing."""
 EVEN_GROUND_STD = math.radians(0.8)
 """Deviation of a tilt seen in circles [rad] above which they lay on no plane."""
+LONGEST_GAP = 1.0
+"""Time without IMU in which a turn may pass unseen [s]."""
 AROUND = 0.25
 """Half of the time around a velocity that rim speeds are averaged over [s]."""
 
@@ -156,7 +158,17 @@ class Evidence:
         still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * noise)
         still &= np.isfinite(self.rate).any(axis=1)
         still[: width - 1] = False
-        return _shared(self._after(still, SHORTEST_REST))
+        return _shared(self._after(still, SHORTEST_REST) & self.heard)
+
+    @cached_property
+    def heard(self) -> Mask:
+        """Rows that lie in no gap of the IMU, all without one."""
+        imu = self.recording.imu
+        if imu is None or imu.stamp.size < 2:
+            return np.ones(self.time.size, dtype=bool)
+        at = np.sort(self.seconds(imu))
+        after = np.clip(np.searchsorted(at, self.time), 1, at.size - 1)
+        return _shared(at[after] - at[after - 1] < LONGEST_GAP)
 
     def _after(self, condition: Mask, duration: float) -> Mask:
         """Return where a condition has held for some time [s]."""
@@ -241,7 +253,7 @@ class Evidence:
     @cached_property
     def unturned(self) -> Mask:
         """Rows of driving without a turn, neither by the gyro nor by the wheels."""
-        rim, rows = np.abs(self.rim), self.moving.copy()
+        rim, rows = np.abs(self.rim), self.moving & self.heard
         difference = self.side_difference
         if np.isfinite(difference).any():
             rows &= np.abs(moving_mean(difference, self.rows_in(SETTLING))) < STRAIGHT_SHARE * rim
@@ -261,7 +273,7 @@ class Evidence:
         if self.gyro is None:
             return _shared(np.zeros(self.time.size, dtype=bool))
         rate = np.abs(self.gyro[:, 2])
-        return _shared(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
+        return _shared(self.moving & self.heard & (rate > 0.3 * np.quantile(rate, 0.98)))
 
     @cached_property
     def reference_speed(self) -> FloatArray | None:

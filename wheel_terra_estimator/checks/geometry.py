@@ -34,6 +34,8 @@ LEAST_RADIUS_ERROR = 0.025
 RADIUS_SIGMAS = 4.0
 LEAST_OF_SIDES = 0.05
 """Share by which the radii of the sides differ, at least [-]; a cross slope makes a side slip."""
+MOST_UNLIKE = 0.1
+"""Difference of the speeds of one side on the straight, as a share, of like wheels [-]."""
 OUTRUN_STD = 0.01
 """Slip that is left open where a rover outruns its wheels [-]."""
 PRIOR_OF_RADIUS = 0.85
@@ -247,7 +249,8 @@ def _referred_to_slip_radius(evidence: Evidence, ratio: Estimate) -> Estimate:
     The soil shears at r + lambda h, between rim and lug tips, and over the contact from the front
     angle t1 on its speed is v cos t, not v: shear vanishes in the mean at a slip of
     (1 - lambda) h/(r + h) - t1^2/6, with t1^2/6 = z/(3 r). Where neither is known, lambda lies
-    anywhere in 0 to 1 and z/r is that of firm ground.
+    anywhere in 0 to 1 and z/r is that of firm ground. Depth counts for nothing to twice as much:
+    soil gives way along the contact as well.
     """
     configuration = evidence.facts.configuration
     assert configuration is not None
@@ -257,7 +260,7 @@ def _referred_to_slip_radius(evidence: Evidence, ratio: Estimate) -> Estimate:
     depth = _depth(evidence)
     tip = 0.0 if configuration.slip_radius == 'rim' else 1.0
     slip = (tip - shear.value) * lugs - depth.value / 3.0
-    std = math.hypot(shear.std * lugs, depth.std / 3.0)
+    std = math.hypot(shear.std * lugs, depth.std / 3.0, UNIFORM_STD * 2.0 * depth.value / 3.0)
     return Estimate(ratio.value * (1.0 + slip), math.hypot(ratio.std, std))
 
 
@@ -292,6 +295,9 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sigmas = sides.sigmas_from(0.0) if lopsided else ratio.sigmas_from(1.0)
     if not lopsided and (abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < RADIUS_SIGMAS):
         return [], evidence
+    if not lopsided and _unlike(evidence) > MOST_UNLIKE:
+        reason = 'wheels of one side turn unlike each other on the straight; lift and turn them'
+        return [NotChecked('radius', reason)], evidence
     if not (trial.falls or lopsided):
         reason = 'its halves of the drive say another: drive longer, over firm ground'
         return [NotChecked('radius', reason)], evidence
@@ -341,10 +347,17 @@ def _of_sides(evidence: Evidence) -> Estimate:
     rim = evidence.rim[rows]
     trial = tried(lambda part: block_fit(rim[part, None], apart[part])[0].value, 0.0, rim**2)
     told = block_fit(rim[:, None], apart)[0]
-    shares = np.nanmedian(evidence.speed[rows] / rim[:, None], axis=0)
-    odd = max(float(np.ptp(shares[evidence.facts.side == side])) for side in (1.0, -1.0))
-    alike = odd < 0.5 * abs(told.value)  # else it is one wheel
+    alike = _unlike(evidence) < 0.5 * abs(told.value)  # else it is one wheel
     return told if trial.falls and alike else Estimate(0.0, math.inf)
+
+
+def _unlike(evidence: Evidence) -> float:
+    """Return by how much the speeds of the wheels of one side differ on the straight [-]."""
+    shares = evidence.speed[evidence.straight] / evidence.rim[evidence.straight, None]
+    of_sides = [
+        np.nanmedian(shares[:, evidence.facts.side == side], axis=0) for side in (1.0, -1.0)
+    ]
+    return max(float(np.ptp(one)) for one in of_sides if one.size)
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:

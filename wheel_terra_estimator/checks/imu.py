@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, Evidence
+from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, LONGEST_GAP, Evidence
 from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
 from wheel_terra_estimator.checks.felt_motion import (
     LEAST_YAW,
@@ -59,8 +59,6 @@ LEAST_SHOWN = 0.01
 """Change of an angle [deg] below which a cure leaves it out."""
 LEAST_MOUNTING = math.radians(1.5)
 """Mounting errors below this [rad] are left to calibration."""
-LONGEST_GAP = 1.0
-"""Time without IMU in which a turn may pass unseen [s]."""
 LEAST_TURN = 4.5
 """Heading that a drive has to cover for the mounting to be told from a slope [rad]."""
 FLAT_TURN_STD = math.radians(0.1)
@@ -369,7 +367,7 @@ def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
     imu, gyro = evidence.recording.imu, evidence.gyro
     if imu is None or gyro is None:
         return None
-    rest = evidence.at_rest & (evidence.time <= evidence.seconds(imu).max())  # while it is heard
+    rest = evidence.at_rest & (evidence.time <= evidence.seconds(imu).max())
     if rest.sum() * evidence.period < LEAST_STANDSTILL:
         return None
     spread = robust_std_of_rows(gyro[rest].T)

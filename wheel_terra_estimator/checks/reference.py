@@ -61,7 +61,12 @@ CLEAR_SPEED = 5.0
 """Speed over the noise of the reference that a ratio of speeds needs [-]."""
 LEAST_ROWS = 5
 """Velocities beside rims that a ratio needs."""
-KNOWN_UNITS = {'kilometres per hour': 3.6, 'millimetres per second': 1000.0, 'knots': 1.9438}
+KNOWN_UNITS = {
+    'kilometres per hour': 3.6,
+    'centimetres per second': 100.0,
+    'millimetres per second': 1000.0,
+    'knots': 1.9438,
+}
 
 
 def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -282,6 +287,8 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
         new[:] = True
     forward = forward[new]
     rim = np.nan_to_num(evidence.rim_at(reference.stamp[new], evidence.rim))
+    if evidence.facts.known and np.median(np.abs(forward)) > BEYOND * np.abs(rim).max():
+        return []  # in another unit
     noise = min(bend_noise(forward), bend_noise(forward - rim))  # wheels start and stop as well
     evidence.figures['reference.noise_m_s'] = float(f'{noise:.3g}')
     stated = reference.variance[np.isfinite(reference.variance)]

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.evidence import Evidence, row_medians
 from wheel_terra_estimator.checks.faults import listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import SinkageSeries
 from wheel_terra_estimator.checks.statistics import bend_noise, correlation
+from wheel_terra_estimator.checks.torque import thrust
 from wheel_terra_estimator.checks.trial import halves
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorErrors
 
@@ -32,8 +33,8 @@ BELOW_ZERO = 0.006
 """A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
 BURIED = 0.5
 """Depth over radius that no drive has all the time [-]."""
-SKEWED = 0.2
-"""Skewness of readings with deep spells, at least [-]."""
+DRAGS = 0.3
+"""Correlation of depth with thrust or slip from which deep wheels are seen to be dragged [-]."""
 LIKE_OTHERS = 0.2
 """Correlation with the other wheels of one that counts downwards as they do [-]."""
 ALIKE_SHARE = 0.4
@@ -80,14 +81,13 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [*outcomes, *unit, *noise], evidence.with_channel('sinkage', sinkage=unknown)
     told = _sign_and_zero(evidence, names, table, middle)
     outcomes += [*unit, *told, *noise]
-    mended = evidence
+    known = sinkage.sinkage
     for finding in told:
-        if isinstance(finding, Finding) and finding.fault == 'sinkage_sign':
+        if isinstance(finding, Finding):  # a zero is left unknown, as what may be one is
             wrong = [finding.wheel in (None, name) for name in sinkage.names]
-            mended = mended.with_channel(
-                'sinkage', sinkage=sinkage.sinkage * np.where(wrong, -1.0, 1.0)
-            )
-    return outcomes, mended
+            sign = finding.fault == 'sinkage_sign' and finding.confidence > LEAST_SURE
+            known = known * np.where(wrong, -1.0 if sign else np.nan, 1.0)
+    return outcomes, evidence.with_channel('sinkage', sinkage=known)
 
 
 def without_stated_errors(
@@ -166,15 +166,15 @@ def _sign_and_zero(
     configuration = evidence.facts.configuration
     lugs = float(np.max(configuration.wheels.lug_height)) if configuration else 0.0
     limit, usual = BELOW_ZERO + lugs, float(np.nanmedian(middle))
-    if usual < -limit:  # a reversed sign (deep spells go down) or a zero (deep spells go up)
+    if usual < -limit:
         top = float(np.nanmedian(np.nanquantile(table, 0.98, axis=0)))
-        skew = float(np.median([_skew(column) for column in table.T]))
+        dragged = _dragged_where_deep(evidence, table)
         told: dict[str, Any] = {'reading': 1000 * usual, 'others': '', 'of': ''}
         how = f'median sinkage {1000 * usual:.0f} mm: the wheels would float'
         zero = _zero(evidence, names, usual, DEEP_STD, how)
-        if top > 0.004 or skew > SKEWED:
+        if top > 0.004 or dragged > DRAGS:
             return [zero]
-        if skew < -SKEWED:
+        if dragged < -DRAGS:
             return [evidence.found('sinkage_sign', 0.9, value=-1.0, **told)]
         told['others'] = ' without a deep spell (or its zero is off)'
         either = evidence.found('sinkage_sign', 0.5, value=-1.0, **told)
@@ -194,7 +194,7 @@ def _sign_and_zero(
             beside_it = np.nanmedian(np.delete(table, index, axis=1), axis=1)
             alike = correlation(table[:, index] - own, beside_it - typical) > LIKE_OTHERS
             like_sign = not alike and abs(-own - typical) < 0.6 * typical
-            if like_sign and _skew(table[:, index]) <= 0.0:
+            if like_sign:
                 beside = f', the others {1000 * typical:.0f} mm'
                 told = {'reading': 1000 * own, 'others': beside, 'of': f' of {name}'}
                 outcomes.append(evidence.found('sinkage_sign', 0.9, wheel=name, value=-1.0, **told))
@@ -205,6 +205,24 @@ def _sign_and_zero(
         if abs(far) > odd and _lasting(table, index, far):
             outcomes.append(_zero(evidence, [name], far, spread, how))
     return outcomes
+
+
+def _dragged_where_deep(evidence: Evidence, table: FloatArray) -> float:
+    """Return how well readings (k, p) follow the thrust, else the slip, of straights [-].
+
+    What a wheel sinks by costs thrust, and slip digs: a reversed sign follows both downwards.
+    """
+    sinkage, speed = evidence.recording.sinkage, evidence.reference_speed
+    assert sinkage is not None
+    effort = np.abs(thrust(evidence))
+    if not effort.any() and speed is not None:
+        effort = np.clip(1.0 - speed / np.maximum(np.abs(evidence.rim), 1e-3), -1.0, 1.0)
+    depth, there = row_medians(table), np.isfinite(table).any(axis=1)
+    rows = there & (evidence.rim_at(sinkage.stamp, evidence.unturned.astype(float)) > 0.99)
+    if rows.sum() < LEAST_READINGS:
+        return 0.0
+    seen = evidence.rim_at(sinkage.stamp, effort)[rows]
+    return correlation(seen - seen.mean(), depth[rows] - depth[rows].mean())
 
 
 def _lasting(table: FloatArray, index: int, far: float) -> bool:
@@ -232,12 +250,3 @@ def _zero(evidence: Evidence, names: list[str], left: float, std: float, how: st
     wheel = names[0] if len(names) == 1 else None
     told = {'wheel': wheel, 'value': value, 'std': round(std, 4), 'zeros': listed(zeros)}
     return evidence.found('sinkage_zero', 0.9 if wheel else 0.8, how=how, **told)
-
-
-def _skew(column: FloatArray) -> float:
-    """Return the skewness by quantiles (Bowley 1901), from -1 to 1."""
-    known = column[np.isfinite(column)]
-    if known.size < LEAST_READINGS:
-        return 0.0
-    low, middle, high = np.quantile(known, [0.1, 0.5, 0.9])
-    return float((high + low - 2.0 * middle) / max(high - low, 1e-9))

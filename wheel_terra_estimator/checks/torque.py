@@ -198,7 +198,9 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     fit = slope_fit(evidence)
     told: dict[str, Any] = {'gains': '...'}
-    if fit is not None and fit.gain.value > GAIN_SIGMAS * max(fit.gain.std, fit.trial.after):
+    if isinstance(fit, Slopes) and fit.gain.value > GAIN_SIGMAS * max(
+        fit.gain.std, fit.trial.after
+    ):
         whole = whole_gain(evidence, fit.gain.value)
         mean = float(np.mean(whole))
         told = {'value': mean, 'std': mean * fit.gain.std / fit.gain.value}
@@ -214,7 +216,7 @@ def _middle_mean(values: FloatArray) -> float:
     return float(np.mean(np.clip(values, low, high)))
 
 
-class _Slopes(NamedTuple):
+class Slopes(NamedTuple):
     """Thrust over mass times specific force: torque gain times true over stated mass; its trial.
 
     ``scatter`` is that of the specific force along the drive [m/s^2]; ``unlike``: the wheels take
@@ -227,11 +229,11 @@ class _Slopes(NamedTuple):
     unlike: bool
 
 
-def slope_fit(evidence: Evidence) -> _Slopes | None:
-    """Return the scale of the torques by slopes, and its trial on halves; None without slopes."""
+def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
+    """Return the scale of the torques by slopes, and its trial on halves, or why not."""
     rows = evidence.straight
     if evidence.force is None or rows.sum() < 3 * LEAST_MOVING_ROWS:
-        return None
+        return NotChecked('gain', 'torque: hardly any straight, steady stretch in it')
     # Noise of a regressor makes a slope look flat: both sides are means over the same time.
     along = moving_mean(evidence.force[:, 0], SMOOTH_ROWS)[rows]
     pushed = moving_mean(thrust(evidence), SMOOTH_ROWS)[rows]
@@ -239,7 +241,11 @@ def slope_fit(evidence: Evidence) -> _Slopes | None:
     down, up = np.quantile(along * sense, (0.05, 0.95))
     scatter = float(np.std(along))
     if scatter < LEAST_SLOPE_STD or max(down, -up) > -UP_AND_DOWN:
-        return None
+        steepest = math.degrees(max(up, -down) / evidence.facts.gravity)
+        there = f'slopes to one side alone, by {steepest:.1f} degrees,'
+        there = there if max(up, -down) > UP_AND_DOWN else 'no slopes'
+        reason = f'torque: {there} in it; drive up and down 5 to 10 degrees'
+        return NotChecked('gain', reason)
     columns = [evidence.facts.mass * along, sense]
     if (sense > 0).any() and (sense < 0).any():
         columns.append(np.ones(along.size))
@@ -252,7 +258,7 @@ def slope_fit(evidence: Evidence) -> _Slopes | None:
     single = [moving_mean(column, SMOOTH_ROWS)[rows] for column in evidence.torque.T]
     shares = sorted(block_fit(design, column)[0].value for column in single)
     unlike = shares[-1] > MOST_UNLIKE_SHARES * shares[0]
-    return _Slopes(block_fit(design, pushed)[0], trial, scatter, unlike)
+    return Slopes(block_fit(design, pushed)[0], trial, scatter, unlike)
 
 
 def whole_gain(evidence: Evidence, left: float) -> FloatArray:
@@ -273,11 +279,11 @@ def whole_zeros(evidence: Evidence, left: list[Estimate]) -> list[Estimate]:
     ]
 
 
-def torque_gain(evidence: Evidence) -> _Slopes | NotChecked:
+def torque_gain(evidence: Evidence) -> Slopes | NotChecked:
     """Return the scale of the torques against mass times specific force, model error included."""
     fit = slope_fit(evidence)
-    if fit is None:
-        return NotChecked('gain', 'torque: no slopes in it; drive up and down 5 to 10 degrees')
+    if isinstance(fit, NotChecked):
+        return fit
     traction = evidence.figures.get('torque.level_traction', 1.0)
     traction = max(traction, traction / max(fit.gain.value, 1e-3))  # with this scale as well
     if traction > SOFT_TRACTION:
@@ -338,7 +344,8 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
     fits = both_ways(evidence)
     if fits is None:
         return None
-    return [Estimate(zero.value, math.hypot(zero.std, RUTS * back.value)) for zero, back in fits]
+    resists = RUTS * float(np.mean([abs(back.value) for _, back in fits]))
+    return [Estimate(zero.value, math.hypot(zero.std, resists)) for zero, _ in fits]
 
 
 def _calm_force(evidence: Evidence) -> FloatArray:
@@ -363,10 +370,13 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     sense = np.sign(smooth[rows])
     if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
         return None
-    slopes = _calm_force(evidence)[rows]  # along both axes: the IMU may be turned about z
+    slopes, facts = _calm_force(evidence)[rows], evidence.facts
+    load = np.nan_to_num(facts.mass * slopes[:, :1] * facts.radius / len(facts.names))
+    table = np.nan_to_num(evidence.torque[rows]) - load
+    # What is left of slopes along both axes: the IMU may be turned about z.
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
     design = np.column_stack([np.ones(sense.size), sense, slopes])
-    fits = [block_fit(design, np.nan_to_num(column)) for column in evidence.torque[rows].T]
+    fits = [block_fit(design, column) for column in table.T]
     return [(fit[0], fit[1]) for fit in fits]
 
 

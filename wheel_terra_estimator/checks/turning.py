@@ -34,7 +34,7 @@ from wheel_terra_estimator.checks.statistics import (
     integrated,
     robust_std,
 )
-from wheel_terra_estimator.checks.torque import slope_fit
+from wheel_terra_estimator.checks.torque import Slopes, slope_fit
 from wheel_terra_estimator.checks.trial import Trial, halves, worst
 from wheel_terra_estimator.estimation.measurements import heading_of
 
@@ -319,6 +319,10 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     elif turn < 0.0:
         outcomes += _swapped(evidence)
         mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
+        if np.isfinite(mended.steering).any():  # steering joints are named as before, or with it
+            order = [facts.names.index(name) for name in _sides_exchanged(facts)]
+            both = mended, replace(mended, steering=mended.steering[:, order])
+            mended = min(both, key=_left_in_turns)
     if blame == 'reference' and evidence.recording.reference is not None:
         alone = bool(turn) or told.force is not None
         sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels count backwards')
@@ -429,7 +433,7 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
             by_force = math.cos(yaw.value)
     if by_force is None and evidence.facts.known and np.nansum(signed.torque * signed.rate) > 0.0:
         slopes = slope_fit(signed)  # torques that carry the rover up or down them
-        if slopes is not None and slopes.gain.sigmas_from(0.0) > SCALE_SIGMAS:
+        if isinstance(slopes, Slopes) and slopes.gain.sigmas_from(0.0) > SCALE_SIGMAS:
             by_force = float(np.sign(slopes.gain.value))
     return _Told(by_reference, by_force)
 
@@ -576,9 +580,14 @@ def skids(evidence: Evidence) -> bool:
 
 def unlike_in_turns(evidence: Evidence) -> bool:
     """Return whether no track makes the wheels roll alike in turns."""
+    return _left_in_turns(evidence) > MOST_UNLIKE
+
+
+def _left_in_turns(evidence: Evidence) -> float:
+    """Return the residual of the wheels in turns [-]."""
     there, rows = _known(evidence)
     stretch = stretch_of(evidence, there, rows & evidence.turning)
-    return fit_of(Fix((1,) * there.size), stretch).cost > MOST_UNLIKE
+    return fit_of(Fix((1,) * there.size), stretch).cost
 
 
 def ordinary_track(ratio: float) -> bool:
