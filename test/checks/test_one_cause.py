@@ -10,7 +10,9 @@ import pytest
 import rolling_rover as rolling
 from scipy.spatial.transform import Rotation
 
+from wheel_terra_estimator.checks.calibration import calibrate
 from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.series import rows_of
 
 WHOLE = rolling.recording()
 
@@ -75,10 +77,10 @@ def test_a_pitch_of_the_imu_that_no_circle_shows_is_named_beside_zeros_of_all_to
 JOINTS = ('front_left_steer', 'front_right_steer', 'rear_left_steer', 'rear_right_steer')
 
 
-def steered(change):
+def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES):
     """A rover with four steered wheels, long beside its track, in circles; angles changed."""
     motion, rover = rolling.ten_minute_drive(), rolling.rover(**{
-        'wheels.x': [0.6, 0.6, -0.6, -0.6], 'wheels.steering_joints': list(JOINTS),
+        'wheels.x': list(x), 'wheels.steering_joints': list(JOINTS), 'wheels.names': list(names),
     })  # fmt: skip
     along = motion.speed[:, None] - motion.yaw_rate[:, None] * rover.wheels.y
     aside = motion.yaw_rate[:, None] * rover.wheels.x
@@ -108,3 +110,61 @@ def test_steered_wheels_roll_where_they_point(change, faults):
     report = steered(change)
     assert [finding.fault for finding in report.findings] == faults
     assert report.figures['rover.effective_over_stated_track'] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize('order', [(2, 3, 0, 1), (2, 1, 0, 3)])
+def test_front_and_rear_exchanged_where_only_the_front_is_steered(order):
+    """Seen from the rear axle the front wheels go the longer way; steered alike, they do not."""
+    names = [rolling.NAMES[i] for i in order]
+    front = (1.2, 1.2, 0.0, 0.0)
+    (finding,) = steered(lambda angle: angle, front, names).findings
+    assert finding.fault == 'exchanged' and set(finding.wheel.split(', ')) == {
+        name for name, now in zip(rolling.NAMES, names, strict=True) if name != now
+    }
+    assert finding.cure == f'wheels.names: [{", ".join(rolling.NAMES)}]'
+    assert not steered(lambda angle: angle, front).findings
+    assert not steered(lambda angle: angle, names=names).findings  # both alike: nothing tells
+
+
+@pytest.mark.parametrize('degrees', [-15.0, 20.0])
+def test_a_small_yaw_of_the_imu(degrees):
+    whole = rolling.recording(rolling.starts_and_curves())
+    turn = Rotation.from_euler('z', -degrees, degrees=True)
+    imu = replace(whole.imu, force=turn.apply(whole.imu.force))
+    (finding,) = check_recording(replace(whole, imu=imu), rolling.rover()).findings
+    assert finding.fault == 'imu_yaw' and abs(finding.value - degrees) < 2.0 * finding.std < 6.0
+
+
+def test_a_turn_in_a_gap_of_the_imu_is_no_straight():
+    """Between its last reading in a turn and the next the IMU seems to go on turning."""
+    motion = rolling.ten_minute_drive()
+    yaw = np.where(motion.time > 230.0, 0.0, motion.yaw_rate)  # straight after the circle
+    whole = rolling.recording(replace(motion, yaw_rate=yaw))
+    heard = (whole.imu.seconds < 215.0) | (whole.imu.seconds > 245.0)
+    report = check_recording(replace(whole, imu=rows_of(whole.imu, heard)), rolling.rover())
+    assert {finding.kind for finding in report.findings} == {'drop_outs'}
+
+
+def test_a_reference_in_centimetres_per_second():
+    reference = replace(WHOLE.reference, velocity=100.0 * WHOLE.reference.velocity)
+    (finding,) = found(reference=replace(reference, variance=1e4 * reference.variance))
+    assert finding.fault == 'reference_unit' and finding.value == pytest.approx(0.01)
+
+
+def test_a_slope_driven_both_ways_is_no_zero_of_the_torques():
+    """Up forwards, down backwards: in place, so that no circle tells slope from mounting."""
+    motion = rolling.ten_minute_drive(turns=False)
+    told = [
+        calibrate(rolling.recording(replace(motion, slope=0.0 * motion.slope + slope), seed=2),
+                  rolling.rover())
+        for slope in (0.0, 0.02)
+    ]  # fmt: skip
+    assert not [c for one in told for c in one.changes if c.key == 'sensors.torque_zero']
+
+
+def test_slopes_to_one_side_alone_are_not_called_none():
+    motion = rolling.ten_minute_drive(turns=False)
+    climb = replace(motion, slope=np.where(motion.speed > 0.0, 0.138, 0.0))
+    report = check_recording(rolling.recording(climb), rolling.rover())
+    (reason,) = {e.reason for e in report.not_checked if e.kind == 'gain'}
+    assert 'slopes to one side alone, by 7.9 degrees' in reason

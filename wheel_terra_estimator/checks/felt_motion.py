@@ -21,7 +21,7 @@ from wheel_terra_estimator.checks.statistics import (
 
 Complex: TypeAlias = NDArray[np.complex128]
 
-LEAST_YAW = math.radians(25.0)
+LEAST_YAW = math.radians(12.0)
 """Yaw of the mounting below which starts, stops and slopes do not tell it [rad]."""
 YAW_SIGMAS = 4.0
 LEAST_FELT = 0.4
@@ -87,4 +87,5 @@ def yaw_of_motion(parts: Complex, energy: float) -> Estimate | None:
     spread = float(np.sqrt(np.sum(np.abs(parts - total / parts.size) ** 2)))
     if energy <= 0.0 or not 0.5 < abs(total) / energy < 2.0 or abs(total) < 3.0 * spread:
         return None
-    return Estimate(float(np.angle(total)), spread / abs(total))
+    aside = (parts * np.conj(total)).imag / abs(total) ** 2  # along it they differ without a turn
+    return Estimate(float(np.angle(total)), float(np.linalg.norm(aside)))

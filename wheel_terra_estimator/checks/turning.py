@@ -104,16 +104,15 @@ class Turning:
 
 
 class Fix(NamedTuple):
-    """A hypothesis: wheels that go by each other's name, then the sign of each."""
+    """A hypothesis: pairs of wheels that go by each other's name, then the sign of each."""
 
     signs: tuple[int, ...]
-    exchanged: tuple[int, int] | None = None
+    exchanged: tuple[tuple[int, int], ...] = ()
 
     def order(self, count: int) -> list[int]:
         """Return the column that each of so many wheels has under the hypothesis."""
         order = list(range(count))
-        if self.exchanged is not None:
-            a, b = self.exchanged
+        for a, b in self.exchanged:
             order[a], order[b] = b, a
         return order
 
@@ -213,11 +212,18 @@ def sign_fixes(count: int) -> list[Fix]:
     return [Fix((1, *signs)) for signs in itertools.product((1, -1), repeat=count - 1)]
 
 
-def exchanges(count: int, lateral: FloatArray) -> list[Fix]:
-    """Return nothing, and every left wheel exchanged with a right one; two wheels are the sides."""
-    plain = (1,) * count
-    pairs = itertools.product(np.flatnonzero(lateral > 0.0), np.flatnonzero(lateral < 0.0))
-    return [Fix(plain), *(Fix(plain, (int(a), int(b))) for a, b in pairs if count > 2)]
+def exchanges(stretch: Turning) -> list[Fix]:
+    """Return nothing, and every left wheel exchanged with a right one; two wheels are the sides.
+
+    Wheels that are steered otherwise turn faster: front and rear ones may be exchanged as well.
+    """
+    count = stretch.lateral.size
+    left, right = (np.flatnonzero(s * stretch.lateral > 0.0).tolist() for s in (1.0, -1.0))
+    told = [(pair,) for pair in itertools.product(left, right) if count > 2]
+    if stretch.along is not None and np.ptp(stretch.along, axis=1).max(initial=0.0) > 0.0:
+        rows = [list(itertools.combinations(side, 2)) for side in (left, right)]
+        told += [(pair,) for side in rows for pair in side] + list(zip(*rows, strict=False))
+    return [Fix((1,) * count), *(Fix((1,) * count, tuple(pairs)) for pairs in told)]
 
 
 def compare_exchanges(stretch: Turning) -> Comparison | None:
@@ -225,7 +231,7 @@ def compare_exchanges(stretch: Turning) -> Comparison | None:
     turns, count = stretch.turns, stretch.speed.shape[1]
     if count < 3 or turns.sum() < 2 * LEAST_TURNING_ROWS:
         return None
-    return compare(stretch.rows(turns), exchanges(count, stretch.lateral))
+    return compare(stretch.rows(turns), exchanges(stretch))
 
 
 # In a recording ----------------------------------------------------------------------------------
@@ -256,7 +262,7 @@ class _Chosen(NamedTuple):
 
     signs: FloatArray
     track: float = 0.0
-    exchanged: tuple[int, int] | None = None
+    exchanged: tuple[tuple[int, int], ...] = ()
     trial: str = ''
     sure: float = 0.99
 
@@ -298,8 +304,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes: list[Outcome] = []
     chosen = _chosen(evidence, there, rows)
     signs, turn, mended = chosen.signs, chosen.track, evidence
-    if chosen.exchanged is not None:
-        finding, mended = _exchanged(evidence, chosen.exchanged, chosen)
+    if chosen.exchanged:
+        finding, mended = _exchanged(evidence, chosen)
         outcomes.append(finding)
     if not turn:
         reason = 'no turn in it, or no IMU: left and right not checked; drive a circle both ways'
@@ -338,7 +344,7 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     if not 2 <= count <= MOST_WHEELS:
         return _Chosen(signs)
     stretch = stretch_of(evidence, there, rows)
-    best = compare(stretch, [*sign_fixes(count), *exchanges(count, stretch.lateral)[1:]])
+    best = compare(stretch, [*sign_fixes(count), *exchanges(stretch)[1:]])
     if not best.trial.falls:
         again = compare_exchanges(stretch)
         best = again if again is not None and again.trial.falls else best
@@ -358,9 +364,7 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     if not best.trial.passes and best.rival is not None:
         names = [evidence.facts.names[i] for i in there]
         trial += f', or {_told(best.rival, names)}: drive straight'
-    exchanged = None
-    if best.fix.exchanged is not None:
-        exchanged = int(there[best.fix.exchanged[0]]), int(there[best.fix.exchanged[1]])
+    exchanged = tuple((int(there[a]), int(there[b])) for a, b in best.fix.exchanged)
     return _Chosen(signs, turn, exchanged, trial, 0.99 if best.trial.passes else 0.5)
 
 
@@ -373,8 +377,8 @@ def _lasting(evidence: Evidence, there: NDArray[np.intp], rows: Mask, signs: Flo
 
 
 def _told(fix: Fix, names: Sequence[str]) -> str:
-    if fix.exchanged is not None:
-        return f'{names[fix.exchanged[0]]} and {names[fix.exchanged[1]]} exchanged'
+    if fix.exchanged:
+        return ', '.join(f'{names[a]} and {names[b]} exchanged' for a, b in fix.exchanged)
     backwards = [name for name, sign in zip(names, fix.signs, strict=True) if sign < 0]
     return f'{", ".join(backwards)} backwards'
 
@@ -531,12 +535,11 @@ def _sides_exchanged(facts: RoverFacts) -> list[str]:
     return names
 
 
-def _exchanged(
-    evidence: Evidence, pair: tuple[int, int], chosen: _Chosen
-) -> tuple[Finding, Evidence]:
+def _exchanged(evidence: Evidence, chosen: _Chosen) -> tuple[Finding, Evidence]:
     names = evidence.facts.names
-    order = Fix((), pair).order(len(names))
-    told = {'wheel': ', '.join(names[i] for i in pair), 'trial': chosen.trial}
+    order = Fix((), chosen.exchanged).order(len(names))
+    wheels = ', '.join(names[i] for pair in chosen.exchanged for i in pair)
+    told = {'wheel': wheels, 'trial': chosen.trial}
     told['names'] = ', '.join(names[i] for i in order)
     finding = evidence.found('exchanged', min(chosen.sure, 0.95), **told)
     return finding, evidence.with_rate(evidence.rate[:, order], evidence.torque[:, order])
