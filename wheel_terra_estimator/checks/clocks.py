@@ -38,7 +38,7 @@ LONGEST = {'imu': 2.0, 'reference': 3.0}
 """Greatest lag that is looked for [s]."""
 IN_A_DRIVE = 15.0
 """Length of a drive over the greatest lag that it tells [-]."""
-LEAST_OFFSET = {'imu': 0.3, 'reference': 0.25}
+LEAST_OFFSET = 0.2
 """Lags below this [s] are those of chassis, soil, jitter and filters of encoders."""
 LEAST_PERIODS = 0.35
 """The same in periods of the reference: between its stamps nothing is known."""
@@ -135,7 +135,7 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 
 def _counts(evidence: Evidence, name: str, told: Lag) -> bool:
-    least = max(LEAST_OFFSET[name], 1.5 * evidence.period)
+    least = max(LEAST_OFFSET, 1.5 * evidence.period)
     if name == 'reference' and evidence.recording.reference is not None:
         least = max(least, LEAST_PERIODS * evidence.recording.reference.period)
     return told.counts(least)
@@ -262,7 +262,7 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     rim = _even(evidence, evidence.rim, time)
     if period > SLOWEST or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')
-    told = lag_of(time, rim, at[order], forward, 'reference', 'speeds')
+    told = lag_of(time - STEP, rim, at[order], forward, 'reference', 'speeds')  # means up to then
     if told is None:
         return NotChecked('delay', 'reference: does not follow the wheels closely enough')
     evidence.figures['reference.delay_s'] = round(told.value, 3)

@@ -65,6 +65,8 @@ FLAT_TURN_STD = math.radians(0.1)
 """Part of the mounting that unevenness of the ground leaves open [rad]."""
 TURNED_ROUND = 0.75
 """Probability that an IMU that no curve shows is turned round, not its x axis reversed [-]."""
+YAW_MODEL_STD = math.radians(1.0)
+"""Yaw that a body which pitches and rolls as it starts and turns leaves open [rad]."""
 LEAST_QUARTER = math.radians(45.0)
 """Least yaw of a quarter turn [rad]."""
 ALONG_AXIS = math.cos(math.radians(25.0))
@@ -447,7 +449,7 @@ def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
         return None
     other = float(np.angle(quick[0].sum()))
     apart = abs(math.remainder(by_motion.value - other, 2.0 * math.pi))
-    seen = Estimate(by_motion.value, math.hypot(by_motion.std, 0.5 * apart))
+    seen = Estimate(by_motion.value, math.hypot(by_motion.std, 0.5 * apart, YAW_MODEL_STD))
     return seen, Trial(abs(math.remainder(other, 2.0 * math.pi)), apart)
 
 
