@@ -17,7 +17,7 @@ from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecke
 from wheel_terra_estimator.checks.run import configured_mounting, examine
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.configuration.ros_yaml import Value
+from wheel_terra_estimator.configuration.ros_yaml import Value, format_value
 from wheel_terra_estimator.errors import UserError
 
 WORTH_CHANGING = 0.2
@@ -190,29 +190,24 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
 
 
 def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
-    configuration = evidence.facts.configuration
+    configuration, figures = evidence.facts.configuration, report.figures
     assert configuration is not None
-    told, names = geometry.radius_ratio(evidence), {finding.fault for finding in report.findings}
-    rival = 'reference_scale' in names and 'radius' not in names
-    found = not np.allclose(evidence.facts.radius, configuration.wheels.slip_radius)
+    told = next((finding for finding in _sure(report) if finding.fault == 'radius'), None)
+    open_yet = any(finding.fault == 'reference_scale' for finding in report.findings)
+    rolling, source = evidence.facts.radius, 'straight stretches against the other wheels'
+    if told is not None and evidence.recording.reference is not None:
+        source = f'straight, steady, firm stretches against {evidence.recording.reference.topic}'
+        bound = figures['rover.radius_bound_by_reference_m']
+        if open_yet:  # nothing is mended by it yet
+            rolling = rolling * figures['rover.radius_ratio']
+            source += ' (or its scale is off: slip is the same)'
+        if bound > BLUNT_REFERENCE * float(np.mean(rolling)):
+            source += f' (its noise alone allows no better than +- {bound:.2g}: drive longer)'
+    if np.allclose(rolling, configuration.wheels.slip_radius):
+        return evidence
     lugs = configuration.wheels.slip_radius - configuration.wheels.radius
-    if found and (isinstance(told, NotChecked) or rival):
-        after = (evidence.facts.radius - lugs).round(5).tolist()
-        changes.add('wheels.radius', after, None, 'straight stretches against the other wheels')
-    if isinstance(told, NotChecked) or rival:
-        return evidence
-    ratio, radius = told.ratio, float(np.mean(evidence.facts.radius))
-    if not found and 'radius' not in names:
-        return evidence
-    rolling = evidence.facts.radius * ratio.value
-    assert evidence.recording.reference is not None
-    source = f'straight, steady, firm stretches against {evidence.recording.reference.topic}'
-    if 'reference_scale' in names:
-        source += ' (or its scale is off: slip is the same)'
-    bound = report.figures['rover.radius_bound_by_reference_m']
-    if bound > BLUNT_REFERENCE * radius:
-        source += f' (its noise alone allows no better than +- {bound:.2g}: drive faster or longer)'
-    changes.add('wheels.radius', (rolling - lugs).round(5).tolist(), radius * ratio.std, source)
+    std = told.std if told is not None else None
+    changes.add('wheels.radius', (rolling - lugs).round(5).tolist(), std, source)
     return replace(evidence, facts=replace(evidence.facts, radius=rolling))
 
 
@@ -252,8 +247,6 @@ def _track(changes: _Changes, evidence: Evidence) -> None:
 
 def as_file(calibration: Calibration, configuration: Configuration, recording: str) -> str:
     """Return the rover file as text."""
-    from wheel_terra_estimator.configuration import ros_yaml
-
     changes = {change.key: change for change in calibration.changes}
     values = configuration.flat()
     keys = [key for key in values if key in configuration.stated or key in changes]
@@ -267,7 +260,7 @@ def as_file(calibration: Calibration, configuration: Configuration, recording: s
         value = told.after if told is not None else values[key]
         if told is not None:
             lines.append(f'    # {_in_words(told)}')
-        lines.append(f'    {key}: {ros_yaml.format_value(_as_declared(value, values.get(key)))}')
+        lines.append(f'    {key}: {format_value(_as_declared(value, values.get(key)))}')
     return '\n'.join(lines) + '\n'
 
 
@@ -275,14 +268,10 @@ def _as_declared(value: Value, before: Value | None) -> Value:
     """Return a value with the number type that the rover file had."""
     if isinstance(value, list) and isinstance(before, list) and isinstance(before[0], float):
         return [float(item) for item in value]
-    return (
-        float(value) if isinstance(before, float) and not isinstance(value, (str, list)) else value
-    )
+    return float(value) if isinstance(before, float) and isinstance(value, int) else value
 
 
 def _in_words(change: Change) -> str:
-    from wheel_terra_estimator.configuration.ros_yaml import format_value
-
     before = 'not stated' if change.before is None else format_value(change.before)
     std = '' if change.std is None else f' +- {change.std:.2g}'
     return f'before {before}, now {format_value(change.after)}{std}: {change.source}'

@@ -81,9 +81,12 @@ def reversed_axis(evidence: Evidence) -> tuple[str, bool]:
     return 'x' if starts < 0.0 else 'y', True
 
 
-def yaw_of_motion(parts: Complex, energy: float) -> Estimate | None:
+def felt_yaw(evidence: Evidence) -> Estimate | None:
     """Return the angle by which a motion is felt turned [rad]; None where it is not clear."""
-    total = parts.sum()
+    felt = felt_motion(evidence)
+    if felt is None:
+        return None
+    (parts, energy), total = felt, felt[0].sum()
     spread = float(np.sqrt(np.sum(np.abs(parts - total / parts.size) ** 2)))
     if energy <= 0.0 or not 0.5 < abs(total) / energy < 2.0 or abs(total) < 3.0 * spread:
         return None

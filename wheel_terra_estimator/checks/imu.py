@@ -22,8 +22,8 @@ from wheel_terra_estimator.checks.felt_motion import (
     LEAST_YAW,
     YAW_SIGMAS,
     felt_motion,
+    felt_yaw,
     reversed_axis,
-    yaw_of_motion,
 )
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
@@ -443,8 +443,7 @@ def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
     Slopes at the places of starts and stops fall off faster than these: a rover that goes to and
     fro feels the same ones each time.
     """
-    felt, quick = felt_motion(evidence), felt_motion(evidence, 0.5 * DRIFT)
-    by_motion = yaw_of_motion(*felt) if felt is not None else None
+    by_motion, quick = felt_yaw(evidence), felt_motion(evidence, 0.5 * DRIFT)
     if by_motion is None or quick is None:
         return None
     other = float(np.angle(quick[0].sum()))

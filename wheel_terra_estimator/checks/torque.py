@@ -17,7 +17,7 @@ from wheel_terra_estimator.checks.evidence import (
     Evidence,
 )
 from wheel_terra_estimator.checks.faults import listed
-from wheel_terra_estimator.checks.felt_motion import felt_motion, yaw_of_motion
+from wheel_terra_estimator.checks.felt_motion import felt_yaw
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
@@ -144,8 +144,7 @@ def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     rows, sense = evidence.unturned, np.sign(evidence.common_rate)
     if evidence.force is None or rows.sum() < LEAST_MOVING_ROWS:
         return None
-    felt = felt_motion(evidence)
-    yaw = yaw_of_motion(*felt) if felt is not None else None
+    yaw = felt_yaw(evidence)
     width = evidence.rows_in(SETTLING)
     along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
     if yaw is not None:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
 from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS, listed
-from wheel_terra_estimator.checks.felt_motion import felt_motion, yaw_of_motion
+from wheel_terra_estimator.checks.felt_motion import felt_yaw
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries
@@ -431,10 +431,9 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
         fit = float(sense @ forward) / max(float(np.abs(forward).sum()), 1e-12)
         by_reference = fit if abs(fit) > SAME_SENSE else None
     signed = evidence.with_rate(evidence.rate * signs, evidence.torque * signs)
-    if (felt := felt_motion(signed)) is not None:
-        yaw = yaw_of_motion(*felt)
-        if yaw is not None and abs(math.cos(yaw.value)) > CLEAR_DIRECTION:
-            by_force = math.cos(yaw.value)
+    yaw = felt_yaw(signed)
+    if yaw is not None and abs(math.cos(yaw.value)) > CLEAR_DIRECTION:
+        by_force = math.cos(yaw.value)
     if by_force is None and evidence.facts.known and np.nansum(signed.torque * signed.rate) > 0.0:
         slopes = slope_fit(signed)  # torques that carry the rover up or down them
         if isinstance(slopes, Slopes) and slopes.gain.sigmas_from(0.0) > SCALE_SIGMAS:
