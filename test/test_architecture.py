@@ -94,6 +94,18 @@ def test_help_is_light():
     assert result.stdout.strip() == '[]'
 
 
+def test_the_threads_of_numpy_are_set_before_it_is_imported():
+    result = run(
+        'import os\n'
+        "os.environ.pop('OPENBLAS_NUM_THREADS', None)\n"
+        'from wheel_terra_estimator.cli.main import main\n'
+        "before = 'numpy' in sys.modules\n"
+        "main(['config', 'path'])\n"
+        "print(before, 'numpy' in sys.modules, os.environ['OPENBLAS_NUM_THREADS'])"
+    )
+    assert result.stdout.splitlines()[-1] == 'False True 1', result.stderr
+
+
 def test_the_configuration_is_read_without_the_heavy_libraries():
     result = run(
         'from wheel_terra_estimator.configuration import reader\n'

@@ -14,7 +14,6 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import refuse_inputs
 
@@ -66,6 +65,9 @@ def file_or_entry(text: str) -> Path | str:
 
 
 def _inputs(arguments: argparse.Namespace, outputs: dict[str, Path]) -> Iterator[Path]:
+    # Imports numpy, which must not come before `main` has set its threads.
+    from wheel_terra_estimator.configuration import reader, shipped
+
     for name, value in vars(arguments).items():
         if name in outputs:
             continue
