@@ -240,9 +240,10 @@ def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
     down, up = np.quantile(along * sense, (0.05, 0.95))
     scatter = float(np.std(along))
     if scatter < LEAST_SLOPE_STD or max(down, -up) > -UP_AND_DOWN:
-        steepest = math.degrees(max(up, -down) / evidence.facts.gravity)
-        there = f'slopes to one side alone, by {steepest:.1f} degrees,'
-        there = there if max(up, -down) > UP_AND_DOWN else 'no slopes'
+        steepest, there = max(up, -down), 'no slopes'
+        if steepest > UP_AND_DOWN:
+            by = math.degrees(steepest / evidence.facts.gravity)
+            there = f'slopes to one side alone, by {by:.1f} degrees,'
         reason = f'torque: {there} in it; drive up and down 5 to 10 degrees'
         return NotChecked('gain', reason)
     columns = [evidence.facts.mass * along, sense]

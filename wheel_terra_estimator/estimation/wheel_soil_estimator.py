@@ -717,11 +717,11 @@ class WheelSoilEstimator:
         """Judge the slip of each wheel and the stuck warning at a time [s]."""
         rover, wheels = self._rover, self._wheels
         rims = wheels.rim_speeds(time)
-        speed, variance = self._present_speed(rims)
+        present = self._present_speed(rims)
         motion = self._turning.state
         body = BodyMotion(
-            speed,
-            math.sqrt(max(variance, 0.0)),
+            present.speed,
+            math.sqrt(max(present.variance, 0.0)),
             motion.yaw_rate,
             motion.yaw_rate_std,
             self._steering.state.headings,
@@ -750,16 +750,14 @@ class WheelSoilEstimator:
         assessment = self._stuck.update(
             time,
             RoverMotion(
-                speed,
+                present.speed,
                 self._reference.fresh(time),
                 tuple(seen),
                 turning=motion.lateral_motion > _SHARP_TURN
                 or sides_oppose(rims, body.headings.by_yaw_rate),
             ),
         )
-        self._clock = self._clock._replace(
-            assessment=assessment, speed=SpeedAndVariance(speed, variance)
-        )
+        self._clock = self._clock._replace(assessment=assessment, speed=present)
         if self._margin.due(time):
             direction = self._contact_age.state.direction or 1.0
             self._margin.update(time, self._wheel_states(loads), direction * loads.slope_share)
@@ -855,9 +853,10 @@ class WheelSoilEstimator:
         Without a reference velocity, torques that no soil of the filter explains widen it.
         """
         rolling = self._yaw_compensated(rims)
-        filtered, usual = self._filtered_speed(rolling), self._usual_speed(rolling)
+        filtered = self._filtered_speed(rolling)
         if self._reference.known(self._clock.time):
             return filtered
+        usual = self._usual_speed(rolling)
         speed, variance = filtered if usual is None else intersected(filtered, usual)
         return SpeedAndVariance(speed, variance * excess(self._torque.state))
 
@@ -867,14 +866,9 @@ class WheelSoilEstimator:
     def _filtered_speed(self, rims: RimSpeeds) -> SpeedAndVariance:
         """Return speed [m/s] and variance of the filter, carried on from its last cycle."""
         time = self._clock.time
-        speed, variance = self._speed.present(
-            self._ekf,
-            time,
-            rims,
-            self._trusted(self._inertial.state.window, time),
-            inflated=self._reference.known(time),
-        )
-        return SpeedAndVariance(speed, variance)
+        window = self._trusted(self._inertial.state.window, time)
+        told = self._reference.known(time)
+        return SpeedAndVariance(*self._speed.present(self._ekf, time, rims, window, inflated=told))
 
     def _usual_speed(self, rims: RimSpeeds) -> SpeedAndVariance | None:
         """Return speed [m/s] and variance by the slip that is usual at such torques.
