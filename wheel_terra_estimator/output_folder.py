@@ -129,9 +129,9 @@ def new_folder(
 ) -> Iterator[Path]:
     """Yield an empty folder to be filled; at the end of the block it is at ``path``.
 
-    ``keep_partial``: whether what was written before an error is put in its place as well, unless
-    an earlier output stands there. Raises UserError as `check_target`, and where the disk is full
-    or fails.
+    ``keep_partial``: whether what was written before an error (none of the user's) is put in its
+    place as well, unless an earlier output stands there. Raises UserError as `check_target`, and
+    where the disk is full or fails.
     """
     check_target(path, overwrite, inputs, folder=True)
     path = _absolute(path)
@@ -142,7 +142,8 @@ def new_folder(
             try:
                 fresh.mkdir()
                 yield fresh
-            except BaseException:
+            except BaseException as error:
+                keep_partial = keep_partial and not isinstance(error, UserError)
                 if keep_partial and not path.exists() and fresh.is_dir() and any(fresh.iterdir()):
                     with suppress(OSError):
                         mark(fresh)

@@ -117,6 +117,23 @@ def test_rim_speeds_and_positions_of_a_log(tmp_path, reference, sense):
     np.testing.assert_allclose(middle, 0.5 + 0.2 * np.arange(middle.size), atol=1e-6)
 
 
+def test_positions_need_wheels_that_count_one_way(tmp_path, capsys):
+    columns = {
+        'time': {'column': 't', 'unit': 'ms'},
+        'joint_states': {side: {'velocity': {'column': side}} for side in ('left', 'right')},
+        'reference_odom': METRES,
+    }
+    day = 1_700_000_000_000  # [ms]: stamps of a date fall on the grid of the estimates
+    rows = ['t,left,right,x,y', *(f'{day + 50 * i},2.51,-2.5,{0.02 * i},0' for i in range(60))]
+    assert converted(tmp_path, columns, rows) == 2
+    assert 'sign: -1 for each that counts backwards' in capsys.readouterr().err
+    assert not (tmp_path / 'bag').exists()
+    columns['joint_states']['right']['velocity']['sign'] = -1
+    told = converted(tmp_path, columns, rows)
+    np.testing.assert_allclose(told.reference.velocity[:, 0], 0.4, rtol=1e-6)
+    assert set(np.diff(told.joints.stamp)) == {50_000_000}
+
+
 def test_an_imu_that_says_it_has_no_accelerometer(tmp_path):
     with BagFile(tmp_path / 'bag', {'/imu/data': 'sensor_msgs/msg/Imu'}) as bag:
         for stamp in range(10**9, 4 * 10**9, 10**8):

@@ -82,6 +82,8 @@ _PLACES = (('position.x', 'position.y'), ('latitude', 'longitude'))
 EARTH_RADIUS = 6_371_000.0  # mean [m]
 BASELINE = 1.0
 """Positions so far apart [s] make a speed: closer ones are noise."""
+ONE_WAY = 0.5
+"""Share of their rate that the wheels have in common, metre for metre, if all count one way [-]."""
 _JOINT = {'velocity': 'rate', 'effort': 'torque', 'position': 'angle'}
 _TOPICS = ('joint_states', 'imu/data', 'sinkage', 'reference_odom')
 REGULAR = 0.8
@@ -135,6 +137,11 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
                 sender.send(line, row)
             if not sender.sent:
                 raise UserError(f'{table}: no rows below the header')
+            if sender.one_way < ONE_WAY * sender.any_way:
+                raise UserError(
+                    f'{columns}: positions take their sense from the wheels, which count in both '
+                    'directions; sign: -1 for each that counts backwards, and wheels.direction 1'
+                )
         return Converted(bag.counts, list(sender.short), held)
 
 
@@ -267,13 +274,14 @@ class _Sender:
         self.sent = 0
         self.short: dict[int, None] = {}  # lines, in order
         self.places: deque[tuple[int, float, float]] = deque()  # stamp [ns], place
+        self.one_way = self.any_way = 0.0  # common rate and mean size of rates, times speed
 
     def send(self, line: int, row: list[str]) -> None:
         seconds = self.value(line, row, self.layout.time)
         if not math.isfinite(seconds) or not 0.0 <= seconds < 9e9:
             column = self.layout.time.name
             raise UserError(f'{self.table}, line {line}, column {column}: no time from 0 on')
-        stamp = max(round(seconds * 1e9), 1)  # 0 is no stamp
+        stamp = max(round(seconds * 1e6) * 1000, 1)  # of a date no more is held; 0 is no stamp
         header = self.make.header(stamp)
         joints = self.layout.joints
         rates, torques, angles = (
@@ -293,7 +301,7 @@ class _Sender:
         if self._is_new('/sinkage', _cells(row, self.layout.sinkage)):
             self._sinkage(line, row, stamp)
         if self._is_new('/reference_odom', _cells(row, self.layout.reference)):
-            self._reference(line, row, stamp, -1.0 if _mean(rates) < 0.0 else 1.0)
+            self._reference(line, row, stamp, rates)
         self.sent += 1
 
     def _is_new(self, topic: str, cells: list[str]) -> bool:
@@ -350,14 +358,18 @@ class _Sender:
             message = self.make.joint_state(self.make.header(stamp), list(columns), position=depths)
             self.bag.write('/sinkage', message, stamp)
 
-    def _reference(self, line: int, row: list[str], stamp: int, sense: float) -> None:
+    def _reference(self, line: int, row: list[str], stamp: int, rates: list[float]) -> None:
         columns, arrival = self.layout.reference, stamp
+        common = _mean(rates)
         speed = self.value(line, row, columns.get('linear.x'))
         for pair in _PLACES:
             if set(pair) <= set(columns):
                 place = [self.value(line, row, columns[key]) for key in pair]
                 stamp, speed = self._speed(stamp, place, degrees=pair == _PLACES[1])
-                speed *= sense
+                if not math.isnan(speed):
+                    self.one_way += speed * abs(common)
+                    self.any_way += speed * _mean([abs(rate) for rate in rates])
+                speed *= -1.0 if common < 0.0 else 1.0
         if math.isnan(speed):
             return
         variance = self.value(line, row, columns.get('variance'))

@@ -160,7 +160,8 @@ def _checked(
         values[key] = checked_value(parameter, stated, wheels)
     _cross_check(values, stated, sources)
     configuration = Configuration.from_values(values, stated)
-    for key, words in doubtful_units(configuration.soil, stated):
+    typed = () if 'provenance' in stated else stated  # what was fitted needs no doubt
+    for key, words in doubtful_units(configuration.soil, typed):
         _warn(f'{stated[key][1]}: {words}')
     if configuration.rover.contact_law == RESISTIVE_FORCE and configuration.effects:
         _warn(
