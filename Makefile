@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # make demo    the shipped drives through the real node, and a blind trial: reports, key numbers
-# make test    all tests
+# make test    all but the slow tests
 # make lint    ruff and mypy
 # make docs    the site (site/index.html), warnings are errors
 # make clean   remove what these made

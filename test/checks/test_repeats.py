@@ -46,6 +46,11 @@ def test_a_sensor_that_freezes_on_the_way(name, field, column, key):
     assert seconds == pytest.approx(40.0, abs=0.5)
 
 
+def test_a_vector_that_is_the_same_all_along_is_not_said_to_be_zero():
+    dead = next(f for f in found(imu=held(WHOLE.imu, 'force', -1.0, np.inf)) if f.kind == 'frozen')
+    assert 'linear_acceleration is the same in every message' in dead.words
+
+
 @pytest.mark.parametrize('name, field', [('reference', 'velocity'), ('sinkage', 'sinkage')])
 def test_nothing_is_frozen_while_the_rover_stands(name, field):
     assert found(**{name: held(getattr(WHOLE, name), field, 0.0, 15.0)}) == []

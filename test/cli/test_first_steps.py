@@ -79,6 +79,13 @@ def test_two_wheels_need_no_wheelbase(tmp_path):
     assert rover.wheels.x.tolist() == [0.0, 0.0]
 
 
+def test_a_wheel_without_a_partner_has_a_guessed_place(tmp_path, capsys):
+    given = ['--radius', '0.1', '--track', '0.4', '--wheelbase', '0.6', '--mass', '9', '--wheels']
+    rover_of([*given, 'a, b, c, d, e'], tmp_path)
+    said = capsys.readouterr().out
+    assert 'wheels.x is a guess' in said and 'wheels.y is a guess' in said
+
+
 def converted(tmp_path, columns, rows):
     (tmp_path / 'map.yaml').write_text(yaml.safe_dump(columns))
     (tmp_path / 'log.csv').write_text('\n'.join(rows))

@@ -9,6 +9,7 @@ far longer than the sensor itself ever does.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isnan, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -98,7 +99,7 @@ def _sinkage(evidence: Evidence, sinkage: SinkageSeries) -> list[Outcome]:
 
 
 class Stays(NamedTuple):
-    """Where a reading stays the same: rows (k,), the longest time [s], and its number there."""
+    """Where a reading stays: rows (k,), the longest time [s], its number (nan: of a vector)."""
 
     rows: Mask
     longest: float
@@ -108,7 +109,8 @@ class Stays(NamedTuple):
     def how(self) -> str:
         """In words."""
         if self.rows.all():
-            return f'is {self.value:g} in every message while the wheels turn'
+            same = 'is the same' if isnan(self.value) else f'is {self.value:g}'
+            return f'{same} in every message while the wheels turn'
         return f'stays the same to the last digit for up to {self.longest:.1f} s of driving'
 
 
@@ -148,7 +150,7 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
             continue
         rows[np.flatnonzero(known)[first : last + 1]] = True
         if lasts > longest:
-            longest, value = lasts, float(readings[first, 0])
+            longest, value = lasts, float(readings[first, 0]) if values.shape[1] == 1 else nan
     return Stays(rows, longest, value) if longest else None
 
 

@@ -92,7 +92,7 @@ def as_text(recording: Recording, report: CheckReport, without_rover: bool) -> s
     if report.not_checked:
         lines += ['', '  not checked']
         lines += [f'    {entry.kind}: {entry.reason}' for entry in report.not_checked]
-    lines += ['', '  figures']
+    lines += ['', '  figures'] if report.figures else []
     width = max((len(key) for key in report.figures), default=0)
     lines += [f'    {key:{width}}  {value}' for key, value in report.figures.items()]
     if recording.shortened:

@@ -183,6 +183,7 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
     x = [base * (0.5 - row / last) if last else 0.0 for row in rows]
     count = len(wheels)
     guessed = {'rover.centre_of_gravity'} | (set() if measures['width'] else {'wheels.width'})
+    guessed |= ({'wheels.x'} if last > 1 else set()) | ({'wheels.y'} if sum(sides) else set())
     return RoverSketch(
         name=arguments.name or 'my rover',
         wheels=wheels,
