@@ -38,6 +38,16 @@ def test_soils_of_the_literature_are_not_doubted_and_a_thousandth_of_them_is(nam
     assert found == expected
 
 
+def test_a_fitted_number_is_not_doubted(recwarn):
+    fitted = {
+        'soil.cohesion': 3.2,
+        'soil.cohesion_std': 400.0,
+        'provenance': 'wheel-terra diagnose',
+    }
+    reader.from_parameters(fitted, complete=False)
+    assert not recwarn.list
+
+
 def test_the_words_name_the_place_and_the_cure(capsys):
     soft = ['-p', 'soil.cohesion:=0.3', '-p', 'soil.frictional_modulus:=180.0']
     base = ['predict', '--config', 'hit_wh3', '--config', 'dlr_mss', '--load', '0.1']
