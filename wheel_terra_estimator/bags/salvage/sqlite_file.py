@@ -2,21 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of a rosbag2 SQLite file, whole or damaged, in the order of their log times.
 
-A file in which SQLite finds no fault is read by SQLite; of another one the rows are found by their
-own bytes (`sqlite_rows`).
+SQLite reads the file; rows on which it stops are passed by, one number after the other.
 """
 
 from __future__ import annotations
 
-import mmap
 import shutil
 import sqlite3
 from array import array
 from collections import Counter
 from collections.abc import Collection, Iterator
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -24,13 +23,14 @@ import numpy as np
 from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
 from wheel_terra_estimator.bags.salvage.losses import Losses
 from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
-from wheel_terra_estimator.bags.salvage.sqlite_rows import find_rows
 from wheel_terra_estimator.errors import UserError
 
 # Damaged text may stand in the library's own message, which is decoded as UTF-8.
 _UNREADABLE = (sqlite3.Error, UnicodeDecodeError, MemoryError, OverflowError)
 _MOST_GAPS = 100  # in the numbers of the rows that damage explains
-_Message = tuple[int, int, bytes]  # number of the topic, log time [ns], data
+_MOST_PASSED = 100_000  # numbers that are tried behind damaged rows: only made-up files need more
+_WIDENING = 100  # passed rows after which every second number is tried, twice as many: third, ...
+_LARGEST_NUMBER = 2**63 - 1
 
 
 class SqliteFile:
@@ -42,23 +42,30 @@ class SqliteFile:
     def __init__(self, path: Path, stack: ExitStack, limits: Limits = LIMITS) -> None:
         self.path = path
         self.losses = Losses()
-        readable, log = _with_log(path, stack)
-        self._table: _WholeTable | _DamagedTable
+        self._number = array('q')  # of the row, and its log time: only where the order differs
+        self._time = array('q')
+        self._topics: dict[int, tuple[str, str]] = {}  # number -> name and type
+        # Anything may stand in the columns of a row, and is then no message.
+        self._whole = (
+            "typeof(topic_id) = 'integer' AND typeof(data) = 'blob' "
+            "AND typeof(timestamp) = 'integer' AND timestamp >= 0 "
+            f'AND length(data) <= {limits.chunk}'
+        )
         try:
-            self._table = _WholeTable(readable, log, stack, limits, self.losses)
+            fault = self._open(path, stack)
+            counts = self._survey(fault)
         except _UNREADABLE as error:
-            self._table = _DamagedTable(readable, log, stack, limits, self.losses)
-            if not (self._table.topics or self._table.counts):
-                raise UserError(
-                    f'{path}: cannot be read ({error}), and nothing of a recording is left in it; '
-                    'copy it anew from where it was recorded'
-                ) from None
-        topics, counts = self._table.topics, self._table.counts
-        self.topics = [Topic(*described, counts[number]) for number, described in topics.items()]
+            fault, counts = str(error), Counter[int]()
+        if fault and not (self._topics and counts):
+            raise UserError(
+                f'{path}: cannot be read ({fault}), and nothing of a recording is left in it; '
+                'copy it anew from where it was recorded, or: sqlite3 FILE .recover'
+            )
+        self.topics = [Topic(*it, counts[number]) for number, it in self._topics.items()]
         for topic in self.topics:
             found = self.losses.recovered.get(topic.name, 0)
             self.losses.recovered[topic.name] = found + topic.message_count
-        if unknown := sum(count for number, count in counts.items() if number not in topics):
+        if unknown := sum(n for number, n in counts.items() if number not in self._topics):
             self.losses.left_out.append(f'{unknown} messages of topics that are not described')
 
     def notes(self) -> list[str]:
@@ -67,16 +74,120 @@ class SqliteFile:
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of some topics in the order of their log times."""
-        wanted = {n: name for n, (name, _) in self._table.topics.items() if name in topics}
-        for topic, time, data in self._table.rows(wanted):
-            yield RawMessage(time, wanted[topic], data)
+        wanted = {n: name for n, (name, _) in self._topics.items() if name in topics}
+        for _, topic, time, data in self._rows():
+            if topic in wanted:
+                yield RawMessage(time, wanted[topic], data)
+
+    def _rows(self) -> Iterator[tuple[Any, ...]]:
+        if not self._number:
+            yield from self._walk('data')
+            return
+        order = np.argsort(np.asarray(self._time), kind='stable')
+        text = f'SELECT id, topic_id, timestamp, data FROM messages WHERE id = ? AND {self._whole}'
+        for number in np.asarray(self._number)[order].tolist():
+            yield from self._run(text, (number,))
+
+    def _open(self, path: Path, stack: ExitStack) -> str:
+        """Open the file and read its topics; return what SQLite finds wrong with it, if anything.
+
+        Raises sqlite3.Error or another of `_UNREADABLE` where it holds no recording.
+        """
+        readable, logged = _with_log(path, stack)
+        address = f'file:{quote(str(readable.absolute()))}?mode=ro'
+        connection = sqlite3.connect(address + ('' if logged else '&immutable=1'), uri=True)
+        stack.callback(connection.close)
+        self._run = connection.execute
+        self._run('PRAGMA trusted_schema=OFF')
+        self._run('PRAGMA ignore_check_constraints=ON')
+        self._run('PRAGMA writable_schema=ON')  # else a file that was cut off is refused
+        for table in ('topics', 'messages'):
+            kind = self._run(
+                "SELECT sql FROM sqlite_master WHERE type='table' AND name=?", (table,)
+            )
+            if 'virtual' in (kind.fetchone() or ('virtual',))[0].lower()[:32]:
+                raise sqlite3.DatabaseError(f'no table {table}')
+        try:
+            fault = str(self._run('PRAGMA quick_check(1)').fetchone()[0]).splitlines()[-1]
+        except _UNREADABLE as error:
+            fault = str(error)
+        with suppress(*_UNREADABLE):
+            for number, name, kind in self._run('SELECT id, name, type FROM topics'):
+                self._topics[number] = str(name), str(kind)
+        if fault == 'ok':
+            return ''
+        with readable.open('rb') as file:
+            pages = int.from_bytes(file.read(32)[28:], 'big')
+        stated = pages * int(self._run('PRAGMA page_size').fetchone()[0])
+        cut = not logged and stated > readable.stat().st_size
+        self.losses.state = 'is cut off' if cut else 'is damaged'
+        return fault
+
+    def _walk(self, last_column: str) -> Iterator[tuple[Any, ...]]:
+        """Yield number, topic, log time and another column of all messages, by number.
+
+        Behind a row that cannot be read the next number is tried, after many of them wider steps.
+        """
+        text = (
+            f'SELECT id, topic_id, timestamp, {last_column} FROM messages '
+            f'WHERE id >= ? AND {self._whole} ORDER BY id'
+        )
+        begin = wanted = passed = 0  # begin: behind the last row that was read
+        limit = ''
+        while wanted < _LARGEST_NUMBER and passed < _MOST_PASSED:
+            there = begin
+            try:
+                for row in self._run(text + limit, (wanted,)):
+                    if row[0] < wanted:
+                        raise sqlite3.DatabaseError('numbers of rows fall')
+                    begin = wanted = row[0] + 1
+                    yield row
+                if begin == there or not limit:
+                    return
+                limit = ''
+            except _UNREADABLE:
+                if limit:
+                    passed += 1
+                    wanted = min(wanted + 1 + (wanted - begin) // _WIDENING, _LARGEST_NUMBER)
+                limit = ' LIMIT 1'  # the library looks one row ahead, and loses the one before
+
+    def _survey(self, fault: str) -> Counter[int]:
+        """Count the messages of each topic and learn whether they stand in the order of time."""
+        counts: Counter[int] = Counter()
+        last, ordered = -1, True
+        for number, topic, time, _ in self._walk('data' if fault else 'NULL'):
+            counts[topic] += 1
+            ordered = ordered and time >= last
+            last = time
+            self._number.append(number)
+            self._time.append(time)
+        if self._time:
+            self.losses.start, self.losses.last = min(self._time), max(self._time)
+        if fault:
+            self._note_missing_numbers()
+        elif others := self._run('SELECT count(*) FROM messages').fetchone()[0] - counts.total():
+            self.losses.left_out.append(f'{others} rows that are no messages left out')
+        if ordered:
+            self._number = self._time = array('q')
+        return counts
+
+    def _note_missing_numbers(self) -> None:
+        """Say between which log times rows are missing; many gaps are rows that were taken out.
+
+        Recorders number the rows of a file from 1 on, without a gap.
+        """
+        time = np.asarray(self._time)
+        gaps = np.flatnonzero(np.diff(np.asarray(self._number), prepend=0) > 1)
+        for gap in gaps.tolist() if len(gaps) <= _MOST_GAPS else ():
+            span = sorted(time[max(gap - 1, 0) : gap + 1].tolist())
+            self.losses.spans[gap] = span[0], span[-1]
 
 
-def _with_log(path: Path, stack: ExitStack) -> tuple[Path, Path | None]:
-    """Return a file to be read and its write-ahead log, if it has one: copies of both."""
+def _with_log(path: Path, stack: ExitStack) -> tuple[Path, bool]:
+    """Return a file to be read and whether it has a write-ahead log: then both are copies."""
     log = path.with_name(f'{path.name}-wal')
     if not log.is_file() or not log.stat().st_size:
-        return path, None
+        return path, False
     # The newest messages are in the log; SQLite writes beside a file that has one.
     folder = Path(stack.enter_context(TemporaryDirectory()))
     try:
@@ -84,129 +195,4 @@ def _with_log(path: Path, stack: ExitStack) -> tuple[Path, Path | None]:
             shutil.copyfile(file, folder / file.name)
     except OSError as error:
         raise UserError(f'{path}: cannot be copied ({error.strerror})') from None
-    return folder / path.name, folder / log.name
-
-
-class _WholeTable:
-    """The messages as SQLite gives them.
-
-    Raises sqlite3.Error or another of `_UNREADABLE` where the file is damaged, or holds no
-    recording.
-    """
-
-    def __init__(
-        self, path: Path, log: Path | None, stack: ExitStack, limits: Limits, losses: Losses
-    ) -> None:
-        self._number = array('q')  # of the row, and its log time: only where the order differs
-        self._time = array('q')
-        address = f'file:{quote(str(path.absolute()))}?mode=ro'
-        connection = sqlite3.connect(address + ('' if log else '&immutable=1'), uri=True)
-        stack.callback(connection.close)
-        self._run = connection.execute
-        self._run('PRAGMA trusted_schema=OFF')
-        self._run('PRAGMA ignore_check_constraints=ON')
-        if (fault := self._run('PRAGMA quick_check(1)').fetchone()[0]) != 'ok':
-            raise sqlite3.DatabaseError(fault.splitlines()[-1])
-        # Anything may stand in the columns of a row, and is then no message.
-        self._whole = (
-            "typeof(id) = 'integer' AND typeof(topic_id) = 'integer' AND typeof(data) = 'blob' "
-            "AND typeof(timestamp) = 'integer' AND timestamp >= 0 "
-            f'AND length(data) <= {limits.chunk}'
-        )
-        for table in ('topics', 'messages'):
-            kind = self._run(
-                "SELECT sql FROM sqlite_master WHERE type='table' AND name=?", (table,)
-            )
-            if 'virtual' in (kind.fetchone() or ('virtual',))[0].lower()[:32]:
-                raise sqlite3.DatabaseError(f'no table {table}')
-        # Number -> name and type
-        self.topics = {
-            number: (str(name), str(kind))
-            for number, name, kind in self._run('SELECT id, name, type FROM topics')
-        }
-        self.counts = self._survey(losses)  # messages by number of the topic
-
-    def rows(self, wanted: Collection[int]) -> Iterator[_Message]:
-        """Yield the messages of some topics in the order of their log times."""
-        text = f'SELECT topic_id, timestamp, data FROM messages WHERE {self._whole}'
-        if self._number:
-            found: Iterator[_Message]
-            order = np.argsort(np.asarray(self._time), kind='stable')
-            numbers = np.asarray(self._number)[order].tolist()
-            found = (self._run(f'{text} AND id = ?', (n,)).fetchone() for n in numbers)
-        else:
-            found = iter(self._run(f'{text} ORDER BY id'))
-        return (row for row in found if row[0] in wanted)
-
-    def _survey(self, losses: Losses) -> Counter[int]:
-        """Count the messages of each topic and learn whether they stand in the order of time."""
-        counts: Counter[int] = Counter()
-        last, ordered = -1, True
-        text = f'SELECT id, topic_id, timestamp FROM messages WHERE {self._whole} ORDER BY id'
-        for number, topic, time in self._run(text):
-            counts[topic] += 1
-            ordered = ordered and time >= last
-            last = time
-            self._number.append(number)
-            self._time.append(time)
-        if self._time:
-            losses.start, losses.last = min(self._time), max(self._time)
-        if ordered:
-            self._number = self._time = array('q')
-        others = self._run('SELECT count(*) FROM messages').fetchone()[0] - counts.total()
-        if others:
-            losses.left_out.append(f'{others} rows that are no messages left out')
-        return counts
-
-
-class _DamagedTable:
-    """The messages that are found in the bytes of a file; attributes as of `_WholeTable`."""
-
-    def __init__(
-        self, path: Path, log: Path | None, stack: ExitStack, limits: Limits, losses: Losses
-    ) -> None:
-        self._content = b'' if not path.stat().st_size else _mapped(path, log, stack)
-        self._rows = rows = find_rows(self._content, limits.chunk)
-        self.topics = rows.topics
-        numbers, counts = np.unique(rows.topic, return_counts=True)
-        self.counts = Counter(dict(zip(numbers.tolist(), counts.tolist(), strict=True)))
-        losses.state = 'is cut off' if rows.cut else 'is damaged'
-        if len(rows.time):
-            losses.start, losses.last = int(rows.time.min()), int(rows.time.max())
-        if rows.given_up:
-            losses.left_out.append('it looks made up: too many places where rows may begin')
-        if rows.free_unknown:
-            losses.left_out.append('deleted rows may be among them: the list of free pages is lost')
-        self._note_missing_numbers(losses)
-
-    def rows(self, wanted: Collection[int]) -> Iterator[_Message]:
-        """Yield the messages of some topics in the order of their log times."""
-        rows = self._rows
-        for place in np.lexsort((rows.number, rows.time)).tolist():
-            if (topic := int(rows.topic[place])) in wanted:
-                yield topic, int(rows.time[place]), rows.data(self._content, place)
-
-    def _note_missing_numbers(self, losses: Losses) -> None:
-        """Say between which log times rows are missing; many gaps are rows that were taken out.
-
-        Recorders number the rows of a file from 1 on, without a gap.
-        """
-        number, time = self._rows.number, self._rows.time
-        gaps = np.flatnonzero(np.diff(number, prepend=0) > 1)
-        if len(gaps) > _MOST_GAPS:
-            return
-        for gap in gaps.tolist():
-            span = sorted(time[max(gap - 1, 0) : gap + 1].tolist())
-            losses.spans[gap] = span[0], span[-1]
-
-
-def _mapped(path: Path, log: Path | None, stack: ExitStack) -> mmap.mmap:
-    """Return the bytes of a file, those of its log brought in and behind it."""
-    if log:
-        frames = log.read_bytes()
-        with suppress(*_UNREADABLE), closing(sqlite3.connect(path)) as connection:
-            connection.execute('PRAGMA wal_checkpoint(TRUNCATE)')
-        with path.open('ab') as more:
-            more.write(frames)
-    file = stack.enter_context(path.open('rb'))
-    return stack.enter_context(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+    return folder / path.name, True

@@ -59,16 +59,6 @@ def write(path: Path, samples: Sequence[Sample], types: dict[str, str]) -> None:
     connection.close()
 
 
-def topic_places(content: bytes, types: dict[str, str]) -> list[tuple[int, int]]:
-    """Return where the row of each topic stands, its number excepted."""
-    found = []
-    for topic, kind in types.items():
-        text = f'{topic}{kind}cdr'.encode()
-        at = content.index(text)
-        found.append((at - 9, at + len(text)))  # numbers and lengths stand before the text
-    return found
-
-
 def message_places(
     content: bytes, samples: Sequence[Sample], types: dict[str, str]
 ) -> list[list[tuple[int, int]]]:
