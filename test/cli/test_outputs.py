@@ -69,7 +69,7 @@ def test_the_walk_finds_what_it_is_for():
     assert len(PAIRS) > 30
     assert {words[0] for words, parser in COMMANDS.items() if outputs(parser)} == {
         'simulate', 'calibrate', 'init', 'compare', 'convert', 'replay', 'predict', 'diagnose',
-        'trial', 'soilbin', 'evaluate', 'demo', 'check', 'bench', 'config', 'reproduce',
+        'trial', 'soilbin', 'evaluate', 'demo', 'check', 'bench', 'reproduce',
     }  # fmt: skip
 
 
@@ -149,7 +149,6 @@ REFUSED = {
     'check': 'check {bag} --report',
     'calibrate': 'calibrate {bag} -o',
     'init': 'init --bag {bag} -o',
-    'config views': 'config views {bad} -o',
     'compare': 'compare {bag} {bag} --report',
     'convert': 'convert {table} -o',
     'replay': 'replay {bag} {bad} --scheduler {silent} -o',

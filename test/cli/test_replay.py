@@ -3,7 +3,6 @@
 """``wheel-terra replay`` from the command line."""
 
 import itertools
-import json
 import re
 import signal
 from typing import Any
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.drive_laws import DriveLaw, as_text
 from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
 from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.storage import open_bag
@@ -56,34 +54,6 @@ def test_drive_gives_a_bag_a_report_and_a_summary(make_bag, config, tmp_path, ca
     page = report.read_text()
     assert len(re.findall('<path class="line', page)) == 2 + 2 * 3 + 2  # speeds; two wheels; slopes
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # nothing is loaded from elsewhere
-
-
-def test_manoeuvres_that_would_teach_more_are_in_json_terminal_and_report(
-    make_bag, config, tmp_path, capsys, monkeypatch
-):
-    from wheel_terra_estimator.simulation import manoeuvres
-
-    monkeypatch.setattr(manoeuvres, 'DURATION', 1.5)
-    find, found = manoeuvres.with_manoeuvres, []
-
-    def found_once(*arguments, **options):
-        if not found:
-            found.extend(find(*arguments, **options))
-        return found
-
-    monkeypatch.setattr(manoeuvres, 'with_manoeuvres', found_once)
-    bag, page = str(make_bag()), tmp_path / 'report.html'
-    assert main(['replay', bag, *config, '--json']) == 0
-    assert {row['manoeuvre'] for row in json.loads(capsys.readouterr().out)['taught']} == {None}
-    assert main(['replay', bag, *config, '--manoeuvres', '--json']) == 0
-    told = json.loads(capsys.readouterr().out)['taught']
-    assert all((row['manoeuvre'] is None) == (row['verdict'] == 'learned') for row in told)
-    assert all(bool(row['manoeuvre']) == (row['promised_std'] is not None) for row in told)
-    assert main(['replay', bag, *config, '--manoeuvres', '--report', str(page)]) == 0
-    assert 'nothing this rover can drive would teach ' in capsys.readouterr().out
-    assert 'nothing this rover can drive: a plate or shear test' in page.read_text()
-    assert main(['replay', bag, bag, *config, '--manoeuvres', '-o', str(tmp_path / 'out')]) == 2
-    assert '--manoeuvres: belongs to one recording' in capsys.readouterr().err
 
 
 def test_what_was_learned_is_a_further_config_of_every_command(make_bag, config, tmp_path, capsys):
@@ -184,24 +154,3 @@ def test_slip_on_slopes_is_in_the_table_as_it_was_published_last(make_bag, confi
     assert tuple(told[-1].name) == tuple(f'slope_{slope:.0f}deg' for slope in found[:, 0])
     columns = (told[-1].position, told[-1].effort, told[-1].velocity)
     np.testing.assert_allclose(found[:, 1:], np.array(columns).T, rtol=1e-5, atol=1e-9)
-
-
-def test_laws_are_ranked_by_a_drive(tmp_path, make_bag, drive, rover, capsys):
-    ground = 'rover.contact_law:=resistive_force'
-    bag = str(tmp_path / 'climb')
-    simulated = ['simulate', '--scenario', 'firm_drive', '--duration', '6', '-p', ground]
-    assert main([*simulated, '-o', bag]) == 0
-    told = capsys.readouterr().out.rpartition('estimates: ')[2]
-    known = [part for part in told.split()[3:] if part not in ('-p', ground)]
-    assert main(['compare', '--laws', bag, *known, '--json']) == 0
-    ranked = json.loads(capsys.readouterr().out)
-    assert ranked[0]['name'] == 'resistive_force'
-    assert len(ranked) == 3 and len({law['readings'] for law in ranked}) == 1
-    assert ranked[0]['log_likelihood'] - ranked[1]['log_likelihood'] > 20.0
-    text = as_text([DriveLaw('first', 210.0, 90), DriveLaw('second', 190.46, 90)])
-    assert text.splitlines()[2:] == ['| first | 0.0 | 90 |', '| second | -19.5 | 90 |']
-    # Without a reference velocity each law has a slip that suits it.
-    rover.write(tmp_path / 'rover.yaml')
-    blind = make_bag(messages=[row for row in drive if 'reference' not in row[0]])
-    assert main(['compare', '--laws', str(blind), '--config', str(tmp_path / 'rover.yaml')]) == 2
-    assert 'no reference velocity' in capsys.readouterr().err

@@ -1,11 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""compare --laws: the law that made a table wins on it."""
+"""Contact laws beside a diagnosis: the law that made a table wins on it."""
 
 import json
 from pathlib import Path
-
-import pytest
 
 from wheel_terra_estimator.cli.main import main
 
@@ -18,44 +16,6 @@ def table(path: Path, law: str, *more: str) -> str:
     noise = ('--noise', '0.0003,0.5,0.05', '--seed', '3')
     assert main(['predict', *ROVER, *POINTS, '--law', law, *noise, *more, '-o', str(path)]) == 0
     return str(path)
-
-
-@pytest.mark.parametrize(
-    'law', [pytest.param('wong_reece', marks=pytest.mark.slow), 'resistive_force']
-)
-def test_the_law_that_made_the_rows_is_first(law, tmp_path, capsys):
-    path = table(tmp_path / 'rows.csv', law)
-    capsys.readouterr()
-    assert main(['compare', '--laws', path, *ROVER, '--json']) == 0
-    ranked = {r['name']: r for r in json.loads(capsys.readouterr().out)}
-    assert next(iter(ranked)) == law
-    best = ranked.pop(law)
-    # What is left of its own rows is the noise, also on loads that the fit had not seen.
-    for errors, factor in ((best['fitted'], 1.4), (best['by_load'], 2.5)):
-        assert 0.5 * 0.5 < errors['drawbar_pull'] < 0.5 * factor
-        assert 0.5 * 0.05 < errors['torque'] < 0.05 * factor
-    assert best['by_wheel'] == {}
-    if law == 'resistive_force':
-        assert best['free'] == 1
-        assert best['values']['law.scale'] == pytest.approx(1.0, abs=0.03)
-        assert all(best['log_evidence'] - r['log_evidence'] > 5.0 for r in ranked.values())
-
-
-def test_what_compare_refuses(tmp_path, capsys):
-    path = table(tmp_path / 'rows.csv', 'wong_reece')
-    for arguments, word in (
-        (['--laws', path, 'bag'], 'takes one table'),
-        (['bag'], 'two bags'),
-        (['bag', 'bag', '--config', 'hit_fit'], 'belong to --laws'),
-        (['bag', 'bag', '--remap', '/a:=/b'], 'belong to --laws'),
-    ):
-        assert main(['compare', *arguments]) == 2
-        assert word in capsys.readouterr().err
-    rows = (tmp_path / 'rows.csv').read_text().splitlines()
-    aside = [rows[0] + ',slip_angle', *(row + ',0.3' for row in rows[1:])]
-    (tmp_path / 'aside.csv').write_text('\n'.join(aside) + '\n')
-    assert main(['compare', '--laws', str(tmp_path / 'aside.csv'), *ROVER]) == 2
-    assert 'without slip angle' in capsys.readouterr().err
 
 
 def test_diagnose_says_what_another_law_leaves(tmp_path, capsys, undrawn):

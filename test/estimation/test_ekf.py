@@ -4,10 +4,8 @@
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_gate
-from wheel_terra_estimator.estimation.filter.likelihood import Likelihood
 
 
 def make(n, seed=0):
@@ -110,25 +108,3 @@ def test_readings_of_any_size_bring_no_warning_and_no_restart():
     assert np.isfinite(kalman.mean).all()
     assert (np.linalg.eigvalsh(kalman.covariance) > -1e-9).all()
     assert kalman.restarts == 0
-
-
-def test_the_likelihood_is_that_of_the_readings_before_they_are_fused():
-    random = np.random.default_rng(8)
-    root = random.normal(size=(3, 3))
-    ekf = GatedFilter(np.zeros(3), root @ root.T, np.full(3, -1e9), np.full(3, 1e9))
-    ekf.likelihood = likelihood = Likelihood()
-    expected = 0.0
-    for count in (1, 2, 4):
-        H, residual = random.normal(size=(count, 3)), 30.0 * random.normal(size=count)
-        noise = random.uniform(0.1, 5.0, count)
-        S = H @ ekf.covariance @ H.T + np.diag(noise)
-        expected += multivariate_normal(np.zeros(count), S).logpdf(residual)
-        before = likelihood.snapshot()
-        ekf.update(residual, H, noise)
-    assert likelihood.state.readings == 7
-    assert likelihood.state.log == pytest.approx(expected)
-    kept = likelihood.state
-    likelihood.reset()  # a new run of the same drive
-    assert likelihood.state == kept
-    likelihood.restore(before)  # a late reading: the last update is done again
-    assert likelihood.state.readings == 3

@@ -184,7 +184,6 @@ def taught(
     *,
     parameters: Sequence[str] = (),
     remaps: Mapping[str, str] | None = None,
-    manoeuvres: bool = False,
 ) -> tuple[Taught, ...]:
     """Run the estimator over a drive and return what that taught of soil and sensors.
 
@@ -192,16 +191,12 @@ def taught(
     ----------
     drive, rover, parameters, remaps
         As of `estimate`.
-    manoeuvres : bool
-        Whether the short drive that would teach most of each parameter not learned is looked for,
-        by simulation: ten seconds.
 
     Returns
     -------
     tuple of Taught
         ``name``, ``unit`` of the deviations, ``prior_std``, ``std``, ``bits`` gained, ``verdict``
-        ('learned', 'assumed', 'confounded'), ``confounded_with``; ``manoeuvre`` ('': none would
-        teach it) and ``promised_std`` after it.
+        ('learned', 'assumed', 'confounded'), ``confounded_with``.
 
     Examples
     --------
@@ -211,13 +206,9 @@ def taught(
     """
     configuration, inputs = _inputs(drive, rover, parameters)
     if isinstance(inputs, Path):
-        return tuple(_replayed(inputs, configuration, remaps or {}, manoeuvres=manoeuvres).taught)
-    history, core = _estimated(inputs, configuration, smoothed=False)
-    if not manoeuvres:
-        return tuple(core.taught())
-    from wheel_terra_estimator.bags.replay import further
-
-    return further(core, configuration, history)
+        return tuple(_replayed(inputs, configuration, remaps or {}).taught)
+    _, core = _estimated(inputs, configuration, smoothed=False)
+    return tuple(core.taught())
 
 
 def _run(

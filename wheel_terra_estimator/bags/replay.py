@@ -16,8 +16,6 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from wheel_terra_estimator.bags.history import EstimateHistory, HistoryRecorder
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
@@ -26,7 +24,6 @@ from wheel_terra_estimator.bags.track import Track, TrackRecorder, read_odometry
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 from wheel_terra_estimator.estimation.taught import Taught
@@ -85,8 +82,6 @@ class Options:
     progress: bool = True
     smooth: bool = False  # whether the estimates are those of the fixed-interval smoother
     odometry: str = ''  # topic of the bag whose positions the track has; empty: it is reckoned
-    # Whether the manoeuvres that would teach more are looked for: ten seconds
-    manoeuvres: bool = False
 
 
 DEFAULT = Options()
@@ -157,31 +152,9 @@ def replay(
         ),
         interrupted=interrupted.is_set(),
         learned=core.learned(),
-        taught=further(core, configuration, history) if options.manoeuvres else core.taught(),
+        taught=core.taught(),
         filtered=filtered() if filtered is not None else None,
         track=tracker.track(places),
-    )
-
-
-def further(
-    core: EstimatorCore, configuration: Configuration, history: EstimateHistory
-) -> tuple[Taught, ...]:
-    """Return what a drive has taught, with the manoeuvres that would teach more."""
-    taught, posterior = core.taught(), core.posterior()
-    speeds = np.abs(history.forward_velocity)
-    moving = speeds[speeds > configuration.rest_speed]
-    if posterior is None or not moving.size:
-        return taught
-    from wheel_terra_estimator.simulation.manoeuvres import SENSORS, with_manoeuvres
-
-    health = core.health()
-    return with_manoeuvres(
-        taught,
-        configuration,
-        posterior,
-        soil=core.learned(),
-        speed=float(np.median(moving)),
-        sensors=[name for name in SENSORS if f'nis_{name}' in health],
     )
 
 

@@ -7,19 +7,15 @@ from __future__ import annotations
 import argparse
 import re
 
-from wheel_terra_estimator.cli.outputs import add_output
-
 EXAMPLES = (
     'wheel-terra config list rovers',
     'wheel-terra config show frostyboy',
-    'wheel-terra config views my_rover.yaml -o my_rover',
 )
-_VIEWS = 'written are F.plotjuggler.xml and F.foxglove.json'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    actions = parser.add_subparsers(dest='action', required=True, metavar='list|show|path|views')
+    actions = parser.add_subparsers(dest='action', required=True, metavar='list|show|path')
     listing = actions.add_parser('list', help='names of the shipped files')
     listing.add_argument(
         'name', nargs='?', default='', metavar='FOLDER', help='rovers, soils or scenarios'
@@ -28,12 +24,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show.add_argument('name', metavar='NAME', help='bare name, such as frostyboy')
     path = actions.add_parser('path', help='print where the shipped files are, or one of them')
     path.add_argument('name', nargs='?', default='', metavar='NAME', help='bare name')
-    views = actions.add_parser(
-        'views', help='write layouts of PlotJuggler and Foxglove for the wheels of a rover file'
-    )
-    views.add_argument('name', metavar='ROVER', help='rover file, or bare name of a shipped one')
-    add_output(views, _VIEWS, 'F', required=True)
-    views.add_argument('--overwrite', action='store_true', help='replace earlier files')
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -44,13 +34,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(shipped.find(arguments.name).read_text(encoding='utf-8'), end='')
     elif arguments.action == 'path':
         print(shipped.find(arguments.name) if arguments.name else shipped.configuration_folder())
-    elif arguments.action == 'views':
-        from wheel_terra_estimator.configuration import reader
-        from wheel_terra_estimator.messages.layouts import write_layouts
-
-        wheels = reader.load([arguments.name]).wheels.names
-        for path in write_layouts(wheels, arguments.output, arguments.overwrite):
-            print(path)
     else:
         _list(arguments.name.rstrip('/'))
     return 0

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     add_output(
         parser,
-        'rover file to be written; views for PlotJuggler and Foxglove are written beside it',
+        'rover file to be written',
         'F',
         required=True,
     )
@@ -78,19 +77,16 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.configuration.rover_template import rover_file
-    from wheel_terra_estimator.messages.layouts import write_layouts
     from wheel_terra_estimator.output_folder import check_file, new_file
 
     check_file(arguments.output, arguments.overwrite)
     sketch = _sketch(arguments)
-    views = write_layouts(sketch.wheels, arguments.output, arguments.overwrite)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(rover_file(sketch), encoding='utf-8')
     reader.load([arguments.output])
     print(f'rover file: {arguments.output} ({len(sketch.wheels)} wheels, {sketch.mass:g} kg)')
     for key in sorted(sketch.guessed):
         print(f'  {key} is a guess: measure it')
-    print(f'views of its wheels, for PlotJuggler and Foxglove: {", ".join(map(str, views))}')
     print(f'next: wheel-terra check RECORDING --config {arguments.output}')
     return 0
 
@@ -116,7 +112,7 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
     if arguments.bag:
         wheels = wheels or _wheels_of(arguments.bag, bag_arguments.limits_of(arguments))
     elif not wheels:
-        wheels = _ask_wheels()
+        raise UserError('give --urdf, --bag or --wheels')
     return _from_measures(arguments, wheels)
 
 
@@ -168,12 +164,9 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
     if measures['wheelbase'] is None and len(wheels) == 2:
         measures['wheelbase'] = 0.0  # one axle
     missing = [name for name in _NEEDED if measures[name] is None]
-    if missing and not sys.stdin.isatty():
+    if missing:
         words = {name: f'--{name} {unit} ({meaning})' for name, unit, meaning in _MEASURES}
         raise UserError(f'missing: {", ".join(words[name] for name in missing)}')
-    for name, _, meaning in _MEASURES:
-        if measures[name] is None and name in _NEEDED:
-            measures[name] = _ask_number(name, meaning)
     sides = [side_of(name) for name in wheels]
     if 0 in sides:  # left before right, as the file has it
         sides = [1 if i % 2 == 0 else -1 for i in range(len(wheels))]
@@ -197,25 +190,3 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
         guessed=frozenset(guessed),
         source='wheel names from the recording, the rest as given' if arguments.bag else 'as given',
     )
-
-
-def _ask_wheels() -> list[str]:
-    question = 'names of the wheel joints, comma between, front to rear, left before right: '
-    wheels = _names(_ask(question))
-    if not wheels:
-        raise UserError('no wheels named; give --wheels, --bag or --urdf')
-    return wheels
-
-
-def _ask_number(name: str, meaning: str) -> float:
-    text = _ask(f'{meaning}: ')
-    try:
-        return _positive(text)
-    except argparse.ArgumentTypeError as error:
-        raise UserError(f'--{name}: {error}') from None
-
-
-def _ask(question: str) -> str:
-    if not sys.stdin.isatty():
-        raise UserError('give --urdf, --bag or --wheels')
-    return input(question)

@@ -34,7 +34,7 @@ COMMANDS = {
     'simulate': 'drive a simulated rover and write a rosbag2 with ground truth',
     'check': 'say what is wrong with a recording or a rover file, and how to correct it',
     'calibrate': 'write a rover file with what a recording tells: radius, mounting, zeros, noise',
-    'init': 'write a new rover file from a URDF, from a recording, or from a few questions',
+    'init': 'write a new rover file from a URDF, from a recording, or from measures',
     'config': 'list, show or find the shipped rover, soil and scenario files',
     'compare': 'put two bags of estimates side by side, against the truth where there is one',
     'convert': 'write a table of logged values (CSV) as a rosbag2',

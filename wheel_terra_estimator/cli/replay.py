@@ -92,12 +92,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='estimates of the fixed-interval smoother; warnings stay as they were given live',
     )
-    parser.add_argument(
-        '--manoeuvres',
-        action='store_true',
-        help='say which short drive would teach most of what this one has not taught (ten '
-        'seconds); of one recording',
-    )
     parser.add_argument('--json', action='store_true', help='print the summary as JSON')
     parser.add_argument(
         '--report',
@@ -171,7 +165,6 @@ def _options(arguments: argparse.Namespace) -> Options:
         every_set=bool(arguments.table),
         smooth=arguments.smooth,
         odometry=arguments.track_odometry,
-        manoeuvres=arguments.manoeuvres,
     )
 
 
@@ -269,7 +262,6 @@ def _run_several(arguments: argparse.Namespace) -> int:
         ('--arrival', arguments.arrival),
         ('--save-soil', arguments.save_soil),
         ('--slip-on-slope', arguments.slip_on_slope),
-        ('--manoeuvres', arguments.manoeuvres),
     ):
         if given:
             raise UserError(f'{option}: belongs to one recording; replay that one by itself')

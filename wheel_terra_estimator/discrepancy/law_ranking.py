@@ -1,74 +1,33 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Rival contact laws on one table: evidence, error of the fit, error on what was held out."""
+"""Rival contact laws on one table: what each leaves of it, and its evidence."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import gammaln
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
-from wheel_terra_estimator.discrepancy.numbers import SHOWN
 from wheel_terra_estimator.discrepancy.result import Diagnosis, OtherLaw
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.discrepancy.workflow import nuisance_coordinates, operating_points
-from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.contact_law import LAWS, RESISTIVE_FORCE, contact_law
 from wheel_terra_estimator.terramechanics.effects import by_variant, catalogue
 from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
-from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-
-Rows = BoolArray
 
 STRAIGHT = 0.02  # slip angle below which a row counts as without [rad]
 # Prior of the misfit: as if one cell beside those of the table were off by this share of the range.
 USUAL_MISFIT = 0.05
 _SCALE_DEVIATION = np.log(3.0)  # of the resistive scale, known from the soil's plate test alone
-_LOAD_GROUPS = 3  # by load, where the greatest is more than `_LOADS_DIFFER` times the least
-_LOADS_DIFFER = 1.2
 _FEWEST_ROWS = 4
 _ROUNDS = 6  # of fit and misfit in turn; the misfit settles to some per cent in three
-
-
-@dataclass(frozen=True)
-class RankedLaw:
-    """What a table says of a law."""
-
-    name: str  # one of ``contact_law.LAWS``
-    free: int  # parameters that were fitted
-    log_evidence: float  # natural logarithm, with all rows [-]
-    # Quantity -> root mean square error on the rows of the fit, on loads and on wheels that the
-    # fit had not seen [m, N, N m]; empty where the table has only one
-    fitted: dict[str, float]
-    by_load: dict[str, float]
-    by_wheel: dict[str, float]
-    values: dict[str, float]  # fitted parameter -> value [its unit]
-
-
-def rank_laws(table: SteadyTable, configuration: Configuration) -> list[RankedLaw]:
-    """Fit every law to a table and rank them by evidence, the best first.
-
-    Soil and stated effects are free as ``diagnose`` has them; the scale of resistive force theory
-    is free around that of the soil's plate. The misfit of each quantity is unknown and integrated
-    out; rows count as independent. Raises UserError if fewer than four rows are without slip angle,
-    or the wheel is stated nowhere.
-    """
-    table = _straight(table)
-    if len(table) < _FEWEST_ROWS:
-        raise UserError(
-            f'{table.name}: {len(table)} rows without slip angle; the laws are compared on '
-            f'{_FEWEST_ROWS} or more'
-        )
-    fits = [_Fit(name, table, configuration) for name in LAWS]
-    return sorted((fit.ranked() for fit in fits), key=lambda law: -law.log_evidence)
 
 
 def _straight(table: SteadyTable) -> SteadyTable:
@@ -87,11 +46,10 @@ def with_other_laws(diagnosis: Diagnosis) -> Diagnosis:
     table = _straight(diagnosis.table)
     if diagnosis.verdict == 'agrees' or len(table) < _FEWEST_ROWS:
         return diagnosis
-    everything = np.ones(len(table), bool)
     evidence, misfit = {}, {}
     for law in LAWS:
         fit = _Fit(law, table, diagnosis.configuration)
-        u, jacobian, size = fit.fit(everything)
+        u, jacobian, size = fit.fit()
         evidence[law] = fit.log_evidence(u, jacobian, size)
         left = (fit.measured - fit.outputs(u)) / fit.usual
         misfit[law] = float(np.sqrt(np.nanmean(left**2)))
@@ -142,43 +100,10 @@ class _Fit:
         law = contact_law(self.name, replace(soil, **changes), effects, self.width, strict=False)
         return self.readings.read(law.steady_state(self.points).outputs())
 
-    def ranked(self) -> RankedLaw:
-        """Return the law's evidence and errors."""
-        everything = np.ones(len(self.points), bool)
-        u, jacobian, misfit = self.fit(everything)
-        found = self.errors(lambda _: u, [everything])
-        load = np.asarray(self.points.normal_load)
-        loads = np.array_split(np.argsort(load, kind='stable'), _LOAD_GROUPS)
-        by_load = [np.isin(np.arange(load.size), group) for group in loads]
-        if load.max() <= _LOADS_DIFFER * load.min() or len(load) < 2 * _FEWEST_ROWS:
-            by_load = []
-        return RankedLaw(
-            self.name,
-            len(u),
-            self.log_evidence(u, jacobian, misfit),
-            found,
-            self.errors(lambda rows: self.fit(~rows)[0], by_load),
-            self.errors(lambda rows: self.fit(~rows)[0], _wheels(self.points)),
-            {c.key: float(c.value(x)) for c, x in zip(self.coordinates, u, strict=True)},
-        )
-
-    def errors(self, fit: Callable[[Rows], FloatArray], groups: list[Rows]) -> dict[str, float]:
-        """Return quantity -> rms error over groups of rows, each with its own fit."""
-        if not groups:
-            return {}
-        left = np.full_like(self.measured, np.nan)
-        for rows in groups:
-            left[rows] = (self.measured - self.outputs(fit(rows)))[rows]
-        return {
-            quantity: float(np.sqrt(np.nanmean(left[:, q] ** 2)))
-            for q, quantity in enumerate(OUTPUTS)
-            if np.isfinite(left[:, q]).any()
-        }
-
-    def fit(self, rows: Rows) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return coordinates, derivatives of the weighed cells by them, and the misfits (3,)."""
         u = np.zeros(len(self.coordinates))
-        known = np.isfinite(self.measured) & rows[:, None]
+        known = np.isfinite(self.measured)
         lower = np.array([c.lower for c in self.coordinates])
         upper = np.array([c.upper for c in self.coordinates])
         misfit, jacobian = 2.0 * self.usual, np.zeros((0, len(u)))
@@ -203,30 +128,3 @@ class _Fit:
         information = jacobian.T @ jacobian + np.eye(len(u))
         volume = 0.5 * np.linalg.slogdet(information)[1]
         return float(cells[count > 0].sum() - 0.5 * u @ u - volume)
-
-
-def _wheels(points: OperatingPoints) -> list[Rows]:
-    """Return the rows of each wheel; none if there is only one."""
-    wheel = points.wheel
-    names = ('radius', 'width', 'lug_height', 'lug_count')
-    columns = [np.broadcast_to(getattr(wheel, name), (len(points),)) for name in names]
-    keys, group = np.unique(np.round(np.column_stack(columns), 6), axis=0, return_inverse=True)
-    return [np.ravel(group) == k for k in range(len(keys))] if len(keys) > 1 else []
-
-
-def as_text(laws: list[RankedLaw]) -> str:
-    """Return the ranking as a Markdown table."""
-
-    def cells(errors: dict[str, float]) -> str:
-        parts = (f'{SHOWN[q][0] * v:.2f} {SHOWN[q][1]}' for q, v in errors.items())
-        return ', '.join(parts) or '-'
-
-    lines = [
-        '| law | free | ln evidence | error of the fit | on loads held out | on wheels held out |',
-        '|---|---|---|---|---|---|',
-    ]
-    for law in laws:
-        errors = ' | '.join(cells(e) for e in (law.fitted, law.by_load, law.by_wheel))
-        behind = law.log_evidence - laws[0].log_evidence
-        lines.append(f'| {law.name} | {law.free} | {behind:.1f} | {errors} |')
-    return '\n'.join(lines)

@@ -15,13 +15,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 import numpy as np
 
 from wheel_terra_estimator.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.filter.ekf import FilterMemory
 from wheel_terra_estimator.estimation.judgement.classes import PublishedClasses
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import OncePerSecond
 from wheel_terra_estimator.estimation.judgement.stuck.memory import StuckMemory
@@ -176,12 +175,6 @@ ReferenceVelocity
         if self._latest is None:
             return ()
         return tuple(getattr(self._estimator, 'taught', tuple)())
-
-    def posterior(self) -> FilterMemory | None:
-        """Return state and covariance of the filter; None before estimates."""
-        if self._latest is None:
-            return None
-        return cast('FilterMemory | None', getattr(self._estimator, 'posterior', lambda: None)())
 
     @property
     def rejected(self) -> Counter[tuple[str, str]]:

@@ -60,11 +60,6 @@ _MODEL_ERRORS = (
     (SHEAR_MODULUS, SHEAR_MODULUS_ERROR),
     (SLIP_SINKAGE, 0.0),
 )
-_ON_THE_BENCH = {
-    'soil.': ': a plate or shear test',
-    'torque zeros': ': read them with the wheels off the ground',
-}
-"""What else would teach it, by a part of the name."""
 _SAME_FACTOR = {'soil.cohesion': _STRENGTH, 'soil.cohesive_modulus': _STIFFNESS}
 """What the filter scales by one factor with another parameter, and so never tells from it."""
 
@@ -80,9 +75,6 @@ class Taught:
     bits: float  # gained, not below 0
     verdict: str  # LEARNED, ASSUMED or CONFOUNDED
     confounded_with: str = ''
-    manoeuvre: str | None = None
-    """That would teach it best; '' = none that was tried would, None = not asked."""
-    promised_std: float | None = None  # after the manoeuvre
 
     def in_words(self) -> str:
         """Return the verdict for a reader."""
@@ -91,15 +83,6 @@ class Taught:
         if self.verdict == CONFOUNDED:
             return f'not distinguishable from {self.confounded_with}'
         return 'assumed, not learned'
-
-    def cure_in_words(self) -> str:
-        """Return what would teach it; empty where it was learned, or nobody asked."""
-        if self.manoeuvre is None:
-            return ''
-        if self.manoeuvre and self.promised_std is not None:
-            return f'{self.manoeuvre} ({self.with_unit(self.promised_std)})'
-        bench = next((remedy for key, remedy in _ON_THE_BENCH.items() if key in self.name), '')
-        return f'nothing this rover can drive{bench}'
 
     def with_unit(self, std: float) -> str:
         """Return a deviation for a reader."""

@@ -44,20 +44,18 @@ from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.filter.consistency import excess
 from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
-from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, Row
+from wheel_terra_estimator.estimation.filter.ekf import Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
     ForceBalance,
     SumOfPulls,
     rut_tilt,
 )
 from wheel_terra_estimator.estimation.filter.initial_state import (
-    PriorTuning,
     gravity_bias_std,
     initial_filter,
     layout_of,
     with_soil_of,
 )
-from wheel_terra_estimator.estimation.filter.likelihood import Likelihood
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
@@ -181,15 +179,12 @@ class WheelSoilEstimator:
         Rover, soil, sensors, tuning.
     buffer : HistoryBuffer, optional
         Keeps what a smoother needs.
-    likelihood : Likelihood, optional
-        Sums up how likely the readings were.
     """
 
     def __init__(
         self,
         configuration: Configuration,
         buffer: HistoryBuffer | None = None,
-        likelihood: Likelihood | None = None,
     ) -> None:
         self._configuration = configuration
         self._rover = rover = Rover.from_configuration(configuration)
@@ -286,9 +281,6 @@ class WheelSoilEstimator:
         if buffer is not None:
             self._ekf.buffer = buffer
             self._parts += (buffer,)
-        if likelihood is not None:
-            self._ekf.likelihood = likelihood
-            self._parts += (likelihood,)
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -312,16 +304,6 @@ class WheelSoilEstimator:
             self._zero_velocity.keep_zero_of(gyro)
             self._reference.keep_count(rejected[0])
             self._sinkage.keep_count(rejected[1])
-
-    def posterior(self) -> FilterMemory:
-        """Return state and covariance of the filter, for `start_from`."""
-        return self._ekf.snapshot()
-
-    def start_from(self, posterior: FilterMemory) -> None:
-        """Start from what another drive on the same soil left of soil and biases."""
-        whole = PriorTuning(kept_share=1.0)
-        start = with_soil_of(posterior, self._ekf.snapshot(), self._layout, whole)
-        self._ekf.start_from(start)
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return what `restore` needs to come back to this state."""

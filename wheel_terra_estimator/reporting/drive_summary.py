@@ -288,11 +288,6 @@ def as_text(summary: DriveSummary) -> str:
             f'{row.name} ({row.bits:.1f} bits)' for row in summary.taught if row.verdict == LEARNED
         ]
         lines += ['', f'  learned on this drive: {", ".join(learned) or "nothing"}']
-        asked = [row for row in summary.taught if row.manoeuvre is not None]
-        for manoeuvre in sorted({row.manoeuvre or '' for row in asked}, reverse=True):
-            names = [row.name for row in asked if row.manoeuvre == manoeuvre]
-            by = manoeuvre or 'nothing this rover can drive'
-            lines.append(f'    {by} would teach {", ".join(names)}')
     lines += [f'  note: {note}' for note in summary.notes]
     return '\n'.join(lines)
 

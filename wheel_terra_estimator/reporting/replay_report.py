@@ -86,7 +86,6 @@ def _taught_row(row: Taught) -> dict[str, str]:
         'prior': row.with_unit(row.prior_std),
         'std': row.with_unit(row.std),
         'words': row.in_words(),
-        'cure': row.cure_in_words(),
     }
 
 

@@ -19,7 +19,6 @@ from filterpy.kalman import ExtendedKalmanFilter
 from scipy.linalg.lapack import dposv
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.estimation.filter.likelihood import Likelihood
 from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 
 _LEAST_VARIANCE = 1e-30  # of an innovation, in its own unit squared
@@ -89,8 +88,6 @@ class GatedFilter:
     ----------
     buffer : HistoryBuffer or None
         Keeps the transitions of the state for a smoother.
-    likelihood : Likelihood or None
-        Sums up how likely the innovations were.
     """
 
     def __init__(
@@ -104,7 +101,6 @@ class GatedFilter:
         self._lower, self._upper = lower, upper
         self.restarts = 0
         self.buffer: HistoryBuffer | None = None
-        self.likelihood: Likelihood | None = None
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -116,11 +112,6 @@ class GatedFilter:
         if self.buffer is not None:
             self.buffer.cut()
         self.restore(self._start)
-
-    def start_from(self, start: FilterMemory) -> None:
-        """Take another start, for this run and those that begin anew."""
-        self._start = start
-        self.reset()
 
     @property
     def mean(self) -> FloatArray:
@@ -163,8 +154,6 @@ class GatedFilter:
         share = np.maximum(noise * scale * scale, _LEAST_SHARE)
         ekf = self._ekf
         ekf.fuse(residual * scale, H * column, HP * column, share, considered)
-        if self.likelihood is not None:
-            self.likelihood.add(ekf.y, ekf.S, scale)
         ekf.P = 0.5 * (ekf.P + ekf.P.T)
         self._enforce_bounds()
 

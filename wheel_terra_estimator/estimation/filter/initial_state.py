@@ -244,9 +244,7 @@ def bounds(
     return lower, upper
 
 
-def with_soil_of(
-    old: FilterMemory, start: FilterMemory, layout: StateLayout, tuning: PriorTuning = PriorTuning()
-) -> FilterMemory:
+def with_soil_of(old: FilterMemory, start: FilterMemory, layout: StateLayout) -> FilterMemory:
     """Return the start of a run that keeps soil and biases of an old one, widened."""
     kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND]
     kept += [SLIP_PER_DEMAND, RUT_SHARE, SHEAR_RADIUS]
@@ -254,7 +252,7 @@ def with_soil_of(
     kept += range(layout.size)[layout.torque_zero]
     block = np.ix_(kept, kept)
     covariance, mean = start.covariance.copy(), start.mean.copy()
-    share = tuning.kept_share
+    share = PriorTuning().kept_share
     covariance[block] = share * old.covariance[block] + (1.0 - share) * covariance[block]
     mean[kept] = old.mean[kept]
     return FilterMemory(mean, covariance, start.restarts)
