@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 import yaml
 from estimate_sets import STAMP, some_estimates
-from test_full_disk import fill, largest_file
 
 from wheel_terra_estimator.bags.history import HistoryRecorder, read_estimates
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
-from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.comparison import compare
 
@@ -186,13 +184,9 @@ def test_a_reset_clears_the_stuck_warning(tmp_path):
     assert said == [False, True, False, True, False]
 
 
-@pytest.mark.parametrize('cut', [False, True], ids=['whole', 'on a disk that fills up'])
-def test_bags_carry_checksums(make_bag, tmp_path, cut):
+def test_bags_carry_checksums(make_bag):
     """As the format asks: of a chunk over its records, of the summary up to the checksum itself."""
-    if cut:
-        with largest_file(int(2.5 * 2**20)), pytest.raises(UserError):
-            fill(tmp_path / 'out', 1000)
-    (file,) = (tmp_path / 'out' if cut else make_bag()).glob('*.mcap')
+    (file,) = make_bag().glob('*.mcap')
     content = file.read_bytes()
     at, chunks = 8, 0
     while content[at] != 2:

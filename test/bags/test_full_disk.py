@@ -41,35 +41,21 @@ def largest_file(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-@pytest.mark.parametrize('fails_at', [2.5, 3.02, 4.0])
-def test_bag_on_a_disk_that_fills_up_is_closed_and_readable(tmp_path, monkeypatch, fails_at):
-    from rosbags.rosbag2 import Reader
-
+@pytest.mark.parametrize('fails_at', [0.4, 2.5, 3.02])
+def test_bag_on_a_disk_that_fills_up_keeps_what_was_written(tmp_path, fails_at):
     with (
         largest_file(int(fails_at * MEGABYTE)),
         pytest.raises(UserError, match='what was written before is kept there') as caught,
     ):
         fill(tmp_path / 'out', 1000)
     assert '\n' not in str(caught.value)
-    with Reader(tmp_path / 'out') as reader:
-        times = [time for _, time, _ in reader.messages()]
-        assert reader.message_count == len(times)
-    assert times == list(range(1000, 1000 + len(times)))
-    assert len(times) * 8000 > (fails_at - 1.2) * MEGABYTE
     with open_bag(tmp_path / 'out') as bag:
-        assert bag.topics[TOPIC].message_count == len(times)
+        times = [time for time, _, _ in bag.messages((TOPIC,))]
         assert bag.topics[TOPIC].type == KIND
-        assert sum(1 for _ in bag.messages((TOPIC,))) == len(times)
-        assert not bag.notes
-    fill_again = [p.name for p in tmp_path.iterdir()]
-    assert fill_again == ['out']
-
-
-def test_a_disk_without_room_for_one_chunk_keeps_nothing(tmp_path):
-    with largest_file(400_000), pytest.raises(UserError) as caught:
-        fill(tmp_path / 'out', 1000)
-    assert 'kept' not in str(caught.value)
-    assert not list(tmp_path.iterdir())
+        assert 'was not closed' in bag.notes[-1]
+    assert times == list(range(1000, 1000 + len(times)))
+    assert len(times) * 8000 > (fails_at - 0.1) * MEGABYTE
+    assert [p.name for p in tmp_path.iterdir()] == ['out']
 
 
 def test_a_disk_that_is_full_at_the_end_only(tmp_path, monkeypatch):

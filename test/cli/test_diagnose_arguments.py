@@ -5,10 +5,7 @@
 import json
 from pathlib import Path
 
-import pytest
-
 from wheel_terra_estimator.cli.main import main
-from wheel_terra_estimator.configuration import reader
 
 
 def test_packed_recording_is_a_recording(tmp_path, capsys):
@@ -59,7 +56,7 @@ def test_json_is_the_report_and_nothing_else(tmp_path, capsys):
 
 
 def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(tmp_path, capsys, own_law):
-    """The same friction of the drive in two soils: each table gets its soil, both the one size."""
+    """The same friction of the drive in two soils: each table gets its soil."""
     rig = ['--config', 'hit_wh3_lug10']
     for name, soil in (('sand', 'hit_lss1'), ('simulant', 'fjs1_ishigami')):
         friction = 'effects.drivetrain_friction'
@@ -75,9 +72,7 @@ def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(tmp_path, cap
     assert main(arguments) == 0
     said = capsys.readouterr().out
     assert 'over all 2 tables, each with its own soil' in said
-    assert 'with one size' in said.splitlines()[-1]
-    shared = reader.load(['hit_lss1', tmp_path / 'out' / 'effect.yaml'], complete=False)
-    assert shared.effects['drivetrain_friction']['torque'] == pytest.approx(0.8, abs=0.1)
+    assert 'for it 2 of 2 tables' in said.splitlines()[-1]
     stiffness = {}
     for name in ('sand', 'simulant'):
         report = json.loads((tmp_path / 'out' / name / 'report.json').read_text())

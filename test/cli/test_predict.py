@@ -124,55 +124,6 @@ def test_noise_that_makes_no_sense(noise, capsys):
     assert '--noise' in capsys.readouterr().err
 
 
-def test_a_wheel_climbs_at_the_slip_that_gives_the_pull(capsys):
-    arguments = [*BASE, '--climb', 'wheel', '--load', '80', '--slope', '0:0.9:10']
-    assert main(arguments) == 0
-    out = capsys.readouterr()
-    climbed = table(out.out)
-    steep = np.isnan(climbed['slip'])
-    assert 'too steep' in out.err and steep[-1] and not steep[:3].any()
-    assert (np.diff(climbed['slip'][~steep]) > 0.0).all()
-    assert climbed['drawbar_pull'][~steep] == pytest.approx(
-        80.0 * np.sin(climbed['slope'][~steep]), abs=0.02
-    )
-    assert climbed['normal_load'] == pytest.approx(80.0 * np.cos(climbed['slope']))
-    # The same numbers from the curves of a driven wheel under that load.
-    row = 2
-    slip, load = climbed['slip'][row], climbed['normal_load'][row]
-    assert main([*BASE, '--slip', f'{slip:.9f}', '--load', f'{load:.9f}']) == 0
-    driven = table(capsys.readouterr().out)
-    for name in ('sinkage', 'drawbar_pull', 'torque'):
-        assert driven[name][0] == pytest.approx(climbed[name][row], rel=1e-4)
-
-
-def test_a_rover_climbs_on_all_its_wheels(tmp_path, capsys):
-    rover = (
-        'predict',
-        '--config',
-        'generic_six_wheel',
-        '--config',
-        'test_sand',
-        '--climb',
-        'rover',
-    )
-    assert main([*rover, '--slope', '0,0.2']) == 0
-    rows = table(capsys.readouterr().out)
-    configuration = reader.load(['generic_six_wheel', 'test_sand'])
-    weight = float(configuration.rover.mass) * float(configuration.rover.gravity)
-    uphill = rows['slope'] == 0.2
-    assert uphill.sum() == configuration.wheels.count
-    assert len(set(rows['slip'][uphill])) == 1
-    assert rows['drawbar_pull'][uphill].sum() == pytest.approx(weight * np.sin(0.2), abs=0.1)
-    assert rows['normal_load'][uphill].sum() == pytest.approx(weight * np.cos(0.2), rel=1e-6)
-    # The rear wheels carry more uphill than on the level.
-    rear = configuration.wheels.x == configuration.wheels.x.min()
-    assert (rows['normal_load'][uphill][rear] > rows['normal_load'][~uphill][rear]).all()
-    assert main([*rover, '-o', str(tmp_path / 'climb.png')]) == 0
-    assert (tmp_path / 'climb.png').stat().st_size > 5000
-    assert main([*rover, '--load', '80']) == 2
-    assert main([*rover, '--slip', '0.2']) == 2
-
-
 def test_laws(capsys):
     smooth = ('predict', '--config', 'hit_wh3', '--config', 'hit_fit', '--slip', '-0.4:0.9:5')
     assert main([*smooth, '--law', 'bekker_wong_janosi']) == 0
@@ -190,8 +141,6 @@ def test_laws(capsys):
     ):
         assert main([*smooth, '--law', 'resistive_force', *more]) == 2
         assert word in capsys.readouterr().err
-    assert main([*smooth[:-2], '--law', 'wong_reece', '--climb', 'wheel']) == 2
-    assert '--law' in capsys.readouterr().err
 
 
 def test_the_law_of_the_configuration(capsys):
@@ -217,8 +166,6 @@ def test_the_law_of_the_configuration(capsys):
     named = capsys.readouterr().out
     assert main([*rows, *key, '--law', 'bekker_wong_janosi']) == 0
     assert capsys.readouterr().out == named
-    assert main([*rows[:-2], *key, '--climb', 'wheel']) == 2
-    assert 'rover.contact_law' in capsys.readouterr().err
     assert main([*rows, '-p', 'rover.contact_law:=wong']) == 2
     assert (
         "rover.contact_law: 'wong' is unknown, nearest is 'wong_reece'" in capsys.readouterr().err

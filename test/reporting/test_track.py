@@ -16,12 +16,11 @@ from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.track import COLUMNS, TrackRecorder, read_odometry
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading
 from wheel_terra_estimator.messages.convert import ODOMETRY
 from wheel_terra_estimator.reporting.drive_figure import way_figure
 from wheel_terra_estimator.reporting.track_picture import STRENGTHS, has_map, is_straight, maps
-from wheel_terra_estimator.reporting.track_table import as_geojson, parse_origin, write_track
+from wheel_terra_estimator.reporting.track_table import write_track
 
 SPEED, YAW_RATE, STEP = 0.1, 0.05, 50_000_000
 START = 1_000_000_000
@@ -94,7 +93,7 @@ def test_a_point_stands_every_two_centimetres_and_every_second_of_standing(rover
     assert time[-2:] == pytest.approx(1.0)
 
 
-def test_table_and_map(rover, tmp_path):
+def test_table_and_strip(rover, tmp_path):
     sets = drive(rover, 400, yaw_rate=0.0)
     sets[200:300] = [replace(s, slip_class=np.array([0, 2], dtype=np.uint8)) for s in sets[200:300]]
     sets[280:] = [replace(s, stuck=True) for s in sets[280:]]
@@ -108,17 +107,6 @@ def test_table_and_map(rover, tmp_path):
     ]
     assert float(rows[-1]['x [m]']) == pytest.approx(track.values['x'][-1], rel=1e-5)
     assert {row['slip_class'] for row in rows} == {'0', '2'}
-    found = as_geojson(track, (48.0, 11.0))['features']
-    assert [f['properties'].get('slip_class') for f in found] == ['low', 'high', 'low', None]
-    assert found[-1]['properties']['name'] == 'stuck warning'
-    begins = track.values['time'][np.argmax(track.values['slip_class'] == 2)]
-    assert found[1]['properties']['from_s'] == pytest.approx(begins, abs=0.1)
-    (east, north, _), end = found[0]['geometry']['coordinates'][0], found[2]['geometry']
-    assert (east, north) == (pytest.approx(11.0, abs=1e-6), 48.0)
-    # Great circle on the same sphere.
-    turned = math.radians(end['coordinates'][-1][0] - east)
-    half = math.cos(math.radians(48.0)) * math.sin(turned / 2.0)
-    assert 2.0 * 6_378_137.0 * math.asin(half) == pytest.approx(track.values['x'][-1], rel=1e-3)
     assert has_map(track)
     assert is_straight(track)
     strip = way_figure(track, STRENGTHS).drawn()[0].curves
@@ -137,16 +125,6 @@ def test_a_way_with_a_bend_is_a_map_in_true_proportion(rover):
     places = np.array([p.split() for p in re.split('[ML]', low)[1:]], dtype=float)
     assert np.ptp(places, axis=0) == pytest.approx([np.ptp(x), np.ptp(y)], rel=1e-2)
     assert (places > 0.0).all() and (places < [drawn.width, drawn.height]).all()
-
-
-def test_a_stretch_whose_class_is_not_known_has_no_slip(rover):
-    sets = drive(rover, 40)
-    unknown = np.full(2, SlipClass.UNKNOWN, dtype=np.uint8)
-    sets[:20] = [replace(s, slip_class=unknown, slip=np.full(2, 0.99)) for s in sets[:20]]
-    first, second = as_geojson(recorded(rover, sets).track(), (0.0, 0.0))['features']
-    assert first['properties']['slip_class'] == 'unknown'
-    assert first['properties']['mean_slip'] is None
-    assert second['properties']['mean_slip'] == pytest.approx(float(np.median(sets[-1].slip)))
 
 
 def test_an_odometry_in_the_recording(rover, factory, tmp_path):
@@ -169,13 +147,7 @@ def test_an_odometry_in_the_recording(rover, factory, tmp_path):
     assert track.stamp[-1] <= odometry.stamp[-1], 'no place where the odometry is silent'
 
 
-@pytest.mark.parametrize('text', ['48.1', '91,0', 'a,b', '0,200'])
-def test_origins_that_are_none(text):
-    with pytest.raises(UserError, match='--track-origin'):
-        parse_origin(text)
-
-
 def test_what_a_track_cannot_be_is_said_first(tmp_path, capsys):
     command = ['replay', str(tmp_path), '--config', 'pathfinder', '--track', 'way.png']
     assert main(command) == 2
-    assert 'ends in .csv or .geojson' in capsys.readouterr().err
+    assert 'ends in .csv' in capsys.readouterr().err

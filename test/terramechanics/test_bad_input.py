@@ -11,7 +11,6 @@ from terra_tools import SAND, WHEEL, points
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
 from wheel_terra_estimator.terramechanics.entrapment import digging_per_turn
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
-from wheel_terra_estimator.terramechanics.slope_locomotion import rover_climb
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 
@@ -57,10 +56,6 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
                 points(0.1)
             ),
             r'cohesion with the effects on is -2750 Pa; allowed is \[0, inf\) Pa',
-        ),
-        (
-            lambda: rover_climb(WheelSoilModel(SAND), WHEEL, [80.0], [0.1, 2.0]),
-            r'slope is 2 rad \(entry 1\); allowed is \[-1\.5708, 1\.5708\] rad',
         ),
         (lambda: digging_per_turn(WHEEL, 1.5), r'efficiency is 1.5; allowed is \[0, 1\]'),
         (lambda: ConditionedForces(WHEEL, SAND, gravity=-1.0), r'gravity is -1 m/s\^2'),

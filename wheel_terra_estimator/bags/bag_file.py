@@ -4,15 +4,19 @@
 
 from __future__ import annotations
 
+import mmap
+import os
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
+from zlib import crc32
 
 from wheel_terra_estimator.bags.message_factory import MessageFactory
-from wheel_terra_estimator.bags.salvage.mcap_closing import add_checksums, close_cut_file
+from wheel_terra_estimator.bags.salvage import mcap_records as mcap
+from wheel_terra_estimator.bags.salvage.compression import unpack
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 
 Self = TypeVar('Self', bound='BagFile')
@@ -76,41 +80,21 @@ class BagFile:
         trace: TracebackType | None,
     ) -> None:
         with self._stack:
-            if isinstance(error, OSError):
-                self._close_cut()
-            else:  # not the library's own exit, which leaves a file without index after an error
-                storage: Any = self._writer.storage
-                try:
-                    self._writer.close()
-                    if self._storage == 'mcap':
-                        add_checksums(storage.path)
-                except OSError:
-                    self._close_cut()
-                    raise
-            self._stack.__exit__(kind, error, trace)
-
-    def _close_cut(self) -> None:
-        """Close the bag on a disk that takes no more: it keeps all chunks that are whole.
-
-        Without one it keeps nothing: a file that only a recovery could read is no bag.
-        """
-        storage: Any = self._writer.storage
-        if self._storage != 'mcap' or storage is None:
-            return
-        with suppress(OSError):  # the first error is the one to be said
-            storage.bio.raw.close()  # what is buffered has no place any more
-            path: Path = storage.path
+            # Not the library's own exit, which leaves a file without index after any error.
+            storage: Any = self._writer.storage
             try:
-                kept = close_cut_file(path)
-            except OSError:
-                path.unlink()
-                return
-            self._writer.counts = {c.id: kept.counts[c.id] for c in self._connections.values()}
-            self._writer.min_timestamp, self._writer.max_timestamp = kept.start, kept.end
-            writer: Any = self._writer
-            writer.storage = _ClosedFile(path)
-            self._writer.close()  # writes the metadata
-            add_checksums(path)
+                if isinstance(error, OSError):
+                    raise error
+                self._writer.close()
+                if self._storage == 'mcap':
+                    add_checksums(storage.path)
+            except OSError as full:
+                if self._storage == 'mcap' and storage is not None:
+                    with suppress(OSError):
+                        storage.bio.raw.close()  # what is buffered has no place any more
+                self._stack.__exit__(type(full), full, full.__traceback__)
+            else:
+                self._stack.__exit__(kind, error, trace)
 
     def note(self, key: str, value: str) -> None:
         """State something about the bag in the `custom_data` of its metadata."""
@@ -127,13 +111,24 @@ class BagFile:
         self.counts[topic] += 1
 
 
-class _ClosedFile(NamedTuple):
-    """Stands for a storage file that needs no closing."""
-
-    path: Path
-
-    def close(self, version: int, metadata: str) -> None:
-        """Do nothing."""
+def add_checksums(path: Path) -> None:
+    """Give chunks and summary of an MCAP file the checksums that the library leaves out."""
+    with path.open('r+b') as file:
+        place = file.fileno()
+        with mmap.mmap(place, 0, access=mmap.ACCESS_READ) as content:
+            end = len(content) - len(mcap.MAGIC)
+            for item in mcap.records(content, len(mcap.MAGIC), end, mcap.Possible()):
+                if isinstance(item, mcap.Gap):
+                    continue
+                if item.opcode == mcap.CHUNK:
+                    head = mcap.chunk_head(content, item.begin - mcap.HEAD, end)
+                    assert head is not None
+                    data = unpack(head.codec, content[head.begin : item.end], head.size).content
+                    os.pwrite(place, crc32(data).to_bytes(4, 'little'), item.begin + 24)
+                elif item.opcode == mcap.FOOTER:
+                    begin = int.from_bytes(content[item.begin : item.begin + 8], 'little')
+                    checksum = crc32(content[begin : item.begin + 16])
+                    os.pwrite(place, checksum.to_bytes(4, 'little'), item.begin + 16)
 
 
 def _qos(latched: bool) -> Any:

@@ -201,7 +201,6 @@ def _each_with_its_soil(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.discrepancy.report.model_file import write_files
     from wheel_terra_estimator.discrepancy.report.several import (
         over_all,
-        write_shared_effect,
         write_summary,
     )
 
@@ -220,7 +219,6 @@ def _each_with_its_soil(arguments: argparse.Namespace) -> int:
             (folder / name).mkdir()
             write_files(diagnosis, folder / name, pictures=not arguments.no_pictures)
         write_summary(found, folder / 'summary.csv')
-        write_shared_effect(found, folder / 'effect.yaml')
     if arguments.json:
         print(json.dumps({name: diagnosis.to_dict() for name, diagnosis in found.items()}))
         return 0

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.cli.climb import WHO, climb
 from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.readings import Readings
@@ -45,10 +44,8 @@ EXAMPLES = (
     'wheel-terra predict --config hit_wh3 --config hit_fit --slip 0:0.6:13 --load 80',
     'wheel-terra predict --config hit_wh3 --config dlr_mss -o curves.png',
     'wheel-terra predict --config hit_wh3 --config hit_fit --law wong_reece',
-    'wheel-terra predict --config generic_six_wheel --config test_sand --climb rover',
 )
 DEFAULT_SLIP = '0:0.9:19'
-DEFAULT_CLIMB = '0:0.35:15'  # [rad]
 MOST_POINTS = 100_000
 
 # Columns of the result, in the layout of the tables of steady measurements.
@@ -89,12 +86,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='A[,A]',
         help='slip angles, positive where the wheel slides left [rad], as a list or A:B:N (default '
         '0); adds the lateral force',
-    )
-    parser.add_argument(
-        '--climb',
-        choices=WHO,
-        help='free travel up --slope (default 0:0.35:15) instead of --slip: the slip at which the '
-        'pull carries one wheel under --load, or the whole rover',
     )
     parser.add_argument('--wheel', metavar='NAME', help='which of wheels.names (default the first)')
     parser.add_argument(
@@ -143,11 +134,8 @@ def run(arguments: argparse.Namespace) -> int:
     if output is not None:
         _check_output(output, arguments.overwrite)
     # The mass is needed for the default load only.
-    brings_load = bool(arguments.load or arguments.points) and arguments.climb != 'rover'
+    brings_load = bool(arguments.load or arguments.points)
     configuration = configuration_reader.from_arguments(arguments, complete=not brings_load)
-    if arguments.climb:
-        _write(_climb(arguments, configuration), arguments, configuration)
-        return 0
     points = _points(arguments, configuration)
     columns = {n: getattr(points.wheel if n in WHEEL else points, WHEEL.get(n, n)) for n in INPUTS}
     try:
@@ -210,45 +198,6 @@ def _model(arguments: argparse.Namespace, configuration: Configuration, width: f
     return contact_law(law, soil, effects, width, gravity=gravity, strict=False)
 
 
-def _climb(arguments: argparse.Namespace, configuration: Configuration) -> dict[str, FloatArray]:
-    """Return the rows of free travel; say which slopes are too steep."""
-    aside = arguments.slip_angle or arguments.angles or arguments.noise is not None
-    if arguments.slip or arguments.points or arguments.law or aside:
-        raise UserError(
-            '--climb finds the slip of each slope; leave --slip, --slip-angle, --points, --law, '
-            '--angles, --noise'
-        )
-    if configuration.rover.contact_law != BEKKER_WONG_JANOSI:
-        raise UserError(
-            f'rover.contact_law: --climb knows {BEKKER_WONG_JANOSI} alone; add '
-            f'-p rover.contact_law:={BEKKER_WONG_JANOSI}'
-        )
-    if arguments.load and arguments.climb == 'rover':
-        raise UserError('--climb rover takes the loads from rover.mass; leave --load')
-    weight = 0.0
-    if arguments.climb == 'wheel':
-        given = _numbers('--load', arguments.load) if arguments.load else None
-        loads = _share_of_weight(configuration) if given is None else given
-        if loads.size != 1:
-            raise UserError(f'--load {arguments.load}: --climb wheel takes one weight')
-        weight = float(loads[0])
-    slopes = _numbers('--slope', arguments.slope or DEFAULT_CLIMB)
-    wheel = _wheel_index(arguments, configuration)
-    try:
-        result = climb(configuration, arguments.climb, wheel, weight, slopes, arguments.method)
-    except ValueError as error:
-        raise UserError(str(error)) from None
-    steep = np.unique(result['slope'][np.isnan(result['slip'])])
-    if steep.size:
-        listed = ', '.join(f'{slope:.3g}' for slope in steep)
-        print(
-            'wheel-terra predict: this soil gives no pull for these slopes, too steep at any slip: '
-            f'{listed} rad',
-            file=sys.stderr,
-        )
-    return result
-
-
 def _write(
     result: Mapping[str, FloatArray], arguments: argparse.Namespace, configuration: Configuration
 ) -> None:
@@ -262,8 +211,7 @@ def _write(
             with fresh.open('w', encoding='utf-8', newline='') as stream:
                 _write_csv(result, stream)
         else:
-            draw = _draw_climb if arguments.climb else _draw
-            draw(result, fresh, _title(arguments, configuration))
+            _draw(result, fresh, _title(arguments, configuration))
 
 
 def _measured(columns: dict[str, FloatArray], text: str, seed: int) -> dict[str, FloatArray]:
@@ -426,33 +374,6 @@ def _draw(columns: Mapping[str, FloatArray], path: Path, title: str) -> None:
             axis.set_ylabel(axis_label(name))
         axes[0].invert_yaxis()
         axes[0].legend()
-        figure.suptitle(title, fontsize=9)
-        figure.savefig(path, dpi=110)
-
-
-def _draw_climb(columns: Mapping[str, FloatArray], path: Path, title: str) -> None:
-    """Draw slip and sinkage against slope; one curve per wheel where there are several."""
-    from matplotlib.figure import Figure
-
-    from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
-
-    count = int(np.sum(columns['slope'] == columns['slope'][0]))
-    degrees = np.degrees(columns['slope'][::count])
-    with picture_style():
-        figure = Figure(figsize=(7.0, 3.4))
-        left, right = figure.subplots(1, 2)
-        left.plot(degrees, columns['slip'][::count], color=LINE_COLOURS[0])
-        for k in range(count):
-            label = f'wheel {k + 1}' if count > 1 else None
-            colour = LINE_COLOURS[k % len(LINE_COLOURS)]
-            right.plot(degrees, 1e3 * columns['sinkage'][k::count], color=colour, label=label)
-        left.set_ylabel('slip [-]')
-        right.set_ylabel('sinkage [mm]')
-        right.invert_yaxis()
-        for axis in (left, right):
-            axis.set_xlabel('slope [deg]')
-        if count > 1:
-            right.legend()
         figure.suptitle(title, fontsize=9)
         figure.savefig(path, dpi=110)
 

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--track',
         action=Output,
-        metavar='F.csv|F.geojson',
+        metavar='F.csv',
         help='map of the drive: position, slip, class, sinkage, pull margin and learned soil along '
         'the way, units in the header',
     )
@@ -66,12 +66,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='TOPIC',
         help='odometry in the recording whose positions the map has (default: reckoned from the '
         'estimated velocity and the attitude)',
-    )
-    parser.add_argument(
-        '--track-origin',
-        default='0,0',
-        metavar='LAT,LON',
-        help='where the origin of a GeoJSON map lies [deg] (default 0,0)',
     )
     parser.add_argument(
         '--save-soil',
@@ -125,7 +119,6 @@ def _run_one(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.checks.finding import CheckReport
     from wheel_terra_estimator.fleet.drive import replay_drive
-    from wheel_terra_estimator.reporting import track_table
 
     def print_findings(checked: CheckReport) -> None:
         for line in () if arguments.json else check_before.as_lines(checked):
@@ -134,7 +127,6 @@ def _run_one(arguments: argparse.Namespace) -> int:
     (bag,) = arguments.bags
     configuration = configuration_reader.from_arguments(arguments)
     remaps = parse_remaps(arguments.remap)
-    origin = track_table.parse_origin(arguments.track_origin)
     _check_outputs(arguments)
     drive = replay_drive(
         bag,
@@ -149,7 +141,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
         print(json.dumps(_as_dict(drive, arguments.smooth), indent=2))
     else:
         print(_as_text(drive))
-    written = _write_outputs(drive, arguments, origin)
+    written = _write_outputs(drive, arguments)
     if not arguments.json:
         for what, path in written.items():
             print(f'{what}: {path}')
@@ -222,14 +214,12 @@ def _as_text(drive: Drive) -> str:
     return '\n'.join(lines)
 
 
-def _write_outputs(
-    drive: Drive, arguments: argparse.Namespace, origin: tuple[float, float]
-) -> dict[str, Path]:
+def _write_outputs(drive: Drive, arguments: argparse.Namespace) -> dict[str, Path]:
     """Write what was asked for beside the bag of estimates; return what there is now."""
     if arguments.table:
         drive.write_table(arguments.table, arguments.overwrite)
     if arguments.track:
-        drive.write_track(arguments.track, arguments.overwrite, origin)
+        drive.write_track(arguments.track, arguments.overwrite)
     if arguments.slip_on_slope:
         drive.write_slopes(arguments.slip_on_slope, arguments.overwrite)
     if arguments.save_soil:
@@ -254,7 +244,6 @@ def _write_outputs(
 def _run_several(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.fleet.several_bags import SUMMARY_PAGE, Settings, replay_bags
-    from wheel_terra_estimator.reporting import track_table
 
     if not arguments.output:
         raise UserError('several recordings need a folder for their outputs: add -o DIR')
@@ -275,7 +264,6 @@ def _run_several(arguments: argparse.Namespace) -> int:
         bag_arguments.limits_of(arguments),
         _options(arguments),
         track=_plain_name('--track', arguments.track),
-        origin=track_table.parse_origin(arguments.track_origin),
     )
     rows = replay_bags(
         arguments.bags,

@@ -46,10 +46,10 @@ class Drive:
         with new_file(path, overwrite) as fresh:
             estimates_table.write_table(self.result.history, fresh)
 
-    def write_track(self, path: Path, overwrite: bool, origin: tuple[float, float]) -> None:
-        """Write the track as CSV, or as GeoJSON from an origin (latitude, longitude) [deg]."""
+    def write_track(self, path: Path, overwrite: bool) -> None:
+        """Write the track as a table."""
         with new_file(path, overwrite) as fresh:
-            track_table.write_track(self.result.track, fresh, origin)
+            track_table.write_track(self.result.track, fresh)
 
     def write_slopes(self, path: Path, overwrite: bool) -> None:
         """Write what slopes would cost as a table."""

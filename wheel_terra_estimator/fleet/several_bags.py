@@ -59,7 +59,7 @@ class Settings:
     """What is the same for all recordings.
 
     ``report``, ``table`` and ``track`` are names of files in the folder of each recording, empty
-    for none; ``origin``: of the track.
+    for none.
     """
 
     configuration: Configuration
@@ -70,7 +70,6 @@ class Settings:
     limits: Limits = LIMITS
     options: Options = DEFAULT
     track: str = ''
-    origin: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -200,7 +199,7 @@ def _digest(settings: Settings, path: Path) -> str:
         'files': [settings.report, settings.table],
         'limits': asdict(settings.limits),
         'smooth': settings.options.smooth,
-        'track': [settings.track, settings.options.odometry, *settings.origin],
+        'track': [settings.track, settings.options.odometry],
     }
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     digest.update(json.dumps(stated, sort_keys=True, default=str).encode())
@@ -239,7 +238,7 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
     if settings.table:
         drive.write_table(output / settings.table, overwrite=True)
     if settings.track:
-        drive.write_track(output / settings.track, overwrite=True, origin=settings.origin)
+        drive.write_track(output / settings.track, overwrite=True)
     if settings.report:
         drive.write_report(output / settings.report, overwrite=True)
     row = DriveRow.from_drive(str(task.path), drive.summary, drive.checked)

@@ -9,5 +9,5 @@
   ``closed_form`` (its use with effects, the triangles A, B, C).
 - Load to sinkage, pull, torque: ``model`` (by ``load_balance``); sinkage to torque and pull:
   ``conditioned`` (for the filter).
-- Questions: ``slope_locomotion``, ``entrapment``.
+- Questions: ``entrapment``.
 """
