@@ -47,8 +47,8 @@ LONGEST = (
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One more than cores: tests of nodes wait most of their time."""
-    return (os.cpu_count() or 1) + 1
+    """Two more than cores: tests of nodes wait most of their time."""
+    return (os.cpu_count() or 1) + 2
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files that were made to cost time or memory: each ends soon, in an error of one line or notes."""
 
-import random
 import resource
 import struct
 import time
@@ -18,7 +17,6 @@ from wheel_terra_estimator.errors import UserError
 
 MAGIC = b'\x89MCAP0\r\n'
 TIME = 1_700_000_000_000_000_000  # [ns]
-PAGE = 4096
 
 
 def zstd() -> Any:
@@ -128,84 +126,9 @@ def many_topics(size: int) -> bytes:
     return b''.join(parts)
 
 
-def header(size: int, page: int = PAGE) -> bytes:
-    out = bytearray(b'SQLite format 3\0' + bytes(84))
-    out[16:18] = (page if page < 65536 else 1).to_bytes(2, 'big')
-    out[28:32] = (size // page).to_bytes(4, 'big')
-    return bytes(out)
-
-
-def varint(value: int) -> bytes:
-    out = [value & 127]
-    while value := value >> 7:
-        out.append(value & 127 | 128)
-    return bytes(reversed(out))
-
-
-def row(number: int, data: int) -> bytes:
-    """A message's row up to its data."""
-    head = b'\x00\x01\x06' + varint(12 + 2 * data)
-    head = bytes([len(head) + 1]) + head
-    body = head + b'\x01' + struct.pack('>q', TIME)
-    return varint(len(body) + data) + varint(number) + body
-
-
-def short_rows(size: int) -> bytes:
-    return header(size) + b''.join(row(n % 100, 0) for n in range(size // 18))
-
-
-def heads_of_rows(size: int) -> bytes:
-    return header(size) + b'\x05\0\x01\x01' * (size // 4)
-
-
-def thirteens(size: int) -> bytes:
-    one = row(1, 4) + b'\x0d' * 230
-    return header(size, 65536) + one * (size // len(one))
-
-
-def shared_chain(size: int) -> bytes:
-    """All rows go on along the same pages."""
-    pages = size // PAGE
-    rows = pages // 2
-    length = (rows - 5) * (PAGE - 4)
-    most, least = PAGE - 35, (PAGE - 12) * 32 // 255 - 23
-    start = row(1, length)
-    total = length + 14 + 2
-    local = least + (total - least) % (PAGE - 4)
-    local = local if local <= most else least
-    out = bytearray(header(size))
-    for n in range(rows):
-        start = row(n % 100, length)
-        out += (start + b'\1' * (local - len(start) + 6) + (rows + 2).to_bytes(4, 'big')) * 2
-    out = out[: rows * PAGE].ljust(rows * PAGE, b'\0')
-    for n in range(rows, pages):
-        out += ((n + 2) if n + 2 <= pages else 0).to_bytes(4, 'big') + b'\2' * (PAGE - 4)
-    return bytes(out)
-
-
-def full_pages(size: int) -> bytes:
-    """Pages whose lists reach far over one another."""
-    generator = random.Random(1)
-    out = bytearray(header(size, 65536))
-    page = bytearray(65536)
-    short = row(5, 0)
-    count = 20_000
-    struct.pack_into('>BHHHB', page, 0, 13, 0, count, 8 + 2 * count, 0)
-    at = 8 + 2 * count
-    places = []
-    while at + len(short) < 65536:
-        page[at : at + len(short)] = short
-        places.append(at)
-        at += len(short)
-    listed = [generator.choice(places) for _ in range(count)]
-    struct.pack_into(f'>{count}H', page, 8, *listed)
-    return bytes(out.ljust(65536, b'\0') + page * (size // 65536))
-
-
 MCAPS = (zeros, lying_zeros, packed_messages, packed_gaps, headless, headless_bombs,
          nested_chunks, nested_plain_chunks, nested_messages, opcodes, short_messages, metadata,
          many_topics)  # fmt: skip
-SQLITES = (short_rows, heads_of_rows, thirteens, shared_chain, full_pages)
 
 
 def read(path: Path, limits: Limits, sender: Any) -> None:
@@ -227,7 +150,7 @@ LARGE = [pytest.mark.slow, pytest.mark.timeout(900)]
 ELSEWHERE = (zeros, lying_zeros)  # quick in test_input_file.py: a file costs the limit at any size
 CASES = [
     pytest.param(make, size, id=f'{make.__name__}-{size}', marks=LARGE if size > 10**5 else ())
-    for make in (*MCAPS, *SQLITES)
+    for make in MCAPS
     for size in (10**5, 20 * 2**20)
     if size > 10**5 or make not in ELSEWHERE
 ]
@@ -235,7 +158,7 @@ CASES = [
 
 @pytest.mark.parametrize(('make', 'size'), CASES)
 def test_no_file_costs_much(tmp_path, make, size):
-    path = tmp_path / ('a.mcap' if make in MCAPS else 'a.db3')
+    path = tmp_path / 'a.mcap'
     path.write_bytes(make(size))
     limits, longest = (EIGHTH, 4.0) if size <= 10**5 else (LIMITS, 10.0)
     receiver, sender = get_context('fork').Pipe(False)

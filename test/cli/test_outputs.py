@@ -68,7 +68,7 @@ def test_every_option_says_whether_it_is_read_or_written(words):
 def test_the_walk_finds_what_it_is_for():
     assert len(PAIRS) > 30
     assert {words[0] for words, parser in COMMANDS.items() if outputs(parser)} == {
-        'simulate', 'calibrate', 'init', 'compare', 'convert', 'replay', 'predict', 'diagnose',
+        'simulate', 'calibrate', 'init', 'convert', 'replay', 'predict', 'diagnose',
         'trial', 'soilbin', 'evaluate', 'demo', 'check', 'bench', 'reproduce',
     }  # fmt: skip
 
@@ -149,7 +149,6 @@ REFUSED = {
     'check': 'check {bag} --report',
     'calibrate': 'calibrate {bag} -o',
     'init': 'init --bag {bag} -o',
-    'compare': 'compare {bag} {bag} --report',
     'convert': 'convert {table} -o',
     'replay': 'replay {bag} {bad} --scheduler {silent} -o',
     'predict': 'predict --points {table} -o',

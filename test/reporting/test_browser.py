@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import html
 import json
 import re
@@ -172,36 +171,6 @@ def diagnosis_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope='module')
-def comparison_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_estimator.reporting.comparison import compare, write_comparison
-
-    first, truth = an_hour()
-    second = dataclasses.replace(
-        first, values={**first.values, 'slip': np.tanh(first.values['slip'] + 0.05)}
-    )
-    compared = compare(first, second, ['a', 'b'], truth)
-    path = tmp_path_factory.mktemp('comparison') / 'report.html'
-    write_comparison(path, compared, [first, second], truth, overwrite=False)
-    return path
-
-
-def test_two_runs_over_an_hour_on_one_time_axis(comparison_report: Path) -> None:
-    text = comparison_report.read_text(encoding='utf-8')
-    assert comparison_report.stat().st_size < LARGEST_FILE
-    (path,) = re.findall(r'd="([^"]*)" data-name="left_a, B minus A"', text)
-    drawing = re.search(r'B minus A: slip.*?data-low="([^"]*)" data-high="([^"]*)"', text, re.S)
-    low, high = (float(v) for v in drawing.groups())
-    shares = np.array(re.findall(r'[ML][-\d.e+]+ ([-\d.]+)', path), dtype=float) / 1000.0
-    drawn = high - shares * (high - low)
-    first, _ = an_hour()
-    known = first.values['slip_std'][20:, 0] <= 0.25
-    slip = first.values['slip'][20:, 0][known]
-    expected = np.tanh(slip + 0.05) - slip
-    assert drawn.max() == pytest.approx(expected.max(), abs=2e-4 * (high - low))
-    assert drawn.min() == pytest.approx(expected.min(), abs=2e-4 * (high - low))
-
-
-@pytest.fixture(scope='module')
 def soilbin_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from wheel_terra_lab.soilbin import output
     from wheel_terra_lab.soilbin.bookkeeping import SERIES
@@ -269,7 +238,6 @@ def evaluation_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 KINDS = {
     'report': 20,
     'diagnosis_report': 0,
-    'comparison_report': 7,
     'soilbin_report': 6,
     'fleet_report': 0,
     'check_report': 0,

@@ -86,8 +86,7 @@ def test_no_slip_angle_changes_no_digit(method):
     # A straight row among others that slide sideways keeps its numbers too.
     mixed = state(slip, effects=EFFECTS, method=method, slip_angle=np.where(slip < 0, 0.3, 0.0))
     straight = slip >= 0.0
-    tolerance = 1e-9 if method == 'triangles' else 1e-12
-    assert mixed.outputs()[straight] == pytest.approx(plain.outputs()[straight], rel=tolerance)
+    assert mixed.outputs()[straight] == pytest.approx(plain.outputs()[straight], rel=1e-12)
 
 
 @pytest.mark.parametrize('method', METHODS)

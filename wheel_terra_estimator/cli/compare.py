@@ -9,11 +9,10 @@ import json
 from pathlib import Path
 
 from wheel_terra_estimator.cli import bag_arguments
-from wheel_terra_estimator.cli.outputs import Output
 
 EXAMPLES = (
     'wheel-terra compare estimates_a estimates_b',
-    'wheel-terra compare estimates_a estimates_b --truth my_drive --report compare.html',
+    'wheel-terra compare estimates_a estimates_b --truth my_drive',
 )
 
 
@@ -23,9 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('second', type=Path, metavar='B', help='bag of estimates of the same drive')
     parser.add_argument('--truth', type=Path, metavar='BAG', help='recording with ground truth')
     parser.add_argument('--json', action='store_true', help='print the differences as JSON')
-    parser.add_argument('--report', action=Output, metavar='F.html', help='page with both overlaid')
     bag_arguments.add_limits(parser)
-    parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,19 +32,13 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.truth import read_simulated_truth
     from wheel_terra_estimator.bags.writer import read_origin
     from wheel_terra_estimator.errors import UserError
-    from wheel_terra_estimator.output_folder import check_file
     from wheel_terra_estimator.reporting.comparison import (
         as_dict,
         as_text,
         compare,
-        write_comparison,
     )
-    from wheel_terra_estimator.reporting.html import check_page
 
     inputs = [arguments.first, arguments.second]
-    if arguments.report:
-        check_page(arguments.report)
-        check_file(arguments.report, arguments.overwrite)
     limits = bag_arguments.limits_of(arguments)
     histories = []
     notes: list[str] = []
@@ -72,8 +63,4 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps({**as_dict(comparison), 'notes': notes}, indent=2))
     else:
         print('\n'.join([as_text(comparison), *(f'note: {note}' for note in notes)]))
-    if arguments.report:
-        write_comparison(arguments.report, comparison, histories, truth, arguments.overwrite)
-        if not arguments.json:
-            print(f'report: {arguments.report}')
     return 0

@@ -1,13 +1,12 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Two runs of the estimator over the same drive: differences, errors of both, overlaid plots."""
+"""Two runs of the estimator over the same drive: differences, errors of both."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,19 +19,8 @@ from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.reporting import truth_scores
-from wheel_terra_estimator.reporting.drive_figure import SLIP_RANGE
-from wheel_terra_estimator.reporting.drive_style import Border, known
-from wheel_terra_estimator.reporting.drive_summary import short_names
-from wheel_terra_estimator.reporting.style import LINE_COLOURS, RIM_COLOUR
-from wheel_terra_estimator.reporting.time_figure import (
-    Panel,
-    Switch,
-    TimeFigure,
-    limits,
-)
 
 COMPARED = ('slip', 'sinkage', 'drawbar_pull', 'normal_load', 'rim_travel_left', 'pull_margin')
-RUN_COLOURS = {'A': LINE_COLOURS[0], 'B': LINE_COLOURS[1]}
 NEAREST = 30_000_000
 """Sets of the two runs that lie this close together [ns] belong together."""
 
@@ -207,116 +195,3 @@ def as_dict(comparison: Comparison) -> dict[str, Any]:
             for letter, errors in zip('ab', c.errors, strict=True)
         },
     }
-
-
-def write_comparison(
-    path: Path,
-    comparison: Comparison,
-    histories: Sequence[EstimateHistory],
-    truth: Truth | None,
-    overwrite: bool,
-) -> None:
-    """Write a page with both runs overlaid."""
-    from wheel_terra_estimator.reporting.html import render, write_page
-
-    page = render(
-        'comparison.html',
-        comparison=comparison,
-        cards=_cards(comparison),
-        differences=[_difference_row(d) for d in comparison.differences],
-        errors=_error_rows(comparison),
-        warnings=[
-            (letter, ', '.join(f'{start:.1f} s' for start in starts) or 'none')
-            for letter, starts in zip('AB', comparison.warnings, strict=True)
-        ],
-        versions=[origin.version or 'not stated' for origin in comparison.origins],
-        settings=[
-            (key, _shown_value(a), _shown_value(b))
-            for key, (a, b) in comparison.unlike_settings.items()
-        ],
-        settings_known=all(origin.settings for origin in comparison.origins),
-        figure=_figure(histories, truth),
-        truth_source=truth.source if truth else '',
-    )
-    write_page(path, page, overwrite)
-
-
-def _cards(comparison: Comparison) -> list[tuple[str, str]]:
-    slip = next(d for d in comparison.differences if d.name == 'slip')
-    return [
-        (f'{100 * comparison.same_class:.1f} %', 'of the wheel time in the same slip class'),
-        (f'{slip.rms:.3g}', 'rms difference of slip'),
-        (f'{len(comparison.warnings[0])}; {len(comparison.warnings[1])}', 'stuck warnings of A; B'),
-        (str(comparison.common), 'sets in common'),
-    ]
-
-
-def _shown(unit: str) -> tuple[float, str]:
-    """Return factor and unit in which lengths of the ground are shown."""
-    return (1e3, 'mm') if unit == 'm' else (1.0, unit)
-
-
-def _difference_row(d: Difference) -> tuple[str, str, str, str, str]:
-    scale, unit = _shown(d.unit) if d.name == 'sinkage' else (1.0, d.unit)
-    label = f'{d.name.replace("_", " ")} [{unit}]'
-    mean, rms, greatest = (f'{scale * value:.3g}' for value in (d.mean, d.rms, d.greatest))
-    return label, mean, rms, greatest, d.where
-
-
-def _error_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """Rows (quantity, rms of A, of B, within two deviations of A, of B) where truth is known."""
-    first, second = comparison.errors
-    if first is None or second is None:
-        return []
-    rows = []
-    for a, b in zip(first.quantities, second.quantities, strict=True):
-        scale, unit = _shown(a.unit)
-        label = f'{a.name.replace("_", " ")} [{unit}]'
-        rms = (f'{scale * e.rms:.3g}' for e in (a, b))
-        rows.append((label, *rms, *(f'{100 * e.within_two_std:.0f} %' for e in (a, b))))
-    return rows
-
-
-def _figure(histories: Sequence[EstimateHistory], truth: Truth | None) -> TimeFigure:
-    """Draw both runs in the colours of the runs; of the wheels, the first is on."""
-    names, begin = short_names(histories[0].names), int(histories[0].stamp[0])
-    drawn = [known(history, 'slip', Border()) for history in histories]
-    panels = (
-        Panel('slip ratio [-]', 0.3, limits(*drawn, within=SLIP_RANGE)),
-        Panel('B minus A: slip ratio [-]', 0.2),
-        Panel('sinkage [mm]', 0.25),
-        Panel('drawbar pull [N]', 0.25),
-    )
-    switches = [Switch(f'wheel {i}', name, on=i == 0) for i, name in enumerate(names)]
-    switches += [Switch(run, run, colour=RUN_COLOURS[run]) for run in RUN_COLOURS]
-    if truth is not None:
-        switches.append(Switch('truth', 'truth'))
-    ends = [float((history.stamp[-1] - begin) * 1e-9) for history in histories]
-    figure = TimeFigure(panels, switches, max(ends), 'time since the first estimate of A [s]')
-    a, b = common_rows(histories[0].stamp, histories[1].stamp)
-    for wheel, name in enumerate(names):
-        switch = f'wheel {wheel}'
-        for history, slip, run in zip(histories, drawn, RUN_COLOURS, strict=True):
-            seconds = np.asarray((history.stamp - begin) * 1e-9, dtype=np.float64)
-            columns = (
-                slip[:, wheel],
-                1e3 * history.values['sinkage'][:, wheel],
-                history.values['drawbar_pull'][:, wheel],
-            )
-            for panel, values in zip((0, 2, 3), columns, strict=True):
-                label, colour = f'{name}, {run}', RUN_COLOURS[run]
-                figure.line(panel, seconds, values, label, colour, switch, run)
-        change = drawn[1][b, wheel] - drawn[0][a, wheel]
-        seconds = np.asarray((histories[0].stamp[a] - begin) * 1e-9, dtype=np.float64)
-        figure.line(1, seconds, change, f'{name}, B minus A', RIM_COLOUR, switch)
-        if truth is not None:
-            for panel, scale, true in (
-                (0, 1.0, truth.slip),
-                (2, 1e3, truth.sinkage),
-                (3, 1.0, truth.drawbar_pull),
-            ):
-                if true is not None:
-                    seconds = np.asarray((true.stamp - begin) * 1e-9, dtype=np.float64)
-                    values = scale * true.value[:, wheel]
-                    figure.truth(panel, seconds, values, f'{name}, truth', switch, 'truth')
-    return figure

@@ -6,7 +6,7 @@
 - Laws: ``kinematics`` (slip, shear displacement), ``stresses`` (pressure, shear), ``contact`` and
   ``terms`` (one contact with its effects).
 - Forces at given angles: ``quadrature``, ``branch_moments`` (closed form),
-  ``closed_form`` (its use with effects, the triangles A, B, C).
+  ``closed_form`` (its use with effects).
 - Load to sinkage, pull, torque: ``model`` (by ``load_balance``); sinkage to torque and pull:
   ``conditioned`` (for the filter).
 - Questions: ``entrapment``.

@@ -1,15 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Closed forms of load, pull and torque at given contact angles.
+"""Closed form of load, pull and torque at given contact angles.
 
-Two of them:
-
-* ``triangle_forces``: the field's linearised stresses. Both stresses are triangles with their
-  peak at the peak angle, which gives the coefficients A, B, C.
-* ``forces``: one representative angle per side of the peak, placed and weighted by the exact
-  moments of the pressure-sinkage curve, so that the shape of the normal stress (its exponent)
-  and the growth of shear along the contact are kept. Nothing in it is fitted; over the
-  validation family its error is some ten times smaller than that of the triangles.
+One representative angle per side of the peak, placed and weighted by the exact moments of the
+pressure-sinkage curve, so that the shape of the normal stress (its exponent) and the growth of
+shear along the contact are kept. Nothing in it is fitted; over the validation family its error is
+some ten times smaller than that of triangular stresses (coefficients A, B, C).
 """
 
 from __future__ import annotations
@@ -56,21 +52,6 @@ def peak_stresses(contact: Contact[Any], terms: Terms) -> tuple[Any, Any]:
     return sigma, stresses.shear_stress(contact, peak, sigma)
 
 
-def triangle_forces(
-    contact: Contact[Quantity], terms: Terms
-) -> tuple[Quantity, Quantity, Quantity]:
-    """Load [N], pull [N] and torque [N m] of triangular stresses, angles given.
-
-    W = b (r A sigma_m + R B tau_m), F = b (R A tau_m - r B sigma_m), T = b R^2 C tau_m.
-    """
-    a, b, c = coefficients(contact.entrance_angle, contact.peak_angle, contact.leaving_angle)
-    sigma, tau = peak_stresses(contact, terms)
-    r, R, width = contact.radius, contact.shear_radius, contact.width
-    load = width * (r * a * sigma + R * b * tau)
-    pull = width * (R * a * tau - r * b * sigma)
-    return load, pull, width * R * R * c * tau
-
-
 def forces(contact: Contact[Quantity], terms: Terms) -> tuple[Quantity, Quantity, Quantity]:
     """Load [N], pull [N] and torque [N m] from branch moments, angles given."""
     t1 = contact.entrance_angle
@@ -92,17 +73,6 @@ def lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
     if terms.stages['on_normal_stress']:
         force = force + _added_stress_forces(contact, terms)[3]
     return force
-
-
-def triangle_lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
-    """Return the same from triangular stresses: b R C tau_y of the peak angle [N]."""
-    if contact.straight:
-        return 0.0 * contact.entrance_angle
-    sigma, _ = peak_stresses(contact, terms)
-    strength = contact.cohesion + sigma * contact.tan_friction
-    across = strength * stresses.mobilised_shares(contact, contact.peak_angle)[1]
-    span = 0.5 * (contact.entrance_angle - contact.leaving_angle)
-    return contact.width * contact.shear_radius * span * across
 
 
 def angles_in_proportion(terms: Terms) -> bool:

@@ -31,7 +31,7 @@ from wheel_terra_estimator.terramechanics.terms import (
     set_angles,
 )
 
-METHODS = ('quadrature', 'closed_form', 'triangles')
+METHODS = ('quadrature', 'closed_form')
 
 OVERLOADED = 1  # the soil cannot carry the load: values belong to a sinkage of one radius
 # |slip| above 0.95, where no steady state is known; or effects made the strength negative.
@@ -69,8 +69,7 @@ class WheelSoilModel:
         # Effect name -> parameter -> value, and ``form``; only switched-on effects; what is missing
         # takes its default. ``model.effects`` has them by variant (``effects.by_variant``).
         effects: EffectSettings | None = None,
-        # ``quadrature``, ``closed_form`` (branch moments, for on-board use) or ``triangles`` (the
-        # linearised stresses of the literature, for comparison)
+        # ``quadrature`` or ``closed_form`` (branch moments, for on-board use)
         method: str = 'quadrature',
         *,
         # True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
@@ -158,16 +157,12 @@ class WheelSoilModel:
     def _forces(self, contact: Contact[Quantity], terms: Terms) -> tuple[Any, Any, Any]:
         if self.method == 'quadrature':
             return quadrature.forces(contact, terms, self.nodes)
-        if self.method == 'closed_form':
-            return closed_form.forces(contact, terms)
-        return closed_form.triangle_forces(contact, terms)
+        return closed_form.forces(contact, terms)
 
     def _lateral_force(self, contact: Contact[Quantity], terms: Terms) -> Quantity:
         if self.method == 'quadrature':
             return quadrature.lateral_force(contact, terms, self.nodes)
-        if self.method == 'closed_form':
-            return closed_form.lateral_force(contact, terms)
-        return closed_form.triangle_lateral_force(contact, terms)
+        return closed_form.lateral_force(contact, terms)
 
     @staticmethod
     def _outputs(
