@@ -18,7 +18,6 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.selection.weights import log_prior
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
-from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.studies.campaigns.groups import GROUPS
@@ -289,20 +288,13 @@ def test_where_the_verdict_is_open_the_soil_goes_where_the_rows_pull_it():
 
 def test_torn_sheet_is_unexplained():
     """A bend of the torque in slip that no effect has."""
-    table, values, soil, rows = make('sweep40')
+    table, values, *_ = make('sweep40')
     bend = 0.15 * np.ptp(table['torque']) * np.sin(9 * table['slip'])
     table['torque'] = table['torque'] + bend
     diagnosis = run(table, values)
     assert diagnosis.verdict == 'unexplained' or all(e.remainder for e in diagnosis.effects)
     assert diagnosis.where.quantity == 'torque'
     assert diagnosis.to_dict()['where']['unit'] == 'N m'
-    # The structural error that is left is the noise-free misfit, within its band.
-    left, torque = diagnosis.structural_error, QUANTITIES.index('torque')
-    model = table['torque'] - left.residual[:, torque]
-    truth = solve(rows, soil)['torque'] + bend - model
-    error = left.mean[:, torque] - truth
-    assert np.sqrt(np.mean(error**2)) < 0.5 * np.sqrt(np.mean(truth**2))
-    assert np.mean(np.abs(error) < 2.0 * left.std[:, torque]) > 0.85
 
 
 def test_a_soil_that_nobody_can_believe_is_no_agreement(unproposed):

@@ -16,7 +16,6 @@ from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import log_scores
 from wheel_terra_estimator.discrepancy.assessment.order import changes_along_rows
-from wheel_terra_estimator.discrepancy.assessment.structural_error import structural_error
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import Decision, known_alike
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
@@ -58,7 +57,6 @@ def render(
     stretch = changed_stretch(both, setting, after, variance)
     proposal = _proposal(decision)
     gap_p_value = chi_square_p_value(decision.findings.nothing, decision.variance)
-    law = None if proposal is None else proposal.fit
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
     soil = _shifts(findings, after, variance, 'soil')
     moved = (*soil, *_shifts(findings, after, variance, *setting.forward.base_effects))
@@ -106,14 +104,6 @@ def render(
         along_rows=tuple(along),
         nearest=nearest,
         proposal=proposal,
-        structural_error=structural_error(
-            setting.problem,
-            both.scaled_inputs(),
-            law or after,
-            findings.selection.floors,
-            len(table),
-            beyond_law=law is not None,
-        ),
     )
 
 

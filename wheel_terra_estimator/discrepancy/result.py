@@ -19,7 +19,6 @@ from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK, effect_
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration
     from wheel_terra_estimator.discrepancy.assessment.order import Change
-    from wheel_terra_estimator.discrepancy.assessment.structural_error import StructuralError
     from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
 _ASIDE: Mapping[str, Any] = {'json': False}  # metadata of a field that is no part of report.json
@@ -305,8 +304,6 @@ class Diagnosis:
     # Quantities whose residuals change along the order of the rows
     along_rows: tuple[Change, ...] = ()
     proposal: Proposal | None = None  # A law for what no listed effect explains, where one helps
-    # Smooth misfit that is left at the rows, beyond the law where one is proposed
-    structural_error: StructuralError | None = None
     # Effect of the catalogue that was not tried -> why
     not_tried: Mapping[str, str] = field(default_factory=dict)
     contact_laws: Mapping[str, OtherLaw] = field(default_factory=dict)
@@ -372,10 +369,8 @@ def as_json(value: Any) -> Any:
     """Turn results into dicts, lists, text and finite numbers: JSON has no NaN.
 
     A dataclass gives its fields but those marked as no part of the report, and the properties that
-    its ``json_also`` lists (key -> property); one with ``to_json`` is asked itself.
+    its ``json_also`` lists (key -> property).
     """
-    if hasattr(value, 'to_json'):
-        return as_json(value.to_json())
     if is_dataclass(value):
         own = {f.name: f.name for f in fields(value) if f.metadata.get('json', True)}
         own |= getattr(value, 'json_also', {})

@@ -11,7 +11,7 @@ that all amplitudes cost one decomposition.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,17 +56,6 @@ class Problem:
     def rotate(self, cells: FloatArray) -> FloatArray:
         """Whiten and rotate (m,) or (m, P) cells."""
         return self.rotation @ cells
-
-    def under(self, correlation: FloatArray) -> Problem:
-        """Return the same cells and noise with another (N, N) correlation of the floor."""
-        smooth = _floor_covariance(correlation, self.row, self.quantity, self.scale)
-        rotation, roughness = np.empty_like(self.rotation), np.empty(self.size)
-        for block in np.unique(self.block):
-            mine = np.flatnonzero(self.block == block)
-            part = self.rotation[mine]
-            values, vectors = np.linalg.eigh(part @ smooth @ part.T)
-            rotation[mine], roughness[mine] = vectors.T @ part, np.maximum(values, 0.0)
-        return replace(self, rotation=rotation, roughness=roughness)
 
     def variance(self, amplitude: ArrayLike, noise: ArrayLike = 1.0) -> FloatArray:
         """Return (m,) variances of the rotated axes.

@@ -186,7 +186,6 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
         'parity': keep('measured_against_model', pictures.measured_against_model(diagnosis)),
         'residuals': residuals,
         'where': keep('where', pictures.where_map(diagnosis)),
-        'structural_error': keep('structural_error', pictures.structural_error(diagnosis)),
         'competitors': keep('next_measurement', pictures.competitors(proposed))
         if proposed
         else None,

@@ -242,34 +242,6 @@ def where_map(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
-def structural_error(diagnosis: Diagnosis) -> Figure | None:
-    """Draw what the last model leaves, and the smooth part of it, row by row over slip."""
-    left, table = diagnosis.structural_error, diagnosis.table
-    if left is None:
-        return None
-    slip = table.columns['slip']
-    with picture_style():
-        names = ['measured minus model', 'smooth part, with two standard deviations']
-        figure, axes = _panels(1, table.quantities, height=2.5)
-        for axis, q, scale in _each(axes, table.quantities):
-            inside = ~_rejected_cells(diagnosis, q)
-            dots = axis.plot(
-                slip[inside], scale * left.residual[inside, q], 'o', ms=3.5, color=GREY
-            )
-            bars = axis.errorbar(
-                slip,
-                scale * left.mean[:, q],
-                2 * scale * left.std[:, q],
-                fmt='D',
-                ms=3.5,
-                color=BLUE,
-                elinewidth=0.9,
-            )
-            axis.axhline(0.0, color=INK, lw=0.8)
-        _legend(figure, [dots[0], bars], names)
-    return figure
-
-
 def competitors(item: NextMeasurement) -> Figure | None:
     """Draw what the competitors predict on proposed rows, for the quantities in which they part."""
     if item.rows is None or len(item.predictions) < 2:
