@@ -35,33 +35,60 @@ def state(slip: Any, load: Any = 80.0, effects: Any = None, soil: Soil = SAND, *
     return WheelSoilModel(soil, effects, method).steady_state(points(slip, load, wheel, **others))
 
 
-def second_model(slip: float, load: float, soil: Soil, wheel: Wheel, n1=0.0, c2=0.0, lam=0.0):
-    """Sinkage, pull, torque by scipy's quad and brentq, written from the equations alone."""
-    r, b, R = wheel.radius, wheel.width, wheel.radius + lam * wheel.lug_height
+def second_model(
+    slip: float, load: float, n1=0.0, c2=0.0, lam=0.0, beta=0.0, ks=0.0
+) -> tuple[float, ...]:
+    """Sinkage, pull, torque, lateral force of `WHEEL` on `SAND`, from the equations alone.
+
+    By scipy's quad and brentq; ``beta``: slip angle, ``ks``: share of the wedge at the flank.
+    """
+    soil, r, b, mu = SAND, WHEEL.radius, WHEEL.width, math.tan(SAND.friction_angle)
+    R, tip = r + lam * WHEEL.lug_height, r + WHEEL.lug_height
     k = soil.cohesive_modulus / b + soil.frictional_modulus
     n = soil.sinkage_exponent + n1 * abs(slip)
-    tip = wheel.radius + wheel.lug_height
     ratio = tip * (1.0 - slip) if slip >= 0.0 else tip / (1.0 + slip)
+    x = math.pi / 4 - soil.friction_angle / 2
+    d1 = 1 / math.tan(x) + math.tan(x + soil.friction_angle)
+    d2 = 1 / math.tan(x) + mu / math.tan(x) ** 2
 
-    def stress(t: float, t1: float) -> tuple[float, float]:
-        tm, t2 = (soil.peak_stress_ratio + c2 * slip) * t1, soil.leaving_angle_ratio * t1
+    def edges(t1: float) -> tuple[float, float]:
+        return soil.leaving_angle_ratio * t1, (soil.peak_stress_ratio + c2 * slip) * t1
+
+    def stresses(t: float, t1: float) -> np.ndarray:
+        t2, tm = edges(t1)
         mirrored = t if t >= tm else t1 - (t - t2) / (tm - t2) * (t1 - tm)
         sigma = k * (r * max(0.0, math.cos(mirrored) - math.cos(t1))) ** n
-        j = R * (t1 - t) - ratio * (math.sin(t1) - math.sin(t))
-        grip = math.copysign(1.0 - math.exp(-abs(j) / soil.shear_modulus), j)
-        return sigma, (soil.cohesion + sigma * math.tan(soil.friction_angle)) * grip
+        j = np.array([R * (t1 - t) - ratio * (math.sin(t1) - math.sin(t)),
+                      ratio * math.tan(beta) * (t1 - t)])  # fmt: skip
+        size = float(np.hypot(*j))
+        tau = (soil.cohesion + sigma * mu) * -math.expm1(-size / soil.shear_modulus)
+        return np.array([sigma, *(tau * j / max(size, 1e-300))])
 
-    def total(integrand, t1: float) -> float:
-        tm, t2 = (soil.peak_stress_ratio + c2 * slip) * t1, soil.leaving_angle_ratio * t1
-        parts = ((t2, tm), (tm, t1))
-        return sum(quad(lambda t: integrand(t, *stress(t, t1)), *p, epsrel=1e-10)[0] for p in parts)
+    def total(weights, t1: float) -> float:
+        t2, tm = edges(t1)
+        return b * sum(
+            quad(lambda t: float(weights(t) @ stresses(t, t1)), *part, epsrel=1e-10)[0]
+            for part in ((t2, tm), (tm, t1))
+        )
 
-    def balance(t1: float) -> float:
-        return b * total(lambda t, s, q: r * s * math.cos(t) + R * q * math.sin(t), t1) - load
+    def carried(t1: float) -> float:
+        return total(lambda t: np.array([r * math.cos(t), R * math.sin(t), 0.0]), t1)
 
-    t1 = brentq(balance, 0.01, 1.5, xtol=1e-13)
-    pull = b * total(lambda t, s, q: R * q * math.cos(t) - r * s * math.sin(t), t1)
-    return r * (1.0 - math.cos(t1)), pull, b * R * R * total(lambda t, s, q: q, t1)
+    t1 = brentq(lambda a: carried(a) - load, 0.01, 1.5, xtol=1e-13)
+
+    def flank(t: float) -> float:
+        h = r * (math.cos(t) - math.cos(t1))
+        moved = -math.expm1(-ratio * math.tan(beta) * (t1 - t) / soil.shear_modulus)
+        wedge = soil.cohesion * h + d2 * soil.density * 9.80665 * h**2 / 2
+        return moved * d1 * wedge * (r - h * math.cos(t))
+
+    lateral = total(lambda t: np.array([0.0, 0.0, R]), t1)
+    return (
+        r * (1.0 - math.cos(t1)),
+        total(lambda t: np.array([-r * math.sin(t), R * math.cos(t), 0.0]), t1),
+        total(lambda t: np.array([0.0, R * R, 0.0]), t1),
+        -lateral - ks * quad(flank, edges(t1)[0], t1, epsrel=1e-10)[0],
+    )
 
 
 def random_cases(count: int, seed: int) -> list[tuple[Soil, dict, OperatingPoints]]:

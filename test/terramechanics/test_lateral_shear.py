@@ -8,66 +8,16 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.optimize import brentq
-from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, state
+from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, second_model, state
 
 from wheel_terra_estimator.terramechanics.model import METHODS, WheelSoilModel
 
 FLANK = {'side_bulldozing': {'ks': 0.8}}
 
 
-def second_model(slip: float, beta: float, load: float, ks: float) -> tuple[float, ...]:
-    """Sinkage, pull, torque, lateral force by scipy's quad and brentq, from the equations alone."""
-    r, b, c, mu = WHEEL.radius, WHEEL.width, SAND.cohesion, math.tan(SAND.friction_angle)
-    tip, stiffness = r + WHEEL.lug_height, SAND.cohesive_modulus / b + SAND.frictional_modulus
-    ratio = tip * (1.0 - slip) if slip >= 0.0 else tip / (1.0 + slip)
-    weight = SAND.density * 9.80665
-    x = math.pi / 4 - SAND.friction_angle / 2
-    d1 = 1 / math.tan(x) + math.tan(x + SAND.friction_angle)
-    d2 = 1 / math.tan(x) + mu / math.tan(x) ** 2
-
-    def edges(t1: float) -> tuple[float, float, float]:
-        return SAND.leaving_angle_ratio * t1, SAND.peak_stress_ratio * t1, t1
-
-    def stresses(t: float, t1: float) -> np.ndarray:
-        t2, tm, _ = edges(t1)
-        mirrored = t if t >= tm else t1 - (t - t2) / (tm - t2) * (t1 - tm)
-        sigma = stiffness * (r * (math.cos(mirrored) - math.cos(t1))) ** SAND.sinkage_exponent
-        j = np.array([r * (t1 - t) - ratio * (math.sin(t1) - math.sin(t)),
-                      ratio * math.tan(beta) * (t1 - t)])  # fmt: skip
-        size = float(np.hypot(*j))
-        tau = (c + sigma * mu) * (1.0 - math.exp(-size / SAND.shear_modulus))
-        return np.array([sigma, *(tau * j / size)])
-
-    def total(weights, t1: float) -> float:
-        t2, tm, _ = edges(t1)
-        return sum(
-            quad(lambda t: float(weights(t) @ stresses(t, t1)), low, high, epsrel=1e-10)[0]
-            for low, high in ((t2, tm), (tm, t1 - 1e-12))
-        )
-
-    def carried(t1: float) -> float:
-        return b * r * total(lambda t: np.array([math.cos(t), math.sin(t), 0.0]), t1)
-
-    t1 = brentq(lambda a: carried(a) - load, 0.01, 1.5, xtol=1e-13)
-
-    def flank(t: float) -> float:
-        h = r * (math.cos(t) - math.cos(t1))
-        moved = -math.expm1(-ratio * math.tan(beta) * (t1 - t) / SAND.shear_modulus)
-        return moved * d1 * (c * h + d2 * weight * h**2 / 2) * (r - h * math.cos(t))
-
-    lateral = -b * r * total(lambda t: np.array([0.0, 0.0, 1.0]), t1)
-    return (
-        r * (1.0 - math.cos(t1)),
-        b * r * total(lambda t: np.array([-math.sin(t), math.cos(t), 0.0]), t1),
-        b * r * r * total(lambda t: np.array([0.0, 1.0, 0.0]), t1),
-        lateral - ks * quad(flank, edges(t1)[0], t1, epsrel=1e-10)[0],
-    )
-
-
 @pytest.mark.parametrize(('slip', 'beta'), [(0.3, 0.1), (-0.4, 0.5), (0.0, 0.8), (0.8, 1.4)])
 def test_agrees_with_integrals_of_its_own(slip, beta):
-    truth = second_model(slip, beta, 80.0, 0.8)
+    truth = second_model(slip, 80.0, beta=beta, ks=0.8)
     ours = state([slip], slip_angle=beta, effects=FLANK)
     found = (*ours.outputs()[0], ours.lateral_force[0])
     assert found == pytest.approx(truth, rel=3e-4, abs=1e-4)
