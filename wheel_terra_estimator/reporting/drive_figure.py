@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
@@ -17,6 +19,16 @@ WITHIN = 1.96
 """Deviations that hold 95 % of a Gaussian."""
 SLIP_RANGE = (-0.05, 1.0)
 """What the slip panel shows at least [-]."""
+LEAST_EXTENT = 0.5
+"""Way below which a drive has no picture of the ground [m]."""
+STRENGTHS = (
+    ('below 0.7', -math.inf, 0.7, '#9b59b6'),
+    ('0.7 to 0.9', 0.7, 0.9, '#c9a3d9'),
+    ('0.9 to 1.1, as stated', 0.9, 1.1, RIM_COLOUR),
+    ('1.1 to 1.3', 1.1, 1.3, '#8cc9a1'),
+    ('above 1.3', 1.3, math.inf, '#2e8b57'),
+)
+"""Words, bounds and colour of the learned shear strength over the stated one: purple is weaker."""
 VELOCITY, SLIP, CLASSES, SINKAGE, PULL = range(5)
 QUANTITIES = ((SLIP, 'slip', 1.0), (SINKAGE, 'sinkage', 1e3), (PULL, 'drawbar_pull', 1.0))
 """Panel, quantity, its factor from SI to the panel."""
@@ -73,12 +85,11 @@ def drive_figure(
     return figure
 
 
-def way_figure(track: Track, strengths: tuple[tuple[str, float, float, str], ...]) -> TimeFigure:
-    """Return class and soil strength along the way: the map of a drive that went straight.
-
-    ``strengths`` are words, lower and upper bound of the strength learned over that stated, colour.
-    """
+def way_figure(track: Track) -> TimeFigure | None:
+    """Return class and soil strength along the way; None where a drive went nowhere."""
     values, way = track.values, track.values['distance']
+    if track.stamp.size < 2 or way[-1] < LEAST_EXTENT:
+        return None
     panels = (
         Panel('worst slip class of a wheel', 0.05, strips=('class',)),
         Panel('shear strength learned, over that stated', 0.05, strips=('soil',)),
@@ -88,7 +99,7 @@ def way_figure(track: Track, strengths: tuple[tuple[str, float, float, str], ...
         member = (values['slip_class'] == slip_class)[:, None]
         slender = slip_class is SlipClass.UNKNOWN
         figure.strips(0, way, member, slip_class.name.lower(), colour, slender=slender)
-    for words, low, high, colour in strengths:
+    for words, low, high, colour in STRENGTHS:
         member = ((values['soil_strength'] >= low) & (values['soil_strength'] < high))[:, None]
         figure.strips(1, way, member, words, colour)
     return figure

@@ -15,8 +15,13 @@ from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.taught import Taught
-from wheel_terra_estimator.reporting import track_picture, truth_scores
-from wheel_terra_estimator.reporting.drive_figure import drive_figure, slopes_figure, way_figure
+from wheel_terra_estimator.reporting import truth_scores
+from wheel_terra_estimator.reporting.drive_figure import (
+    STRENGTHS,
+    drive_figure,
+    slopes_figure,
+    way_figure,
+)
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, Border
 from wheel_terra_estimator.reporting.drive_summary import (
     DriveSummary,
@@ -70,7 +75,9 @@ def write_replay_report(
         ),
         taught=[_taught_row(row) for row in summary.taught],
         slopes=slopes_figure(history.slip_on_slope) if history.slip_on_slope else None,
-        map=_map(track) if track and track_picture.has_map(track) else None,
+        way=way_figure(track) if track else None,
+        strengths=[(words, colour) for words, _, _, colour in STRENGTHS],
+        position=track.source if track else '',
         smoothed=filtered is not None,
         truth_source=truth.source if truth else '',
         provenance=configuration.provenance,
@@ -171,13 +178,3 @@ def _warnings(summary: DriveSummary, errors: TruthErrors | None) -> list[dict[st
 
 def _capital(words: str) -> str:
     return words[:1].upper() + words[1:]
-
-
-def _map(track: Track) -> dict[str, Any]:
-    straight = track_picture.is_straight(track)
-    return {
-        'figure': way_figure(track, track_picture.STRENGTHS) if straight else None,
-        'maps': () if straight else track_picture.maps(track),
-        'strengths': [(words, colour) for words, _, _, colour in track_picture.STRENGTHS],
-        'source': track.source,
-    }
