@@ -30,15 +30,6 @@ def test_without_a_rover_file_it_proposes_one(capsys):
     assert 'wheels.names: [front_left_wheel_joint, front_right_wheel_joint, rear_left' in said
 
 
-def test_the_page_says_what_the_terminal_says(tmp_path, capsys):
-    page = tmp_path / 'check.html'
-    assert main(['check', str(PATHFINDER), '--config', 'pathfinder', '--report', str(page)]) == 1
-    assert 'finding' in capsys.readouterr().out
-    text = page.read_text(encoding='utf-8')
-    assert '0.1167, 0.1167' in text and 'Not checked' in text and '/wheel/odometry' in text
-    assert main(['check', str(PATHFINDER), '--report', str(page)]) == 2  # is there already
-
-
 def test_what_cannot_be_used(tmp_path, capsys):
     assert main(['check', str(tmp_path / 'nothing')]) == 2
     assert 'no such bag' in capsys.readouterr().err

@@ -69,7 +69,7 @@ def test_the_walk_finds_what_it_is_for():
     assert len(PAIRS) > 30
     assert {words[0] for words, parser in COMMANDS.items() if outputs(parser)} == {
         'simulate', 'calibrate', 'init', 'convert', 'replay', 'predict', 'diagnose',
-        'trial', 'soilbin', 'evaluate', 'demo', 'check', 'bench', 'reproduce',
+        'trial', 'soilbin', 'evaluate', 'demo', 'reproduce',
     }  # fmt: skip
 
 
@@ -146,7 +146,6 @@ def test_a_soil_file_replaces_no_file_of_another_kind(tmp_path, capsys):
 
 REFUSED = {
     'simulate': 'simulate --config {bad} -o',
-    'check': 'check {bag} --report',
     'calibrate': 'calibrate {bag} -o',
     'init': 'init --bag {bag} -o',
     'convert': 'convert {table} -o',
@@ -159,7 +158,6 @@ REFUSED = {
     'reproduce': 'reproduce nakashima --run --no-cache --scheduler {silent} -o',
     'evaluate': 'evaluate --kinds climb --first-seed -1 -o',
     'demo': 'demo --no-node -o',
-    'bench': 'bench --against {table} --report',
 }
 """Command line of every command that writes, refused as late as can be; the place is appended."""
 

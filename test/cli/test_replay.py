@@ -140,17 +140,15 @@ def test_measured_recordings_with_a_rover_file_and_remaps(shared, tmp_path, name
     assert bool(history.warnings) == (rover_name == 'frostyboy')
 
 
-def test_slip_on_slopes_is_in_the_table_as_it_was_published_last(make_bag, config, tmp_path):
-    table, out = tmp_path / 'slopes.csv', tmp_path / 'out'
-    arguments = ['replay', str(make_bag()), *config, '-o', str(out), '--slip-on-slope', str(table)]
-    assert main(arguments) == 0
+def test_slip_on_slopes_is_published_each_second(make_bag, config, tmp_path):
+    out = tmp_path / 'out'
+    assert main(['replay', str(make_bag()), *config, '-o', str(out)]) == 0
     topic = '/wheel_terra_estimator/slip_on_slope'
     with open_bag(out) as bag:
         unpack = topic_messages(JOINT_STATE).unpack
         told = [unpack(data) for _, _, data in bag.messages((topic,))]
     stamps = [stamp_of(message) for message in told]
     assert len(told) >= 3 and all(round(d * 1e-9) == 1 for d in np.diff(stamps))
-    found = np.genfromtxt(table, delimiter=',', skip_header=1)
-    assert tuple(told[-1].name) == tuple(f'slope_{slope:.0f}deg' for slope in found[:, 0])
-    columns = (told[-1].position, told[-1].effort, told[-1].velocity)
-    np.testing.assert_allclose(found[:, 1:], np.array(columns).T, rtol=1e-5, atol=1e-9)
+    assert list(told[-1].name) == [f'slope_{slope}deg' for slope in range(-20, 31, 5)]
+    columns = told[-1].position, told[-1].effort, told[-1].velocity
+    assert np.shape(columns) == (3, 11) and np.isfinite(columns).all()

@@ -197,52 +197,11 @@ def fleet_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture(scope='module')
-def check_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_estimator.cli.main import main
-
-    path = tmp_path_factory.mktemp('check') / 'report.html'
-    drive = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
-    assert main(['check', str(drive), '--config', 'pathfinder', '--report', str(path)]) == 1
-    return path
-
-
-@pytest.fixture(scope='module')
-def bench_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_lab.cli.bench import _write_page
-
-    figures = [
-        {
-            'name': f'closed form, {n} wheels in arrays',
-            'beside': 'adaptive quadrature and root find, wheel by wheel',
-            **{'seconds': 1e-3, 'seconds_beside': 8e-3, 'times_as_fast': 8.0},
-            **{'least': 7.0, 'greatest': 9.0, 'change': 1.02},
-        }
-        for n in (1, 20, 200)
-    ]
-    path = tmp_path_factory.mktemp('bench') / 'report.html'
-    _write_page(path, figures, overwrite=False)
-    return path
-
-
-@pytest.fixture(scope='module')
-def evaluation_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_estimator.cli.main import main
-
-    path = tmp_path_factory.mktemp('evaluate') / 'report.html'
-    line = ['evaluate', '--kinds', 'cruise', '--seeds', '1', '--modes', 'reference', '--jobs', '1']
-    assert main([*line, '-o', str(path)]) == 0
-    return path
-
-
 KINDS = {
     'report': 20,
     'diagnosis_report': 0,
     'soilbin_report': 6,
     'fleet_report': 0,
-    'check_report': 0,
-    'bench_report': 0,
-    'evaluation_report': 0,
 }
 """Page -> lines that its figure has at least."""
 

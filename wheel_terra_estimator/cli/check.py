@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.cli import bag_arguments
-from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 if TYPE_CHECKING:
@@ -31,8 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     configuration_reader.add_arguments(parser)
     bag_arguments.add_arguments(parser)
     parser.add_argument('--json', action='store_true', help='print findings and figures as JSON')
-    parser.add_argument('--report', action=Output, metavar='F.html', help='page to be kept or sent')
-    parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -42,13 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.checks.run import check_recording
     from wheel_terra_estimator.errors import UserError
-    from wheel_terra_estimator.output_folder import check_file
-    from wheel_terra_estimator.reporting.html import check_page
-    from wheel_terra_estimator.reporting.tables_page import write_check
 
-    if arguments.report:
-        check_page(arguments.report)
-        check_file(arguments.report, arguments.overwrite)
     given = bool(arguments.config or arguments.parameters)
     configuration = configuration_reader.from_arguments(arguments) if given else None
     remaps = parse_remaps(arguments.remap)
@@ -64,8 +55,6 @@ def run(arguments: argparse.Namespace) -> int:
     report = check_recording(recording, configuration, tuple(remaps))
     if recording.notes:
         report.figures['recording.notes'] = list(recording.notes)
-    if arguments.report:
-        write_check(arguments.report, recording, report, arguments.overwrite)
     if arguments.json:
         print(json.dumps(report.as_dict(), indent=2))
     else:

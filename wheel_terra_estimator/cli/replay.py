@@ -75,13 +75,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--config for the next drive; of one recording',
     )
     parser.add_argument(
-        '--slip-on-slope',
-        action=Output,
-        metavar='F.csv',
-        help='slip expected on slopes of -20 to 30 degrees, with its deviation and the probability '
-        'of entrapment, as learned by the end; of one recording',
-    )
-    parser.add_argument(
         '--smooth',
         action='store_true',
         help='estimates of the fixed-interval smoother; warnings stay as they were given live',
@@ -169,7 +162,6 @@ def _check_kinds(arguments: argparse.Namespace) -> list[Path]:
         (arguments.report, check_page),
         (arguments.table, estimates_table.check_table),
         (arguments.track, track_table.check_track),
-        (arguments.slip_on_slope, estimates_table.check_slopes),
     )
     for path, check in kinds:
         if path:
@@ -220,8 +212,6 @@ def _write_outputs(drive: Drive, arguments: argparse.Namespace) -> dict[str, Pat
         drive.write_table(arguments.table, arguments.overwrite)
     if arguments.track:
         drive.write_track(arguments.track, arguments.overwrite)
-    if arguments.slip_on_slope:
-        drive.write_slopes(arguments.slip_on_slope, arguments.overwrite)
     if arguments.save_soil:
         if not drive.result.learned:
             raise UserError(
@@ -234,7 +224,6 @@ def _write_outputs(drive: Drive, arguments: argparse.Namespace) -> dict[str, Pat
         'table': arguments.table,
         'track': arguments.track,
         'soil': arguments.save_soil,
-        'slip on slope': arguments.slip_on_slope,
         'estimates': arguments.output,
         'report': arguments.report,
     }
@@ -250,7 +239,6 @@ def _run_several(arguments: argparse.Namespace) -> int:
     for option, given in (
         ('--arrival', arguments.arrival),
         ('--save-soil', arguments.save_soil),
-        ('--slip-on-slope', arguments.slip_on_slope),
     ):
         if given:
             raise UserError(f'{option}: belongs to one recording; replay that one by itself')

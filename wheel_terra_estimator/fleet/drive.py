@@ -15,7 +15,6 @@ from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import Truth, read_truth
 from wheel_terra_estimator.checks.finding import CheckReport
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import (
     estimates_table,
@@ -50,14 +49,6 @@ class Drive:
         """Write the track as a table."""
         with new_file(path, overwrite) as fresh:
             track_table.write_track(self.result.track, fresh)
-
-    def write_slopes(self, path: Path, overwrite: bool) -> None:
-        """Write what slopes would cost as a table."""
-        slopes = self.result.history.slip_on_slope
-        if slopes is None:
-            raise UserError(f'{self.summary.title}: no estimates, so nothing for {path}')
-        with new_file(path, overwrite) as fresh:
-            estimates_table.write_slopes(slopes, fresh)
 
     def write_report(self, path: Path, overwrite: bool) -> None:
         """Write the page with pictures."""

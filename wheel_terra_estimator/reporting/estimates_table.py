@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates of a drive as a table, a row per set and wheel; slip on slopes as it ended."""
+"""Estimates of a drive as a table, a row per set and wheel."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ import numpy as np
 from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory
 from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.estimation.estimates import SLOPES, SlipOnSlope
 from wheel_terra_estimator.frames import unit_of
 
 SUFFIXES = ('.csv', '.parquet')
-_SLOPE_HEAD = ('slope [deg]', 'slip [-]', 'slip_std [-]', 'entrapment_probability [-]')
 
 
 def check_table(path: Path) -> None:
@@ -50,20 +48,6 @@ def write_table(history: EstimateHistory, path: Path) -> None:
         _pandas(path).DataFrame(table).to_parquet(path, index=False)
         return
     write_csv(path, table, zip(*(column.tolist() for column in table.values()), strict=True))
-
-
-def check_slopes(path: Path) -> None:
-    """Refuse, before anything is computed, a table that cannot be written."""
-    if path.suffix != '.csv':
-        raise UserError(f'{path}: the table of slip on slopes ends in .csv')
-
-
-def write_slopes(found: SlipOnSlope, path: Path) -> None:
-    """Write a row for each slope as CSV."""
-    rows = zip(SLOPES, *found, strict=True)
-    write_csv(
-        path, _SLOPE_HEAD, ([f'{round(float(value), 9):.6g}' for value in row] for row in rows)
-    )
 
 
 def _pandas(path: Path) -> Any:

@@ -97,8 +97,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         dest='output',
         action=Output,
-        metavar='F.md|F.html',
-        help='write the tables, as a page where the name ends in .html',
+        metavar='F.md',
+        help='write the tables',
     )
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
 
@@ -106,8 +106,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.output_folder import check_file, new_file
-    from wheel_terra_estimator.reporting.tables_page import write_tables
-    from wheel_terra_lab.evaluation import tables
 
     given = (
         ('--rover', arguments.rover),
@@ -131,13 +129,7 @@ def run(arguments: argparse.Namespace) -> int:
     runs = len(told.healths)
     text = f'{told.text}\n\nThe filter was started anew {restarts} times in {runs} runs.'
     print(text)
-    if arguments.output and arguments.output.suffix == '.html':
-        tone, verdict = ('warn' if restarts or told.status else 'good'), text.splitlines()[-1]
-        title = 'The estimator against truth and baselines'
-        write_tables(
-            arguments.output, title, verdict, tone, tables.as_tables(text), arguments.overwrite
-        )
-    elif arguments.output:
+    if arguments.output:
         with new_file(arguments.output, arguments.overwrite) as fresh:
             fresh.write_text(text + '\n', encoding='utf-8')
     return told.status or (FILTER_FAILED if restarts else 0)

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from wheel_terra_estimator.reporting.tables_page import Table
 from wheel_terra_lab.evaluation import scores
 from wheel_terra_lab.evaluation.bench import DriveScore, Results
 from wheel_terra_lab.evaluation.foresight import (
@@ -40,22 +39,6 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
     lines += ['| ' + ' | '.join(row) + ' |' for row in rows]
     return '\n'.join(lines)
-
-
-def as_tables(text: str) -> list[Table]:
-    """Return the tables of a report in Markdown, each under its heading."""
-    found: list[Table] = []
-    title, block = '', list[str]()
-    for line in [*text.splitlines(), '']:
-        if line.startswith('|'):
-            block.append(line)
-        elif block:
-            head, _, *rows = [[cell.strip(' *') for cell in row[1:-1].split('|')] for row in block]
-            found.append(Table(title, tuple(head), rows))
-            block = []
-        if line.startswith('#'):
-            title = line.strip('# ')
-    return found
 
 
 def report(results: Results, modes: Sequence[str]) -> str:
