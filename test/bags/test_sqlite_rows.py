@@ -120,5 +120,5 @@ def test_what_is_left_of_other_files_is_no_recording(tmp_path):
     with sqlite3.connect(path) as connection:
         connection.execute('CREATE TABLE notes(id INTEGER PRIMARY KEY, text)')
     connection.close()
-    with pytest.raises(UserError, match='nothing of a recording is left'):
+    with pytest.raises(UserError, match='finds no recording in it'):
         read(path)

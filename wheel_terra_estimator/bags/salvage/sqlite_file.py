@@ -58,7 +58,7 @@ class SqliteFile:
             fault, counts = str(error), Counter[int]()
         if fault and not (self._topics and counts):
             raise UserError(
-                f'{path}: cannot be read ({fault}), and nothing of a recording is left in it; '
+                f'{path}: SQLite finds no recording in it ({fault}); '
                 'copy it anew from where it was recorded, or: sqlite3 FILE .recover'
             )
         self.topics = [Topic(*it, counts[number]) for number, it in self._topics.items()]
