@@ -10,7 +10,7 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge, ContactAgeTuning
+from wheel_terra_estimator.estimation.contacts.contact_age import DECAY, START_VARIANCE, ContactAge
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
@@ -495,10 +495,9 @@ def test_the_doubt_of_the_shear_model_is_the_stated_one_at_a_contact_length(part
     for _ in range(3):
         age.advance(parts.rover.contact_length)
         variances.append(age.shear_variance)
-    tuning = ContactAgeTuning()
-    assert variances[0] == pytest.approx(tuning.start_variance)
-    assert variances[1] / variances[0] == pytest.approx(np.exp(-tuning.decay))
-    assert variances[2] / variances[1] == pytest.approx(np.exp(-tuning.decay))
+    assert variances[0] == pytest.approx(START_VARIANCE)
+    assert variances[1] / variances[0] == pytest.approx(np.exp(-DECAY))
+    assert variances[2] / variances[1] == pytest.approx(np.exp(-DECAY))
 
 
 def test_half_of_an_excess_of_twice_the_noise_is_believed(parts):

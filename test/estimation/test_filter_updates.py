@@ -18,7 +18,7 @@ from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import (
     ReferenceUpdate,
 )
-from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate, SinkageUpdateTuning
+from wheel_terra_estimator.estimation.filter.sinkage import FLOOR_VARIANCE, SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.state import (
@@ -596,7 +596,7 @@ def test_a_vibrating_accelerometer_weakens_the_balance(parts):
 def test_two_readings_of_the_sinkage_are_the_textbook_update(parts, ekf):
     """Information adds up: that of the state, and that of their mean with its floor."""
     update = SinkageUpdate(parts.configuration, parts.layout)
-    zi, floor = parts.layout.sinkage.start, SinkageUpdateTuning().floor_variance
+    zi, floor = parts.layout.sinkage.start, FLOOR_VARIANCE
     ekf.set(zi, 0.03, 0.002**2)
     sums = SinkageSums((0.062,) + (0.0,) * 5, (2,) + (0,) * 5)
     ekf.fuse(update.update(ekf, 0.0, sums, parts.sensors.sinkage_std**2))

@@ -9,10 +9,10 @@ from parts import SAND, Parts
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.speed_process import (
+    USUAL_LENGTH,
     RimSpeeds,
     SpeedProcess,
     SpeedStep,
-    SpeedTuning,
 )
 from wheel_terra_estimator.estimation.filter.state import SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
@@ -235,7 +235,7 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
     """As a first-order process in travel: a share of exp(-1) is left after its length."""
     made, rim = process([0.05] * 6), 0.05
     free = SpeedStep(1.0, 0.0, 0.0, 0.0)
-    length = SpeedTuning().usual_length
+    length = USUAL_LENGTH
 
     def after(travel):
         return made.towards_equilibrium_slip(

@@ -36,23 +36,18 @@ UNKNOWN_ANGLE_STD = math.pi / math.sqrt(3.0)
 """Deviation of a slip angle of which nothing is known: even over the whole turn [rad]."""
 
 
-@dataclass(frozen=True)
-class SidewaysTuning:
-    """What the model is worth; the law was chosen on cross slopes of simulator A."""
-
-    contact_share: float = 0.6
-    """Place in the contact, as a share of the entrance angle behind the entry, whose shear
-    displacement stands for all of it."""
-    soil_share: float = (
-        0.4  # of a lateral speed that the soil allows: shear modulus, contact length
-    )
-    strength_share: float = 0.25  # of the lateral force that the soil gives: strength, flank
-    force_share: float = 0.3  # of the lateral force of one wheel: how the sum is shared out
-    load_share: float = 0.03  # of the weight: forces of ruts, stones and toe
-    speed_share: float = 0.02  # of the speed: lateral speed that nothing here tells
-    memory: float = 5.0  # travel over which what a reference told of the model fades [m]
-    smoothing: float = 0.5  # time constant of the felt force: vibration slides no wheel [s]
-    blind_force: float = 2.0  # lateral specific force without an accelerometer [m/s^2]
+# What the model is worth; the law was chosen on cross slopes of simulator A.
+_CONTACT_SHARE = 0.6
+"""Place in the contact, as a share of the entrance angle behind the entry, whose shear
+displacement stands for all of it."""
+_SOIL_SHARE = 0.4  # of a lateral speed that the soil allows: shear modulus, contact length
+_STRENGTH_SHARE = 0.25  # of the lateral force that the soil gives: strength, flank
+_FORCE_SHARE = 0.3  # of the lateral force of one wheel: how the sum is shared out
+_LOAD_SHARE = 0.03  # of the weight: forces of ruts, stones and toe
+_SPEED_SHARE = 0.02  # of the speed: lateral speed that nothing here tells
+_MEMORY = 5.0  # travel over which what a reference told of the model fades [m]
+_SMOOTHING = 0.5  # time constant of the felt force: vibration slides no wheel [s]
+_BLIND_FORCE = 2.0  # lateral specific force without an accelerometer [m/s^2]
 
 
 class SidewaysRover(NamedTuple):
@@ -140,28 +135,28 @@ class SidewaysState(NamedTuple):
 class SidewaysMotion(Component[SidewaysState]):
     """Follows how the rover slides sideways."""
 
-    def __init__(self, rover: SidewaysRover, tuning: SidewaysTuning = SidewaysTuning()) -> None:
+    def __init__(self, rover: SidewaysRover) -> None:
         super().__init__(SidewaysState())
-        self._rover, self._tuning = rover, tuning
+        self._rover = rover
 
     def update(self, time: float, given: SidewaysInputs) -> Sideways:
         """Return slip angles, lateral forces and lateral speed at a time [s]."""
-        state, tuning = self.state, self._tuning
+        state = self.state
         pace = _pace(self._rover, given)
         since = 0.0 if isnan(state.time) else max(time - state.time, 0.0)
         travel = pace * since
         felt = given.lateral_force
         if not isnan(state.felt) and not isnan(felt):
-            felt = state.felt + (felt - state.felt) * since / (tuning.smoothing + since)
+            felt = state.felt + (felt - state.felt) * since / (_SMOOTHING + since)
         given = given._replace(lateral_force=felt)
-        fading = math.exp(-travel / tuning.memory)
+        fading = math.exp(-travel / _MEMORY)
         error, doubt = state.error * fading, 1.0 + (state.doubt - 1.0) * fading * fading
         if pace < self._rover.rest_speed or sum(given.loads) <= _NO_LOAD:
             told = self._at_rest(given)
             self.state = SidewaysState(time, error, doubt, pace, felt, 0.0, told)
             return told
-        contacts = _contacts(self._rover, given, tuning)
-        model, model_variance = model_speed(self._rover, given, contacts, tuning)
+        contacts = _contacts(self._rover, given)
+        model, model_variance = model_speed(self._rover, given, contacts)
         told = self._told(given, contacts, model + error * pace, doubt * model_variance)
         self.state = SidewaysState(time, error, doubt, pace, felt, model_variance, told)
         return told
@@ -180,9 +175,9 @@ class SidewaysMotion(Component[SidewaysState]):
         """Return the answer of wheels that stand: angles held, the felt force shared by load."""
         loads = np.array(given.loads)
         last = self.state.told or Sideways.unknown(given.loads)
-        total, std = _felt_force(self._rover, given, self._tuning)
+        total, std = _felt_force(self._rover, given)
         share = loads / max(float(loads.sum()), 1e-9)
-        force_std = np.hypot(np.abs(total * share), std * share) + self._tuning.load_share * loads
+        force_std = np.hypot(np.abs(total * share), std * share) + _LOAD_SHARE * loads
         return Sideways(
             last.angle,
             (UNKNOWN_ANGLE_STD,) * len(loads),
@@ -195,7 +190,7 @@ class SidewaysMotion(Component[SidewaysState]):
     def _told(
         self, given: SidewaysInputs, contacts: _Contacts, velocity: float, variance: float
     ) -> Sideways:
-        tuning, rover = self._tuning, self._rover
+        rover = self._rover
         x, y = np.array(rover.longitudinal), np.array(rover.lateral)
         sine, cosine, forward, turning = contacts[:4]
         aside = velocity + turning
@@ -209,10 +204,10 @@ class SidewaysMotion(Component[SidewaysState]):
         angle = np.arctan2(across, along)
         angle_std = _angle_std(along, across, np.sqrt(var_along), np.sqrt(var_across))
         forces = _wheel_forces(contacts, velocity, rover.rest_speed, given.shear_modulus)
-        _, std = _felt_force(rover, given, tuning)
+        _, std = _felt_force(rover, given)
         loads = np.array(given.loads)
         shared = std * loads / max(float(loads.sum()), 1e-9)
-        force_std = np.hypot(tuning.force_share * np.abs(forces), shared)
+        force_std = np.hypot(_FORCE_SHARE * np.abs(forces), shared)
         return Sideways(
             _floats(angle),
             _floats(np.minimum(angle_std, UNKNOWN_ANGLE_STD)),
@@ -259,10 +254,10 @@ class _Contacts(NamedTuple):
     strength: FloatArray  # greatest force [N]
 
 
-def _contacts(rover: SidewaysRover, given: SidewaysInputs, tuning: SidewaysTuning) -> _Contacts:
+def _contacts(rover: SidewaysRover, given: SidewaysInputs) -> _Contacts:
     radius = np.array(rover.radius)
     entry = np.arccos(1.0 - np.minimum(np.maximum(given.sinkage, 1e-4) / radius, 1.0))
-    swept = tuning.contact_share * entry
+    swept = _CONTACT_SHARE * entry
     strength = given.tan_friction * np.array(given.loads)
     return _Contacts(
         np.sin(given.steering),
@@ -297,11 +292,11 @@ def _wheel_forces(
 
 
 def model_speed(
-    rover: SidewaysRover, given: SidewaysInputs, contacts: _Contacts, tuning: SidewaysTuning
+    rover: SidewaysRover, given: SidewaysInputs, contacts: _Contacts
 ) -> tuple[float, float]:
     """Return the lateral speed of the body by forces alone [m/s], and its variance."""
     pace = _pace(rover, given)
-    felt, felt_std = _felt_force(rover, given, tuning)
+    felt, felt_std = _felt_force(rover, given)
     reach = 2.0 * pace + abs(given.yaw_rate) * max(abs(x) for x in rover.longitudinal)
     speeds = reach * _PLACES
     forces = _wheel_forces(contacts, speeds[:, None], rover.rest_speed, given.shear_modulus)
@@ -316,10 +311,10 @@ def model_speed(
     ends = np.interp((lateral - step, lateral + step), speeds, against)
     stiffness = float(ends[1] - ends[0]) / (2.0 * step)
     # Softer towards the limit of the strength: there little is known of a speed.
-    doubt = math.hypot(felt_std, tuning.strength_share * felt)
+    doubt = math.hypot(felt_std, _STRENGTH_SHARE * felt)
     std = min(doubt / max(stiffness, 1e-9), reach)
-    variance = std**2 + (tuning.soil_share * (lateral - free)) ** 2
-    return lateral, variance + (tuning.speed_share * pace) ** 2
+    variance = std**2 + (_SOIL_SHARE * (lateral - free)) ** 2
+    return lateral, variance + (_SPEED_SHARE * pace) ** 2
 
 
 def _pace(rover: SidewaysRover, given: SidewaysInputs) -> float:
@@ -328,13 +323,11 @@ def _pace(rover: SidewaysRover, given: SidewaysInputs) -> float:
     return max(abs(given.speed) + turning, *rims) if rims else abs(given.speed) + turning
 
 
-def _felt_force(
-    rover: SidewaysRover, given: SidewaysInputs, tuning: SidewaysTuning
-) -> tuple[float, float]:
+def _felt_force(rover: SidewaysRover, given: SidewaysInputs) -> tuple[float, float]:
     """Return the sum of lateral forces along y of the body that is felt, and its deviation [N]."""
     weight = sum(given.loads)
     pulled = sum(f * math.sin(d) for f, d in zip(given.pulls, given.steering, strict=True))
     if isnan(given.lateral_force):
-        return -pulled, rover.mass * tuning.blind_force
+        return -pulled, rover.mass * _BLIND_FORCE
     felt = rover.mass * given.lateral_force - pulled
-    return felt, math.hypot(rover.mass * given.lateral_force_std, tuning.load_share * weight)
+    return felt, math.hypot(rover.mass * given.lateral_force_std, _LOAD_SHARE * weight)

@@ -5,19 +5,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.rover import Rover
 
-
-@dataclass(frozen=True)
-class ContactAgeTuning:
-    """Doubt of the shear model behind a start; tuned on simulated drives, seeds 1000 to 1019."""
-
-    start_variance: float = 2.5  # over the square of the shear
-    decay: float = 2.0  # per contact length
+# Doubt of the shear model behind a start; tuned on simulated drives, seeds 1000 to 1019.
+START_VARIANCE = 2.5  # over the square of the shear
+DECAY = 2.0  # per contact length
 
 
 class ContactAgeState(NamedTuple):
@@ -30,9 +25,9 @@ class ContactAgeState(NamedTuple):
 class ContactAge(Component[ContactAgeState]):
     """Travel since the contacts formed."""
 
-    def __init__(self, rover: Rover, tuning: ContactAgeTuning = ContactAgeTuning()) -> None:
+    def __init__(self, rover: Rover) -> None:
         super().__init__(ContactAgeState())
-        self._rover, self._tuning = rover, tuning
+        self._rover = rover
 
     def update(self, rim_speed: float) -> bool:
         """Take the typical rim speed of a cycle [m/s], nan = unknown.
@@ -64,4 +59,4 @@ class ContactAge(Component[ContactAgeState]):
     def shear_variance(self) -> float:
         """Variance of the shear model, over its square: shear builds up over a contact length."""
         lengths = self.state.travel / self._rover.contact_length
-        return self._tuning.start_variance * math.exp(-self._tuning.decay * (lengths - 1.0))
+        return START_VARIANCE * math.exp(-DECAY * (lengths - 1.0))

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -34,17 +33,14 @@ from wheel_terra_estimator.estimation.rover import Rover
 Floats = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class LinearisationTuning:
-    """Tuned on simulated drives, seeds 1000 to 1019, where no other source is given."""
-
-    slope_keep: float = 0.9
-    """Share of the old derivatives kept in a cycle: they are means over about a second."""
-    new_contact: float = 0.15
-    """Change of a torque by strength, of load times radius, that is no noise of the state."""
-    least_load: float = 1e-3  # [N]: a wheel with less is in the air
-    least_rim_over_rest: float = 2.0
-    """Rim speed over ``rest_speed`` above which a wheel turns."""
+# Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
+_SLOPE_KEEP = 0.9
+"""Share of the old derivatives kept in a cycle: they are means over about a second."""
+_NEW_CONTACT = 0.15
+"""Change of a torque by strength, of load times radius, that is no noise of the state."""
+_LEAST_LOAD = 1e-3  # [N]: a wheel with less is in the air
+_LEAST_RIM_OVER_REST = 2.0
+"""Rim speed over ``rest_speed`` above which a wheel turns."""
 
 
 class ContactForces(NamedTuple):
@@ -84,25 +80,18 @@ class Linearisation(Component[FloatArray]):
     """
 
     def __init__(
-        self,
-        rover: Rover,
-        layout: StateLayout,
-        models: WheelModels,
-        leaving_angle_std: float,
-        tuning: LinearisationTuning = LinearisationTuning(),
+        self, rover: Rover, layout: StateLayout, models: WheelModels, leaving_angle_std: float
     ) -> None:
         super().__init__(np.full((2, len(STEPPED), rover.wheel_count), np.nan))
-        self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
+        self._rover, self._layout, self._models = rover, layout, models
         self._leaving_angle_std = leaving_angle_std
-        self.least_load = tuning.least_load
+        self.least_load = _LEAST_LOAD
 
     def turning(self, rims: Floats, loads: Floats) -> tuple[bool, ...]:
         """Say for which wheels the contact models hold: they turn under a load."""
-        tuning = self._tuning
-        least = tuning.least_rim_over_rest * self._rover.rest_speed
+        least = _LEAST_RIM_OVER_REST * self._rover.rest_speed
         return tuple(
-            abs(rim) >= least and load >= tuning.least_load
-            for rim, load in zip(rims, loads, strict=True)
+            abs(rim) >= least and load >= _LEAST_LOAD for rim, load in zip(rims, loads, strict=True)
         )
 
     def update(
@@ -200,10 +189,10 @@ class Linearisation(Component[FloatArray]):
     def smoothed(self, forces: WheelForces, moment: FloatArray, turning: BoolArray) -> FloatArray:
         """Return the smoothed derivatives; `moment`: load times radius of each wheel [N m]."""
         old, new = self.state, np.stack([forces.d_torque, forces.d_pull])
-        slopes = smoothed_slopes(old, new, self._tuning.slope_keep)
+        slopes = smoothed_slopes(old, new, _SLOPE_KEEP)
         # A wheel that comes free or locks is another contact at once.
         change = np.abs(new[0, STRENGTH] - old[0, STRENGTH])
-        other = change > self._tuning.new_contact * moment
+        other = change > _NEW_CONTACT * moment
         slopes[:, 1:] = np.where(other, new[:, 1:], slopes[:, 1:])
         return np.where(turning, slopes, old)
 

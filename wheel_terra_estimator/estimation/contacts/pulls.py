@@ -9,7 +9,6 @@ strength, and the specific force gives the sum. Both corrections stay outside th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
@@ -28,24 +27,21 @@ from wheel_terra_estimator.estimation.scalars import NAN, clipped
 Floats = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class PullTuning:
-    """Tuned on simulated drives, seeds 1000 to 1019, where no other source is given."""
-
-    guess_std: float = 0.1  # of the load, where no model holds
-    floor_std: float = 1e-3  # [N]
-    model_std: float = 0.01  # of the load
-    level_std: float = 0.2  # of the load, where loads are those of level ground
-    gain_share: float = 0.5  # of the torques' gain error that the pull takes over
-    most_torque: float = 1.2  # of load times radius
-    most_drag: float = 2.0  # of the load
-    excess_gain: float = 0.2  # smoothing of reading less model, per cycle
-    shrinkage: float = 2.0
-    """Noise variances taken off the square of an excess (James and Stein 1961): nothing below its
-    noise is believed, all of what is far above it."""
-    least_excess: float = 1e-12  # square of it [N^2 m^2]
-    turning_loss: float = 5.0  # trust in an excess lost per lateral motion
-    scrub_std: float = 0.1  # of the load at full lateral motion: pushed sideways
+# Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
+_GUESS_STD = 0.1  # of the load, where no model holds
+_FLOOR_STD = 1e-3  # [N]
+_MODEL_STD = 0.01  # of the load
+_LEVEL_STD = 0.2  # of the load, where loads are those of level ground
+_GAIN_SHARE = 0.5  # of the torques' gain error that the pull takes over
+_MOST_TORQUE = 1.2  # of load times radius
+_MOST_DRAG = 2.0  # of the load
+_EXCESS_GAIN = 0.2  # smoothing of reading less model, per cycle
+_SHRINKAGE = 2.0
+"""Noise variances taken off the square of an excess (James and Stein 1961): nothing below its
+noise is believed, all of what is far above it."""
+_LEAST_EXCESS = 1e-12  # square of it [N^2 m^2]
+_TURNING_LOSS = 5.0  # trust in an excess lost per lateral motion
+_SCRUB_STD = 0.1  # of the load at full lateral motion: pushed sideways
 
 
 class PullEvidence(NamedTuple):
@@ -84,17 +80,11 @@ class Pulls(Component[PullState]):
         Of each wheel on level ground [N]: what a pull may be before anything is known.
     """
 
-    def __init__(
-        self,
-        rover: Rover,
-        sensors: SensorFigures,
-        loads: Floats,
-        tuning: PullTuning = PullTuning(),
-    ) -> None:
+    def __init__(self, rover: Rover, sensors: SensorFigures, loads: Floats) -> None:
         zero = (0.0,) * rover.wheel_count
         unknown = (NAN,) * rover.wheel_count
         super().__init__(PullState(zero, loads, zero, zero, zero, unknown))
-        self._rover, self._sensors, self._tuning = rover, sensors, tuning
+        self._rover, self._sensors = rover, sensors
 
     def note_stationary(self, pulls: Floats) -> None:
         """Take the pulls of wheels that stand, from their torques [N]; nan = not known."""
@@ -124,13 +114,13 @@ class Pulls(Component[PullState]):
             Of the body against the ground by its ruts [rad].
         """
         forces, total, loads, headings, turning, readings, stationary, lateral_motion = evidence
-        state, share, tuning = self.state, loads.slope_share, self._tuning
+        state, share = self.state, loads.slope_share
         n = self._rover.wheel_count
         pull, std = [0.0] * n, [0.0] * n
         torque, excess = list(state.torque), list(state.torque_excess)
         own = [0.0] * n  # variances that no other wheel shares
         joint = np.zeros((n, n))
-        scrub = [(tuning.scrub_std * lateral_motion * load) ** 2 for load in loads.load]
+        scrub = [(_SCRUB_STD * lateral_motion * load) ** 2 for load in loads.load]
         if forces is not None:
             pulls, torques = [moved.tolist() for moved in forces.moved_to(mean)]
             joint = forces.pull_rows @ covariance @ forces.pull_rows.T
@@ -144,8 +134,8 @@ class Pulls(Component[PullState]):
                 standing = stationary[i]
                 pull[i] = load * share if isnan(standing) else standing
                 torque[i] = pull[i] * self._rover.rim_radius[i]
-                known = tuning.guess_std if loads.force_known else 1.0
-                std[i] = known * load + tuning.floor_std
+                known = _GUESS_STD if loads.force_known else 1.0
+                std[i] = known * load + _FLOOR_STD
                 own[i] = std[i] ** 2
             else:
                 excess[i] = self._smoothed_excess(excess[i], readings[i], torques[i])
@@ -155,7 +145,7 @@ class Pulls(Component[PullState]):
                     pulls[i] += beyond * pull_by_strength[i] / torque_by_strength[i]
                 # First order from far away overshoots: no soil gives more than the load.
                 pull[i] = clipped(pulls[i], -load, load)
-                most = tuning.most_torque * load * self._rover.shear_radius[i]
+                most = _MOST_TORQUE * load * self._rover.shear_radius[i]
                 torque[i] = clipped(torques[i], -most, most)
                 own[i] = self._own_variance(
                     i, pull[i], torque[i], load, level=not loads.force_known
@@ -189,7 +179,7 @@ class Pulls(Component[PullState]):
         seen = sum(f * c for f, c in zip(pull, along.tolist(), strict=True))
         residual = total.along - total.weight * tilt - seen
         gains = shares / (float(along @ shares) + total.variance)
-        most = self._tuning.most_drag
+        most = _MOST_DRAG
         return [
             clipped(f + gain * residual, -most * load, load)
             for f, gain, load in zip(pull, gains.tolist(), loads, strict=True)
@@ -199,21 +189,21 @@ class Pulls(Component[PullState]):
         self, i: int, pull: float, torque: float, load: float, *, level: bool
     ) -> float:
         """Return the variance of a turning wheel's pull that no other wheel shares [N^2]."""
-        rover, sensors, tuning = self._rover, self._sensors, self._tuning
+        rover, sensors = self._rover, self._sensors
         radius = rover.shear_radius[i]
         return (
             (rover.load_std * pull) ** 2
             + (sensors.torque_zero_std / radius) ** 2
-            + (tuning.gain_share * sensors.torque_gain_std * torque / radius) ** 2
-            + (tuning.model_std * load) ** 2
-            + (tuning.level_std * load if level else 0.0) ** 2
+            + (_GAIN_SHARE * sensors.torque_gain_std * torque / radius) ** 2
+            + (_MODEL_STD * load) ** 2
+            + (_LEVEL_STD * load if level else 0.0) ** 2
         )
 
     def _smoothed_excess(self, excess: float, reading: float, model: float) -> float:
         """Return what a wheel's torque says beyond its model, smoothed [N m]."""
         if isnan(reading):
             return excess
-        return excess + self._tuning.excess_gain * (reading - model - excess)
+        return excess + _EXCESS_GAIN * (reading - model - excess)
 
     def _believed(self, excess: float, reading: float, lateral_motion: float) -> float:
         """Return what of the excess is beyond the sensor's errors [N m].
@@ -224,12 +214,12 @@ class Pulls(Component[PullState]):
         """
         if isnan(reading):
             return 0.0
-        sensors, tuning = self._sensors, self._tuning
+        sensors = self._sensors
         noise = (
-            tuning.excess_gain / 2.0 * sensors.torque_std**2
+            _EXCESS_GAIN / 2.0 * sensors.torque_std**2
             + sensors.torque_zero_std**2
             + (sensors.torque_gain_std * reading) ** 2
         )
-        square = max(excess * excess, tuning.least_excess)
-        believed = max(1.0 - tuning.shrinkage * noise / square, 0.0)
-        return excess * believed * max(1.0 - tuning.turning_loss * lateral_motion, 0.0)
+        square = max(excess * excess, _LEAST_EXCESS)
+        believed = max(1.0 - _SHRINKAGE * noise / square, 0.0)
+        return excess * believed * max(1.0 - _TURNING_LOSS * lateral_motion, 0.0)

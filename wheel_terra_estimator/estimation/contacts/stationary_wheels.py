@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
@@ -26,21 +25,17 @@ from wheel_terra_estimator.estimation.filter.state import (
 )
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
-
-@dataclass(frozen=True)
-class StationaryTuning:
-    """Tuned on simulated drives with locked wheels, seeds 1000 to 1019, unless said otherwise."""
-
-    sliding_ratio: float = 3.0
-    """v/(r w) taken for a locked wheel: its shear is saturated long before [-]."""
-    most_drag: float = 2.0  # of the load: friction and the soil pushed ahead
-    straight: float = 0.1
-    """Lateral motion above which a torque against the drag is no sign of a jammed drive [-]."""
-    dragged_doubt: float = 0.1
-    """Standard deviation of a dragged wheel's pull over its load, beside gain and turning."""
-    idle_doubt: float = 0.3
-    """The same of a wheel that stands, is lifted or unknown: it may carry its share of the slope,
-    or nothing."""
+# Tuned on simulated drives with locked wheels, seeds 1000 to 1019, unless said otherwise.
+_SLIDING_RATIO = 3.0
+"""v/(r w) taken for a locked wheel: its shear is saturated long before [-]."""
+_MOST_DRAG = 2.0  # of the load: friction and the soil pushed ahead
+_STRAIGHT = 0.1
+"""Lateral motion above which a torque against the drag is no sign of a jammed drive [-]."""
+_DRAGGED_DOUBT = 0.1
+"""Standard deviation of a dragged wheel's pull over its load, beside gain and turning."""
+_IDLE_DOUBT = 0.3
+"""The same of a wheel that stands, is lifted or unknown: it may carry its share of the slope,
+or nothing."""
 
 
 class StationaryPull(NamedTuple):
@@ -55,14 +50,9 @@ class StationaryWheels:
     """Pulls of wheels for which the models of a turning wheel do not hold."""
 
     def __init__(
-        self,
-        rover: Rover,
-        sensors: SensorFigures,
-        layout: StateLayout,
-        models: WheelModels,
-        tuning: StationaryTuning = StationaryTuning(),
+        self, rover: Rover, sensors: SensorFigures, layout: StateLayout, models: WheelModels
     ) -> None:
-        self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
+        self._rover, self._layout, self._models = rover, layout, models
         self._gain_std = sensors.torque_gain_std
 
     def pulls(
@@ -92,13 +82,13 @@ class StationaryWheels:
         headings : Headings
             Of the wheels.
         """
-        rover, tuning = self._rover, self._tuning
+        rover = self._rover
         speed = headings.speeds(float(x[SPEED]), yaw_rate)
         held = np.clip(torques / np.array(rover.shear_radius), -loads, loads)
         direction = np.where(speed > 0.0, 1.0, -1.0)
         forces = self._models.forces(
             WheelStates(
-                tuning.sliding_ratio,
+                _SLIDING_RATIO,
                 x[self._layout.sinkage],
                 loads,
                 float(x[SHEAR_STRENGTH]),
@@ -107,11 +97,11 @@ class StationaryWheels:
             )
         )
         by_torque, by_pull = forces.d_torque[STRENGTH], forces.d_pull[STRENGTH]
-        jammed = (direction * torques > 0.0) & (lateral_motion < tuning.straight)
+        jammed = (direction * torques > 0.0) & (lateral_motion < _STRAIGHT)
         tells = (by_torque != 0.0) & ~jammed
         gain = np.where(tells, by_pull / np.where(tells, by_torque, 1.0), 0.0)
         pull = forces.pull + gain * (direction * torques - forces.torque)
-        most = tuning.most_drag * loads
+        most = _MOST_DRAG * loads
         return np.where(
             np.abs(speed) < rover.rest_speed, held, direction * np.clip(pull, -most, most)
         )
@@ -120,9 +110,8 @@ class StationaryWheels:
         self, pull: float, load: float, slope_share: float, lateral_motion: float
     ) -> StationaryPull:
         """Return what to expect of a wheel that gives `pull` [N], nan = unknown."""
-        tuning = self._tuning
         if isnan(pull):
-            return StationaryPull(pull, load * slope_share, tuning.idle_doubt * load)
+            return StationaryPull(pull, load * slope_share, _IDLE_DOUBT * load)
         # In turns it is pushed sideways, too.
-        doubt = tuning.dragged_doubt + self._gain_std + min(lateral_motion, 1.0)
+        doubt = _DRAGGED_DOUBT + self._gain_std + min(lateral_motion, 1.0)
         return StationaryPull(pull, pull, doubt * load)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
@@ -17,28 +16,25 @@ from wheel_terra_estimator.estimation.scalars import clipped, known, median
 Floats = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class TurningTuning:
-    """Tuned on simulated drives, seeds 1000 to 1019, where no other source is given."""
-
-    least_gain: float = 0.25
-    """Of the gyro per cycle while it agrees with the wheels; more than noise is followed."""
-    least_noise: float = 1e-6  # of the yaw rate [rad/s]
-    least_curvature_length: float = 0.1  # [m], for rovers with one axle
-    least_travel_share: float = 0.1
-    """Travel, as a share of the curvature length, below which no curvature is known."""
-    steepest: float = 0.3  # curvature of the ground [rad/m]
-    common_curvature: float = 0.1
-    """Curvature of common ground [rad/m], against which the gyro's zero is weighed."""
-    least_speed: float = 1e-4  # [m/s]
-    least_yaw_noise_share: float = 0.4
-    """Of the gyro's noise that the smoothing leaves: sqrt(g / (2 - g)) for the least gain."""
-    skid_yaw_share: float = 0.6
-    """Yaw rate over that of rolling wheels, of a rover that has to skid to turn, and its doubt: it
-    turns as one with 1.3 to 3 times its track (docs/own_rover.md)."""
-    skid_yaw_doubt: float = 0.4  # of that yaw rate
-    roll_yaw_doubt: float = 0.15  # of a rover that does not skid
-    least_wheel_yaw_std: float = 0.005  # [rad/s]
+# Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
+_LEAST_GAIN = 0.25
+"""Of the gyro per cycle while it agrees with the wheels; more than noise is followed."""
+_LEAST_NOISE = 1e-6  # of the yaw rate [rad/s]
+_LEAST_CURVATURE_LENGTH = 0.1  # [m], for rovers with one axle
+_LEAST_TRAVEL_SHARE = 0.1
+"""Travel, as a share of the curvature length, below which no curvature is known."""
+_STEEPEST = 0.3  # curvature of the ground [rad/m]
+_COMMON_CURVATURE = 0.1
+"""Curvature of common ground [rad/m], against which the gyro's zero is weighed."""
+_LEAST_SPEED = 1e-4  # [m/s]
+_LEAST_YAW_NOISE_SHARE = 0.4
+"""Of the gyro's noise that the smoothing leaves: sqrt(g / (2 - g)) for the least gain."""
+_SKID_YAW_SHARE = 0.6
+"""Yaw rate over that of rolling wheels, of a rover that has to skid to turn, and its doubt: it
+turns as one with 1.3 to 3 times its track (docs/own_rover.md)."""
+_SKID_YAW_DOUBT = 0.4  # of that yaw rate
+_ROLL_YAW_DOUBT = 0.15  # of a rover that does not skid
+_LEAST_WHEEL_YAW_STD = 0.005  # [rad/s]
 
 
 _OPPOSED = 0.5
@@ -82,16 +78,14 @@ class TurningState(NamedTuple):
 class Turning(Component[TurningState]):
     """Follows yaw rate, lateral motion and the curvature of the ground."""
 
-    def __init__(
-        self, rover: Rover, sensors: SensorFigures, tuning: TurningTuning = TurningTuning()
-    ) -> None:
+    def __init__(self, rover: Rover, sensors: SensorFigures) -> None:
         self._per_cycle = max(sensors.imu_rate * rover.period, 1.0)
         super().__init__(TurningState())
-        self._rover, self._sensors, self._tuning = rover, sensors, tuning
+        self._rover, self._sensors = rover, sensors
         skids = rover.skids
-        self._skid_share = tuning.skid_yaw_share if skids else 1.0
-        self._wheel_doubt = tuning.skid_yaw_doubt if skids else tuning.roll_yaw_doubt
-        self._curvature_length = max(rover.curvature_length, tuning.least_curvature_length)
+        self._skid_share = _SKID_YAW_SHARE if skids else 1.0
+        self._wheel_doubt = _SKID_YAW_DOUBT if skids else _ROLL_YAW_DOUBT
+        self._curvature_length = max(rover.curvature_length, _LEAST_CURVATURE_LENGTH)
 
     def update(
         self,
@@ -108,7 +102,7 @@ class Turning(Component[TurningState]):
 
         Speeds are in [m/s]; a rim speed that is unknown is nan.
         """
-        state, tuning = self.state, self._tuning
+        state = self.state
         by_wheels = state.by_wheels
         if known(rims):
             by_wheels = self._skid_share * headings.yaw_rate(rims)
@@ -117,7 +111,7 @@ class Turning(Component[TurningState]):
             std = self._gyro_std(window)
         elif gyro_silent and known(rims):
             yaw_rate = by_wheels
-            std = math.hypot(self._wheel_doubt * yaw_rate, tuning.least_wheel_yaw_std)
+            std = math.hypot(self._wheel_doubt * yaw_rate, _LEAST_WHEEL_YAW_STD)
         else:
             return state
         # Nose-up rotation over travel, both forgotten over the length of the rover.
@@ -138,13 +132,13 @@ class Turning(Component[TurningState]):
 
     def curvature(self, speed: float) -> float:
         """Return slope gained per travel [rad/m]: front wheels may climb steeper ground."""
-        state, tuning = self.state, self._tuning
-        if abs(state.travel) < tuning.least_travel_share * self._curvature_length:
+        state = self.state
+        if abs(state.travel) < _LEAST_TRAVEL_SHARE * self._curvature_length:
             return 0.0
-        curvature = clipped(state.rotation / state.travel, -tuning.steepest, tuning.steepest)
+        curvature = clipped(state.rotation / state.travel, -_STEEPEST, _STEEPEST)
         # What the gyro's zero makes of it, against the curvature of common ground.
-        doubt = self._sensors.angular_rate_bias_std / max(abs(speed), tuning.least_speed)
-        return curvature / (1.0 + (doubt / tuning.common_curvature) ** 2)
+        doubt = self._sensors.angular_rate_bias_std / max(abs(speed), _LEAST_SPEED)
+        return curvature / (1.0 + (doubt / _COMMON_CURVATURE) ** 2)
 
     def _side_speed(self, speed: float, yaw_rate: float, headings: Headings) -> float:
         """Return how fast the wheel is pushed sideways that is pushed most [m/s].
@@ -162,7 +156,7 @@ class Turning(Component[TurningState]):
     def _gyro_std(self, window: InertialWindow) -> float:
         """Return the deviation of the smoothed yaw rate [rad/s]."""
         noise = self._noise(window) / math.sqrt(self._per_cycle)
-        left = self._tuning.least_yaw_noise_share * noise
+        left = _LEAST_YAW_NOISE_SHARE * noise
         return math.hypot(left, self._sensors.angular_rate_bias_std)
 
     def _yaw_rate(self, window: InertialWindow, change: float) -> float:
@@ -171,8 +165,8 @@ class Turning(Component[TurningState]):
         What may be noise of the gyro is smoothed, what is more is followed: the smoothing makes
         the yaw rate late only by what the wheels do not tell of its change.
         """
-        tuning, expected = self._tuning, self.state.yaw_rate + change
+        expected = self.state.yaw_rate + change
         now = window.yaw_rate / window.rates
-        noise = max(self._noise(window) / math.sqrt(window.rates), tuning.least_noise)
-        gain = clipped(tuning.least_gain * abs(now - expected) / noise, tuning.least_gain, 1.0)
+        noise = max(self._noise(window) / math.sqrt(window.rates), _LEAST_NOISE)
+        gain = clipped(_LEAST_GAIN * abs(now - expected) / noise, _LEAST_GAIN, 1.0)
         return expected + gain * (now - expected)

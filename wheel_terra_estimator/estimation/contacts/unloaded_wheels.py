@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
@@ -16,17 +15,14 @@ from wheel_terra_estimator.estimation.scalars import NAN, median
 Floats = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class UnloadedTuning:
-    """Tuned on simulated drives with lifted wheels, seeds 1000 to 1019."""
-
-    hold: float = 0.3  # [s] before a wheel is called unloaded, or loaded again
-    free_share: float = 0.2  # of the typical torque: a wheel with less carries nothing
-    loaded_share: float = 0.4  # with more it carries its load again
-    least_rim_share: float = 0.95  # of the typical rim speed: a slower one is held
-    telling_torque: float = 5.0
-    """Typical torque over noise and zero of the sensors above which torques can be compared."""
-    most_lateral_motion: float = 0.1  # turns part the torques as well [-]
+# Tuned on simulated drives with lifted wheels, seeds 1000 to 1019.
+_HOLD = 0.3  # [s] before a wheel is called unloaded, or loaded again
+_FREE_SHARE = 0.2  # of the typical torque: a wheel with less carries nothing
+_LOADED_SHARE = 0.4  # with more it carries its load again
+_LEAST_RIM_SHARE = 0.95  # of the typical rim speed: a slower one is held
+_TELLING_TORQUE = 5.0
+"""Typical torque over noise and zero of the sensors above which torques can be compared."""
+_MOST_LATERAL_MOTION = 0.1  # turns part the torques as well [-]
 
 
 class UnloadedState(NamedTuple):
@@ -39,13 +35,10 @@ class UnloadedState(NamedTuple):
 class UnloadedWheels(Component[UnloadedState]):
     """Finds wheels without load."""
 
-    def __init__(
-        self, rover: Rover, sensors: SensorFigures, tuning: UnloadedTuning = UnloadedTuning()
-    ) -> None:
+    def __init__(self, rover: Rover, sensors: SensorFigures) -> None:
         n = rover.wheel_count
         super().__init__(UnloadedState((False,) * n, (NAN,) * n))
         self._noise = sensors.torque_std + sensors.torque_zero_std
-        self._tuning = tuning
 
     def update(
         self,
@@ -68,7 +61,7 @@ class UnloadedWheels(Component[UnloadedState]):
         lateral_motion : float
             Of the outer wheels over the fastest rim speed [-].
         """
-        state, tuning = self.state, self._tuning
+        state = self.state
         if len(rolling) < 2:
             # One wheel cannot be compared with another.
             if not all(isnan(value) for value in torque):
@@ -76,8 +69,8 @@ class UnloadedWheels(Component[UnloadedState]):
             return self.state
         typical = median([torque[i] for i in rolling])
         middle_rim = median([rim_speed[i] for i in rolling])
-        telling = abs(typical) > tuning.telling_torque * self._noise
-        telling = telling and lateral_motion < tuning.most_lateral_motion
+        telling = abs(typical) > _TELLING_TORQUE * self._noise
+        telling = telling and lateral_motion < _MOST_LATERAL_MOTION
         unloaded, since = list(state.unloaded), list(state.since)
         for i in rolling:
             share = torque[i] / typical if telling else 1.0
@@ -87,14 +80,13 @@ class UnloadedWheels(Component[UnloadedState]):
                 since[i] = NAN
             elif isnan(since[i]):
                 since[i] = time
-            elif time - since[i] > tuning.hold:
+            elif time - since[i] > _HOLD:
                 unloaded[i], since[i] = free, NAN
         self.state = UnloadedState(tuple(unloaded), tuple(since))
         return self.state
 
     def _seems_free(self, share: float, pace: float, *, telling: bool, unloaded: bool) -> bool:
         """Say whether a wheel with a share of the typical torque and rim speed carries nothing."""
-        tuning = self._tuning
         if unloaded:
-            return not telling or share < tuning.loaded_share
-        return telling and abs(share) < tuning.free_share and pace > tuning.least_rim_share
+            return not telling or share < _LOADED_SHARE
+        return telling and abs(share) < _FREE_SHARE and pace > _LEAST_RIM_SHARE

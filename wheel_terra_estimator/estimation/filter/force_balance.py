@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,15 +23,12 @@ from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 Floats = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class BalanceTuning:
-    """Tuned on simulated drives, seeds 1000 to 1019."""
-
-    weight_std: float = 0.005  # of the weight: what curvature, ruts and mass leave open
-    side_share: float = 0.5
-    """Of the load: the side force that a steered wheel may give, which acts along the body by the
-    sine of its angle (friction angle of sand)."""
-    model_share: float = 0.1  # of the load: pull that a doubt of a shear model leaves open
+# Tuned on simulated drives, seeds 1000 to 1019.
+_WEIGHT_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
+_SIDE_SHARE = 0.5
+"""Of the load: the side force that a steered wheel may give, which acts along the body by the
+sine of its angle (friction angle of sand)."""
+_MODEL_SHARE = 0.1  # of the load: pull that a doubt of a shear model leaves open
 
 
 class SumOfPulls(NamedTuple):
@@ -52,10 +48,9 @@ class ForceBalance(ForceRows):
         rover: Rover,
         sensors: SensorFigures,
         layout: StateLayout,
-        tuning: BalanceTuning = BalanceTuning(),
     ) -> None:
         super().__init__(configuration)
-        self._rover, self._sensors, self._layout, self._tuning = rover, sensors, layout, tuning
+        self._rover, self._sensors, self._layout = rover, sensors, layout
 
     def sum_of_pulls(self, window: InertialWindow, loads: Floats, curvature: float) -> SumOfPulls:
         """Return what the mean specific force of a window says of the pulls.
@@ -71,7 +66,7 @@ class ForceBalance(ForceRows):
         if window.duration > 0.0:
             noise = max(noise, window.noise_density / window.duration)
         noise += sensors.specific_force_bias_std**2
-        variance = rover.mass**2 * noise + (self._tuning.weight_std * weight) ** 2
+        variance = rover.mass**2 * noise + (_WEIGHT_STD * weight) ** 2
         return SumOfPulls(rover.mass * force[0] + uphill, weight, variance)
 
     def update(
@@ -113,11 +108,11 @@ class ForceBalance(ForceRows):
             jacobian = forces.pull_rows.sum(axis=0)
         pull_sum = open_variance = 0.0
         for i, (load, standing) in enumerate(zip(loads, stationary, strict=True)):
-            along, side = headings.along[i], headings.across[i] * self._tuning.side_share * load
+            along, side = headings.along[i], headings.across[i] * _SIDE_SHARE * load
             open_variance += side * side
             if standing is None:
                 pull_sum += along * float(forces.pull[i])
-                open_variance += model_variance[i] * (self._tuning.model_share * load) ** 2
+                open_variance += model_variance[i] * (_MODEL_SHARE * load) ** 2
                 open_variance += float(forces.pull_noise[i]) ** 2
             else:
                 pull_sum += along * standing.expected

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -26,35 +25,32 @@ _RISE = 1.76
 it by chance, from 5 to 0.05 % [-]."""
 
 
-@dataclass(frozen=True)
-class ReferenceTuning:
-    """Tuned on simulated drives, seeds 1000 to 1019, and the nine snow immobilisations."""
-
-    known_time: float = 5.0
-    """Age [s] up to which a reference tells slip and soil apart; after that the soil is held."""
-    fresh_time: float = 10.0
-    """Age [s] up to which the speed rests on more than a guess, for the stuck warning."""
-    longest_gap: float = 10.0  # between references that is remembered [s]
-    gap_gain: float = 0.3  # smoothing of it, per reference
-    moving_std: float = 3.0  # deviations from 0 of a reference that moves
-    moving_rest: float = 2.0  # times ``rest_speed``
-    slide_gaps: float = 2.0  # gaps for which a slide on standing wheels is believed
-    shortest_slide: float = 1.0  # [s]
-    mean_count: float = 6.0
-    """References over which their innovations' mean is taken."""
-    lasting_count: float = 30.0
-    """The same of a common-mode bias that lasts: smaller, and over longer."""
-    most_deviations: float = 3.0  # deviations that one reference counts for in it
-    most_variance_factor: float = 100.0
-    run_excess: float = 4.0
-    """Square of that mean over its variance above which the references run to one side."""
-    beyond_rim: float = 1.5  # times the fastest rim speed: no rover drives faster than its wheels
-    beyond_std: float = 5.0
-    same_std: float = 4.0  # deviations within which two references disagree by the same amount
-    count_beyond: int = 4  # references beyond the rim speed that must agree to be believed
-    count: int = 2  # references that must agree to be believed
-    gate: float = 4.0  # to which an outlier is weakened (squared deviations)
-    gate_beyond: float = 0.01
+# Tuned on simulated drives, seeds 1000 to 1019, and the nine snow immobilisations.
+_KNOWN_TIME = 5.0
+"""Age [s] up to which a reference tells slip and soil apart; after that the soil is held."""
+_FRESH_TIME = 10.0
+"""Age [s] up to which the speed rests on more than a guess, for the stuck warning."""
+_LONGEST_GAP = 10.0  # between references that is remembered [s]
+_GAP_GAIN = 0.3  # smoothing of it, per reference
+_MOVING_STD = 3.0  # deviations from 0 of a reference that moves
+_MOVING_REST = 2.0  # times ``rest_speed``
+_SLIDE_GAPS = 2.0  # gaps for which a slide on standing wheels is believed
+_SHORTEST_SLIDE = 1.0  # [s]
+_MEAN_COUNT = 6.0
+"""References over which their innovations' mean is taken."""
+_LASTING_COUNT = 30.0
+"""The same of a common-mode bias that lasts: smaller, and over longer."""
+_MOST_DEVIATIONS = 3.0  # deviations that one reference counts for in it
+_MOST_VARIANCE_FACTOR = 100.0
+_RUN_EXCESS = 4.0
+"""Square of that mean over its variance above which the references run to one side."""
+_BEYOND_RIM = 1.5  # times the fastest rim speed: no rover drives faster than its wheels
+_BEYOND_STD = 5.0
+_SAME_STD = 4.0  # deviations within which two references disagree by the same amount
+_COUNT_BEYOND = 4  # references beyond the rim speed that must agree to be believed
+_COUNT = 2  # references that must agree to be believed
+_GATE = 4.0  # to which an outlier is weakened (squared deviations)
+_GATE_BEYOND = 0.01
 
 
 class ReferenceState(NamedTuple):
@@ -81,14 +77,13 @@ class ReferenceUpdate(Component[ReferenceState]):
         rover: Rover,
         sensors: SensorFigures,
         layout: StateLayout,
-        tuning: ReferenceTuning = ReferenceTuning(),
     ) -> None:
         super().__init__(ReferenceState())
         self._error = layout.reference_error
         self._reading = np.zeros(layout.size)  # of speed and of the error that lasts
         self._reading[SPEED if self._error is None else [SPEED, self._error]] = 1.0
         self._gate = float(configuration.filter.gate)
-        self._rover, self._sensors, self._tuning = rover, sensors, tuning
+        self._rover, self._sensors = rover, sensors
 
     def predict(self, prediction: Prediction, dt: float) -> None:
         """Add the error that lasts to a prediction over `dt` [s], if there is one."""
@@ -112,11 +107,11 @@ class ReferenceUpdate(Component[ReferenceState]):
 
     def known(self, time: float) -> bool:
         """Say whether a reference is young enough to tell slip and soil apart."""
-        return time - self.state.time < self._tuning.known_time
+        return time - self.state.time < _KNOWN_TIME
 
     def fresh(self, time: float) -> bool:
         """Say whether the present speed rests on a reference."""
-        return time - self.state.time < self._tuning.fresh_time
+        return time - self.state.time < _FRESH_TIME
 
     def keep_count(self, rejected: int) -> None:
         """Go on with the count of rejected references of an old run."""
@@ -130,12 +125,12 @@ class ReferenceUpdate(Component[ReferenceState]):
         references, the models hold the speed against them; a gate on single ones cannot see it.
         The running mean of white innovations has variance 1 / (2 n - 1) over n.
         """
-        tuning, state = self._tuning, self.state
+        state = self.state
         excess = max(
-            self._excess(state.mean_innovation, tuning.mean_count),
-            self._excess(state.lasting_innovation, tuning.lasting_count),
+            self._excess(state.mean_innovation, _MEAN_COUNT),
+            self._excess(state.lasting_innovation, _LASTING_COUNT),
         )
-        return clipped(excess**2, 1.0, tuning.most_variance_factor)
+        return clipped(excess**2, 1.0, _MOST_VARIANCE_FACTOR)
 
     def _excess(self, mean: float, count: float) -> float:
         """Return the square of a mean of `count` innovations over the variance of white ones [-].
@@ -144,13 +139,12 @@ class ReferenceUpdate(Component[ReferenceState]):
         limit of a run as seldom a second as slow ones do.
         """
         gap = clipped(self.state.gap, _LEAST_GAP, 1.0)
-        limit = self._tuning.run_excess
+        limit = _RUN_EXCESS
         return mean * mean * (2.0 * count - 1.0) * limit / (limit - _RISE * math.log(gap))
 
     def believes(self, agreeing: int, *, beyond: bool) -> bool:
         """Say whether so many references in a row that disagree by the same amount are right."""
-        tuning = self._tuning
-        return agreeing >= (tuning.count_beyond if beyond else tuning.count)
+        return agreeing >= (_COUNT_BEYOND if beyond else _COUNT)
 
     def update(
         self,
@@ -179,36 +173,35 @@ class ReferenceUpdate(Component[ReferenceState]):
         variance : float
             Of the reading as stated, or more where more is seen [(m/s)^2].
         """
-        tuning = self._tuning
         self._note_time(time)
         if still:
             self._note_slide(ekf, time, reference.forward, variance)
         residual, prior = self.innovation(ekf, reference)
         total = prior + variance
         nis = residual * residual / total
-        most = tuning.most_deviations
+        most = _MOST_DEVIATIONS
         score = clipped(residual / math.sqrt(total), -most, most)
         state = self.state
         state = state._replace(nis=smoothed_nis(state.nis, nis))
         if nis <= self._gate or state.rejected_in_a_row:  # a single wild one is no bias
             mean, lasting = state.mean_innovation, state.lasting_innovation
             state = state._replace(
-                mean_innovation=mean + (score - mean) / tuning.mean_count,
-                lasting_innovation=lasting + (score - lasting) / tuning.lasting_count,
+                mean_innovation=mean + (score - mean) / _MEAN_COUNT,
+                lasting_innovation=lasting + (score - lasting) / _LASTING_COUNT,
             )
         opened = False
         if nis > self._gate:
             beyond = abs(reference.forward) > (
-                tuning.beyond_rim * fastest_rim + tuning.beyond_std * math.sqrt(total)
+                _BEYOND_RIM * fastest_rim + _BEYOND_STD * math.sqrt(total)
             )
             apart = abs(residual - state.last_rejected)
-            same = apart < tuning.same_std * math.sqrt(2.0 * variance + total)
+            same = apart < _SAME_STD * math.sqrt(2.0 * variance + total)
             agreeing = state.rejected_in_a_row + 1
             opened = same and self.believes(agreeing, beyond=beyond)
             if opened:
                 ekf.inflate(SPEED, residual * residual)
             else:
-                gate = tuning.gate_beyond if beyond else tuning.gate
+                gate = _GATE_BEYOND if beyond else _GATE
                 variance += chi_square_gate(residual, total, gate)
             state = state._replace(
                 rejected=state.rejected + 1,
@@ -229,10 +222,10 @@ class ReferenceUpdate(Component[ReferenceState]):
         return max(variance, sensors.reference_std_floor**2)
 
     def _note_time(self, time: float) -> None:
-        state, tuning = self.state, self._tuning
+        state = self.state
         gap = state.gap
         if state.time > -math.inf:
-            gap += tuning.gap_gain * (min(time - state.time, tuning.longest_gap) - gap)
+            gap += _GAP_GAIN * (min(time - state.time, _LONGEST_GAP) - gap)
         self.state = state._replace(time=time, gap=gap)
 
     def _note_slide(self, ekf: GatedFilter, time: float, forward: float, variance: float) -> None:
@@ -240,11 +233,10 @@ class ReferenceUpdate(Component[ReferenceState]):
 
         A single one that moves may be wild: the slide is believed from the second in a row.
         """
-        tuning = self._tuning
-        noise = tuning.moving_std * math.sqrt(variance)
+        noise = _MOVING_STD * math.sqrt(variance)
         until = time
-        moves = abs(forward) > max(noise, tuning.moving_rest * self._rover.rest_speed)
+        moves = abs(forward) > max(noise, _MOVING_REST * self._rover.rest_speed)
         if moves and (self.state.rejected_in_a_row or time < self.state.sliding_until):
-            until += max(tuning.slide_gaps * self.state.gap, tuning.shortest_slide)
+            until += max(_SLIDE_GAPS * self.state.gap, _SHORTEST_SLIDE)
             ekf.inflate(SPEED, forward**2)
         self.state = self.state._replace(sliding_until=until)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,18 +16,14 @@ from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
 
-
-@dataclass(frozen=True)
-class SinkageUpdateTuning:
-    """Tuned on simulated drives, seeds 1000 to 1019."""
-
-    believed_after: int = 8
-    """Rejected readings in a row after which they are no spikes: the wheel is somewhere else."""
-    first_believed_after: int = 2
-    """The same at the start, where the configured soil or the first reading may be far off; later
-    those that are rejected have to outnumber those that were used."""
-    age: float = 2.0  # up to which a reading counts as known [s]
-    floor_variance: float = 1e-10  # of a reading [m^2]
+# Tuned on simulated drives, seeds 1000 to 1019.
+_BELIEVED_AFTER = 8
+"""Rejected readings in a row after which they are no spikes: the wheel is somewhere else."""
+_FIRST_BELIEVED_AFTER = 2
+"""The same at the start, where the configured soil or the first reading may be far off; later
+those that are rejected have to outnumber those that were used."""
+_AGE = 2.0  # up to which a reading counts as known [s]
+FLOOR_VARIANCE = 1e-10  # of a reading [m^2]
 
 
 class SinkageUpdateState(NamedTuple):
@@ -44,16 +39,11 @@ class SinkageUpdateState(NamedTuple):
 class SinkageUpdate(Component[SinkageUpdateState]):
     """Turns sinkage readings into rows of the update."""
 
-    def __init__(
-        self,
-        configuration: Configuration,
-        layout: StateLayout,
-        tuning: SinkageUpdateTuning = SinkageUpdateTuning(),
-    ) -> None:
+    def __init__(self, configuration: Configuration, layout: StateLayout) -> None:
         n = layout.wheel_count
         super().__init__(SinkageUpdateState((-math.inf,) * n, (0,) * n, (0,) * n))
         self._gate = float(configuration.filter.gate)
-        self._layout, self._tuning = layout, tuning
+        self._layout = layout
 
     def keep_count(self, rejected: int) -> None:
         """Go on with the count of rejected readings of an old run."""
@@ -61,7 +51,7 @@ class SinkageUpdate(Component[SinkageUpdateState]):
 
     def unread(self, time: float) -> list[int]:
         """Return the wheels whose sinkage was not read of late."""
-        return [i for i, when in enumerate(self.state.time) if time - when >= self._tuning.age]
+        return [i for i, when in enumerate(self.state.time) if time - when >= _AGE]
 
     def update(
         self, ekf: GatedFilter, time: float, sums: SinkageSums, reading_variance: float
@@ -72,7 +62,6 @@ class SinkageUpdate(Component[SinkageUpdateState]):
         """
         if not any(sums.readings):
             return []
-        tuning = self._tuning
         when, in_a_row = list(self.state.time), list(self.state.rejected_in_a_row)
         used, rejected, mean_nis = list(self.state.used), self.state.rejected, self.state.nis
         rows = []
@@ -80,18 +69,18 @@ class SinkageUpdate(Component[SinkageUpdateState]):
             if not count:
                 continue
             index = self._layout.sinkage.start + i
-            variance = reading_variance / count + tuning.floor_variance
+            variance = reading_variance / count + FLOOR_VARIANCE
             residual = total / count - float(ekf.mean[index])
             nis = residual * residual / (float(ekf.covariance[index, index]) + variance)
             if nis > self._gate:
                 rejected += 1
                 in_a_row[i] += 1
-                needed = max(used[i] + 1, tuning.first_believed_after)
-                if in_a_row[i] < min(needed, tuning.believed_after):
+                needed = max(used[i] + 1, _FIRST_BELIEVED_AFTER)
+                if in_a_row[i] < min(needed, _BELIEVED_AFTER):
                     continue
                 ekf.inflate(index, residual * residual)
             in_a_row[i] = 0
-            used[i] = min(used[i] + 1, tuning.believed_after)
+            used[i] = min(used[i] + 1, _BELIEVED_AFTER)
             mean_nis = smoothed_nis(mean_nis, min(nis, self._gate))
             when[i] = time
             jacobian = np.zeros(self._layout.size)

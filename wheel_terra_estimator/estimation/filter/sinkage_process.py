@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -30,33 +29,30 @@ from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 Floats = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class SinkageTuning:
-    """Tuned on simulated drives, seeds 1000 to 1019, where no other source is given."""
-
-    resting_walk: float = 1e-10  # of a wheel that does not turn [m^2/s]
-    lifted_walk: float = 1e-4  # of a wheel in the air [m^2/s]
-    walk: float = 1e-9  # [m^2/s]
-    least_load: float = 1e-3  # [N]: less is in the air
-    spin_travel: float = 0.1  # of the slip velocity that counts as travel over new soil
-    spin_relaxation: float = 0.3  # of it that counts for the relaxation
-    least_contact: float = 0.02  # length of a contact [m]
-    least_contact_sinkage: float = 1e-3  # [m]
-    least_sinkage: float = 5e-4  # [m], for the step on log sinkage
-    ratio_step: float = 0.02  # of v / rim speed, for the derivative of the bearing law
-    pressure_power: float = 0.5
-    """Load goes with z^(N + 1/2): pressure with z^N, length of the contact with its root."""
-    longest_step: float = 0.7  # ln of the sinkage in one cycle
-    relaxation_slope: float = 0.9  # of the relaxation that acts on the covariance
-    least_memory: float = 0.05  # of the sinkage in the covariance
-    law_share: float = 0.5
-    """Of the slip that the bearing law would see in the sinkage, without reference: its errors (n0,
-    n1, the zero of the sensor) stay the same all the way, readings do not average them out."""
-    law_error: float = 0.05  # of the sinkage per contact length
-    digging: float = 0.05  # of the slip velocity times slip
-    slope_keep: float = 0.9  # smoothing of the derivatives over about a second of cycles
-    rate_time: float = 0.5  # time constant of the published rate [s]
-    first_rate_std: float = 1.0  # [m/s], before anything is known
+# Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
+_RESTING_WALK = 1e-10  # of a wheel that does not turn [m^2/s]
+_LIFTED_WALK = 1e-4  # of a wheel in the air [m^2/s]
+_WALK = 1e-9  # [m^2/s]
+_LEAST_LOAD = 1e-3  # [N]: less is in the air
+_SPIN_TRAVEL = 0.1  # of the slip velocity that counts as travel over new soil
+_SPIN_RELAXATION = 0.3  # of it that counts for the relaxation
+_LEAST_CONTACT = 0.02  # length of a contact [m]
+_LEAST_CONTACT_SINKAGE = 1e-3  # [m]
+_LEAST_SINKAGE = 5e-4  # [m], for the step on log sinkage
+_RATIO_STEP = 0.02  # of v / rim speed, for the derivative of the bearing law
+_PRESSURE_POWER = 0.5
+"""Load goes with z^(N + 1/2): pressure with z^N, length of the contact with its root."""
+_LONGEST_STEP = 0.7  # ln of the sinkage in one cycle
+_RELAXATION_SLOPE = 0.9  # of the relaxation that acts on the covariance
+_LEAST_MEMORY = 0.05  # of the sinkage in the covariance
+_LAW_SHARE = 0.5
+"""Of the slip that the bearing law would see in the sinkage, without reference: its errors (n0,
+n1, the zero of the sensor) stay the same all the way, readings do not average them out."""
+_LAW_ERROR = 0.05  # of the sinkage per contact length
+_DIGGING = 0.05  # of the slip velocity times slip
+_SLOPE_KEEP = 0.9  # smoothing of the derivatives over about a second of cycles
+_RATE_TIME = 0.5  # time constant of the published rate [s]
+_FIRST_RATE_STD = 1.0  # [m/s], before anything is known
 
 
 class SinkageState(NamedTuple):
@@ -90,17 +86,12 @@ class SinkageProcess(Component[SinkageState]):
     """
 
     def __init__(
-        self,
-        rover: Rover,
-        layout: StateLayout,
-        models: WheelModels,
-        leaving_angle_std: float,
-        tuning: SinkageTuning = SinkageTuning(),
+        self, rover: Rover, layout: StateLayout, models: WheelModels, leaving_angle_std: float
     ) -> None:
         n = rover.wheel_count
         none = np.full((2, n), np.nan)
-        super().__init__(SinkageState(none, (0.0,) * n, (tuning.first_rate_std,) * n))
-        self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
+        super().__init__(SinkageState(none, (0.0,) * n, (_FIRST_RATE_STD,) * n))
+        self._rover, self._layout, self._models = rover, layout, models
         self._leaving_angle_std = leaving_angle_std
 
     def forget_slopes(self) -> None:
@@ -139,33 +130,31 @@ class SinkageProcess(Component[SinkageState]):
         reference_known : bool
             Whether a reference velocity tells the slip.
         """
-        tuning, layout = self._tuning, self._layout
+        layout = self._layout
         entries = range(layout.size)[layout.sinkage]
         turning = np.array([abs(rim) >= self._rover.rest_speed for rim in rims])  # known ones
-        loaded = np.array(loads) > tuning.least_load
-        prediction.Q[entries, entries] = (
-            np.where(turning, tuning.lifted_walk, tuning.resting_walk) * dt
-        )
+        loaded = np.array(loads) > _LEAST_LOAD
+        prediction.Q[entries, entries] = np.where(turning, _LIFTED_WALK, _RESTING_WALK) * dt
         if not turning.any():
             return 0.0
         rim = np.where(turning, rims, 1.0)
         direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
         speed = direction * headings.speeds(float(x[SPEED]), yaw_rate)
-        travel = np.abs(speed) + tuning.spin_travel * np.abs(rim - speed)
+        travel = np.abs(speed) + _SPIN_TRAVEL * np.abs(rim - speed)
         relaxes = turning & loaded
         if relaxes.any():
             measured = np.array(leaving_angles)
             states = WheelStates(
                 speed / rim,
                 x[layout.sinkage],
-                np.maximum(loads, tuning.least_load),
+                np.maximum(loads, _LEAST_LOAD),
                 float(x[SHEAR_STRENGTH]),
                 float(x[SHEAR_MODULUS]),
                 leaving_angle=None if np.isnan(measured).all() else measured,
                 stiffness=x[layout.stiffness],
                 slip_sinkage=float(x[SLIP_SINKAGE]),
             )
-            share = 1.0 if reference_known else tuning.law_share
+            share = 1.0 if reference_known else _LAW_SHARE
             by_speed = share * direction * np.array(headings.by_speed)
             self._relax(prediction, states, _Motion(speed, rim, by_speed, dt), relaxes)
         return dt * float(travel[turning].sum()) / len(rims)
@@ -178,36 +167,36 @@ class SinkageProcess(Component[SinkageState]):
         relaxes: BoolArray,
     ) -> None:
         """Relax the sinkages of turning wheels under a load."""
-        tuning, layout, z = self._tuning, self._layout, np.asarray(states.sinkage)
+        layout, z = self._layout, np.asarray(states.sinkage)
         speed, rim, by_speed, dt = motion
         slip = slip_of_speed_ratio(states.speed_ratio)
         radius = np.array(self._rover.rim_radius)
-        shortest = tuning.least_contact_sinkage
-        length = np.maximum(np.sqrt(2.0 * radius * np.maximum(z, shortest)), tuning.least_contact)
-        travel = (np.abs(speed) + tuning.spin_relaxation * np.abs(rim - speed)) * dt
+        shortest = _LEAST_CONTACT_SINKAGE
+        length = np.maximum(np.sqrt(2.0 * radius * np.maximum(z, shortest)), _LEAST_CONTACT)
+        travel = (np.abs(speed) + _SPIN_RELAXATION * np.abs(rim - speed)) * dt
         alpha = -np.expm1(-travel / length)
-        slower = np.array([0.0, tuning.ratio_step])[:, None]
+        slower = np.array([0.0, _RATIO_STEP])[:, None]
         carried, exponents, log_depths = self._models.bearing(
             states._replace(speed_ratio=states.speed_ratio - slower)
         )
         # One Newton step on log load over log sinkage, bounded: relaxation does the rest.
-        power = exponents[0] + tuning.pressure_power
-        most = tuning.longest_step
+        power = exponents[0] + _PRESSURE_POWER
+        most = _LONGEST_STEP
         growth = np.clip(np.log(states.load / carried[0]) / power, -most, most)
-        floored = np.maximum(z, tuning.least_sinkage)
+        floored = np.maximum(z, _LEAST_SINKAGE)
         target = floored * np.exp(growth)
         sensitivity = alpha * target / power
         raw = np.stack(
             [
-                np.log(carried[0] / carried[1]) / tuning.ratio_step,
+                np.log(carried[0] / carried[1]) / _RATIO_STEP,
                 np.abs(slip) * log_depths[0],
             ]
         )
-        slopes = smoothed_slopes(self.state.slopes, raw, tuning.slope_keep)
+        slopes = smoothed_slopes(self.state.slopes, raw, _SLOPE_KEEP)
         self.state = self.state._replace(slopes=np.where(relaxes, slopes, self.state.slopes))
         # What the law does not know: a share of the sinkage per contact length, and digging.
-        digging = tuning.digging * np.maximum(slip, 0.0) ** 2 * rim * dt
-        noise = (tuning.law_error * floored) ** 2 * 2.0 * alpha + digging**2 + tuning.walk * dt
+        digging = _DIGGING * np.maximum(slip, 0.0) ** 2 * rim * dt
+        noise = (_LAW_ERROR * floored) ** 2 * 2.0 * alpha + digging**2 + _WALK * dt
         if states.leaving_angle is not None:
             angle = states.leaving_angle - self._leaving_angle_std
             there = self._models.bearing(states._replace(leaving_angle=angle)).load
@@ -215,7 +204,7 @@ class SinkageProcess(Component[SinkageState]):
             noise += np.where(np.isnan(angle), 0.0, error)
         wheels = np.flatnonzero(relaxes)
         zi = layout.sinkage.start + wheels
-        memory = np.maximum(1.0 - alpha * tuning.relaxation_slope, tuning.least_memory)
+        memory = np.maximum(1.0 - alpha * _RELAXATION_SLOPE, _LEAST_MEMORY)
         prediction.mean[zi] = (z + alpha * (target - z))[wheels]
         prediction.F[zi, zi] = memory[wheels]
         prediction.F[zi, layout.stiffness.start + wheels] = -sensitivity[wheels]
@@ -228,7 +217,7 @@ class SinkageProcess(Component[SinkageState]):
         if dt <= 0.0:
             return
         part = self._layout.sinkage
-        gain = 1.0 - math.exp(-dt / self._tuning.rate_time)
+        gain = 1.0 - math.exp(-dt / _RATE_TIME)
         change = ((ekf.mean[part] - before) / dt).tolist()
         variance = np.diagonal(ekf.covariance)[part].tolist()
         self.state = self.state._replace(

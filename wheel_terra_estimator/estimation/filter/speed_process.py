@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
@@ -41,66 +40,63 @@ _LEAST_WHEELS = 3
 """Wheels that can disagree."""
 
 
-@dataclass(frozen=True)
-class SpeedTuning:
-    """Tuned on simulated drives, seeds 1000 to 1019, where no other source is given."""
-
-    first_ratio: float = 0.95  # v / rim speed before anything is known: level, loose soil
-    first_ratio_std: float = 0.3
-    least_reversed_ratio: float = 0.2
-    most_reversed_ratio: float = 1.1
-    reversed_slip_share: float = 0.5
-    """Of the slip to be expected with the new direction: behind a reversal ruts and shear form
-    anew, and the slip grows with them. Tuned on stops and reversals of both worlds, seeds 1000 to
-    1005."""
-    first_sight_share: float = 0.3
-    """Deviation of the speed over the rim speed when the wheels are first heard."""
-    least_ratio: float = -0.5  # remembered v / rim speed
-    most_ratio: float = 2.0
-    least_ratio_std: float = 0.1
-    most_ratio_std: float = 0.5
-    ratio_rim: float = 2.0  # over the low rim speed: v / rim speed is remembered above it
-    coast_drift: float = 0.05  # [m/s^2] of a rover whose wheels are not heard
-    coast_walk: float = 0.02  # [m/s/sqrt(s)]
-    rim_change: float = 0.2
-    """Error of a change of rim speed as a change of speed, over that change [-]."""
-    floor_walk: float = 1e-8  # [(m/s)^2/s]
-    start_walk: float = 0.4
-    """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
-    start_walk_travel: float = 0.2  # [m] with which it decays
-    digging_walk: float = 12.0
-    """The same over the sinkage that most wheels gain per rim travel [1/sqrt(m)]: where contacts
-    change, the slip does."""
-    most_walk: float = 0.6  # of it where contacts change [1/sqrt(m)]
-    watched_share: float = 0.5
-    """Of ``filter.ratio_walk`` where sinkages would show such a change."""
-    demand_error: float = 0.3  # of what the demand changes, over that change [-]
-    slip_per_demand_walk: float = 0.2  # [1/sqrt(m)]
-    inflation_rate: float = 2.0
-    """Process noise of a change of speed, over its square, per second [1/s]: it may come within
-    half a second."""
-    inflation_time: float = 0.3  # with which the inflation decays [s]
-    rate_noise: float = 3.0
-    """Deviations of the wheel rates within which the wheels do not disagree [-]."""
-    side_time: float = 1.0  # over which a change of one side against the other is seen [s]
-    side_change: float = 1.0  # speed that it may bring, over that change [-]
-    least_covered: float = 0.5  # of a step by the IMU, to use it
-    attitude_time: float = 0.5
-    """Time within which errors of the attitude change over rough ground [s]."""
-    bias_walk: float = 1e-3  # of the accelerometer's bias [m/s^2/sqrt(s)]
-    leaking_share: float = 0.3
-    """Of gravity times the error of the attitude: what of it changes along the way."""
-    leak_rate: float = 0.1  # of that change [1/s]
-    equilibrium_slip_std: float = 0.2  # about that of the configured soil on such a slope
-    usual_length: float = 1.5  # rim travel over which slip returns to it [m]
-    least_equilibrium_slip: float = -0.2
-    most_equilibrium_slip: float = 0.8
-    start_share: float = 0.5
-    """Of the usual speed: what is farther from it at a start without reference is a transient of
-    the accelerometer."""
-    start_noise: float = 3.0
-    """Times the accelerometer's noise over a second: what is more is no transient but a slide."""
-    present: float = 1e-6  # [s]: a cycle no older is the present
+# Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
+_FIRST_RATIO = 0.95  # v / rim speed before anything is known: level, loose soil
+_FIRST_RATIO_STD = 0.3
+_LEAST_REVERSED_RATIO = 0.2
+_MOST_REVERSED_RATIO = 1.1
+_REVERSED_SLIP_SHARE = 0.5
+"""Of the slip to be expected with the new direction: behind a reversal ruts and shear form
+anew, and the slip grows with them. Tuned on stops and reversals of both worlds, seeds 1000 to
+1005."""
+_FIRST_SIGHT_SHARE = 0.3
+"""Deviation of the speed over the rim speed when the wheels are first heard."""
+_LEAST_RATIO = -0.5  # remembered v / rim speed
+_MOST_RATIO = 2.0
+_LEAST_RATIO_STD = 0.1
+_MOST_RATIO_STD = 0.5
+_RATIO_RIM = 2.0  # over the low rim speed: v / rim speed is remembered above it
+_COAST_DRIFT = 0.05  # [m/s^2] of a rover whose wheels are not heard
+_COAST_WALK = 0.02  # [m/s/sqrt(s)]
+_RIM_CHANGE = 0.2
+"""Error of a change of rim speed as a change of speed, over that change [-]."""
+_FLOOR_WALK = 1e-8  # [(m/s)^2/s]
+_START_WALK = 0.4
+"""Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
+_START_WALK_TRAVEL = 0.2  # [m] with which it decays
+_DIGGING_WALK = 12.0
+"""The same over the sinkage that most wheels gain per rim travel [1/sqrt(m)]: where contacts
+change, the slip does."""
+_MOST_WALK = 0.6  # of it where contacts change [1/sqrt(m)]
+_WATCHED_SHARE = 0.5
+"""Of ``filter.ratio_walk`` where sinkages would show such a change."""
+_DEMAND_ERROR = 0.3  # of what the demand changes, over that change [-]
+_SLIP_PER_DEMAND_WALK = 0.2  # [1/sqrt(m)]
+_INFLATION_RATE = 2.0
+"""Process noise of a change of speed, over its square, per second [1/s]: it may come within
+half a second."""
+_INFLATION_TIME = 0.3  # with which the inflation decays [s]
+_RATE_NOISE = 3.0
+"""Deviations of the wheel rates within which the wheels do not disagree [-]."""
+_SIDE_TIME = 1.0  # over which a change of one side against the other is seen [s]
+_SIDE_CHANGE = 1.0  # speed that it may bring, over that change [-]
+_LEAST_COVERED = 0.5  # of a step by the IMU, to use it
+_ATTITUDE_TIME = 0.5
+"""Time within which errors of the attitude change over rough ground [s]."""
+_BIAS_WALK = 1e-3  # of the accelerometer's bias [m/s^2/sqrt(s)]
+_LEAKING_SHARE = 0.3
+"""Of gravity times the error of the attitude: what of it changes along the way."""
+_LEAK_RATE = 0.1  # of that change [1/s]
+_EQUILIBRIUM_SLIP_STD = 0.2  # about that of the configured soil on such a slope
+USUAL_LENGTH = 1.5  # rim travel over which slip returns to it [m]
+_LEAST_EQUILIBRIUM_SLIP = -0.2
+_MOST_EQUILIBRIUM_SLIP = 0.8
+_START_SHARE = 0.5
+"""Of the usual speed: what is farther from it at a start without reference is a transient of
+the accelerometer."""
+_START_NOISE = 3.0
+"""Times the accelerometer's noise over a second: what is more is no transient but a slide."""
+_PRESENT = 1e-6  # [s]: a cycle no older is the present
 
 
 class SpeedStep(NamedTuple):
@@ -181,31 +177,25 @@ class AccelerationNoise(NamedTuple):
 class SpeedProcess(Component[SpeedState]):
     """Predicts the body speed."""
 
-    def __init__(
-        self,
-        configuration: Configuration,
-        rover: Rover,
-        sensors: SensorFigures,
-        tuning: SpeedTuning = SpeedTuning(),
-    ) -> None:
+    def __init__(self, configuration: Configuration, rover: Rover, sensors: SensorFigures) -> None:
         self._walk = float(configuration.filter.ratio_walk)
         unknown = RimSpeeds((NAN,) * rover.wheel_count, NAN)
         super().__init__(
             SpeedState(
                 NAN,
                 unknown,
-                tuning.first_ratio,
-                tuning.first_ratio_std,
+                _FIRST_RATIO,
+                _FIRST_RATIO_STD,
                 self._walk,
                 slow_rims=unknown.each,
             )
         )
-        self._rover, self._sensors, self._tuning = rover, sensors, tuning
+        self._rover, self._sensors = rover, sensors
         self._equilibrium_slip = UsualSlip(configuration, rover)
         self._noise = self._acceleration_noise(
             StatedNoise(sensors.specific_force_std, 0.0, sensors.orientation_std)
         )
-        self._rim_noise = tuning.rate_noise * sensors.wheel_rate_std * max(rover.slip_radius)
+        self._rim_noise = _RATE_NOISE * sensors.wheel_rate_std * max(rover.slip_radius)
 
     def acceleration_noise(self, stated: StatedNoise) -> AccelerationNoise:
         """Return the noise of the specific force less gravity; what is not stated by default."""
@@ -221,14 +211,13 @@ class SpeedProcess(Component[SpeedState]):
         )
 
     def _acceleration_noise(self, stated: StatedNoise) -> AccelerationNoise:
-        tuning = self._tuning
         attitude = self._rover.gravity * stated.orientation_std
         # The residual of gravity changes as the rover drives over rough ground.
-        leak = tuning.leaking_share * attitude
+        leak = _LEAKING_SHARE * attitude
         return AccelerationNoise(
             stated.specific_force_std**2 / max(self._sensors.imu_rate, 1.0),
-            attitude**2 * tuning.attitude_time,
-            tuning.bias_walk**2 + leak**2 * tuning.leak_rate,
+            attitude**2 * _ATTITUDE_TIME,
+            _BIAS_WALK**2 + leak**2 * _LEAK_RATE,
         )
 
     # -- What other parts tell -------------------------------------------------------------------
@@ -244,8 +233,8 @@ class SpeedProcess(Component[SpeedState]):
         A rover that begins or ends a turn moves with the mean of its sides no more: by how much
         one side slips more than the other is not known.
         """
-        tuning, slow = self._tuning, self.state.slow_rims
-        gain = gain_of(dt, tuning.side_time)
+        slow = self.state.slow_rims
+        gain = gain_of(dt, _SIDE_TIME)
         self.state = self.state._replace(
             slow_rims=tuple(
                 [
@@ -255,7 +244,7 @@ class SpeedProcess(Component[SpeedState]):
             )
         )
         apart = spread([now - old for old, now in zip(slow, rims.each, strict=True)])
-        self.inflate(tuning.side_change * max(apart - self._rim_noise, 0.0))
+        self.inflate(_SIDE_CHANGE * max(apart - self._rim_noise, 0.0))
 
     def reverse_direction(self, ekf: GatedFilter, before: float, now: float) -> None:
         """Carry v / rim speed over to the other direction: up becomes down.
@@ -272,21 +261,21 @@ class SpeedProcess(Component[SpeedState]):
             What the ground asked of the drive that ended, and asks of this one, as shares of the
             load [-]; nan = unknown.
         """
-        state, tuning = self.state, self._tuning
+        state = self.state
         ended = PastDrive(state.ratio, state.ratio_std, before)
         known_one = state.other_direction or ended
         change = now - known_one.demand
         if isnan(change):
             change = 0.0
         slip = 1.0 - known_one.ratio + float(ekf.mean[SLIP_PER_DEMAND]) * change
-        ratio = 1.0 - tuning.reversed_slip_share * slip
+        ratio = 1.0 - _REVERSED_SLIP_SHARE * slip
         gain_std = math.sqrt(float(ekf.covariance[SLIP_PER_DEMAND, SLIP_PER_DEMAND]))
         self.state = state._replace(
-            ratio=clipped(ratio, tuning.least_reversed_ratio, tuning.most_reversed_ratio),
+            ratio=clipped(ratio, _LEAST_REVERSED_RATIO, _MOST_REVERSED_RATIO),
             ratio_std=clipped(
                 math.hypot(known_one.ratio_std, gain_std * change),
-                tuning.least_ratio_std,
-                tuning.first_ratio_std,
+                _LEAST_RATIO_STD,
+                _FIRST_RATIO_STD,
             ),
             other_direction=ended,
         )
@@ -303,11 +292,11 @@ class SpeedProcess(Component[SpeedState]):
         reference_known : bool
             Without a reference the walk between changes is not narrowed.
         """
-        tuning, walk = self._tuning, self._walk
-        start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
+        walk = self._walk
+        start = _START_WALK * math.exp(-travel / _START_WALK_TRAVEL)
         if not isnan(digging):
-            steady = walk * (tuning.watched_share if reference_known else 1.0)
-            changing = min(tuning.digging_walk * max(digging, 0.0), tuning.most_walk)
+            steady = walk * (_WATCHED_SHARE if reference_known else 1.0)
+            changing = min(_DIGGING_WALK * max(digging, 0.0), _MOST_WALK)
             walk = math.hypot(steady, changing)
         self.state = self.state._replace(ratio_walk=max(walk, start))
 
@@ -382,24 +371,24 @@ class SpeedProcess(Component[SpeedState]):
             lost = gain * float(mean[SLIP_PER_DEMAND])
             mean[SPEED] += lost
             F[SPEED, SLIP_PER_DEMAND] = gain
-            Q[SPEED, SPEED] += (self._tuning.demand_error * lost) ** 2
-            walk = self._tuning.slip_per_demand_walk**2
+            Q[SPEED, SPEED] += (_DEMAND_ERROR * lost) ** 2
+            walk = _SLIP_PER_DEMAND_WALK**2
             Q[SLIP_PER_DEMAND, SLIP_PER_DEMAND] = walk * abs(rim) * dt
 
     def by_wheels(self, dt: float, rims: RimSpeeds, inflation: float) -> SpeedStep:
         """Return the prediction with the wheels alone over `dt` [s]."""
-        state, tuning = self.state, self._tuning
+        state = self.state
         before, now = state.rims.typical, rims.typical
         if isnan(before) or isnan(now):
             # No wheels: hold the speed, open at the rate at which a rover may brake.
-            variance = (tuning.coast_drift * dt) ** 2 + (tuning.coast_walk**2) * dt
+            variance = (_COAST_DRIFT * dt) ** 2 + (_COAST_WALK**2) * dt
             return SpeedStep(1.0, 0.0, 0.0, variance)
         change = now - before
         mean = 0.5 * (abs(before) + abs(now))
         variance = mean * mean * state.ratio_walk**2 * mean * dt
-        variance += (tuning.rim_change * change) ** 2 + tuning.floor_walk * dt
+        variance += (_RIM_CHANGE * change) ** 2 + _FLOOR_WALK * dt
         apart = self.disagreement(rims)
-        variance += tuning.inflation_rate * inflation * inflation * dt + apart * apart
+        variance += _INFLATION_RATE * inflation * inflation * dt + apart * apart
         if state.settled and abs(before) > self._rover.low_rim:
             return SpeedStep(now / before, 0.0, 0.0, variance)
         # From a start on: a ratio taken from slow wheels would carry their noise up the ramp.
@@ -409,7 +398,7 @@ class SpeedProcess(Component[SpeedState]):
     def combined(self, step: SpeedStep, dt: float, window: InertialWindow) -> SpeedStep:
         """Return the prediction with the wheels combined with the accelerometer's over `dt` [s]."""
         covered = window.duration
-        if covered < self._tuning.least_covered * dt or dt <= 0.0:
+        if covered < _LEAST_COVERED * dt or dt <= 0.0:
             return step
         # A stretch that the IMU left out is filled with its mean.
         accelerated = window.speed_change * dt / covered
@@ -445,17 +434,15 @@ class SpeedProcess(Component[SpeedState]):
         """
         if not abs(rim) >= self._rover.low_rim:
             return step
-        tuning = self._tuning
-        most = tuning.most_equilibrium_slip
+        most = _MOST_EQUILIBRIUM_SLIP
         slip = self._equilibrium_slip.at(direction * slope_share, beyond=most)
-        usual = 1.0 - clipped(slip, tuning.least_equilibrium_slip, most)
-        keep = math.exp(-abs(rim) * dt / tuning.usual_length)
+        usual = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
+        keep = math.exp(-abs(rim) * dt / USUAL_LENGTH)
         return SpeedStep(
             keep * step.speed_gain,
             keep * step.bias_gain,
             keep * step.constant + (1.0 - keep) * usual * rim,
-            keep * keep * step.variance
-            + (1.0 - keep * keep) * (tuning.equilibrium_slip_std * rim) ** 2,
+            keep * keep * step.variance + (1.0 - keep * keep) * (_EQUILIBRIUM_SLIP_STD * rim) ** 2,
         )
 
     def present(
@@ -470,7 +457,7 @@ class SpeedProcess(Component[SpeedState]):
         """Return speed and variance at a time [s], carried on from the last cycle."""
         x, P = ekf.mean, ekf.covariance
         speed, variance = float(x[SPEED]), float(P[SPEED, SPEED])
-        if self.since_cycle(time) < self._tuning.present:
+        if self.since_cycle(time) < _PRESENT:
             return speed, variance
         a, b, constant, noise, _ = self.step(time, rims, window, inflated=inflated)
         carried = a * speed + b * float(x[GRAVITY_BIAS]) + constant
@@ -486,7 +473,7 @@ class SpeedProcess(Component[SpeedState]):
     def begin(self, ekf: GatedFilter, rims: RimSpeeds) -> None:
         """At the first sight of the wheels they may roll or spin, or be at rest."""
         if isnan(self.state.rims.typical) and not isnan(rims.typical):
-            spread = max(self._tuning.first_sight_share * abs(rims.typical), self._rover.rest_speed)
+            spread = max(_FIRST_SIGHT_SHARE * abs(rims.typical), self._rover.rest_speed)
             ekf.set(SPEED, self.state.ratio * rims.typical, spread * spread)
 
     def remove_start_transient(
@@ -498,11 +485,11 @@ class SpeedProcess(Component[SpeedState]):
         a speed of zero the wheels' prediction, v' = v rim'/rim, stays zero. A rover that slides, or
         wheels that spin up at once, differ by more than the accelerometer's noise.
         """
-        state, tuning = self.state, self._tuning
+        state = self.state
         usual = state.ratio * rim
         off = abs(float(ekf.mean[SPEED]) - usual)
-        noise = tuning.start_noise * self.acceleration_noise(stated).density
-        if abs(rim) > self._rover.low_rim and tuning.start_share * abs(usual) < off < noise:
+        noise = _START_NOISE * self.acceleration_noise(stated).density
+        if abs(rim) > self._rover.low_rim and _START_SHARE * abs(usual) < off < noise:
             ekf.set(SPEED, usual, (state.ratio_std * rim) ** 2)
 
     def keep_with_rims(self, ekf: GatedFilter, rims: RimSpeeds) -> None:
@@ -511,7 +498,7 @@ class SpeedProcess(Component[SpeedState]):
         Only a slide does that, and no force of its wheels would ever end it.
         """
         if abs(rims.typical) > self._rover.low_rim and rims.oppose(float(ekf.mean[SPEED])):
-            least = (self._tuning.first_ratio_std * rims.typical) ** 2
+            least = (_FIRST_RATIO_STD * rims.typical) ** 2
             ekf.set(SPEED, 0.0, max(float(ekf.covariance[SPEED, SPEED]), least))
 
     def keep_least_variance(self, ekf: GatedFilter, rims: Floats) -> None:
@@ -523,14 +510,14 @@ class SpeedProcess(Component[SpeedState]):
 
     def end_cycle(self, time: float, ekf: GatedFilter, rims: RimSpeeds, *, settled: bool) -> None:
         """Remember what the next cycle needs."""
-        state, tuning, rim = self.state, self._tuning, rims.typical
-        inflation = state.inflation * math.exp(-self.since_cycle(time) / tuning.inflation_time)
+        state, rim = self.state, rims.typical
+        inflation = state.inflation * math.exp(-self.since_cycle(time) / _INFLATION_TIME)
         ratio, ratio_std = state.ratio, state.ratio_std
-        if settled and abs(rim) > tuning.ratio_rim * self._rover.low_rim:
+        if settled and abs(rim) > _RATIO_RIM * self._rover.low_rim:
             speed, variance = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
-            ratio = clipped(speed / rim, tuning.least_ratio, tuning.most_ratio)
+            ratio = clipped(speed / rim, _LEAST_RATIO, _MOST_RATIO)
             std = math.sqrt(variance) / abs(rim)
-            ratio_std = clipped(std, tuning.least_ratio_std, tuning.most_ratio_std)
+            ratio_std = clipped(std, _LEAST_RATIO_STD, _MOST_RATIO_STD)
         self.state = state._replace(
             cycle_time=time,
             rims=rims,

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
@@ -14,20 +13,16 @@ from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import GyroZero, InertialWindow
 from wheel_terra_estimator.estimation.scalars import NAN
 
-
-@dataclass(frozen=True)
-class ZeroVelocityTuning:
-    """Tuned on simulated drives, seeds 1000 to 1019."""
-
-    settling_time: float = 0.15  # [s] of standing wheels before the rover counts as standing
-    std: float = 0.0005  # of a rover that stands [m/s]
-    coasting_time: float = 2.0
-    """Time [s] for which a fast rover may slide on: it is not stopped against its accelerometer."""
-    coasting_gate: float = 9.0
-    gyro_settling_time: float = 0.5  # [s]
-    most_yaw_rate: float = 0.05  # [rad/s]: what turns faster does not stand
-    most_cycles: float = 200.0  # over which the zero of the gyro is a mean
-    kept_share: float = 0.5  # of the weight of the zeros, in a run that keeps soil and biases
+# Tuned on simulated drives, seeds 1000 to 1019.
+_SETTLING_TIME = 0.15  # [s] of standing wheels before the rover counts as standing
+_STD = 0.0005  # of a rover that stands [m/s]
+_COASTING_TIME = 2.0
+"""Time [s] for which a fast rover may slide on: it is not stopped against its accelerometer."""
+_COASTING_GATE = 9.0
+_GYRO_SETTLING_TIME = 0.5  # [s]
+_MOST_YAW_RATE = 0.05  # [rad/s]: what turns faster does not stand
+_MOST_CYCLES = 200.0  # over which the zero of the gyro is a mean
+_KEPT_SHARE = 0.5  # of the weight of the zeros, in a run that keeps soil and biases
 
 
 class ZeroVelocityState(NamedTuple):
@@ -41,13 +36,12 @@ class ZeroVelocityState(NamedTuple):
 class ZeroVelocityUpdate(Component[ZeroVelocityState]):
     """Fuses standing still; learns the zero of the gyro meanwhile."""
 
-    def __init__(self, tuning: ZeroVelocityTuning = ZeroVelocityTuning()) -> None:
+    def __init__(self) -> None:
         super().__init__(ZeroVelocityState())
-        self._tuning = tuning
 
     def keep_zero_of(self, old: ZeroVelocityState) -> None:
         """Begin a run with the gyro's zero of an old one, at less weight."""
-        weight = self._tuning.kept_share * old.weight
+        weight = _KEPT_SHARE * old.weight
         self.state = ZeroVelocityState(zero=old.zero, weight=weight)
 
     def standing(self) -> bool:
@@ -89,21 +83,20 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
             self.state = self.state._replace(since=time)
         if sliding:
             return
-        tuning = self._tuning
         settled = time - self.state.since
-        if settled < tuning.settling_time:
+        if settled < _SETTLING_TIME:
             return
-        variance = tuning.std**2
-        if settled < tuning.coasting_time:
+        variance = _STD**2
+        if settled < _COASTING_TIME:
             speed, P = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
-            variance += chi_square_gate(speed, P + variance, tuning.coasting_gate)
+            variance += chi_square_gate(speed, P + variance, _COASTING_GATE)
         ekf.fuse_entry(SPEED, 0.0, variance)
-        turning = abs(yaw_rate) >= tuning.most_yaw_rate
-        if settled > tuning.gyro_settling_time and window.rates and not turning:
+        turning = abs(yaw_rate) >= _MOST_YAW_RATE
+        if settled > _GYRO_SETTLING_TIME and window.rates and not turning:
             self._learn_zero(yaw_rate, window.pitch_rate / window.rates)
 
     def _learn_zero(self, yaw_rate: float, pitch_rate: float) -> None:
         state = self.state
-        weight = min(state.weight + 1.0, self._tuning.most_cycles)
+        weight = min(state.weight + 1.0, _MOST_CYCLES)
         zero = GyroZero(state.zero.yaw + yaw_rate / weight, state.zero.pitch + pitch_rate / weight)
         self.state = state._replace(zero=zero, weight=weight)

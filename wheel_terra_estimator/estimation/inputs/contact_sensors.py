@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
@@ -45,13 +44,10 @@ class SinkageInput(Component[SinkageSums]):
         return sums
 
 
-@dataclass(frozen=True)
-class LeavingAngleTuning:
-    """Smoothing of the rear cameras' angles."""
-
-    gain: float = 0.3  # per reading
-    longest_age: float = 1.0
-    """An older angle [s] is forgotten: half a wheel's turn of a slow rover."""
+# Smoothing of the rear cameras' angles.
+_GAIN = 0.3  # per reading
+_LONGEST_AGE = 1.0
+"""An older angle [s] is forgotten: half a wheel's turn of a slow rover."""
 
 
 class LeavingAngleState(NamedTuple):
@@ -64,31 +60,29 @@ class LeavingAngleState(NamedTuple):
 class LeavingAngleInput(Component[LeavingAngleState]):
     """Smooths the measured leaving angles."""
 
-    def __init__(self, wheel_count: int, tuning: LeavingAngleTuning = LeavingAngleTuning()) -> None:
+    def __init__(self, wheel_count: int) -> None:
         super().__init__(LeavingAngleState((NAN,) * wheel_count, (-math.inf,) * wheel_count))
-        self._tuning = tuning
         self._unknown = (NAN,) * wheel_count
 
     def update(self, time: float, reading: LeavingAngleReading) -> None:
         """Take a message at a time [s]; wheels that are nan were not read."""
-        tuning = self._tuning
         angle, when = list(self.state.angle), list(self.state.time)
         for i, value in enumerate(reading.leaving_angle.tolist()):
             if not isnan(value):
-                old = value if time - when[i] > tuning.longest_age else angle[i]
-                angle[i] = old + tuning.gain * (value - old)
+                old = value if time - when[i] > _LONGEST_AGE else angle[i]
+                angle[i] = old + _GAIN * (value - old)
                 when[i] = time
         self.state = LeavingAngleState(tuple(angle), tuple(when))
 
     @property
     def noise_share(self) -> float:
         """Deviation of a smoothed angle over that of one reading [-]: sqrt(g / (2 - g))."""
-        gain = self._tuning.gain
+        gain = _GAIN
         return math.sqrt(gain / (2.0 - gain))
 
     def angles(self, time: float) -> Floats:
         """Return the leaving angle of each wheel [rad]; nan where there is none of late."""
-        state, longest = self.state, self._tuning.longest_age
+        state, longest = self.state, _LONGEST_AGE
         if time - max(state.time) >= longest:
             return self._unknown
         return tuple(

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
@@ -16,18 +15,14 @@ from wheel_terra_estimator.estimation.inputs.stated_noise import KEYS, NOTHING_S
 from wheel_terra_estimator.estimation.measurements import InertialReading
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of
 
-
-@dataclass(frozen=True)
-class InertialTuning:
-    """Times of the IMU."""
-
-    longest_gap: float = 0.25
-    """Time over which one reading is held [s]; a longer gap is not integrated over."""
-    noise_time: float = 2.0
-    """Time constant with which the seen noise of the accelerometer is smoothed [s]."""
-    levelling_time: float = 5.0
-    """Time constant with which an attitude without orientation follows the specific force [s]: a
-    rover's mean acceleration over longer than a start or a stop is nothing."""
+# Times of the IMU.
+_LONGEST_GAP = 0.25
+"""Time over which one reading is held [s]; a longer gap is not integrated over."""
+_NOISE_TIME = 2.0
+"""Time constant with which the seen noise of the accelerometer is smoothed [s]."""
+_LEVELLING_TIME = 5.0
+"""Time constant with which an attitude without orientation follows the specific force [s]: a
+rover's mean acceleration over longer than a start or a stop is nothing."""
 
 
 class GyroZero(NamedTuple):
@@ -98,21 +93,13 @@ class InertialInput(Component[InertialState]):
     ----------
     gravity : float
         [m/s^2].
-    tuning : InertialTuning, optional
-        Times.
     given : container of str
         Keys that a file states, as against defaults; all of them by default.
     """
 
-    def __init__(
-        self,
-        gravity: float,
-        tuning: InertialTuning = InertialTuning(),
-        given: Container[str] = frozenset(KEYS),
-    ) -> None:
+    def __init__(self, gravity: float, given: Container[str] = frozenset(KEYS)) -> None:
         super().__init__(InertialState())
         self._gravity = gravity
-        self._tuning = tuning
         self._given = given
 
     @property
@@ -147,11 +134,11 @@ class InertialInput(Component[InertialState]):
             force_time, change, last_force = time, force_x - last_force, force_x
             speed_change, duration = window.speed_change, window.duration
             noise = window.noise_density
-            if 0.0 < since <= self._tuning.longest_gap:
+            if 0.0 < since <= _LONGEST_GAP:
                 # Readings of a white noise differ by twice its variance; times dt it is a density,
                 # the same for raw readings and for means of several.
                 seen = 0.5 * change**2 * since
-                noise += gain_of(since, self._tuning.noise_time) * (seen - noise)
+                noise += gain_of(since, _NOISE_TIME) * (seen - noise)
                 speed_change += (force_x - self._gravity * attitude.sine_up) * since
                 duration += since
             window = window._replace(
@@ -198,5 +185,5 @@ class InertialInput(Component[InertialState]):
         turned = attitude.sine_up - (0.0 if isnan(rate) else rate * dt)
         if isnan(force):
             return Attitude(clipped(turned, -1.0, 1.0), known=True)
-        share = dt / (self._tuning.levelling_time + dt)
+        share = dt / (_LEVELLING_TIME + dt)
         return Attitude(clipped(turned + share * (force - turned), -1.0, 1.0), known=True)

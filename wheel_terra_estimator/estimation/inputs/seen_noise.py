@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Container
-from dataclasses import dataclass
 from math import isnan
 from typing import Any, NamedTuple
 
@@ -27,27 +26,24 @@ Floats = tuple[float, ...]
 _LINE = 6.0  # variance of x1 - 2 x2 + x3 over that of each
 
 
-@dataclass(frozen=True)
-class SeenNoiseTuning:
-    """How slowly it is learned, and within which bounds."""
-
-    one_second_in: int = 4  # is learned from; the noise of sensors changes slowly
-    first_seconds: float = 12.0  # of a run; of what nobody stated they are all learned from
-    readings: float = 200.0  # over which the mean goes
-    references: float = 30.0
-    most_jump: float = 4.0
-    """Deviations of what is seen beyond which one reading does not count: steps are no noise."""
-    wild: float = 10.0
-    """Deviations of what is seen beyond which a reference is wild: no noise, and the gate's."""
-    in_step: float = 0.2  # share by which two spacings of readings may differ
-    longest_gap: float = 0.5  # between readings that are compared [s]
-    least_share: float = 0.01  # of the stated deviation
-    most_share: float = 100.0
-    told_after: int = 100  # readings before it is told
-    told_references: int = 10
-    much: float = 5.0  # times what is stated, to be said
-    clearly: float = 2.0
-    """Times what is stated, to be taken in its place: less may be the motion's own."""
+# How slowly it is learned, and within which bounds.
+_ONE_SECOND_IN = 4  # is learned from; the noise of sensors changes slowly
+_FIRST_SECONDS = 12.0  # of a run; of what nobody stated they are all learned from
+_READINGS = 200.0  # over which the mean goes
+_REFERENCES = 30.0
+_MOST_JUMP = 4.0
+"""Deviations of what is seen beyond which one reading does not count: steps are no noise."""
+_WILD = 10.0
+"""Deviations of what is seen beyond which a reference is wild: no noise, and the gate's."""
+_IN_STEP = 0.2  # share by which two spacings of readings may differ
+_LONGEST_GAP = 0.5  # between readings that are compared [s]
+_LEAST_SHARE = 0.01  # of the stated deviation
+_MOST_SHARE = 100.0
+_TOLD_AFTER = 100  # readings before it is told
+_TOLD_REFERENCES = 10
+_MUCH = 5.0  # times what is stated, to be said
+_CLEARLY = 2.0
+"""Times what is stated, to be taken in its place: less may be the motion's own."""
 
 
 class ChannelState(NamedTuple):
@@ -103,8 +99,6 @@ class SeenNoise(Component[SeenNoiseState]):
         What is stated, or the defaults.
     rates : dict
         Messages a second, by sensor.
-    tuning : SeenNoiseTuning, optional
-        How it is learned.
     given : container of str
         Keys that somebody stated, as against defaults; all of them by default.
     """
@@ -113,12 +107,10 @@ class SeenNoise(Component[SeenNoiseState]):
         self,
         sensors: SensorFigures,
         rates: dict[str, float],
-        tuning: SeenNoiseTuning | None = None,
         given: Container[str] = frozenset(KEYS.values()),
     ) -> None:
         super().__init__(SeenNoiseState())
         self._defaults = {sensor for sensor, key in KEYS.items() if key not in given}
-        self._tuning = tuning or SeenNoiseTuning()
         self._rates = rates  # messages a second, by sensor
         self.stated = {
             'accelerometer': sensors.specific_force_std,
@@ -134,10 +126,9 @@ class SeenNoise(Component[SeenNoiseState]):
 
         Of what nobody stated the first seconds are all learned from.
         """
-        tuning = self._tuning
         skipped: Collection[str] = ()
-        if int(time) % tuning.one_second_in:
-            if time > tuning.first_seconds:
+        if int(time) % _ONE_SECOND_IN:
+            if time > _FIRST_SECONDS:
                 return
             skipped = KEYS.keys() - self._defaults
         found: dict[str, Floats] = {}
@@ -156,11 +147,9 @@ class SeenNoise(Component[SeenNoiseState]):
     def read(self, sensor: str, time: float, values: Floats) -> None:
         """Take a reading (one value per wheel or axis, nan = none) at a time [s]."""
         state: ChannelState = getattr(self.state, sensor)
-        tuning, gap = self._tuning, time - state.time
+        gap = time - state.time
         variance, count = state.variance, state.readings
-        in_step = (
-            abs(gap - state.gap) <= tuning.in_step * gap <= tuning.in_step * tuning.longest_gap
-        )
+        in_step = abs(gap - state.gap) <= _IN_STEP * gap <= _IN_STEP * _LONGEST_GAP
         if in_step and len(state.before) == len(values):
             bends = [
                 (a - 2.0 * b + c) ** 2
@@ -171,7 +160,7 @@ class SeenNoise(Component[SeenNoiseState]):
                 # The mean of n messages has an n-th of their variance.
                 messages = max(gap * self._rates[sensor], 1.0)
                 seen = messages * sum(bends) / (_LINE * len(bends))
-                variance, count = self._mean(sensor, variance, count, seen, tuning.readings)
+                variance, count = self._mean(sensor, variance, count, seen, _READINGS)
         self._keep(sensor, ChannelState(time, gap, values, state.last, variance, count))
 
     def compare_reference(
@@ -193,9 +182,9 @@ class SeenNoise(Component[SeenNoiseState]):
         if state.last:
             last, gain = state.last
             seen = (innovation - last) ** 2 / (1.0 + (1.0 + gain) ** 2)
-            if seen <= self._tuning.wild**2 * max(seen_variance, variance):
+            if seen <= _WILD**2 * max(seen_variance, variance):
                 seen_variance, count = self._mean(
-                    'reference', seen_variance, count, seen, self._tuning.references
+                    'reference', seen_variance, count, seen, _REFERENCES
                 )
         kept = (innovation, P / (P + variance))
         self._keep('reference', ChannelState(time, 0.0, kept, (), seen_variance, count))
@@ -205,13 +194,13 @@ class SeenNoise(Component[SeenNoiseState]):
     def _mean(
         self, sensor: str, variance: float, count: int, seen: float, length: float
     ) -> tuple[float, int]:
-        tuning, stated = self._tuning, self.stated[sensor] ** 2
-        if count and seen > tuning.most_jump**2 * max(variance, stated):
+        stated = self.stated[sensor] ** 2
+        if count and seen > _MOST_JUMP**2 * max(variance, stated):
             # Louder for good is learned, a little at a time; a step is not.
-            seen = tuning.most_jump**2 * max(variance, stated)
+            seen = _MOST_JUMP**2 * max(variance, stated)
         count += 1
         variance += (seen - variance) / min(count, length)
-        low, high = tuning.least_share**2 * stated, tuning.most_share**2 * stated
+        low, high = _LEAST_SHARE**2 * stated, _MOST_SHARE**2 * stated
         return clipped(variance, low, high), count
 
     def _keep(self, sensor: str, channel: ChannelState) -> None:
@@ -221,8 +210,7 @@ class SeenNoise(Component[SeenNoiseState]):
     def seen(self, sensor: str) -> float | None:
         """Return the deviation of one message as seen; None while too few came."""
         state: ChannelState = getattr(self.state, sensor)
-        tuning = self._tuning
-        least = tuning.told_references if sensor == 'reference' else tuning.told_after
+        least = _TOLD_REFERENCES if sensor == 'reference' else _TOLD_AFTER
         return math.sqrt(state.variance) if state.readings >= least else None
 
     def variance(self, sensor: str, stated: float | None = None) -> float:
@@ -236,7 +224,7 @@ class SeenNoise(Component[SeenNoiseState]):
             stated = self.stated[sensor] ** 2
             if seen and sensor in self._defaults:
                 return seen**2
-        return seen**2 if seen**2 > self._tuning.clearly**2 * stated else stated
+        return seen**2 if seen**2 > _CLEARLY**2 * stated else stated
 
     def take_stated(self, by_imu: StatedNoise) -> None:
         """Take what the messages of the IMU state, where no file does."""
@@ -280,7 +268,7 @@ class SeenNoise(Component[SeenNoiseState]):
         words: dict[str, list[str]] = {'stated': [], 'default': []}
         for sensor in UNITS:
             seen, (stated, given) = self.seen(sensor), self._stated(sensor)
-            if seen is not None and stated > 0.0 and seen > self._tuning.much * stated:
+            if seen is not None and stated > 0.0 and seen > _MUCH * stated:
                 than = 'what is stated' if given or self._own(sensor) else 'the default'
                 words['stated' if given else 'default'].append(
                     f'{sensor.replace("_", " ")} noise {seen / stated:.0f} times {than} '

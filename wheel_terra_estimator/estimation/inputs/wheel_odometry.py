@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
@@ -17,23 +16,20 @@ from wheel_terra_estimator.estimation.scalars import NAN
 Floats = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class WheelOdometryTuning:
-    """Times of the wheel odometry."""
-
-    smoothing_time: float = 0.05
-    """Time constant of the rim speeds [s]: fast odometry is noisy or quantised; less than any use
-    of the rim speed needs."""
-    longest_smoothed: float = 0.06
-    """Odometry that is this slow [s between messages] is not smoothed."""
-    slope_gain: float = 0.5  # smoothing of the rim speeds' rate of change, per message
-    longest_carried: float = 0.15
-    """Time [s] over which a rim speed is carried on at its rate of change: over the lag of its
-    smoothing, and to a stamp between two messages."""
-    longest_gap: float = 0.3  # between messages from which a rate of change is taken [s]
-    slope_noise: float = 3.0  # deviations of the rates within which a rim speed is constant
-    torque_age: float = 2.0
-    """A torque that is no older [s] counts as known."""
+# Times of the wheel odometry.
+_SMOOTHING_TIME = 0.05
+"""Time constant of the rim speeds [s]: fast odometry is noisy or quantised; less than any use
+of the rim speed needs."""
+_LONGEST_SMOOTHED = 0.06
+"""Odometry that is this slow [s between messages] is not smoothed."""
+_SLOPE_GAIN = 0.5  # smoothing of the rim speeds' rate of change, per message
+_LONGEST_CARRIED = 0.15
+"""Time [s] over which a rim speed is carried on at its rate of change: over the lag of its
+smoothing, and to a stamp between two messages."""
+_LONGEST_GAP = 0.3  # between messages from which a rate of change is taken [s]
+_SLOPE_NOISE = 3.0  # deviations of the rates within which a rim speed is constant
+_TORQUE_AGE = 2.0
+"""A torque that is no older [s] counts as known."""
 
 
 class WheelOdometryState(NamedTuple):
@@ -53,12 +49,7 @@ class WheelOdometryState(NamedTuple):
 class WheelOdometryInput(Component[WheelOdometryState]):
     """Keeps the newest rim speeds, sums torques."""
 
-    def __init__(
-        self,
-        rover: Rover,
-        sensors: SensorFigures,
-        tuning: WheelOdometryTuning = WheelOdometryTuning(),
-    ) -> None:
+    def __init__(self, rover: Rover, sensors: SensorFigures) -> None:
         n = rover.wheel_count
         never = -math.inf
         start = WheelOdometryState(
@@ -76,17 +67,16 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         self._radius = rover.slip_radius
         self._silence = rover.silence
         # A constant rim speed whose readings scatter seems to change by this much a second.
-        noise = tuning.slope_noise * sensors.wheel_rate_std * max(rover.slip_radius)
-        self._least_slope = noise / tuning.smoothing_time
-        self._tuning = tuning
+        noise = _SLOPE_NOISE * sensors.wheel_rate_std * max(rover.slip_radius)
+        self._least_slope = noise / _SMOOTHING_TIME
 
     def update(self, time: float, odometry: WheelOdometry) -> None:
         """Take a message at a time [s]."""
-        state, tuning = self.state, self._tuning
+        state = self.state
         if odometry.steering is not None and all(isnan(rate) for rate in odometry.rate.tolist()):
             return  # steering angles alone
         dt = time - state.time
-        keep = 0.0 if dt >= tuning.longest_smoothed else math.exp(-dt / tuning.smoothing_time)
+        keep = 0.0 if dt >= _LONGEST_SMOOTHED else math.exp(-dt / _SMOOTHING_TIME)
         rim_speed, rate_time = list(state.rim_speed), list(state.rate_time)
         rim_slope = list(state.rim_slope)
         for i, rate in enumerate(odometry.rate.tolist()):
@@ -94,9 +84,9 @@ class WheelOdometryInput(Component[WheelOdometryState]):
                 rim, old = rate * self._radius[i], rim_speed[i]
                 gap = time - rate_time[i]
                 rim_speed[i] = rim if isnan(old) else keep * old + (1.0 - keep) * rim
-                if 0.0 < gap < tuning.longest_gap:
+                if 0.0 < gap < _LONGEST_GAP:
                     slope = (rim_speed[i] - old) / gap
-                    rim_slope[i] += tuning.slope_gain * (slope - rim_slope[i])
+                    rim_slope[i] += _SLOPE_GAIN * (slope - rim_slope[i])
                 else:
                     rim_slope[i] = 0.0
                 rate_time[i] = time
@@ -151,7 +141,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
 
     def _carried(self, rim: float, slope: float, age: float) -> float:
         """Return a rim speed carried on over its age [s]: a ramp goes on, and smoothing lags."""
-        if abs(slope) <= self._least_slope or age > self._tuning.longest_carried:
+        if abs(slope) <= self._least_slope or age > _LONGEST_CARRIED:
             return rim
         return rim + slope * age
 
@@ -165,4 +155,4 @@ class WheelOdometryInput(Component[WheelOdometryState]):
 
     def torque_known(self, time: float) -> bool:
         """Say whether a torque was read of late."""
-        return time - self.state.torque_time < self._tuning.torque_age
+        return time - self.state.torque_time < _TORQUE_AGE

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,14 +14,11 @@ from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, 
 Floats = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class MarginTuning:
-    """Where and how often the greatest pull is looked for."""
-
-    slips: tuple[float, ...] = (0.3, 0.6, 0.9)
-    """Slips at which the pull is tried: traction curves are flat around their top."""
-    period: float = 1.0  # [s]
-    least_load: float = 1e-3  # [N]: less is in the air
+# Where and how often the greatest pull is looked for.
+_SLIPS = (0.3, 0.6, 0.9)
+"""Slips at which the pull is tried: traction curves are flat around their top."""
+_PERIOD = 1.0  # [s]
+_LEAST_LOAD = 1e-3  # [N]: less is in the air
 
 
 class MarginState(NamedTuple):
@@ -35,15 +31,13 @@ class MarginState(NamedTuple):
 class PullMargin(Component[MarginState]):
     """Works out the pull margins, once a second."""
 
-    def __init__(
-        self, wheel_count: int, models: WheelModels, tuning: MarginTuning = MarginTuning()
-    ) -> None:
+    def __init__(self, wheel_count: int, models: WheelModels) -> None:
         super().__init__(MarginState((0.0,) * wheel_count))
-        self._models, self._tuning = models, tuning
+        self._models = models
 
     def due(self, time: float) -> bool:
         """Return whether margins are to be worked out anew at a time [s]."""
-        return time - self.state.time >= self._tuning.period
+        return time - self.state.time >= _PERIOD
 
     def update(self, time: float, wheels: WheelStates, demand: float) -> None:
         """Work out the margins.
@@ -57,8 +51,8 @@ class PullMargin(Component[MarginState]):
         demand : float
             Pull that the ground asks in the direction of driving, over the load [-].
         """
-        ratios = 1.0 - np.array(self._tuning.slips)
+        ratios = 1.0 - np.array(_SLIPS)
         _, pull = self._models.torque_and_pull(wheels._replace(speed_ratio=ratios[:, None]))
         margin = pull.max(axis=0) - demand * wheels.load
-        margin = np.where(wheels.load >= self._tuning.least_load, margin, 0.0)
+        margin = np.where(wheels.load >= _LEAST_LOAD, margin, 0.0)
         self.state = MarginState(tuple(margin.tolist()), time)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
@@ -18,14 +17,11 @@ Floats = tuple[float, ...]
 _TIME_ROUNDING = 1e-6  # [s]
 
 
-@dataclass(frozen=True)
-class SlipTuning:
-    """Deviations of the slip that no model of the filter has."""
-
-    drift: float = 0.05
-    """Sideways over forward speed that no sensor of a steered rover reads: 3 degrees."""
-    forgetting: float = 0.02  # growth of the deviation per stamp where no rate is known
-    least_std: float = 1e-3
+# Deviations of the slip that no model of the filter has.
+_DRIFT = 0.05
+"""Sideways over forward speed that no sensor of a steered rover reads: 3 degrees."""
+_FORGETTING = 0.02  # growth of the deviation per stamp where no rate is known
+_LEAST_STD = 1e-3
 
 
 class BodyMotion(NamedTuple):
@@ -54,14 +50,9 @@ class WheelSlip(NamedTuple):
 class SlipJudge(Component[tuple[WheelSlip, ...]]):
     """Judges the slip of all wheels."""
 
-    def __init__(
-        self,
-        rover: Rover,
-        sensors: SensorFigures,
-        tuning: SlipTuning = SlipTuning(),
-    ) -> None:
+    def __init__(self, rover: Rover, sensors: SensorFigures) -> None:
         super().__init__((WheelSlip(),) * rover.wheel_count)
-        self._rover, self._tuning = rover, tuning
+        self._rover = rover
         self._rim_std = tuple(sensors.wheel_rate_std * r for r in rover.slip_radius)
 
     def update(self, time: float, rims: Floats, body: BodyMotion) -> tuple[WheelSlip, ...]:
@@ -78,7 +69,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
         self, i: int, before: WheelSlip, time: float, rim: float, body: BodyMotion
     ) -> WheelSlip:
         if isnan(rim):
-            std = min(before.std + self._tuning.forgetting, 1.0)
+            std = min(before.std + _FORGETTING, 1.0)
             return before._replace(std=std, resting=False, judged=False)
         rest = self._rover.rest_speed
         if body.stopped and abs(body.speed) < rest and abs(rim) < rest:
@@ -90,12 +81,12 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
             v_std = math.hypot(
                 headings.by_speed[i] * body.speed_std, body.yaw_rate_std * headings.by_yaw_rate[i]
             )
-            drift = self._tuning.drift * headings.across[i] * body.speed
+            drift = _DRIFT * headings.across[i] * body.speed
             v_std = math.hypot(v_std, drift)
         if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
             return self._at_rest(before, time)
         slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)
-        return WheelSlip(slip, min(max(std, self._tuning.least_std), 1.0), judged=True)
+        return WheelSlip(slip, min(max(std, _LEAST_STD), 1.0), judged=True)
 
     def _at_rest(self, before: WheelSlip, time: float) -> WheelSlip:
         """Return a wheel that stands: its slip holds its last value."""

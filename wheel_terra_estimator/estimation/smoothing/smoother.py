@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,12 +67,9 @@ _OF_THE_FILTER = (
 _NOTHING_MISSING = MissingInputs(*(False,) * len(MissingInputs._fields))
 
 
-@dataclass(frozen=True)
-class SmootherTuning:
-    """Tuned on simulated drives of both worlds, seeds 1021 to 1024 and 2180."""
-
-    least_share: float = 0.9
-    """Of the filter's deviation of a speed: model errors do not average out as noise does."""
+# Tuned on simulated drives of both worlds, seeds 1021 to 1024 and 2180.
+_LEAST_SHARE = 0.9
+"""Of the filter's deviation of a speed: model errors do not average out as noise does."""
 
 
 class Kept(NamedTuple):
@@ -110,12 +107,10 @@ class DriveSmoother:
         Makes the forward pass.
     """
 
-    def __init__(
-        self, configuration: Configuration, tuning: SmootherTuning = SmootherTuning()
-    ) -> None:
+    def __init__(self, configuration: Configuration) -> None:
         self._buffer = HistoryBuffer()
         self.estimator = WheelSoilEstimator(configuration, self._buffer)
-        self._configuration, self._tuning = configuration, tuning
+        self._configuration = configuration
         self._kept: DiskBuffer[Kept] = DiskBuffer()
 
     def keep(self, estimates: EstimateSet, companion: Any = None) -> None:
@@ -127,7 +122,7 @@ class DriveSmoother:
 
         A set of the filter is given as it is where there is nothing to smooth.
         """
-        parts = _Judges(self._configuration, self._tuning)
+        parts = _Judges(self._configuration)
         guard = OutputGuard(self._configuration)
         classes, last = PublishedClasses(self._configuration), 0
         for kept, moment in centred(self._moments(parts)):
@@ -184,11 +179,11 @@ class DriveSmoother:
 class _Judges:
     """What the estimator makes of its state, run once more over the smoothed one."""
 
-    def __init__(self, configuration: Configuration, tuning: SmootherTuning) -> None:
+    def __init__(self, configuration: Configuration) -> None:
         self._rover = rover = Rover.from_configuration(configuration)
         sensors = SensorFigures.from_configuration(configuration)
         self._layout = layout = layout_of(rover, sensors)
-        self._tuning, self._most_std = tuning, float(configuration.filter.class_std)
+        self._most_std = float(configuration.filter.class_std)
         self._slips = SlipJudge(rover, sensors)
         self._pulls = Pulls(rover, sensors, WheelLoads(rover).state.load)
         self._outputs = Outputs(configuration, rover, sensors, layout)
@@ -213,7 +208,7 @@ class _Judges:
         typical = sum(map(abs, heard)) / len(given.rims)
         least = max(
             typical * LEAST_SLIP_STD,
-            self._tuning.least_share * instant.motion.speed_std,
+            _LEAST_SHARE * instant.motion.speed_std,
         )
         return Moment(
             instant,
