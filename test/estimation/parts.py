@@ -2,12 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Constants of a rover for tests of single parts of the estimator."""
 
+import math
 from dataclasses import dataclass
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
+from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.filter.initial_state import initial_filter, layout_of
+from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 SAND = ['generic_six_wheel', 'dry_sand_ding2015']
@@ -24,6 +28,29 @@ class Parts:
         self.sensors = SensorFigures.from_configuration(self.configuration)
         self.layout = layout_of(self.rover, self.sensors)
         self.models = contact_models(self.configuration)
+
+    def cycle(self, rims=(0.05,) * 6, loads=None, **given):
+        """Return a cycle of a rover that drives straight ahead on level ground."""
+        n = self.rover.wheel_count
+        level = WheelLoads(self.rover).state
+        driving = {
+            'time': 0.0,
+            'dt': 0.1,
+            'window': InertialWindow(),
+            'rims': rims,
+            'yaw_compensated': RimSpeeds.of(rims, 0.0, straight_headings(self.rover)),
+            'yaw_rate': 0.0,
+            'lateral_motion': 0.0,
+            'headings': straight_headings(self.rover),
+            'still': False,
+            'torque': (math.nan,) * n,
+            'leaving_angles': (math.nan,) * n,
+            'loads': level._replace(load=loads or level.load, force_known=True),
+            'turns': (True,) * n,
+            'reference_known': True,
+            'demand_change': 0.0,
+        }
+        return Cycle(**(driving | given))
 
     def filter(self):
         """Return a filter at the start of a run."""

@@ -13,7 +13,7 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.contact_age import DECAY, START_VARIANCE, ContactAge
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
-from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
+from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.contacts.ruts import Ruts, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
@@ -236,7 +236,8 @@ def lifted(parts, torque, *, steps, found=None, lateral_motion=0.0, rims=FORWARD
     found = found or UnloadedWheels(parts.rover, parts.sensors)
     start = 0.0 if not hasattr(found, 'clock') else found.clock
     for i in range(steps):
-        found.update(start + 0.1 * i, range(6), torque, rims, lateral_motion)
+        time = start + 0.1 * i
+        found.update(parts.cycle(rims, time=time, torque=torque, lateral_motion=lateral_motion))
     found.clock = start + 0.1 * steps
     return found
 
@@ -287,11 +288,12 @@ def standing_pull(parts, torque, speed, lateral_motion=0.0):
     x = parts.filter().mean.copy()
     x[SPEED] = speed
     wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
-    headings = straight_headings(parts.rover)
-    given = {'yaw_rate': 0.0, 'headings': headings, 'lateral_motion': lateral_motion}
     n = parts.rover.wheel_count
-    pulls = wheels.pulls(x, np.full(n, torque), np.full(n, 60.0), **given)
-    return float(pulls[0])
+    rims, turns = (0.0,) * n, (False,) * n
+    cycle = parts.cycle(
+        rims, (60.0,) * n, turns=turns, torque=(torque,) * n, lateral_motion=lateral_motion
+    )
+    return wheels.update(x, cycle)[0][0]
 
 
 @pytest.mark.parametrize('torque', [-8.0, 20.0])
@@ -327,18 +329,9 @@ def forces_at(parts, ruts=RUTS, **moved):
     x[SPEED], x[layout.sinkage], x[RUT_SHARE] = 0.7 * 0.05, 0.03, 0.5
     for name, change in moved.items():
         x[ENTRIES[name](layout)] += change
-    loads = WheelLoads(parts.rover).state.load
+    cycle = parts.cycle(FORWARD)
     for _ in range(100):  # the slopes are means over a second
-        forces = linearisation.update(
-            x,
-            turns=linearisation.turning(FORWARD, loads),
-            yaw_rate=0.0,
-            headings=straight_headings(parts.rover),
-            rims=FORWARD,
-            loads=loads,
-            leaving_angles=(NAN,) * 6,
-            ruts=ruts,
-        )
+        forces = linearisation.update(x, cycle, ruts)
     return forces
 
 
@@ -458,7 +451,7 @@ def test_the_residual_of_the_sum_is_distributed_as_least_squares_does(parts):
 def published_pull(parts, excess, lateral_motion=0.0):
     """Pulls after 40 cycles in which all torques read `excess` more than the model."""
     pulls = Pulls(parts.rover, parts.sensors, (300.0,) * 6)
-    forces, loads = forces_at(parts), WheelLoads(parts.rover).state.load
+    forces, cycle = forces_at(parts), parts.cycle(lateral_motion=lateral_motion)
     ekf = parts.filter()
     ekf.mean[:] = forces.state
     for _ in range(40):
@@ -468,12 +461,9 @@ def published_pull(parts, excess, lateral_motion=0.0):
             PullEvidence(
                 forces,
                 total=None,
-                loads=LoadState(loads, (0.0, 0.0, 9.8), force_known=True),
-                headings=straight_headings(parts.rover),
-                turning=(True,) * 6,
+                cycle=cycle,
                 readings=tuple((forces.torque + excess).tolist()),
                 stationary=(np.nan,) * 6,
-                lateral_motion=lateral_motion,
             ),
             tilt=0.0,
         )

@@ -10,7 +10,6 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
-from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
@@ -194,14 +193,9 @@ def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, m
 def rest(parts, ekf, seconds, yaw=0.0):
     update = ZeroVelocityUpdate()
     for i in range(round(10 * seconds)):
-        update.update(
-            ekf,
-            0.1 * i,
-            still=True,
-            sliding=False,
-            window=InertialWindow(readings=5, rates=5, pitch_rate=5 * 0.002),
-            yaw_rate=yaw,
-        )
+        window = InertialWindow(readings=5, rates=5, pitch_rate=5 * 0.002)
+        cycle = parts.cycle((0.0,) * 6, time=0.1 * i, still=True, window=window, yaw_rate=yaw)
+        update.update(ekf, cycle, sliding=False)
     return update
 
 
@@ -279,18 +273,9 @@ def sinkage_predicted(
 ):
     """Return the prediction over a tenth of a second, and the travel."""
     prediction = Prediction.unchanged(x)
-    travel = SinkageProcess(parts.rover, parts.layout, parts.models, angle_std).predict(
-        prediction,
-        x,
-        0.1,
-        rims=rims,
-        loads=loads or WheelLoads(parts.rover).state.load,
-        yaw_rate=0.0,
-        headings=straight_headings(parts.rover),
-        leaving_angles=(angle,) * 6,
-        reference_known=reference_known,
-    )
-    return prediction, travel
+    cycle = parts.cycle(rims, loads, leaving_angles=(angle,) * 6, reference_known=reference_known)
+    process = SinkageProcess(parts.rover, parts.layout, parts.models, angle_std)
+    return prediction, process.predict(prediction, x, cycle)
 
 
 def relaxed(parts, ekf, seconds, reference_known=True, speed=0.05, start=None):
@@ -397,16 +382,9 @@ def test_softer_ground_is_weaker_ground_where_no_torque_says_how_weak(parts):
 
 
 def linearised(parts, x, loads, angle=NAN, angle_std=0.05):
-    return Linearisation(parts.rover, parts.layout, parts.models, angle_std).update(
-        x,
-        turns=(True,) * 6,
-        yaw_rate=0.0,
-        headings=straight_headings(parts.rover),
-        rims=FORWARD,
-        loads=loads,
-        leaving_angles=(angle,) * 6,
-        ruts=(0.0,) * 6,
-    )
+    linearisation = Linearisation(parts.rover, parts.layout, parts.models, angle_std)
+    cycle = parts.cycle(FORWARD, loads, leaving_angles=(angle,) * 6)
+    return linearisation.update(x, cycle, (0.0,) * 6)
 
 
 def forces(parts, ekf):
@@ -415,19 +393,20 @@ def forces(parts, ekf):
 
 
 def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0, reference_known=True):
-    update, (found, _) = (
-        TorqueUpdate(parts.configuration, parts.rover, parts.layout),
-        forces(parts, ekf),
+    found, _ = forces(parts, ekf)
+    cycle = parts.cycle(
+        FORWARD,
+        torque=(*(found.torque + excess).tolist()[:5], NAN),
+        turns=(True,) * 4 + (False,) * 2,
+        reference_known=reference_known,
     )
-    return update.update(
+    return TorqueUpdate(parts.configuration, parts.rover, parts.layout).update(
         ekf,
         found,
-        torque=(*(found.torque + excess).tolist()[:5], NAN),
+        cycle,
         variance=parts.sensors.torque_std**2,
-        turning=(True,) * 4 + (False,) * 2,
-        model_variance=(doubt,) * 6,
+        model_variance=doubt,
         repeats=repeats,
-        reference_known=reference_known,
     ), found
 
 
@@ -484,11 +463,9 @@ def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ek
         rows = update.update(
             ekf,
             found,
-            torque=tuple(torque.tolist()),
+            parts.cycle(FORWARD, torque=tuple(torque.tolist())),
             variance=parts.sensors.torque_std**2,
-            turning=(True,) * 6,
-            reference_known=True,
-            model_variance=(0.0,) * 6,
+            model_variance=0.0,
             repeats=1.0,
         )
         ekf.fuse(rows)
@@ -503,23 +480,20 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
     variances, torques, pulls = [], [], []
     for std, angle in ((1e-9, -0.2), (0.05, -0.2), (1e-9, -0.25), (0.05, NAN), (1e-9, NAN)):
         found = linearised(parts, ekf.mean, loads, angle, std)
-        given = {'model_variance': (0.0,) * 6, 'repeats': 1.0}
+        given = {'model_variance': 0.0, 'repeats': 1.0}
+        torque = tuple(found.torque.tolist())
+        cycle = parts.cycle(FORWARD, loads, torque=torque, window=window(0.0, 9.8))
         noise = parts.sensors.torque_std**2
         rows = TorqueUpdate(parts.configuration, parts.rover, parts.layout).update(
             ekf,
             found,
-            torque=tuple(found.torque.tolist()),
+            cycle,
             variance=noise,
-            turning=(True,) * 6,
-            reference_known=True,
             **given,
         )
-        total = balance.sum_of_pulls(window(0.0, 9.8), loads, 0.0)
+        total = balance.sum_of_pulls(cycle, 0.0)
         along = total._replace(along=float(found.pull.sum()))
-        straight = straight_headings(parts.rover)
-        row = balance.update(
-            ekf, found, along, stationary=[None] * 6, headings=straight, loads=loads, **given
-        )
+        row = balance.update(ekf, found, along, cycle, stationary=[None] * 6, **given)
         variances.append((rows[0].variance, row.variance))
         torques.append(float(found.torque[0]))
         pulls.append(found.pull)
@@ -547,19 +521,19 @@ def test_the_balance_of_forces_on_a_slope(parts, ekf):
     found, loads = forces(parts, ekf)
     ekf.mean[parts.layout.sinkage] = 0.03  # even ruts: the body lies along the ground
     along = float(found.pull.sum()) + 12.0
-    total = balance.sum_of_pulls(window(along / parts.rover.mass, 9.6), loads, 0.0)
-    given = {'loads': loads, 'model_variance': (0.0,) * 6, 'repeats': 1.0}
-    straight = straight_headings(parts.rover)
-    row = balance.update(ekf, found, total, stationary=[None] * 6, headings=straight, **given)
+    cycle = parts.cycle(FORWARD, loads, window=window(along / parts.rover.mass, 9.6))
+    total = balance.sum_of_pulls(cycle, 0.0)
+    given = {'model_variance': 0.0, 'repeats': 1.0}
+    row = balance.update(ekf, found, total, cycle, stationary=[None] * 6, **given)
     assert row.residual == pytest.approx(12.0, abs=1e-6)
     rear = int(np.argmin(parts.rover.longitudinal))
     ekf.mean[parts.layout.sinkage.start + rear] += 0.01  # the nose points up by it
-    tilted = balance.update(ekf, found, total, stationary=[None] * 6, headings=straight, **given)
+    tilted = balance.update(ekf, found, total, cycle, stationary=[None] * 6, **given)
     tilt = 0.01 * parts.rover.rut_tilt[rear]
     assert tilt > 0.0
     assert tilted.residual == pytest.approx(12.0 - parts.rover.mass * 9.6 * tilt)
     standing = [StationaryPull(NAN, 5.0, 20.0), *[None] * 5]
-    held = balance.update(ekf, found, total, stationary=standing, headings=straight, **given)
+    held = balance.update(ekf, found, total, cycle, stationary=standing, **given)
     assert held.residual - tilted.residual == pytest.approx(float(found.pull[0]) - 5.0)
 
 
@@ -587,8 +561,10 @@ def test_a_vibrating_accelerometer_weakens_the_balance(parts):
     """Noise of 1 m/s^2 at 100 Hz is a density of 0.01: over 0.1 s a variance of 0.1."""
     balance = ForceBalance(parts.configuration, parts.rover, parts.sensors, parts.layout)
     loads = (parts.rover.mass * 9.8 / 6,) * 6
-    calm = balance.sum_of_pulls(window(0.0, 9.8), loads, 0.0)
-    shaken = balance.sum_of_pulls(window(0.0, 9.8, noise=0.01), loads, 0.0)
+    calm, shaken = (
+        balance.sum_of_pulls(parts.cycle(FORWARD, loads, window=told), 0.0)
+        for told in (window(0.0, 9.8), window(0.0, 9.8, noise=0.01))
+    )
     added = parts.rover.mass**2 * (0.1 - parts.sensors.specific_force_std**2 / 5)
     assert shaken.variance - calm.variance == pytest.approx(added)
 

@@ -7,10 +7,10 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.speed_process import (
     USUAL_LENGTH,
-    RimSpeeds,
     SpeedProcess,
     SpeedStep,
 )

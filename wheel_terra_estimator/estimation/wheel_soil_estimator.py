@@ -17,12 +17,15 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import (
     ContactForces,
     Linearisation,
+    turning_wheels,
 )
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
 from wheel_terra_estimator.estimation.contacts.measured_wheels import (
@@ -32,10 +35,7 @@ from wheel_terra_estimator.estimation.contacts.measured_wheels import (
 )
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.contacts.ruts import Ruts, contact_depths, curvature_of
-from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
-    StationaryPull,
-    StationaryWheels,
-)
+from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
 from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestClimb
 from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
@@ -44,7 +44,7 @@ from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.filter.consistency import excess
 from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
-from wheel_terra_estimator.estimation.filter.ekf import Row
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
     ForceBalance,
     SumOfPulls,
@@ -62,7 +62,7 @@ from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
-from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
+from wheel_terra_estimator.estimation.filter.speed_process import SpeedProcess
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     GRAVITY_BIAS,
@@ -152,24 +152,6 @@ class _Clock(NamedTuple):
     speed: SpeedAndVariance | None = None  # where this stamp was judged
 
 
-class _Cycle(NamedTuple):
-    """What one cycle knows before its update."""
-
-    time: float  # [s]
-    dt: float
-    window: InertialWindow
-    rims: Floats  # [m/s], nan = unknown
-    yaw_compensated: RimSpeeds
-    still: bool  # all wheels stand
-    torque: Floats  # means since the last cycle [N m], nan = none came
-    leaving_angles: Floats  # [rad], nan = unknown
-    loads: LoadState
-    turns: tuple[bool, ...]
-    """Wheels for which the contact models hold: they turn under a load."""
-    reference_known: bool  # of late, before this cycle
-    demand_change: float  # by how much more the ground asks than at the last cycle [-]
-
-
 class WheelSoilEstimator:
     """Estimator of one rover; sees stamps in order and only checked numbers.
 
@@ -246,36 +228,8 @@ class WheelSoilEstimator:
         )
         self._teaching = Teaching.of_filter(layout, self._ekf.covariance)
         self._clock = _Clock()
-        self._parts: tuple[Part, ...] = (
-            self._inertial,
-            self._wheels,
-            self._sinkages,
-            self._leaving_angles,
-            self._noise,
-            self._steering,
-            self._turning,
-            self._loads,
-            self._contact_age,
-            self._ruts,
-            self._unloaded,
-            self._demand,
-            self._torque_coefficient,
-            self._climb,
-            self._linearisation,
-            self._pulls,
-            self._ekf,
-            self._speed,
-            self._sinkage_process,
-            self._reference,
-            self._zero_velocity,
-            self._sinkage,
-            self._torque,
-            self._balance,
-            self._slips,
-            self._margin,
-            self._slopes,
-            self._sideways,
-            self._stuck,
+        self._parts: tuple[Part, ...] = tuple(
+            part for part in vars(self).values() if isinstance(part, Component | GatedFilter)
         )
         self._buffer = buffer
         if buffer is not None:
@@ -382,24 +336,17 @@ class WheelSoilEstimator:
 
         if reference is not None:
             self._fuse_reference(cycle, reference)
-        self._zero_velocity.update(
-            ekf,
-            time,
-            still=cycle.still,
-            sliding=time < self._reference.state.sliding_until,
-            window=cycle.window,
-            yaw_rate=self._turning.state.yaw_rate,
-        )
+        self._zero_velocity.update(ekf, cycle, sliding=time < self._reference.state.sliding_until)
 
         rows = self._sinkage.update(
             ekf, time, self._sinkages.take(), self._noise.variance('sinkage')
         )
-        self._find_unloaded(cycle)
-        forces, total = None, None
+        self._unloaded.update(cycle)
+        forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
         if cycle.still:
             self._forget_contacts()
         else:
-            forces, total, force_rows = self._force_rows(cycle)
+            forces, total, stationary, force_rows = self._force_rows(cycle)
             if self._contact_age.settled or cycle.reference_known:
                 rows += force_rows
         considered = considered_entries(
@@ -418,9 +365,7 @@ class WheelSoilEstimator:
         evidence = PullEvidence(
             forces=forces,
             total=total,
-            loads=cycle.loads,
-            headings=self._steering.state.headings,
-            turning=cycle.turns,
+            cycle=cycle,
             readings=tuple(
                 [
                     reading - zero
@@ -429,8 +374,7 @@ class WheelSoilEstimator:
                     )
                 ]
             ),
-            stationary=self._pulls.state.stationary,
-            lateral_motion=self._turning.state.lateral_motion,
+            stationary=stationary,
         )
         tilt = rut_tilt(self._rover, layout, ekf.mean)
         self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)
@@ -438,7 +382,7 @@ class WheelSoilEstimator:
             present = Gaussian(ekf.mean, ekf.covariance)
             self._buffer.mark((evidence, ekf.mean.copy()), present)
 
-    def _begin_cycle(self, time: float) -> _Cycle:
+    def _begin_cycle(self, time: float) -> Cycle:
         """Work out turning, loads and rim speeds; note what changes under the wheels."""
         ekf, speed, rover = self._ekf, self._speed, self._rover
         dt = speed.since_cycle(time)
@@ -475,22 +419,25 @@ class WheelSoilEstimator:
         speed.begin(ekf, yaw_compensated)
         speed.follow_sides(yaw_compensated, dt)
         heard = known(rims)
-        return _Cycle(
+        return Cycle(
             time=time,
             dt=dt,
             window=window,
             rims=rims,
             yaw_compensated=yaw_compensated,
+            yaw_rate=turning.yaw_rate,
+            lateral_motion=turning.lateral_motion,
+            headings=headings,
             still=bool(heard) and all(abs(rim) < rover.rest_speed for rim in heard),
             torque=self._wheels.take_torque(),
             leaving_angles=self._leaving_angles.angles(time),
             loads=loads,
-            turns=self._linearisation.turning(rims, loads.load),
+            turns=turning_wheels(rover, rims, loads.load),
             reference_known=reference_known,
             demand_change=demand_change,
         )
 
-    def _torque_over_load(self, cycle: _Cycle) -> float:
+    def _torque_over_load(self, cycle: Cycle) -> float:
         """Return the torques over loads times radii, positive where they drive; nan = none [-]."""
         told = [
             (torque - zero, load * radius)
@@ -516,7 +463,7 @@ class WheelSoilEstimator:
         slip = 1.0 - float(self._ekf.mean[SPEED]) / rim if steady and straight else NAN
         self._climb.update(demand, slip, dt)
 
-    def _predict(self, cycle: _Cycle) -> None:
+    def _predict(self, cycle: Cycle) -> None:
         """Predict speed, sinkage, soil and errors of the shear model to the time of a cycle."""
         x = self._ekf.mean
         prediction = Prediction.unchanged(x)
@@ -544,17 +491,7 @@ class WheelSoilEstimator:
         )
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:
-            travel = self._sinkage_process.predict(
-                prediction,
-                x,
-                cycle.dt,
-                rims=cycle.rims,
-                loads=cycle.loads.load,
-                yaw_rate=self._turning.state.yaw_rate,
-                headings=self._steering.state.headings,
-                leaving_angles=cycle.leaving_angles,
-                reference_known=cycle.reference_known,
-            )
+            travel = self._sinkage_process.predict(prediction, x, cycle)
             self._contact_age.advance(travel)
             self._note_ruts(cycle.dt)
             if travel > 0.0:
@@ -582,7 +519,7 @@ class WheelSoilEstimator:
             curvature_of(speed, self._turning.state.yaw_rate),
         )
 
-    def _fuse_reference(self, cycle: _Cycle, reference: ReferenceVelocity) -> None:
+    def _fuse_reference(self, cycle: Cycle, reference: ReferenceVelocity) -> None:
         """Fuse a reference velocity."""
         time, ekf = cycle.time, self._ekf
         innovation, variance = self._reference.innovation(ekf, reference)
@@ -597,51 +534,28 @@ class WheelSoilEstimator:
             variance=noise,
         )
 
-    def _find_unloaded(self, cycle: _Cycle) -> None:
-        """Find wheels without load."""
-        low = self._rover.low_rim
-        rolling = [
-            i
-            for i, (rim, torque) in enumerate(zip(cycle.rims, cycle.torque, strict=True))
-            if abs(rim) > low and not isnan(torque)
-        ]
-        self._unloaded.update(
-            cycle.time, rolling, cycle.torque, cycle.rims, self._turning.state.lateral_motion
-        )
-
     def _forget_contacts(self) -> None:
         """Let the contacts form anew: all wheels stand."""
         self._contact_age.stop()
         self._linearisation.reset()
         self._sinkage_process.forget_slopes()
-        self._pulls.forget_stationary()
 
-    def _force_rows(self, cycle: _Cycle) -> tuple[ContactForces, SumOfPulls | None, list[Row]]:
-        """Return forces, what is known of their sum, and the rows of torques and balance."""
-        ekf, loads = self._ekf, cycle.loads.load
-        forces = self._linearisation.update(
-            ekf.mean,
-            turns=cycle.turns,
-            yaw_rate=self._turning.state.yaw_rate,
-            headings=self._steering.state.headings,
-            rims=cycle.rims,
-            loads=loads,
-            leaving_angles=cycle.leaving_angles,
-            ruts=self._ruts.state.depth,
-        )
-        stationary = self._stationary_pulls(cycle)
+    def _force_rows(
+        self, cycle: Cycle
+    ) -> tuple[ContactForces, SumOfPulls | None, Floats, list[Row]]:
+        """Return forces, what is known of their sum, pulls of standing wheels, and the rows."""
+        ekf = self._ekf
+        forces = self._linearisation.update(ekf.mean, cycle, self._ruts.state.depth)
+        pulls, stationary = self._stationary.update(ekf.mean, cycle)
         start = self._contact_age.shear_variance
-        model_variance = tuple([start if turns else 0.0 for turns in cycle.turns])
         repeats = correlated_cycles(cycle.rims, cycle.dt) * self._reference.model_variance_factor
         rows = self._torque.update(
             ekf,
             forces,
-            torque=cycle.torque,
+            cycle,
             variance=self._noise.variance('torque'),
-            turning=cycle.turns,
-            model_variance=model_variance,
+            model_variance=start,
             repeats=repeats,
-            reference_known=cycle.reference_known,
         )
         read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
         self._speed.follow_contacts(
@@ -650,48 +564,19 @@ class WheelSoilEstimator:
             reference_known=cycle.reference_known,
         )
         if not cycle.window.readings:
-            return forces, None, rows
+            return forces, None, pulls, rows
         curvature = self._turning.curvature(float(ekf.mean[SPEED]))
-        total = self._balance.sum_of_pulls(cycle.window, loads, curvature)
+        total = self._balance.sum_of_pulls(cycle, curvature)
         balance = self._balance.update(
             ekf,
             forces,
             total,
+            cycle,
             stationary=stationary,
-            headings=self._steering.state.headings,
-            loads=loads,
-            model_variance=model_variance,
+            model_variance=start,
             repeats=repeats,
         )
-        return forces, total, [*rows, balance]
-
-    def _stationary_pulls(self, cycle: _Cycle) -> list[StationaryPull | None]:
-        """Return what to expect of the wheels that do not turn under a load; None = it turns."""
-        motion, share = self._turning.state, cycle.loads.slope_share
-        told = [
-            not (turns or isnan(rim) or isnan(torque)) and load >= self._linearisation.least_load
-            for turns, rim, torque, load in zip(
-                cycle.turns, cycle.rims, cycle.torque, cycle.loads.load, strict=True
-            )
-        ]
-        pulls = [NAN] * len(told)
-        if any(told):
-            found = self._stationary.pulls(
-                self._ekf.mean,
-                np.array(cycle.torque),
-                np.array(cycle.loads.load),
-                yaw_rate=motion.yaw_rate,
-                headings=self._steering.state.headings,
-                lateral_motion=motion.lateral_motion,
-            )
-            pulls = np.where(told, found, NAN).tolist()
-        self._pulls.note_stationary(tuple(pulls))
-        return [
-            None
-            if turns
-            else self._stationary.expectation(pull, load, share, motion.lateral_motion)
-            for turns, pull, load in zip(cycle.turns, pulls, cycle.loads.load, strict=True)
-        ]
+        return forces, total, pulls, [*rows, balance]
 
     # -- What it means ---------------------------------------------------------------------------
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.contacts.steering import Headings
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle
+from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
     STEPPED,
     STRENGTH,
@@ -38,7 +39,6 @@ _SLOPE_KEEP = 0.9
 """Share of the old derivatives kept in a cycle: they are means over about a second."""
 _NEW_CONTACT = 0.15
 """Change of a torque by strength, of load times radius, that is no noise of the state."""
-_LEAST_LOAD = 1e-3  # [N]: a wheel with less is in the air
 _LEAST_RIM_OVER_REST = 2.0
 """Rim speed over ``rest_speed`` above which a wheel turns."""
 
@@ -85,59 +85,31 @@ class Linearisation(Component[FloatArray]):
         super().__init__(np.full((2, len(STEPPED), rover.wheel_count), np.nan))
         self._rover, self._layout, self._models = rover, layout, models
         self._leaving_angle_std = leaving_angle_std
-        self.least_load = _LEAST_LOAD
 
-    def turning(self, rims: Floats, loads: Floats) -> tuple[bool, ...]:
-        """Say for which wheels the contact models hold: they turn under a load."""
-        least = _LEAST_RIM_OVER_REST * self._rover.rest_speed
-        return tuple(
-            abs(rim) >= least and load >= _LEAST_LOAD for rim, load in zip(rims, loads, strict=True)
-        )
-
-    def update(
-        self,
-        x: FloatArray,
-        *,
-        turns: tuple[bool, ...],
-        yaw_rate: float,
-        headings: Headings,
-        rims: Floats,
-        loads: Floats,
-        leaving_angles: Floats,
-        ruts: Floats,
-    ) -> ContactForces:
+    def update(self, x: FloatArray, cycle: Cycle, ruts: Floats) -> ContactForces:
         """Work out the forces of the wheels that turn at a state `x` (size,).
 
-        Parameters
-        ----------
-        x : numpy.ndarray
-            (size,) state.
-        turns : tuple of bool
-            Wheels for which the models hold, see `turning`.
-        yaw_rate : float
-            [rad/s].
-        headings : Headings
-            Of the wheels.
-        rims, loads, leaving_angles : tuple of float
-            Of each wheel [m/s], [N], [rad]; nan = unknown.
-        ruts : tuple of float
-            That each wheel meets [m].
+        `ruts` are those that each wheel meets [m].
         """
+        turns, headings, loads = cycle.turns, cycle.headings, cycle.loads.load
         layout, n = self._layout, self._rover.wheel_count
         rows = np.zeros((2, n, layout.size))
         if not any(turns):
             nothing = np.zeros(n)
             return ContactForces(x.copy(), nothing, nothing, rows[0], rows[1], nothing, nothing)
         turning = np.array(turns)
-        rim, load, rut = np.where(turning, rims, 1.0), np.array(loads), np.array(ruts)
+        rim, load, rut = np.where(turning, cycle.rims, 1.0), np.array(loads), np.array(ruts)
         direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
         rut_share, sheared = float(x[RUT_SHARE]), 1.0 - float(x[SHEAR_RADIUS])
         # No wheel stands higher than the rut that it meets.
         sinkage = x[layout.sinkage]
         met = np.minimum(rut, np.maximum(sinkage, 0.0))
-        measured = np.array(leaving_angles)
+        measured = np.array(cycle.leaving_angles)
         states = WheelStates(
-            speed_ratio=sheared * direction * headings.speeds(float(x[SPEED]), yaw_rate) / rim,
+            speed_ratio=sheared
+            * direction
+            * headings.speeds(float(x[SPEED]), cycle.yaw_rate)
+            / rim,
             sinkage=sinkage - rut_share * met,
             load=load,
             strength=x[SHEAR_STRENGTH] + x[layout.shear_error],
@@ -195,6 +167,14 @@ class Linearisation(Component[FloatArray]):
         other = change > _NEW_CONTACT * moment
         slopes[:, 1:] = np.where(other, new[:, 1:], slopes[:, 1:])
         return np.where(turning, slopes, old)
+
+
+def turning_wheels(rover: Rover, rims: Floats, loads: Floats) -> tuple[bool, ...]:
+    """Say for which wheels the contact models hold: they turn under a load."""
+    least = _LEAST_RIM_OVER_REST * rover.rest_speed
+    return tuple(
+        abs(rim) >= least and load >= LEAST_LOAD for rim, load in zip(rims, loads, strict=True)
+    )
 
 
 def smoothed_slopes(old: FloatArray, new: FloatArray, keep: float) -> FloatArray:

@@ -12,6 +12,8 @@ from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover
 
 Floats = tuple[float, ...]
+LEAST_LOAD = 1e-3
+"""Of a wheel on the ground [N]: with less it is in the air."""
 _LEAST_FORCE = 0.1  # specific force on z [m/s^2] below which a slope is not defined
 _LEAST_TOTAL = 1e-9  # of the loads [N]
 

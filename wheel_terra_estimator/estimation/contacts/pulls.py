@@ -16,13 +16,12 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
-from wheel_terra_estimator.estimation.contacts.loads import LoadState
-from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN, clipped
+from wheel_terra_estimator.estimation.scalars import clipped
 
 Floats = tuple[float, ...]
 
@@ -50,12 +49,9 @@ class PullEvidence(NamedTuple):
     forces: ContactForces | None
     """Of the turning wheels; None where all stand."""
     total: SumOfPulls | None  # what the specific force says of their sum; None = nothing
-    loads: LoadState
-    headings: Headings
-    turning: tuple[bool, ...]  # wheels for which the models hold
+    cycle: Cycle
     readings: Floats  # last torque of each wheel [N m], nan = never known
     stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
-    lateral_motion: float  # of the outer wheels over the fastest rim speed [-]
 
 
 class PullState(NamedTuple):
@@ -66,7 +62,6 @@ class PullState(NamedTuple):
     model_pull: Floats  # without the correction by the sum: what the loads are worked out from
     torque: Floats  # by sensor or model [N m]
     torque_excess: Floats  # reading less model, smoothed [N m]
-    stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
 
 
 class Pulls(Component[PullState]):
@@ -82,17 +77,8 @@ class Pulls(Component[PullState]):
 
     def __init__(self, rover: Rover, sensors: SensorFigures, loads: Floats) -> None:
         zero = (0.0,) * rover.wheel_count
-        unknown = (NAN,) * rover.wheel_count
-        super().__init__(PullState(zero, loads, zero, zero, zero, unknown))
+        super().__init__(PullState(zero, loads, zero, zero, zero))
         self._rover, self._sensors = rover, sensors
-
-    def note_stationary(self, pulls: Floats) -> None:
-        """Take the pulls of wheels that stand, from their torques [N]; nan = not known."""
-        self.state = self.state._replace(stationary=pulls)
-
-    def forget_stationary(self) -> None:
-        """Forget them: all wheels stand."""
-        self.note_stationary((NAN,) * self._rover.wheel_count)
 
     def update(
         self,
@@ -109,11 +95,12 @@ class Pulls(Component[PullState]):
         mean, covariance : numpy.ndarray
             (size,), (size, size) after the update.
         evidence : PullEvidence
-            Forces, their sum, loads and torques of the cycle.
+            Forces, their sum and torques of the cycle.
         tilt : float
             Of the body against the ground by its ruts [rad].
         """
-        forces, total, loads, headings, turning, readings, stationary, lateral_motion = evidence
+        forces, total, cycle, readings, stationary = evidence
+        loads, lateral_motion = cycle.loads, cycle.lateral_motion
         state, share = self.state, loads.slope_share
         n = self._rover.wheel_count
         pull, std = [0.0] * n, [0.0] * n
@@ -129,7 +116,7 @@ class Pulls(Component[PullState]):
             torque_by_strength = forces.torque_rows[:, SHEAR_STRENGTH].tolist()
             noises = forces.pull_noise.tolist()
         for i, load in enumerate(loads.load):
-            if not turning[i]:
+            if not cycle.turns[i]:
                 # Static friction carries the slope, or it is dragged along.
                 standing = stationary[i]
                 pull[i] = load * share if isnan(standing) else standing
@@ -154,12 +141,10 @@ class Pulls(Component[PullState]):
                 std[i] = math.sqrt(max(shared[i], 0.0) + own[i] + scrub[i])
         model_pull = tuple(pull)
         if forces is not None and total is not None:
-            along = np.array(headings.along)
+            along = np.array(cycle.headings.along)
             shares = (joint + np.diag(own)) @ along + np.array(scrub)
             pull = self.distributed(pull, shares, along, total, loads.load, tilt)
-        self.state = PullState(
-            tuple(pull), tuple(std), model_pull, tuple(torque), tuple(excess), stationary
-        )
+        self.state = PullState(tuple(pull), tuple(std), model_pull, tuple(torque), tuple(excess))
 
     def distributed(
         self,

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.estimation.contacts.steering import Headings
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle
+from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
     STRENGTH,
     WheelModels,
@@ -24,6 +25,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import NAN
 
 # Tuned on simulated drives with locked wheels, seeds 1000 to 1019, unless said otherwise.
 _SLIDING_RATIO = 3.0
@@ -55,35 +57,37 @@ class StationaryWheels:
         self._rover, self._layout, self._models = rover, layout, models
         self._gain_std = sensors.torque_gain_std
 
-    def pulls(
-        self,
-        x: FloatArray,
-        torques: FloatArray,
-        loads: FloatArray,
-        *,
-        yaw_rate: float,
-        headings: Headings,
-        lateral_motion: float,
-    ) -> FloatArray:
+    def update(
+        self, x: FloatArray, cycle: Cycle
+    ) -> tuple[tuple[float, ...], list[StationaryPull | None]]:
+        """Return the pulls of a cycle at a state `x` (size,), and what to expect of each wheel.
+
+        Pulls are [N], nan where no torque tells; None stands for a wheel that turns.
+        """
+        loads, share = cycle.loads, cycle.loads.slope_share
+        told = [
+            not (turns or isnan(rim) or isnan(torque)) and load >= LEAST_LOAD
+            for turns, rim, torque, load in zip(
+                cycle.turns, cycle.rims, cycle.torque, loads.load, strict=True
+            )
+        ]
+        pulls = [NAN] * len(told)
+        if any(told):
+            pulls = np.where(told, self._pulls(x, cycle), NAN).tolist()
+        return tuple(pulls), [
+            None if turns else self.expectation(pull, load, share, cycle.lateral_motion)
+            for turns, pull, load in zip(cycle.turns, pulls, loads.load, strict=True)
+        ]
+
+    def _pulls(self, x: FloatArray, cycle: Cycle) -> FloatArray:
         """Return the pulls of wheels that stand, from their torques, (n,) [N]; nan without one.
 
         A locked wheel slides: its shear is saturated, and torque gives the pull whatever the
         strength of the soil. Where its hub stands too, torque and pull balance about the hub. A
         torque that drives a wheel which is dragged is not the soil's: its drive is jammed.
-
-        Parameters
-        ----------
-        x : numpy.ndarray
-            (size,) state.
-        torques, loads : numpy.ndarray
-            (n,) [N m], [N].
-        yaw_rate, lateral_motion : float
-            Turning of the rover [rad/s], [-].
-        headings : Headings
-            Of the wheels.
         """
-        rover = self._rover
-        speed = headings.speeds(float(x[SPEED]), yaw_rate)
+        rover, torques, loads = self._rover, np.array(cycle.torque), np.array(cycle.loads.load)
+        speed = cycle.headings.speeds(float(x[SPEED]), cycle.yaw_rate)
         held = np.clip(torques / np.array(rover.shear_radius), -loads, loads)
         direction = np.where(speed > 0.0, 1.0, -1.0)
         forces = self._models.forces(
@@ -97,7 +101,7 @@ class StationaryWheels:
             )
         )
         by_torque, by_pull = forces.d_torque[STRENGTH], forces.d_pull[STRENGTH]
-        jammed = (direction * torques > 0.0) & (lateral_motion < _STRAIGHT)
+        jammed = (direction * torques > 0.0) & (cycle.lateral_motion < _STRAIGHT)
         tells = (by_torque != 0.0) & ~jammed
         gain = np.where(tells, by_pull / np.where(tells, by_torque, 1.0), 0.0)
         pull = forces.pull + gain * (direction * torques - forces.torque)

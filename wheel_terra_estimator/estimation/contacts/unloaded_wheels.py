@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, median
 
@@ -36,45 +36,31 @@ class UnloadedWheels(Component[UnloadedState]):
     """Finds wheels without load."""
 
     def __init__(self, rover: Rover, sensors: SensorFigures) -> None:
-        n = rover.wheel_count
+        n, self._low_rim = rover.wheel_count, rover.low_rim
         super().__init__(UnloadedState((False,) * n, (NAN,) * n))
         self._noise = sensors.torque_std + sensors.torque_zero_std
 
-    def update(
-        self,
-        time: float,
-        rolling: Sequence[int],
-        torque: Floats,
-        rim_speed: Floats,
-        lateral_motion: float,
-    ) -> UnloadedState:
-        """Judge the wheels at a time [s].
-
-        Parameters
-        ----------
-        time : float
-            [s].
-        rolling : sequence of int
-            Wheels that turn and whose torque was read.
-        torque, rim_speed : tuple of float
-            Of all wheels [N m], [m/s]; nan = unknown.
-        lateral_motion : float
-            Of the outer wheels over the fastest rim speed [-].
-        """
-        state = self.state
+    def update(self, cycle: Cycle) -> UnloadedState:
+        """Judge the wheels in a cycle."""
+        state, torque, rims, time = self.state, cycle.torque, cycle.rims, cycle.time
+        rolling = [  # and its torque was read
+            i
+            for i, (rim, read) in enumerate(zip(rims, torque, strict=True))
+            if abs(rim) > self._low_rim and not isnan(read)
+        ]
         if len(rolling) < 2:
             # One wheel cannot be compared with another.
             if not all(isnan(value) for value in torque):
                 self.state = state._replace(unloaded=(False,) * len(torque))
             return self.state
         typical = median([torque[i] for i in rolling])
-        middle_rim = median([rim_speed[i] for i in rolling])
+        middle_rim = median([rims[i] for i in rolling])
         telling = abs(typical) > _TELLING_TORQUE * self._noise
-        telling = telling and lateral_motion < _MOST_LATERAL_MOTION
+        telling = telling and cycle.lateral_motion < _MOST_LATERAL_MOTION
         unloaded, since = list(state.unloaded), list(state.since)
         for i in rolling:
             share = torque[i] / typical if telling else 1.0
-            pace = rim_speed[i] / middle_rim if middle_rim else 0.0
+            pace = rims[i] / middle_rim if middle_rim else 0.0
             free = self._seems_free(share, pace, telling=telling, unloaded=unloaded[i])
             if free == unloaded[i]:
                 since[i] = NAN

@@ -11,13 +11,12 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
-from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.filter.torque import ForceRows
-from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 Floats = tuple[float, ...]
@@ -52,15 +51,17 @@ class ForceBalance(ForceRows):
         super().__init__(configuration)
         self._rover, self._sensors, self._layout = rover, sensors, layout
 
-    def sum_of_pulls(self, window: InertialWindow, loads: Floats, curvature: float) -> SumOfPulls:
-        """Return what the mean specific force of a window says of the pulls.
+    def sum_of_pulls(self, cycle: Cycle, curvature: float) -> SumOfPulls:
+        """Return what the mean specific force of a cycle says of the pulls.
 
         On curved ground (slope per travel, [rad/m]) the wheels' own slopes differ from the body's.
         """
-        rover, sensors = self._rover, self._sensors
+        rover, sensors, window = self._rover, self._sensors, cycle.window
         force = window.mean_force()
         weight = rover.mass * force[2]
-        uphill = curvature * sum(w * x for w, x in zip(loads, rover.longitudinal, strict=True))
+        uphill = curvature * sum(
+            w * x for w, x in zip(cycle.loads.load, rover.longitudinal, strict=True)
+        )
         std = window.stated.specific_force_std or sensors.specific_force_std
         noise = std**2 / window.readings
         if window.duration > 0.0:
@@ -74,11 +75,10 @@ class ForceBalance(ForceRows):
         ekf: GatedFilter,
         forces: ContactForces,
         total: SumOfPulls,
+        cycle: Cycle,
         *,
         stationary: Sequence[StationaryPull | None],
-        headings: Headings,
-        loads: Floats,
-        model_variance: Floats,
+        model_variance: float,
         repeats: float,
     ) -> Row:
         """Return the row of a cycle.
@@ -91,17 +91,16 @@ class ForceBalance(ForceRows):
             Of all wheels.
         total : SumOfPulls
             What the specific force says.
+        cycle : Cycle
+            With loads and headings.
         stationary : sequence of StationaryPull or None
             Of each wheel; None where it turns.
-        headings : Headings
-            Of the wheels.
-        loads : tuple of float
-            [N].
-        model_variance : tuple of float
-            Of the shear model of each wheel, over its square [-].
+        model_variance : float
+            Of the shear model, over its square [-].
         repeats : float
             Cycles that are one piece of information.
         """
+        headings, loads = cycle.headings, cycle.loads.load
         if headings.steered:
             jacobian = np.array(headings.along) @ forces.pull_rows
         else:
@@ -112,7 +111,7 @@ class ForceBalance(ForceRows):
             open_variance += side * side
             if standing is None:
                 pull_sum += along * float(forces.pull[i])
-                open_variance += model_variance[i] * (_MODEL_SHARE * load) ** 2
+                open_variance += model_variance * (_MODEL_SHARE * load) ** 2
                 open_variance += float(forces.pull_noise[i]) ** 2
             else:
                 pull_sum += along * standing.expected

@@ -11,8 +11,9 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import smoothed_slopes
-from wheel_terra_estimator.estimation.contacts.steering import Headings
+from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
@@ -33,7 +34,6 @@ Floats = tuple[float, ...]
 _RESTING_WALK = 1e-10  # of a wheel that does not turn [m^2/s]
 _LIFTED_WALK = 1e-4  # of a wheel in the air [m^2/s]
 _WALK = 1e-9  # [m^2/s]
-_LEAST_LOAD = 1e-3  # [N]: less is in the air
 _SPIN_TRAVEL = 0.1  # of the slip velocity that counts as travel over new soil
 _SPIN_RELAXATION = 0.3  # of it that counts for the relaxation
 _LEAST_CONTACT = 0.02  # length of a contact [m]
@@ -98,64 +98,34 @@ class SinkageProcess(Component[SinkageState]):
         """Take the derivatives anew: the wheels stand."""
         self.state = self.state._replace(slopes=self._start.slopes)
 
-    def predict(
-        self,
-        prediction: Prediction,
-        x: FloatArray,
-        dt: float,
-        *,
-        rims: Floats,
-        loads: Floats,
-        yaw_rate: float,
-        headings: Headings,
-        leaving_angles: Floats,
-        reference_known: bool,
-    ) -> float:
-        """Add the sinkages to a prediction from a state `x` over `dt` [s]; return the travel [m].
-
-        Parameters
-        ----------
-        prediction : Prediction
-            Is changed.
-        x : numpy.ndarray
-            (size,) state before.
-        dt : float
-            [s].
-        rims, loads, leaving_angles : tuple of float
-            Of each wheel [m/s], [N], [rad]; nan = unknown.
-        yaw_rate : float
-            [rad/s].
-        headings : Headings
-            Of the wheels.
-        reference_known : bool
-            Whether a reference velocity tells the slip.
-        """
-        layout = self._layout
+    def predict(self, prediction: Prediction, x: FloatArray, cycle: Cycle) -> float:
+        """Add the sinkages to a prediction from a state `x` (size,); return the travel [m]."""
+        layout, rims, loads, dt = self._layout, cycle.rims, cycle.loads.load, cycle.dt
         entries = range(layout.size)[layout.sinkage]
         turning = np.array([abs(rim) >= self._rover.rest_speed for rim in rims])  # known ones
-        loaded = np.array(loads) > _LEAST_LOAD
+        loaded = np.array(loads) > LEAST_LOAD
         prediction.Q[entries, entries] = np.where(turning, _LIFTED_WALK, _RESTING_WALK) * dt
         if not turning.any():
             return 0.0
         rim = np.where(turning, rims, 1.0)
         direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
-        speed = direction * headings.speeds(float(x[SPEED]), yaw_rate)
+        speed = direction * cycle.headings.speeds(float(x[SPEED]), cycle.yaw_rate)
         travel = np.abs(speed) + _SPIN_TRAVEL * np.abs(rim - speed)
         relaxes = turning & loaded
         if relaxes.any():
-            measured = np.array(leaving_angles)
+            measured = np.array(cycle.leaving_angles)
             states = WheelStates(
                 speed / rim,
                 x[layout.sinkage],
-                np.maximum(loads, _LEAST_LOAD),
+                np.maximum(loads, LEAST_LOAD),
                 float(x[SHEAR_STRENGTH]),
                 float(x[SHEAR_MODULUS]),
                 leaving_angle=None if np.isnan(measured).all() else measured,
                 stiffness=x[layout.stiffness],
                 slip_sinkage=float(x[SLIP_SINKAGE]),
             )
-            share = 1.0 if reference_known else _LAW_SHARE
-            by_speed = share * direction * np.array(headings.by_speed)
+            share = 1.0 if cycle.reference_known else _LAW_SHARE
+            by_speed = share * direction * np.array(cycle.headings.by_speed)
             self._relax(prediction, states, _Motion(speed, rim, by_speed, dt), relaxes)
         return dt * float(travel[turning].sum()) / len(rims)
 

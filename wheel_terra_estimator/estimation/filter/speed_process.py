@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.contacts.steering import Headings
+from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
 from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
@@ -108,34 +108,6 @@ class SpeedStep(NamedTuple):
     variance: float
     wheel_weight: float = 1.0
     """Share of the prediction with the wheels in it."""
-
-
-class RimSpeeds(NamedTuple):
-    """Rim speeds without the share that turning and steering have in them [m/s]; nan = unknown."""
-
-    each: Floats
-    typical: float
-    """Median of the known ones, so that no single wheel decides; nan = none is known."""
-
-    @classmethod
-    def of(cls, rims: Floats, yaw_rate: float, headings: Headings) -> RimSpeeds:
-        """Take turning [rad/s] and steering off: the body speed that each wheel asks for."""
-        if headings.steered:
-            each = tuple([headings.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)])
-        else:  # each rolls along with the body
-            each = tuple(
-                [
-                    rim - by_yaw_rate * yaw_rate
-                    for rim, by_yaw_rate in zip(rims, headings.by_yaw_rate, strict=True)
-                ]
-            )
-        heard = known(each)
-        return cls(each, median(heard) if heard else NAN)
-
-    def oppose(self, speed: float) -> bool:
-        """Tell whether all wheels turn against a speed of the body [m/s]; in a spin some do not."""
-        heard = known(self.each)
-        return bool(heard) and all(speed * rim < 0.0 for rim in heard)
 
 
 class PastDrive(NamedTuple):

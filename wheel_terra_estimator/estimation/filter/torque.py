@@ -11,6 +11,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.filter.consistency import distrusted, smoothed_nis
 from wheel_terra_estimator.estimation.filter.correlation import SAME_GROUND
@@ -67,15 +68,16 @@ class TorqueUpdate(ForceRows):
         self,
         ekf: GatedFilter,
         forces: ContactForces,
+        cycle: Cycle,
         *,
-        torque: Floats,
         variance: float,
-        turning: tuple[bool, ...],
-        model_variance: Floats,
+        model_variance: float,
         repeats: float,
-        reference_known: bool,
     ) -> list[Row]:
         """Return the rows of the torques of a cycle.
+
+        Without a reference velocity the slip follows what all torques say, and only little what
+        they differ by.
 
         Parameters
         ----------
@@ -83,19 +85,14 @@ class TorqueUpdate(ForceRows):
             At whose state the forces were worked out.
         forces : ContactForces
             Of all wheels.
-        torque : tuple of float
-            Readings [N m], nan = none.
+        cycle : Cycle
+            With the readings.
         variance : float
             Of a reading [N^2 m^2].
-        turning : tuple of bool
-            Wheels for which the models hold.
-        model_variance : tuple of float
-            Of the shear model of each wheel, over its square [-].
+        model_variance : float
+            Of the shear model, over its square [-].
         repeats : float
             Cycles that are one piece of information.
-        reference_known : bool
-            Without a reference velocity the slip follows what all torques say, and only little what
-            they differ by.
         """
         rows = []
         H, zeros = forces.torque_rows, self.zeros(ekf.mean)
@@ -104,15 +101,15 @@ class TorqueUpdate(ForceRows):
             H[self._ones] = 1.0
         priors = np.einsum('ij,ij->i', H @ ekf.covariance, H).tolist()
         models, noises = forces.torque.tolist(), forces.torque_noise.tolist()
-        for i, reading in enumerate(torque):
-            if isnan(reading) or not turning[i]:
+        for i, reading in enumerate(cycle.torque):
+            if isnan(reading) or not cycle.turns[i]:
                 continue
             model = models[i]
             noise = variance + (self._load_std * model) ** 2 + _FLOOR_VARIANCE
-            total = repeats * noise + model_variance[i] * model**2
+            total = repeats * noise + model_variance * model**2
             total += noises[i] ** 2
             rows.append(self.row(Row(reading - zeros[i] - model, H[i], total), priors[i]))
-        if reference_known or len(rows) < _LEAST_APART:
+        if cycle.reference_known or len(rows) < _LEAST_APART:
             return rows
         return _independent(rows, _APART_STD * float(np.abs(forces.torque).mean()), repeats)
 

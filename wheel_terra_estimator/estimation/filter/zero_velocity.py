@@ -8,9 +8,10 @@ from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import SPEED
-from wheel_terra_estimator.estimation.inputs.inertial import GyroZero, InertialWindow
+from wheel_terra_estimator.estimation.inputs.inertial import GyroZero
 from wheel_terra_estimator.estimation.scalars import NAN
 
 # Tuned on simulated drives, seeds 1000 to 1019.
@@ -48,34 +49,13 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         """Say whether all wheels stand."""
         return not isnan(self.state.since)
 
-    def update(
-        self,
-        ekf: GatedFilter,
-        time: float,
-        *,
-        still: bool,
-        sliding: bool,
-        window: InertialWindow,
-        yaw_rate: float,
-    ) -> None:
+    def update(self, ekf: GatedFilter, cycle: Cycle, *, sliding: bool) -> None:
         """Fuse what the wheels say of a rover that stands.
 
-        Parameters
-        ----------
-        ekf : GatedFilter
-            Is updated.
-        time : float
-            [s].
-        still : bool
-            Whether all wheels stand.
-        sliding : bool
-            Whether a reference says that the rover slides on them.
-        window : InertialWindow
-            IMU readings of the cycle.
-        yaw_rate : float
-            [rad/s].
+        `sliding` says that by a reference it slides on them.
         """
-        if not still:
+        time, window, yaw_rate = cycle.time, cycle.window, cycle.yaw_rate
+        if not cycle.still:
             if self.standing():
                 self.state = self.state._replace(since=NAN)
             return

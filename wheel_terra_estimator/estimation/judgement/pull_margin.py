@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 
 Floats = tuple[float, ...]
@@ -18,7 +19,6 @@ Floats = tuple[float, ...]
 _SLIPS = (0.3, 0.6, 0.9)
 """Slips at which the pull is tried: traction curves are flat around their top."""
 _PERIOD = 1.0  # [s]
-_LEAST_LOAD = 1e-3  # [N]: less is in the air
 
 
 class MarginState(NamedTuple):
@@ -54,5 +54,5 @@ class PullMargin(Component[MarginState]):
         ratios = 1.0 - np.array(_SLIPS)
         _, pull = self._models.torque_and_pull(wheels._replace(speed_ratio=ratios[:, None]))
         margin = pull.max(axis=0) - demand * wheels.load
-        margin = np.where(wheels.load >= _LEAST_LOAD, margin, 0.0)
+        margin = np.where(wheels.load >= LEAST_LOAD, margin, 0.0)
         self.state = MarginState(tuple(margin.tolist()), time)
