@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Noise as it is seen: of readings on a ramp, of means, of references beside a moving filter."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from parts import SAND, Parts
@@ -12,12 +14,16 @@ from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
 from wheel_terra_estimator.estimation.measurements import StepInputs, WheelOdometry
 
 NAN = float('nan')
-RATES = {'accelerometer': 100.0, 'gyro': 100.0, 'wheel_rate': 10.0, 'torque': 10.0, 'sinkage': 10.0}
+
+
+def sensors():
+    figures = Parts(reader.load(SAND)).sensors
+    return replace(figures, imu_rate=100.0, wheel_odometry_rate=10.0, sinkage_rate=10.0)
 
 
 @pytest.fixture
 def noise():
-    return SeenNoise(Parts(reader.load(SAND)).sensors, RATES)
+    return SeenNoise(sensors())
 
 
 def read(noise, sensor, std, times, slope=0.0, messages=1):
@@ -50,9 +56,8 @@ def test_noise_clearly_beyond_what_is_stated_is_taken_in_its_place(noise):
 
 
 def test_noise_that_nobody_stated_is_taken_as_it_is_seen():
-    parts, times = Parts(reader.load(SAND)), 0.1 * np.arange(400)
-    default = parts.sensors.torque_std
-    silent = SeenNoise(parts.sensors, RATES, given={'sensors.sinkage_std'})
+    times, default = 0.1 * np.arange(400), sensors().torque_std
+    silent = SeenNoise(sensors(), given={'sensors.sinkage_std'})
     assert silent.variance('torque') == default**2
     seen = read(silent, 'torque', 0.1 * default, times)
     assert silent.variance('torque') == pytest.approx(seen**2)
@@ -62,22 +67,19 @@ def test_noise_that_nobody_stated_is_taken_as_it_is_seen():
 
 
 def test_noise_that_messages_of_the_imu_state_is_told_as_stated():
-    noise, times = (
-        SeenNoise(Parts(reader.load(SAND)).sensors, RATES, given=()),
-        0.1 * np.arange(400),
-    )
-    noise.take_stated(StatedNoise(angular_rate_std=0.0005))
+    noise, times = SeenNoise(sensors(), given=()), 0.1 * np.arange(400)
+    by_imu = StatedNoise(angular_rate_std=0.0005)
     seen = read(noise, 'gyro', 0.02, times)
-    assert noise.report()['gyro_noise_stated_rad_s'] == 0.0005
-    words = noise.in_words()
+    assert noise.report(by_imu)['gyro_noise_stated_rad_s'] == 0.0005
+    words = noise.in_words(by_imu)
     assert list(words) == ['default']  # vibration is no fault
     assert f'gyro noise {seen / 0.0005:.0f} times what is stated' in words['default']
     assert '(covariance of imu/data, or sensors.angular_rate_std: ' in words['default']
 
 
 def test_what_nobody_stated_is_known_after_the_first_seconds():
-    sensors, rng = Parts(reader.load(SAND)).sensors, np.random.default_rng(8)
-    told, silent = SeenNoise(sensors, RATES), SeenNoise(sensors, RATES, given=())
+    rng = np.random.default_rng(8)
+    told, silent = SeenNoise(sensors()), SeenNoise(sensors(), given=())
     for i in range(120):
         odometry = WheelOdometry(0, np.full(6, 0.5), 3.0 + 0.02 * rng.normal(size=6))
         for noise in (told, silent):
@@ -94,9 +96,9 @@ def test_steps_and_gaps_are_no_noise(noise):
         value = 0.02 * (i // 100) + std * rng.normal()  # a wheel enters another rut
         noise.read('sinkage', float(time), (value, NAN))
     assert noise.seen('sinkage') == pytest.approx(std, rel=0.3)
-    before = noise.state.sinkage.readings
+    before = noise.state.channels['sinkage'].readings
     noise.read('sinkage', 100.0, (0.5, 0.5))
-    assert noise.state.sinkage.readings == before
+    assert noise.state.channels['sinkage'].readings == before
 
 
 @pytest.mark.parametrize('factor', [0.5, 1.0, 4.0])

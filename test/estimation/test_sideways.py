@@ -13,14 +13,20 @@ from wheel_terra_estimator.estimation.sideways import (
     UNKNOWN_ANGLE_STD,
     SidewaysInputs,
     SidewaysMotion,
-    SidewaysRover,
 )
 from wheel_terra_estimator.simulation import scenario as scenarios
 from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.drive import START, Drive
 
 X, Y = (0.4, 0.4, -0.4, -0.4), (0.3, -0.3, 0.3, -0.3)
-ROVER = SidewaysRover(X, Y, (0.12,) * 4, (0.12,) * 4, 40.0, 0.002)
+ROVER = SimpleNamespace(
+    longitudinal=X,
+    lateral=Y,
+    rim_radius=(0.12,) * 4,
+    width=(0.12,) * 4,
+    mass=40.0,
+    rest_speed=0.002,
+)
 STRAIGHT = SidewaysInputs(
     speed=0.08,
     speed_std=0.002,

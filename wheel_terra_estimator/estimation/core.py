@@ -83,7 +83,6 @@ class EstimatorCore:
         estimator: Estimator | None = None,
         judged_by: Callable[[Configuration], InputJudge] | None = None,
     ) -> None:
-        self._judged_by = judged_by
         self._estimator = estimator or _estimator(configuration)
         self._judge = judged_by(configuration) if judged_by else None
         self._settings = _time_settings(configuration)

@@ -118,6 +118,7 @@ them: 2 kg and 900 kg have no newton metres in common."""
 class SensorFigures:
     """Standard deviations and rates of the sensors, as in the keys ``sensors.*``."""
 
+    wheel_odometry_rate: float  # [Hz]
     wheel_rate_std: float  # [rad/s]
     torque_std: float  # [N m]
     torque_zero_std: float
@@ -128,6 +129,7 @@ class SensorFigures:
     angular_rate_std: float  # [rad/s], per message
     angular_rate_bias_std: float
     orientation_std: float  # [rad]
+    sinkage_rate: float  # [Hz]
     sinkage_std: float  # [m]
     sinkage_zero_std: float
     leaving_angle_std: float  # [rad]

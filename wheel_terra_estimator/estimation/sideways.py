@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.rover import Rover
 
 Floats = tuple[float, ...]
 
@@ -48,26 +48,6 @@ _SPEED_SHARE = 0.02  # of the speed: lateral speed that nothing here tells
 _MEMORY = 5.0  # travel over which what a reference told of the model fades [m]
 _SMOOTHING = 0.5  # time constant of the felt force: vibration slides no wheel [s]
 _BLIND_FORCE = 2.0  # lateral specific force without an accelerometer [m/s^2]
-
-
-class SidewaysRover(NamedTuple):
-    """Constants of a rover; one entry per wheel."""
-
-    longitudinal: Floats  # x [m]
-    lateral: Floats  # y [m]
-    radius: Floats  # of the rim [m]
-    width: Floats  # [m]
-    mass: float  # [kg]
-    rest_speed: float  # [m/s]
-
-    @classmethod
-    def of(cls, configuration: Configuration) -> SidewaysRover:
-        """Return the constants of a configuration."""
-        wheels = configuration.wheels
-        per_wheel = (wheels.x, wheels.y, wheels.radius, wheels.width)
-        x, y, radius, width = (tuple(map(float, values)) for values in per_wheel)
-        mass = float(configuration.rover.mass)
-        return cls(x, y, radius, width, mass, float(configuration.rest_speed))
 
 
 class SidewaysInputs(NamedTuple):
@@ -135,7 +115,7 @@ class SidewaysState(NamedTuple):
 class SidewaysMotion(Component[SidewaysState]):
     """Follows how the rover slides sideways."""
 
-    def __init__(self, rover: SidewaysRover) -> None:
+    def __init__(self, rover: Rover) -> None:
         super().__init__(SidewaysState())
         self._rover = rover
 
@@ -254,8 +234,8 @@ class _Contacts(NamedTuple):
     strength: FloatArray  # greatest force [N]
 
 
-def _contacts(rover: SidewaysRover, given: SidewaysInputs) -> _Contacts:
-    radius = np.array(rover.radius)
+def _contacts(rover: Rover, given: SidewaysInputs) -> _Contacts:
+    radius = np.array(rover.rim_radius)
     entry = np.arccos(1.0 - np.minimum(np.maximum(given.sinkage, 1e-4) / radius, 1.0))
     swept = _CONTACT_SHARE * entry
     strength = given.tan_friction * np.array(given.loads)
@@ -291,9 +271,7 @@ def _wheel_forces(
     return np.asarray(-strength * share * aside / displacement)
 
 
-def model_speed(
-    rover: SidewaysRover, given: SidewaysInputs, contacts: _Contacts
-) -> tuple[float, float]:
+def model_speed(rover: Rover, given: SidewaysInputs, contacts: _Contacts) -> tuple[float, float]:
     """Return the lateral speed of the body by forces alone [m/s], and its variance."""
     pace = _pace(rover, given)
     felt, felt_std = _felt_force(rover, given)
@@ -317,13 +295,13 @@ def model_speed(
     return lateral, variance + (_SPEED_SHARE * pace) ** 2
 
 
-def _pace(rover: SidewaysRover, given: SidewaysInputs) -> float:
+def _pace(rover: Rover, given: SidewaysInputs) -> float:
     turning = abs(given.yaw_rate) * max(abs(y) for y in rover.lateral)
     rims = [abs(rim) for rim in given.rims if not isnan(rim)]
     return max(abs(given.speed) + turning, *rims) if rims else abs(given.speed) + turning
 
 
-def _felt_force(rover: SidewaysRover, given: SidewaysInputs) -> tuple[float, float]:
+def _felt_force(rover: Rover, given: SidewaysInputs) -> tuple[float, float]:
     """Return the sum of lateral forces along y of the body that is felt, and its deviation [N]."""
     weight = sum(given.loads)
     pulled = sum(f * math.sin(d) for f, d in zip(given.pulls, given.steering, strict=True))

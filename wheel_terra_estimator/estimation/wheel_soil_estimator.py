@@ -104,7 +104,6 @@ from wheel_terra_estimator.estimation.scalars import NAN, known, median
 from wheel_terra_estimator.estimation.sideways import (
     SidewaysInputs,
     SidewaysMotion,
-    SidewaysRover,
 )
 from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 from wheel_terra_estimator.estimation.taught import Taught, Teaching, with_model_errors
@@ -179,18 +178,7 @@ class WheelSoilEstimator:
         self._wheels = WheelOdometryInput(rover, sensors)
         self._sinkages = SinkageInput(rover.wheel_count)
         self._leaving_angles = LeavingAngleInput(rover.wheel_count)
-        figures = configuration.sensors
-        self._noise = SeenNoise(
-            sensors,
-            {
-                'accelerometer': figures.imu_rate,
-                'gyro': figures.imu_rate,
-                'wheel_rate': figures.wheel_odometry_rate,
-                'torque': figures.wheel_odometry_rate,
-                'sinkage': figures.sinkage_rate,
-            },
-            given=configuration.stated,
-        )
+        self._noise = SeenNoise(sensors, given=configuration.stated)
         # Wheels on the ground.
         self._steering = Steering(rover)
         self._turning = Turning(rover, sensors)
@@ -220,7 +208,7 @@ class WheelSoilEstimator:
         self._slips = SlipJudge(rover, sensors)
         self._margin = PullMargin(rover.wheel_count, models)
         self._slopes = SlopeCurve()
-        self._sideways = SidewaysMotion(SidewaysRover.of(configuration))
+        self._sideways = SidewaysMotion(rover)
         self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
         self._outputs = Outputs(configuration, rover, sensors, layout)
         self._learned = Learned(
@@ -308,7 +296,6 @@ class WheelSoilEstimator:
 
     def _begin_with(self, stated: StatedNoise, before: StatedNoise = NOTHING_STATED) -> None:
         """Start from what the messages of the IMU state of their noise."""
-        self._noise.take_stated(stated)
         if stated.orientation_std != before.orientation_std:
             std = gravity_bias_std(self._rover, self._sensors, stated.orientation_std)
             self._ekf.set(GRAVITY_BIAS, float(self._ekf.mean[GRAVITY_BIAS]), std**2)
@@ -826,7 +813,7 @@ class WheelSoilEstimator:
         zero = self._zero_velocity.state.zero
         report['gyro_zero_yaw_rad_s'] = float(f'{zero.yaw:.3g}')
         report['accelerometer_bias_m_s2'] = float(f'{float(self._ekf.mean[GRAVITY_BIAS]):.3g}')
-        report |= self._noise.report()
-        for than, words in self._noise.in_words().items():
+        report |= self._noise.report(self._inertial.stated)
+        for than, words in self._noise.in_words(self._inertial.stated).items():
             report[f'noise_beyond_{than}'] = words
         return report

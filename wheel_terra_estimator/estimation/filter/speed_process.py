@@ -164,30 +164,17 @@ class SpeedProcess(Component[SpeedState]):
         )
         self._rover, self._sensors = rover, sensors
         self._equilibrium_slip = UsualSlip(configuration, rover)
-        self._noise = self._acceleration_noise(
-            StatedNoise(sensors.specific_force_std, 0.0, sensors.orientation_std)
-        )
         self._rim_noise = _RATE_NOISE * sensors.wheel_rate_std * max(rover.slip_radius)
 
     def acceleration_noise(self, stated: StatedNoise) -> AccelerationNoise:
         """Return the noise of the specific force less gravity; what is not stated by default."""
-        if not any(stated):
-            return self._noise
         sensors = self._sensors
-        return self._acceleration_noise(
-            StatedNoise(
-                stated.specific_force_std or sensors.specific_force_std,
-                0.0,
-                stated.orientation_std or sensors.orientation_std,
-            )
-        )
-
-    def _acceleration_noise(self, stated: StatedNoise) -> AccelerationNoise:
-        attitude = self._rover.gravity * stated.orientation_std
+        force = stated.specific_force_std or sensors.specific_force_std
+        attitude = self._rover.gravity * (stated.orientation_std or sensors.orientation_std)
         # The residual of gravity changes as the rover drives over rough ground.
         leak = _LEAKING_SHARE * attitude
         return AccelerationNoise(
-            stated.specific_force_std**2 / max(self._sensors.imu_rate, 1.0),
+            force**2 / max(sensors.imu_rate, 1.0),
             attitude**2 * _ATTITUDE_TIME,
             _BIAS_WALK**2 + leak**2 * _LEAK_RATE,
         )

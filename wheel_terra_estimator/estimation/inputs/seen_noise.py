@@ -11,9 +11,9 @@ another by the noise of two references.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Container
+from collections.abc import Collection, Container, Mapping
 from math import isnan
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
@@ -57,37 +57,36 @@ class ChannelState(NamedTuple):
     readings: int = 0
 
 
+class Sensor(NamedTuple):
+    """Where the noise of a sensor is stated, and how often it is read."""
+
+    std: str  # of `SensorFigures`, and of the keys ``sensors.*``
+    unit: str  # as in the keys of diagnostics
+    rate: str = ''  # of `SensorFigures`: messages a second
+
+    @property
+    def key(self) -> str:
+        """Key of the standard deviation."""
+        return f'sensors.{self.std}'
+
+
+SENSORS = {
+    'accelerometer': Sensor('specific_force_std', 'm_s2', 'imu_rate'),
+    'gyro': Sensor('angular_rate_std', 'rad_s', 'imu_rate'),
+    'wheel_rate': Sensor('wheel_rate_std', 'rad_s', 'wheel_odometry_rate'),
+    'torque': Sensor('torque_std', 'N_m', 'wheel_odometry_rate'),
+    'sinkage': Sensor('sinkage_std', 'm', 'sinkage_rate'),
+    'reference': Sensor('reference_std', 'm_s'),
+}
+"""The covariance of a reference's message comes before the key."""
+_ALL = frozenset(sensor.key for sensor in SENSORS.values())
+
+
 class SeenNoiseState(NamedTuple):
-    """One entry per sensor."""
+    """What was read of each sensor, and what the last reference states."""
 
-    accelerometer: ChannelState = ChannelState()
-    gyro: ChannelState = ChannelState()
-    wheel_rate: ChannelState = ChannelState()
-    torque: ChannelState = ChannelState()
-    sinkage: ChannelState = ChannelState()
-    reference: ChannelState = ChannelState()
-    reference_stated: float = math.nan  # by its last message [m/s], nan = by none
-    by_imu: StatedNoise = NOTHING_STATED  # what its messages state, where no file does
-
-
-UNITS = {
-    'accelerometer': 'm_s2',
-    'gyro': 'rad_s',
-    'wheel_rate': 'rad_s',
-    'torque': 'N_m',
-    'sinkage': 'm',
-    'reference': 'm_s',
-}
-"""Sensor -> unit in the keys of diagnostics."""
-KEYS = {
-    'accelerometer': 'sensors.specific_force_std',
-    'gyro': 'sensors.angular_rate_std',
-    'wheel_rate': 'sensors.wheel_rate_std',
-    'torque': 'sensors.torque_std',
-    'sinkage': 'sensors.sinkage_std',
-    'reference': 'sensors.reference_std',
-}
-"""Sensor -> where its noise is stated; the covariance of a reference's message comes first."""
+    channels: Mapping[str, ChannelState] = dict.fromkeys(SENSORS, ChannelState())
+    reference_stated: float = 0.0  # [m/s], 0 = nothing
 
 
 class SeenNoise(Component[SeenNoiseState]):
@@ -96,29 +95,17 @@ class SeenNoise(Component[SeenNoiseState]):
     Parameters
     ----------
     sensors : SensorFigures
-        What is stated, or the defaults.
-    rates : dict
-        Messages a second, by sensor.
+        What is stated, or the defaults, and messages a second.
     given : container of str
         Keys that somebody stated, as against defaults; all of them by default.
     """
 
-    def __init__(
-        self,
-        sensors: SensorFigures,
-        rates: dict[str, float],
-        given: Container[str] = frozenset(KEYS.values()),
-    ) -> None:
+    def __init__(self, sensors: SensorFigures, given: Container[str] = _ALL) -> None:
         super().__init__(SeenNoiseState())
-        self._defaults = {sensor for sensor, key in KEYS.items() if key not in given}
-        self._rates = rates  # messages a second, by sensor
-        self.stated = {
-            'accelerometer': sensors.specific_force_std,
-            'gyro': sensors.angular_rate_std,
-            'wheel_rate': sensors.wheel_rate_std,
-            'torque': sensors.torque_std,
-            'sinkage': sensors.sinkage_std,
-            'reference': sensors.reference_std,
+        self._figures = sensors
+        self._defaults = {name for name, sensor in SENSORS.items() if sensor.key not in given}
+        self.stated: dict[str, float] = {
+            name: getattr(sensors, sensor.std) for name, sensor in SENSORS.items()
         }
 
     def take(self, time: float, inputs: StepInputs) -> None:
@@ -130,7 +117,7 @@ class SeenNoise(Component[SeenNoiseState]):
         if int(time) % _ONE_SECOND_IN:
             if time > _FIRST_SECONDS:
                 return
-            skipped = KEYS.keys() - self._defaults
+            skipped = SENSORS.keys() - self._defaults
         found: dict[str, Floats] = {}
         if inputs.inertial is not None:
             found['accelerometer'] = (float(inputs.inertial.specific_force[0]),)
@@ -146,7 +133,7 @@ class SeenNoise(Component[SeenNoiseState]):
 
     def read(self, sensor: str, time: float, values: Floats) -> None:
         """Take a reading (one value per wheel or axis, nan = none) at a time [s]."""
-        state: ChannelState = getattr(self.state, sensor)
+        state = self.state.channels[sensor]
         gap = time - state.time
         variance, count = state.variance, state.readings
         in_step = abs(gap - state.gap) <= _IN_STEP * gap <= _IN_STEP * _LONGEST_GAP
@@ -158,26 +145,22 @@ class SeenNoise(Component[SeenNoiseState]):
             ]
             if bends:
                 # The mean of n messages has an n-th of their variance.
-                messages = max(gap * self._rates[sensor], 1.0)
+                rate: float = getattr(self._figures, SENSORS[sensor].rate)
+                messages = max(gap * rate, 1.0)
                 seen = messages * sum(bends) / (_LINE * len(bends))
                 variance, count = self._mean(sensor, variance, count, seen, _READINGS)
         self._keep(sensor, ChannelState(time, gap, values, state.last, variance, count))
 
     def compare_reference(
-        self,
-        time: float,
-        innovation: float,
-        variance: float,
-        P: float,
-        stated: float = math.nan,
+        self, time: float, innovation: float, variance: float, P: float, stated: float = 0.0
     ) -> None:
         """Take the innovation of a reference [m/s], its variance and that of the speed [(m/s)^2].
 
-        `stated` is the variance in the message [(m/s)^2]; not above zero or nan: none. The speed
+        `stated` is the variance in the message [(m/s)^2]; none where it is not above 0. The speed
         took over the share K = P / (P + R) of the innovation before, so that the difference of two
         has the variance (1 + (1 + K)^2) R.
         """
-        state = self.state.reference
+        state = self.state.channels['reference']
         seen_variance, count = state.variance, state.readings
         if state.last:
             last, gain = state.last
@@ -188,7 +171,7 @@ class SeenNoise(Component[SeenNoiseState]):
                 )
         kept = (innovation, P / (P + variance))
         self._keep('reference', ChannelState(time, 0.0, kept, (), seen_variance, count))
-        own = math.sqrt(stated) if stated > 0.0 else math.nan
+        own = math.sqrt(stated) if stated > 0.0 else 0.0
         self.state = self.state._replace(reference_stated=own)
 
     def _mean(
@@ -204,12 +187,11 @@ class SeenNoise(Component[SeenNoiseState]):
         return clipped(variance, low, high), count
 
     def _keep(self, sensor: str, channel: ChannelState) -> None:
-        changed: dict[str, Any] = {sensor: channel}
-        self.state = self.state._replace(**changed)
+        self.state = self.state._replace(channels={**self.state.channels, sensor: channel})
 
     def seen(self, sensor: str) -> float | None:
         """Return the deviation of one message as seen; None while too few came."""
-        state: ChannelState = getattr(self.state, sensor)
+        state = self.state.channels[sensor]
         least = _TOLD_REFERENCES if sensor == 'reference' else _TOLD_AFTER
         return math.sqrt(state.variance) if state.readings >= least else None
 
@@ -226,60 +208,56 @@ class SeenNoise(Component[SeenNoiseState]):
                 return seen**2
         return seen**2 if seen**2 > _CLEARLY**2 * stated else stated
 
-    def take_stated(self, by_imu: StatedNoise) -> None:
-        """Take what the messages of the IMU state, where no file does."""
-        self.state = self.state._replace(by_imu=by_imu)
+    def _stated(self, sensor: str, by_imu: StatedNoise) -> tuple[float, bool, bool]:
+        """Return the deviation of a message as stated; by the message, and whether more is a fault.
 
-    def _own(self, sensor: str) -> float:
-        """Return the deviation that the sensor's messages state; 0 = none that counts."""
-        if sensor == 'reference':
-            own = self.state.reference_stated
-            return 0.0 if isnan(own) else own
-        by_imu = self.state.by_imu
-        own_ones = {'accelerometer': by_imu.specific_force_std, 'gyro': by_imu.angular_rate_std}
-        return own_ones.get(sensor, 0.0)
-
-    def _stated(self, sensor: str) -> tuple[float, bool]:
-        """Return the deviation of a message as stated, and whether more than that is a fault.
-
-        It is where a file or the message of a reference states it. The message of an IMU states
-        what its sensors have at rest: a rover that vibrates is no fault of anybody.
+        The message of an IMU states what its sensors have at rest: a rover that vibrates is no
+        fault of anybody.
         """
-        own = self._own(sensor)
+        own = {
+            'reference': self.state.reference_stated,
+            'accelerometer': by_imu.specific_force_std,
+            'gyro': by_imu.angular_rate_std,
+        }.get(sensor, 0.0)
         if own:
-            return own, sensor == 'reference'
-        return self.stated[sensor], sensor not in self._defaults
+            return own, True, sensor == 'reference'
+        return self.stated[sensor], False, sensor not in self._defaults
 
-    def report(self) -> dict[str, float]:
-        """Return stated and seen noise by key, with the unit at its end."""
+    def report(self, by_imu: StatedNoise = NOTHING_STATED) -> dict[str, float]:
+        """Return stated and seen noise by key, with the unit at its end.
+
+        `by_imu` is what the messages of the IMU state, where no file does.
+        """
         found = {}
-        for sensor, unit in UNITS.items():
-            seen = self.seen(sensor)
+        for name, sensor in SENSORS.items():
+            seen = self.seen(name)
             if seen is not None:
-                found[f'{sensor}_noise_stated_{unit}'] = float(f'{self._stated(sensor)[0]:.3g}')
-                found[f'{sensor}_noise_seen_{unit}'] = float(f'{seen:.3g}')
+                stated, _, _ = self._stated(name, by_imu)
+                found[f'{name}_noise_stated_{sensor.unit}'] = float(f'{stated:.3g}')
+                found[f'{name}_noise_seen_{sensor.unit}'] = float(f'{seen:.3g}')
         return found
 
-    def in_words(self) -> dict[str, str]:
+    def in_words(self, by_imu: StatedNoise = NOTHING_STATED) -> dict[str, str]:
         """Return what is much noisier than stated, and than a default; empty where nothing is.
 
         An IMU that is noisier than its messages state is among the latter.
         """
         words: dict[str, list[str]] = {'stated': [], 'default': []}
-        for sensor in UNITS:
-            seen, (stated, given) = self.seen(sensor), self._stated(sensor)
-            if seen is not None and stated > 0.0 and seen > _MUCH * stated:
-                than = 'what is stated' if given or self._own(sensor) else 'the default'
-                words['stated' if given else 'default'].append(
-                    f'{sensor.replace("_", " ")} noise {seen / stated:.0f} times {than} '
-                    f'({self._where(sensor)}: {seen:.2g})'
+        for name, sensor in SENSORS.items():
+            seen = self.seen(name)
+            if seen is None:
+                continue
+            stated, by_message, binding = self._stated(name, by_imu)
+            if 0.0 < _MUCH * stated < seen:
+                where = sensor.key
+                if by_message:
+                    where = _BY_MESSAGE.get(name, f'covariance of imu/data, or {sensor.key}')
+                than = 'what is stated' if binding or by_message else 'the default'
+                words['stated' if binding else 'default'].append(
+                    f'{name.replace("_", " ")} noise {seen / stated:.0f} times {than} '
+                    f'({where}: {seen:.2g})'
                 )
         return {than: '; '.join(found) for than, found in words.items() if found}
 
-    def _where(self, sensor: str) -> str:
-        """Return where the noise of a sensor can be stated, as far as that counts."""
-        if not self._own(sensor):
-            return KEYS[sensor]
-        if sensor == 'reference':
-            return 'covariance of reference_odom, or sensors.reference_std_floor'
-        return f'covariance of imu/data, or {KEYS[sensor]}'
+
+_BY_MESSAGE = {'reference': 'covariance of reference_odom, or sensors.reference_std_floor'}
