@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -31,19 +30,13 @@ _LEVEL = Climbed()
 NamedSoil = Callable[[FloatArray, FloatArray], tuple[tuple[str, ...], FloatArray, FloatArray]]
 
 
-@dataclass(frozen=True)
-class PlaceToPlace:
-    """By how much soil varies from place to place, one standard deviation of the logarithm [-].
-
-    Mean coefficients of variation of sand within a site (Phoon and Kulhawy 1999, Canadian
-    Geotechnical Journal 36, tables 1 and 3): friction angle 9 %, cone resistance 38 %. The first is
-    12 % of the tangent at 37.6 degrees; the second stands for the stiffness, and for want of a
-    source of its own for the shear deformation modulus too.
-    """
-
-    strength: float = 0.12
-    shear_modulus: float = 0.38
-    stiffness: float = 0.38
+# By how much soil varies from place to place, one standard deviation of the logarithm [-]. Mean
+# coefficients of variation of sand within a site (Phoon and Kulhawy 1999, Canadian Geotechnical
+# Journal 36, tables 1 and 3): friction angle 9 %, cone resistance 38 %. The first is 12 % of the
+# tangent at 37.6 degrees; the second stands for the stiffness, and for want of a source of its own
+# for the shear deformation modulus too.
+_STRENGTH_SPREAD = 0.12
+_STIFFNESS_SPREAD = 0.38
 
 
 class Learned:
@@ -59,8 +52,6 @@ class Learned:
         Covariance of the filter at the start of a run.
     named_soil : callable
         Mean and covariance of the filter -> keys, values and deviations of the soil.
-    spread : PlaceToPlace
-        What is added to the deviations of the soil.
     """
 
     _BISECTIONS = 12  # of the strength: to a ten-thousandth
@@ -71,10 +62,9 @@ class Learned:
         layout: StateLayout,
         start: FloatArray,
         named_soil: NamedSoil,
-        spread: PlaceToPlace = PlaceToPlace(),
     ) -> None:
         self._configuration, self._layout = configuration, layout
-        self._start, self._named_soil, self._spread = start.copy(), named_soil, spread
+        self._start, self._named_soil = start.copy(), named_soil
 
     def values(
         self,
@@ -163,9 +153,9 @@ class Learned:
         """
         wide, stiffness = covariance.copy(), self._layout.stiffness
         for entry, spread in (
-            ((SHEAR_STRENGTH, SHEAR_STRENGTH), self._spread.strength),
-            ((SHEAR_MODULUS, SHEAR_MODULUS), self._spread.shear_modulus),
-            ((stiffness, stiffness), self._spread.stiffness),
+            ((SHEAR_STRENGTH, SHEAR_STRENGTH), _STRENGTH_SPREAD),
+            ((SHEAR_MODULUS, SHEAR_MODULUS), _STIFFNESS_SPREAD),
+            ((stiffness, stiffness), _STIFFNESS_SPREAD),
         ):
             learned, before = float(covariance[entry].mean()), float(self._start[entry].mean())
             wide[entry] = max(learned, min(learned + spread**2, before))

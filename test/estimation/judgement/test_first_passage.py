@@ -6,14 +6,20 @@ import math
 
 import numpy as np
 import pytest
+from parts import SAND
 
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.stuck.forecast import outlook
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
 from wheel_terra_estimator.estimation.judgement.stuck.passage import (
+    DIGGING,
+    RETURN_LENGTH,
+    SCATTER,
     TRAVELS,
-    FirstPassage,
-    SlipProcess,
+    USUAL_SLIP,
+    USUAL_STD,
+    passage_probability,
 )
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
@@ -25,7 +31,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
 )
 
 RIM = 0.05  # [m/s]
-DEFAULTS = StuckSettings()
+DEFAULTS = StuckSettings.from_configuration(reader.load(SAND))
 
 
 def motion(slip, sunk=0.01, std=0.03, radius=0.12):
@@ -43,7 +49,7 @@ def followed(motions):
 
 
 def likely(situation, settings=DEFAULTS):
-    return outlook(situation, FirstPassage(), settings).probability
+    return outlook(situation, settings).probability
 
 
 def sinking(slip, growth=0.0, std=0.03, seconds=20.0, radius=0.12):
@@ -66,16 +72,14 @@ def test_digging_is_what_more_than_half_of_the_wheels_do(sinks, digging):
 
 def simulated(slip, std, deepening, travel, paths=100_000):
     """Share of simulated paths that come above 0.9, in steps of 5 cm, exact in each."""
-    process, rng, step = SlipProcess(), np.random.default_rng(1), 0.05
+    rng, step = np.random.default_rng(1), 0.05
     # The present slip: what is seen and what slips usually are, each with its own weight.
-    weight = process.usual_std**2 / (process.usual_std**2 + std**2)
-    s = process.usual_slip + weight * (slip - process.usual_slip)
+    weight = USUAL_STD**2 / (USUAL_STD**2 + std**2)
+    s = USUAL_SLIP + weight * (slip - USUAL_SLIP)
     s = s + math.sqrt(weight) * std * rng.standard_normal(paths)
-    level = (
-        process.digging * deepening * (process.usual_slip + weight * (slip - process.usual_slip))
-    )
-    rate = 1.0 / process.return_length
-    spread = process.scatter * math.sqrt((1.0 - math.exp(-2.0 * rate * step)) / (2.0 * rate))
+    level = DIGGING * deepening * (USUAL_SLIP + weight * (slip - USUAL_SLIP))
+    rate = 1.0 / RETURN_LENGTH
+    spread = SCATTER * math.sqrt((1.0 - math.exp(-2.0 * rate * step)) / (2.0 * rate))
     there = s > ENTRAPPED_SLIP
     for _ in range(round(travel / step)):
         s = level - (level - s) * math.exp(-rate * step) + spread * rng.standard_normal(paths)
@@ -96,18 +100,17 @@ def simulated(slip, std, deepening, travel, paths=100_000):
     ],
 )
 def test_the_probability_is_that_of_simulated_paths(slip, std, deepening, travel):
-    found = np.interp(travel, TRAVELS, FirstPassage().probability([slip], [std], deepening)[0])
+    found = np.interp(travel, TRAVELS, passage_probability([slip], [std], deepening)[0])
     assert found == pytest.approx(simulated(slip, std, deepening, travel), abs=0.02)
 
 
 def test_it_is_between_0_and_1_and_grows_with_slip_travel_and_digging():
-    passage = FirstPassage()
     slips = np.linspace(-1.0, 1.0, 41)
     for std in (1e-4, 0.1, 0.9):
-        found = passage.probability(slips, [std] * 41, 0.02)
+        found = passage_probability(slips, [std] * 41, 0.02)
         assert (found >= -1e-9).all() and (found <= 1.0 + 1e-9).all()
         assert (np.diff(found, axis=0) > -1e-6).all() and (np.diff(found, axis=1) > -1e-9).all()
-    grown = [passage.probability([0.5], [0.05], d)[0, 15] for d in (-1.0, 0.0, 0.02, 0.05, 9.0)]
+    grown = [passage_probability([0.5], [0.05], d)[0, 15] for d in (-1.0, 0.0, 0.02, 0.05, 9.0)]
     assert grown[0] == grown[1] and grown == sorted(grown) and grown[-1] > 0.95
 
 
@@ -145,17 +148,17 @@ def test_the_first_axle_of_two_that_enters_loose_soil_is_no_entrapment():
 
 @pytest.mark.parametrize('slip', [0.3, 0.7, 0.9])
 def test_the_travel_left_is_that_within_which_it_is_as_likely_as_not(slip):
-    (wheel, *_), _ = outlook(sinking(slip, 0.08, radius=1.0), FirstPassage(), DEFAULTS)
-    course = FirstPassage().probability([slip], [0.03], 0.08)[0]
+    (wheel, *_), _ = outlook(sinking(slip, 0.08, radius=1.0), DEFAULTS)
+    course = passage_probability([slip], [0.03], 0.08)[0]
     assert np.interp(wheel.travel, TRAVELS, course) == pytest.approx(0.5, abs=0.04)
     assert wheel.time == pytest.approx(wheel.travel / RIM)
-    nothing = outlook(sinking(0.2), FirstPassage(), DEFAULTS).wheels[0]
+    nothing = outlook(sinking(0.2), DEFAULTS).wheels[0]
     assert (nothing.travel, nothing.time) == (10.0, 600.0)
 
 
 def test_the_travel_left_ends_where_a_wheel_is_in_too_deep_to_climb_out():
     growth, seconds = 0.03, 20.0
-    (wheel, *_), _ = outlook(sinking(0.35, growth, seconds=seconds), FirstPassage(), DEFAULTS)
+    (wheel, *_), _ = outlook(sinking(0.35, growth, seconds=seconds), DEFAULTS)
     left = (0.4 * 0.12 - growth * RIM * seconds) / growth
     assert wheel.travel == pytest.approx(left, rel=0.05)
     assert wheel.time == pytest.approx(wheel.travel / RIM)
@@ -171,14 +174,14 @@ def test_a_torque_against_the_way_is_a_drag(rim, share):
 
 def test_a_longer_look_ahead_sees_more_of_wheels_that_sink():
     there = sinking(0.4, 0.06)
-    near, far = (likely(there, StuckSettings(horizon=h, travel=0.01)) for h in (2.0, 15.0))
+    near, far = (likely(there, DEFAULTS._replace(horizon=h, travel=0.01)) for h in (2.0, 15.0))
     assert near < 0.2 < 0.4 < far
-    by_travel = likely(there, StuckSettings(horizon=2.0, travel=15.0 * RIM))
+    by_travel = likely(there, DEFAULTS._replace(horizon=2.0, travel=15.0 * RIM))
     assert by_travel == pytest.approx(far)
 
 
 def test_more_likely_than_not_for_half_a_second_raises_the_warning():
-    monitor, since = StuckMonitor(), None
+    monitor, since = StuckMonitor(DEFAULTS), None
     for i in range(400):
         time = 0.1 * i
         found = monitor.update(time, motion(0.45, 0.01 + 0.065 * RIM * time))
@@ -193,7 +196,7 @@ def test_more_likely_than_not_for_half_a_second_raises_the_warning():
 
 def test_wheels_that_dig_in_a_spin_on_the_spot_are_no_entrapment():
     def warned(turning):
-        monitor = StuckMonitor()
+        monitor = StuckMonitor(DEFAULTS)
         found = [
             monitor.update(
                 0.1 * i,

@@ -6,6 +6,7 @@ import math
 import re
 
 import pytest
+from parts import SAND
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
@@ -14,6 +15,8 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     RoverMotion,
     WheelMotion,
 )
+
+SETTINGS = StuckSettings.from_configuration(reader.load(SAND))
 
 
 def wheel(slip, rim=0.05, known=True, torque=math.nan):
@@ -34,7 +37,7 @@ def judge(monitor, time, speed, speed_known, wheels, **more):
 
 def course(rows, dt=0.1, monitor=None, start=0.0):
     """Run rows of wheels; return the assessments."""
-    monitor = monitor or StuckMonitor()
+    monitor = monitor or StuckMonitor(SETTINGS)
     found = []
     for i, wheels in enumerate(rows):
         moving = [w for w in wheels if w.known]
@@ -84,7 +87,7 @@ def test_one_spinning_wheel_raises_nothing():
 
 
 def test_spin_in_place_slip_raises_nothing_by_its_trend():
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     found = [
         judge(monitor, 0.1 * i, 0.0, True, [wheel(min(0.01 * i, 0.7))] * 6, turning=True)
         for i in range(200)
@@ -93,7 +96,7 @@ def test_spin_in_place_slip_raises_nothing_by_its_trend():
 
 
 def test_clears_after_three_seconds_below():
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     stuck = course([[wheel(0.97)] * 6] * 40, monitor=monitor)
     assert stuck[-1].stuck
     out = course([[wheel(0.3)] * 6] * 60, monitor=monitor, start=4.0)
@@ -102,7 +105,7 @@ def test_clears_after_three_seconds_below():
 
 
 def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     rolling = [wheel(0.2, rim=1.0, torque=0.4)] * 4
     stalled = [wheel(0.0, rim=0.0, known=False, torque=0.95)] * 2 + [
         wheel(0.2, rim=1.5, torque=0.1)
@@ -118,7 +121,7 @@ def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
 @pytest.mark.parametrize('spinning', [True, False])
 def test_a_side_that_turns_round_behind_a_spin_is_no_stall(spinning):
     """Left wheels from -0.3 to 0.5 rad/s within a second, near their torque limit at zero."""
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     right = wheel(0.1, rim=0.05, torque=0.3)
     before = [wheel(0.5, rim=-0.045 if spinning else 0.045, torque=0.3), right] * 3
     found = [
@@ -155,7 +158,7 @@ def test_travel_left_shrinks_to_nothing_where_wheels_dig():
 
 @pytest.mark.parametrize('ahead', [1, -1])
 def test_the_direction_is_that_of_the_rims_that_led_in_and_stays_until_it_clears(ahead):
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
 
     def drive(slip, rim, seconds, start):
         rows = [[wheel(slip, rim=ahead * rim, known=rim != 0.0)] * 6] * round(10 * seconds)
@@ -172,7 +175,7 @@ def test_the_direction_is_that_of_the_rims_that_led_in_and_stays_until_it_clears
 
 def stalling(before, seconds):
     """Wheels turn so, [m/s], for some seconds, the last of them on the spot; then two stall."""
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     stalled = [wheel(0.0, rim=0.0, known=False, torque=0.95)] * 2 + [wheel(0.2, torque=0.1)] * 2
     for i in range(round(10 * seconds)):
         rims = before(0.1 * i)
@@ -190,7 +193,7 @@ def test_the_direction_is_unknown_where_the_rims_went_both_ways():
 
 
 def test_memory_comes_back():
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     course([[wheel(0.97)] * 6] * 10, monitor=monitor)
     memory = monitor.snapshot()
     one = course([[wheel(0.97)] * 6] * 20, monitor=monitor, start=1.0)
@@ -200,7 +203,7 @@ def test_memory_comes_back():
 
 
 def test_wheels_that_are_being_stopped_raise_nothing_by_an_early_reference():
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     # The reference stands 0.9 s before the wheels do, as in a recorded stop on firm ground.
     found = []
     for i in range(120):
@@ -215,7 +218,7 @@ def test_wheels_that_are_being_stopped_raise_nothing_by_an_early_reference():
 
 def test_a_stop_on_a_slope_is_no_want_of_power():
     """Wheels that are stopped hold the slope: their torque is what it was, half of the limit."""
-    monitor, found = StuckMonitor(), []
+    monitor, found = StuckMonitor(SETTINGS), []
     for i in range(120):
         rim = min(max(0.05 - 0.02 * max(0.1 * i - 8.0, 0.0), 0.0), 0.05)
         rows = [wheel(0.2, rim=rim, known=rim > 0.002, torque=0.5)] * 4
@@ -224,7 +227,7 @@ def test_a_stop_on_a_slope_is_no_want_of_power():
 
 
 def test_drives_that_give_way_near_their_limit_raise_it_without_any_speed():
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     cruise = [wheel(0.2, rim=1.8, torque=0.4)] * 4
     hard = [wheel(0.2, rim=0.8, torque=0.95)] * 2 + [wheel(0.2, rim=1.75, torque=0.4)] * 2
     steep = [wheel(0.2, rim=1.75, torque=0.75)] * 4
@@ -267,7 +270,7 @@ def test_a_wheel_that_is_dragged_is_not_stalled():
     """Its torque is as great as that of a stalled wheel and works against the drive."""
 
     def stalled(torque):
-        monitor = StuckMonitor()
+        monitor = StuckMonitor(SETTINGS)
         rolling = [wheel(0.2, rim=1.0, torque=0.4)] * 4
         stands = [wheel(-1.0, rim=0.0, known=False, torque=torque)] * 2
         for i in range(30):
@@ -308,16 +311,16 @@ def deepening(settings, per_metre, slip=0.4, seconds=40.0):
 
 
 def test_a_steady_deepening_warns():
-    found = deepening(StuckSettings(), per_metre=0.06)
+    found = deepening(SETTINGS, per_metre=0.06)
     warned = next(i for i, a in enumerate(found) if a.stuck)
     assert 0.1 < found[warned].wheels[0].travel < 2.0
     assert 'rim travel' in found[warned].reason
     # Ground on which wheels sink no further than into their ruts raises nothing.
-    assert first(deepening(StuckSettings(), per_metre=0.01)) is None
+    assert first(deepening(SETTINGS, per_metre=0.01)) is None
 
 
 def test_two_wheels_of_six_that_dig_are_no_entrapment():
-    monitor, found = StuckMonitor(), []
+    monitor, found = StuckMonitor(SETTINGS), []
     for i in range(400):
         sunk = wheel(0.4)._replace(sinkage=min(0.01 + 0.0006 * i, 0.1))
         found.append(judge(monitor, 0.1 * i, 0.03, True, [sunk] * 2 + [wheel(0.4)] * 4))
@@ -334,7 +337,7 @@ def test_the_parameters_of_the_configuration_reach_the_warning():
 
 def test_a_sign_that_is_there_keeps_the_warning():
     """Slip has fallen, but two wheels are still held near their torque limit."""
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     cruise = [wheel(0.2, rim=1.0, torque=0.3)] * 4
     held = [wheel(0.2, rim=1.0, torque=0.3)] * 2 + [
         wheel(0.0, rim=0.1, known=False, torque=0.95)
@@ -355,7 +358,7 @@ def test_a_wheel_whose_slip_is_not_known_or_brakes_has_no_entrapment_in_sight():
 
 
 def test_the_words_say_what_is_seen_and_what_to_do():
-    monitor, found = StuckMonitor(), []
+    monitor, found = StuckMonitor(SETTINGS), []
     for i in range(400):
         slip = min(0.2 + 0.004 * i, 0.85)
         wheels = [wheel(slip)._replace(sinkage=0.01 + 0.04 * 0.05 * 0.1 * i)] * 6
@@ -374,19 +377,19 @@ def test_the_words_say_what_is_seen_and_what_to_do():
 @pytest.mark.parametrize(('speed', 'confirmed'), [(0.0, True), (0.002, True), (0.05, False)])
 def test_a_rover_that_stands_by_a_reference_confirms_the_warning(speed, confirmed):
     """Rim speeds in a wrong unit make slip 0.98 of 5 cm/s, but no speed of zero."""
-    monitor = StuckMonitor()
+    monitor = StuckMonitor(SETTINGS)
     spinning = [wheel(0.98, rim=2.5)._replace(slip_std=0.003 / 2.5)] * 6
     found = [judge(monitor, 0.1 * i, speed, True, spinning) for i in range(30)]
     assert found[-1].stuck and found[-1].confirmed is confirmed
     assert not any(a.confirmed for a in found if not a.stuck)
-    blind = StuckMonitor()
+    blind = StuckMonitor(SETTINGS)
     assert not any(judge(blind, 0.1 * i, speed, False, spinning).confirmed for i in range(30))
 
 
 def test_wheels_at_their_torque_limit_confirm_it_and_torques_far_beyond_do_not():
     """Torques in a wrong unit are a thousand times too great."""
     for torque, confirmed in ((0.95, True), (950.0, False)):
-        monitor = StuckMonitor()
+        monitor = StuckMonitor(SETTINGS)
         for i in range(30):
             judge(monitor, 0.1 * i, 0.0, False, [wheel(0.2, rim=1.0, torque=0.4)] * 4)
         held = [wheel(0.0, rim=0.0, known=False, torque=torque)] * 4
@@ -403,7 +406,7 @@ def test_a_median_above_0_9_is_warned_of_also_right_after_a_start():
 
 @pytest.mark.parametrize('threshold', [0.2, 0.5, 0.8])
 def test_the_threshold_is_the_probability_that_raises_it(threshold):
-    monitor, before, sunk = StuckMonitor(StuckSettings(threshold=threshold)), [], 0.01
+    monitor, before, sunk = StuckMonitor(SETTINGS._replace(threshold=threshold)), [], 0.01
     for i in range(600):
         sunk += 0.0002 * i * 0.05 * 0.1  # more and more per rim travel
         wheels = [wheel(0.4)._replace(sinkage=sunk)] * 6

@@ -19,6 +19,8 @@ from wheel_terra_lab.evaluation.tables import _foresight
 
 STEP = 0.1
 
+SETTINGS = StuckSettings(horizon=15.0, travel=0.3, threshold=0.5, clear_slip=0.6, clear_time=3.0)
+
 
 def drive(slips, rim=0.1, probability=0.0):
     """A drive of two wheels with the same slip, one row in a tenth of a second."""
@@ -34,7 +36,7 @@ def drive(slips, rim=0.1, probability=0.0):
         stuck=np.zeros(slips.size, dtype=bool),
         stuck_probability=np.full((slips.size, 2), probability),
     )
-    return foresight(truth, record, np.full(2, 0.1), StuckSettings(horizon=15.0, travel=0.3))
+    return foresight(truth, record, np.full(2, 0.1), SETTINGS)
 
 
 def test_the_event_lies_within_the_horizon():

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT
-from wheel_terra_estimator.estimation.judgement.stuck.passage import TRAVELS, FirstPassage
+from wheel_terra_estimator.estimation.judgement.stuck.passage import TRAVELS, passage_probability
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import Situation
 from wheel_terra_estimator.estimation.scalars import median
@@ -37,10 +37,10 @@ class Outlook(NamedTuple):
     probability: float  # median of the wheels that tell [-]
 
 
-def outlook(s: Situation, passage: FirstPassage, settings: StuckSettings) -> Outlook:
+def outlook(s: Situation, settings: StuckSettings) -> Outlook:
     """Return what lies ahead in a situation; before a start is over only what is under way."""
     wheels = s.motion.wheels
-    within = passage.probability([w.slip for w in wheels], [w.slip_std for w in wheels], s.digging)
+    within = passage_probability([w.slip for w in wheels], [w.slip_std for w in wheels], s.digging)
     travel = max(settings.horizon * s.fastest, settings.travel) if s.settled else 0.0
     place = min(travel / TRAVELS[1], len(TRAVELS) - 1.0)
     before = min(int(place), len(TRAVELS) - 2)

@@ -19,7 +19,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.forecast import (
     WheelForecast,
     outlook,
 )
-from wheel_terra_estimator.estimation.judgement.stuck.passage import FirstPassage, SlipProcess
+from wheel_terra_estimator.estimation.judgement.stuck.passage import USUAL_STD
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     NEAR_LIMIT,
@@ -38,7 +38,6 @@ that sink, standing (two readings of wheel odometry). Where the rover stops, a r
 to 0.9 s before the wheels do, and none of them sinks."""
 _SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
 _DIGGING_SLIP = 0.8  # median slip above which a rover that drives on digs itself in
-_SETTINGS = StuckSettings()
 
 
 class StuckAssessment(NamedTuple):
@@ -75,15 +74,15 @@ class StuckMonitor(Component[StuckState]):
         The parameters.
     """
 
-    def __init__(self, settings: StuckSettings = _SETTINGS) -> None:
+    def __init__(self, settings: StuckSettings) -> None:
         super().__init__(StuckState())
-        self._settings, self._passage = settings, FirstPassage()
+        self._settings = settings
 
     def update(self, time: float, motion: RoverMotion) -> StuckAssessment:
         """Judge the motion of the rover at a time [s]."""
         old, settings = self.state, self._settings
         situation = observe(old.memory, time, motion)
-        ahead = outlook(situation, self._passage, settings)
+        ahead = outlook(situation, settings)
         likely = ahead.probability > settings.threshold or _digs(situation)
         there = likely and not situation.braked, situation.standing
         since = tuple(
@@ -115,7 +114,7 @@ class StuckMonitor(Component[StuckState]):
 
 
 def _digs(s: Situation) -> bool:
-    return s.settled and s.slip > _DIGGING_SLIP and s.slip_std < SlipProcess.usual_std
+    return s.settled and s.slip > _DIGGING_SLIP and s.slip_std < USUAL_STD
 
 
 def _confirmed(s: Situation) -> bool:

@@ -16,8 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 from scipy.special import ndtr
@@ -29,6 +28,7 @@ from wheel_terra_estimator.estimation.scalars import clipped, median
 _LOWEST = -0.5
 """Lower end of the grid: what comes below stays in its last cell [-]."""
 _CELLS = 48
+_EDGES = np.linspace(_LOWEST, ENTRAPPED_SLIP, _CELLS + 1)
 _STEP = 0.05
 """Rim travel of a step [m]: a second at 5 cm/s, for which an entrapment must last."""
 _STEPS = 80
@@ -38,69 +38,51 @@ _LEVELS = np.linspace(0.0, 1.6, 9) * ENTRAPPED_SLIP
 _LEAST_STD = 1e-3
 
 
-@dataclass(frozen=True)
-class SlipProcess:
-    """Near the greatest likelihood of what came, on tuning drives of simulators A, B and C."""
-
-    return_length: float = 0.3  # L [m]
-    scatter: float = 0.8  # sigma [1/sqrt(m)]
-    digging: float = 45.0  # k [1]: over the present slip and the sinkage gained per rim travel
-    usual_slip: float = 0.06  # of a rover in loose soil
-    usual_std: float = 0.28
-    """Deviation of slips around it: a slip that is hardly known is worth no more than this."""
+# Near the greatest likelihood of what came, on tuning drives of simulators A, B and C.
+RETURN_LENGTH = 0.3  # L [m]
+SCATTER = 0.8  # sigma [1/sqrt(m)]
+DIGGING = 45.0  # k [1]: over the present slip and the sinkage gained per rim travel
+USUAL_SLIP = 0.06  # of a rover in loose soil
+USUAL_STD = 0.28
+"""Deviation of slips around it: a slip that is hardly known is worth no more than this."""
 
 
-class FirstPassage:
-    """The tabulated process.
+def passage_probability(
+    slip: Sequence[float], std: Sequence[float], deepening: float
+) -> FloatArray:
+    """Return the probability within each of the `TRAVELS` for each of n wheels, (n, travels).
 
     Parameters
     ----------
-    process : SlipProcess
-        Its numbers.
+    slip, std : sequence of float
+        Present slip and its standard deviation [-].
+    deepening : float
+        Sinkage gained over rim travel by the rover [m/m]; s_0 is the median slip.
     """
-
-    def __init__(self, process: SlipProcess = SlipProcess()) -> None:
-        self._process = process
-        self._edges = np.linspace(_LOWEST, ENTRAPPED_SLIP, _CELLS + 1)
-        self._table = _table(process)
-
-    def probability(
-        self, slip: Sequence[float], std: Sequence[float], deepening: float
-    ) -> FloatArray:
-        """Return the probability within each of the `TRAVELS` for each of n wheels, (n, travels).
-
-        Parameters
-        ----------
-        slip, std : sequence of float
-            Present slip and its standard deviation [-].
-        deepening : float
-            Sinkage gained over rim travel by the rover [m/m]; s_0 is the median slip.
-        """
-        process = self._process
-        variance = np.square(np.maximum(std, _LEAST_STD))
-        known = process.usual_std**2 / (process.usual_std**2 + variance)
-        mean = process.usual_slip + known * (np.asarray(slip) - process.usual_slip)
-        below = ndtr((self._edges - mean[:, None]) / np.sqrt(known * variance)[:, None])
-        weights = np.diff(below, axis=1)
-        weights[:, 0] += below[:, 0]
-        level = process.digging * max(deepening, 0.0) * clipped(median(mean.tolist()), 0.0, 1.0)
-        place = min(level / _LEVELS[1], len(_LEVELS) - 1 - 1e-9)
-        i = int(place)
-        ahead = (1.0 - place + i) * self._table[i] + (place - i) * self._table[i + 1]
-        return np.asarray(1.0 - below[:, -1:] + weights @ ahead.T)
+    variance = np.square(np.maximum(std, _LEAST_STD))
+    known = USUAL_STD**2 / (USUAL_STD**2 + variance)
+    mean = USUAL_SLIP + known * (np.asarray(slip) - USUAL_SLIP)
+    below = ndtr((_EDGES - mean[:, None]) / np.sqrt(known * variance)[:, None])
+    weights = np.diff(below, axis=1)
+    weights[:, 0] += below[:, 0]
+    level = DIGGING * max(deepening, 0.0) * clipped(median(mean.tolist()), 0.0, 1.0)
+    place = min(level / _LEVELS[1], len(_LEVELS) - 1 - 1e-9)
+    i = int(place)
+    table = _table()
+    ahead = (1.0 - place + i) * table[i] + (place - i) * table[i + 1]
+    return np.asarray(1.0 - below[:, -1:] + weights @ ahead.T)
 
 
-@lru_cache(maxsize=4)
-def _table(process: SlipProcess) -> FloatArray:
+@cache
+def _table() -> FloatArray:
     """Return (levels, travels, cells) the probability from the middle of each cell."""
-    edges = np.linspace(_LOWEST, ENTRAPPED_SLIP, _CELLS + 1)
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    kept = math.exp(-_STEP / process.return_length)
-    std = process.scatter * math.sqrt(0.5 * process.return_length * (1.0 - kept * kept))
+    middle = 0.5 * (_EDGES[1:] + _EDGES[:-1])
+    kept = math.exp(-_STEP / RETURN_LENGTH)
+    std = SCATTER * math.sqrt(0.5 * RETURN_LENGTH * (1.0 - kept * kept))
     found = np.zeros((len(_LEVELS), _STEPS + 1, _CELLS))
     for level, rows in zip(_LEVELS, found, strict=True):
         mean = level + (middle - level) * kept
-        below = ndtr((edges - mean[:, None]) / std)
+        below = ndtr((_EDGES - mean[:, None]) / std)
         absorbed = 1.0 - below[:, -1]
         below[:, 0] = 0.0
         moves = np.diff(below, axis=1)

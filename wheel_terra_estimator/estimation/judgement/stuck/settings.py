@@ -12,11 +12,11 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 class StuckSettings(NamedTuple):
     """The keys ``filter.stuck_*``."""
 
-    horizon: float = 15.0  # [s]
-    travel: float = 0.3  # [m]
-    threshold: float = 0.5  # probability
-    clear_slip: float = 0.6
-    clear_time: float = 3.0  # [s]
+    horizon: float  # [s]
+    travel: float  # [m]
+    threshold: float  # probability
+    clear_slip: float
+    clear_time: float  # [s]
 
     @classmethod
     def from_configuration(cls, configuration: Configuration) -> StuckSettings:
