@@ -135,20 +135,19 @@ def test_a_rover_that_must_pull_more_slips_more_at_once():
     parts = Parts(reader.load(SAND))
     made, mean = process([0.05] * 6), parts.filter().mean.copy()
     mean[[SPEED, SLIP_PER_DEMAND]] = 0.04, 2.0
-    given = {'rim': 0.05, 'demand_change': 0.05}
+    ahead, astern = (parts.cycle([rim] * 6, demand_change=0.05) for rim in (0.05, -0.05))
     climbing = Prediction.unchanged(mean)
-    made.predict(climbing, SpeedStep(1.0, 0.0, 0.0, 1e-9), 0.1, **given)
+    made.predict(climbing, SpeedStep(1.0, 0.0, 0.0, 1e-9), ahead)
     assert climbing.mean[SPEED] == pytest.approx(0.04 - 0.1 * 0.05)
     assert climbing.F[SPEED, SLIP_PER_DEMAND] == pytest.approx(-0.05 * 0.05)
     # Backwards the speed is negative, and loses as much of its size.
     mean[SPEED] = -0.04
     back = Prediction.unchanged(mean)
-    given['rim'] = -0.05
-    made.predict(back, SpeedStep(1.0, 0.0, 0.0, 1e-9), 0.1, **given)
+    made.predict(back, SpeedStep(1.0, 0.0, 0.0, 1e-9), astern)
     assert back.mean[SPEED] == pytest.approx(-0.035)
     # A speed that rests on the accelerometer alone is not changed by it.
     alone = Prediction.unchanged(mean)
-    made.predict(alone, SpeedStep(1.0, 0.0, 0.0, 1e-9, wheel_weight=0.0), 0.1, **given)
+    made.predict(alone, SpeedStep(1.0, 0.0, 0.0, 1e-9, wheel_weight=0.0), astern)
     assert alone.mean[SPEED] == -0.04
 
 
@@ -238,9 +237,8 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
     length = USUAL_LENGTH
 
     def after(travel):
-        return made.towards_equilibrium_slip(
-            free, travel / rim, rim, direction=1.0, slope_share=0.0
-        )
+        cycle = Parts(reader.load(SAND)).cycle([rim] * 6, dt=travel / rim)
+        return made.towards_equilibrium_slip(free, cycle, 1.0)
 
     assert after(length).speed_gain == pytest.approx(np.exp(-1.0))
     usual = after(1e3 * length).constant
@@ -265,7 +263,7 @@ def test_a_start_up_transient_is_removed_and_nothing_else(speed, kept):
     made = process([0.06] * 6)
     ekf = Parts(reader.load(SAND)).filter()
     ekf.set(SPEED, speed, 1e-6)
-    made.remove_start_transient(ekf, 0.06)
+    made.remove_start_transient(ekf, Parts(reader.load(SAND)).cycle([0.06] * 6))
     expected = speed if kept else 0.8 * 0.06
     assert ekf.mean[SPEED] == pytest.approx(expected)
 

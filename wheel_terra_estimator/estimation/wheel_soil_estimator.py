@@ -25,22 +25,22 @@ from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import (
     ContactForces,
     Linearisation,
+    contact_states,
     turning_wheels,
 )
-from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
+from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.measured_wheels import (
     SpeedAndVariance,
     intersected,
     slip_of_torque,
 )
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
-from wheel_terra_estimator.estimation.contacts.ruts import Ruts, contact_depths, curvature_of
+from wheel_terra_estimator.estimation.contacts.ruts import Ruts, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
 from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestClimb
 from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.filter.consistency import excess
 from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
@@ -64,10 +64,7 @@ from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProce
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import SpeedProcess
 from wheel_terra_estimator.estimation.filter.state import (
-    CENTROID,
     GRAVITY_BIAS,
-    MOUND,
-    RUT_SHARE,
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
     SPEED,
@@ -272,7 +269,8 @@ class WheelSoilEstimator:
             stated = inputs.reference.lateral_variance or self._sensors.reference_std**2
             floor = self._sensors.reference_std_floor**2
             self._sideways.correct(inputs.reference.lateral, max(stated, floor))
-        if inputs.reference is not None or (self._cycle_is_due(time) and (rolled or silent)):
+        is_due = (rolled or silent) and self._is_due(time, self._speed.state.cycle_time)
+        if inputs.reference is not None or is_due:
             self._run_cycle(time, inputs.reference)
         if rolled or silent:
             self._judge(time)
@@ -300,8 +298,8 @@ class WheelSoilEstimator:
             std = gravity_bias_std(self._rover, self._sensors, stated.orientation_std)
             self._ekf.set(GRAVITY_BIAS, float(self._ekf.mean[GRAVITY_BIAS]), std**2)
 
-    def _cycle_is_due(self, time: float) -> bool:
-        before = self._speed.state.cycle_time
+    def _is_due(self, time: float, before: float) -> bool:
+        """Return whether the period is over that began `before` [s]; nan = it never did."""
         return isnan(before) or time - before >= self._rover.period - _PERIOD_ROUNDING
 
     # -- One cycle of the filter -----------------------------------------------------------------
@@ -317,9 +315,7 @@ class WheelSoilEstimator:
         )
         self._predict(cycle)
         if not cycle.reference_known and not self._contact_age.settled:
-            self._speed.remove_start_transient(
-                ekf, cycle.yaw_compensated.typical, cycle.window.stated
-            )
+            self._speed.remove_start_transient(ekf, cycle)
 
         if reference is not None:
             self._fuse_reference(cycle, reference)
@@ -421,7 +417,7 @@ class WheelSoilEstimator:
             loads=loads,
             turns=turning_wheels(rover, rims, loads.load),
             reference_known=reference_known,
-            demand_change=demand_change,
+            demand_change=demand_change if reference_known else 0.0,
         )
 
     def _torque_over_load(self, cycle: Cycle) -> float:
@@ -461,21 +457,9 @@ class WheelSoilEstimator:
             inflated=cycle.reference_known,
         )
         if not cycle.still and not cycle.reference_known:
-            step = self._speed.towards_equilibrium_slip(
-                step,
-                cycle.dt,
-                cycle.yaw_compensated.typical,
-                direction=self._contact_age.state.direction,
-                slope_share=cycle.loads.slope_share,
-            )
-        self._speed.predict(
-            prediction,
-            step,
-            cycle.dt,
-            rim=cycle.yaw_compensated.typical,
-            demand_change=cycle.demand_change if cycle.reference_known else 0.0,
-            stated=cycle.window.stated,
-        )
+            direction = self._contact_age.state.direction
+            step = self._speed.towards_equilibrium_slip(step, cycle, direction)
+        self._speed.predict(prediction, step, cycle)
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:
             travel = self._sinkage_process.predict(prediction, x, cycle)
@@ -614,36 +598,19 @@ class WheelSoilEstimator:
         self._clock = self._clock._replace(assessment=assessment, speed=present)
         if self._margin.due(time):
             direction = self._contact_age.state.direction or 1.0
-            self._margin.update(time, self._wheel_states(loads), direction * loads.slope_share)
-        self._learn_slopes(time, slips, rims, motion.lateral_motion)
-        self._follow_sideways(time, body, rims)
+            states = contact_states(ekf.mean, self._layout, loads.load, self._ruts.state.depth)
+            self._margin.update(time, states, direction * loads.slope_share)
+        if self._is_due(time, self._slopes.state.time):
+            self._learn_slopes(time, slips, rims, motion.lateral_motion)
+            self._follow_sideways(time, body, rims)
         if self._buffer is not None:
             self._buffer.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
-
-    def _wheel_states(self, loads: LoadState) -> WheelStates:
-        """Return the state of the wheels as the models take it, at no slip."""
-        x, layout = self._ekf.mean, self._layout
-        sinkages = contact_depths(
-            x[layout.sinkage].tolist(), self._ruts.state.depth, float(x[RUT_SHARE])
-        )
-        return WheelStates(
-            1.0,
-            np.array(sinkages),
-            np.array(loads.load),
-            x[SHEAR_STRENGTH] + x[layout.shear_error],
-            float(x[SHEAR_MODULUS]),
-            float(x[CENTROID]),
-            float(x[MOUND]),
-        )
 
     def _learn_slopes(
         self, time: float, slips: tuple[WheelSlip, ...], rims: Floats, lateral_motion: float
     ) -> None:
         """Learn what slopes cost, from the wheels that turn straight on settled contacts."""
-        before = self._slopes.state.time
-        since = time - before
-        if since < self._rover.period - _PERIOD_ROUNDING:
-            return
+        since = time - self._slopes.state.time
         inertial = self._inertial.state
         turning = [
             (wheel, abs(rim))
@@ -664,10 +631,7 @@ class WheelSoilEstimator:
         )
 
     def _follow_sideways(self, time: float, body: BodyMotion, rims: Floats) -> None:
-        """Follow how the rover slides sideways, once a cycle."""
-        before = self._sideways.state.time
-        if time - before < self._rover.period - _PERIOD_ROUNDING:
-            return
+        """Follow how the rover slides sideways."""
         loads, ekf, soil = self._loads.state, self._ekf, self._configuration.soil
         strength = math.exp(float(ekf.mean[SHEAR_STRENGTH]))
         self._sideways.update(

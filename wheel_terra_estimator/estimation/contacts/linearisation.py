@@ -101,21 +101,11 @@ class Linearisation(Component[FloatArray]):
         rim, load, rut = np.where(turning, cycle.rims, 1.0), np.array(loads), np.array(ruts)
         direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
         rut_share, sheared = float(x[RUT_SHARE]), 1.0 - float(x[SHEAR_RADIUS])
-        # No wheel stands higher than the rut that it meets.
-        sinkage = x[layout.sinkage]
-        met = np.minimum(rut, np.maximum(sinkage, 0.0))
+        met = _met(x, layout, rut)
         measured = np.array(cycle.leaving_angles)
-        states = WheelStates(
-            speed_ratio=sheared
-            * direction
-            * headings.speeds(float(x[SPEED]), cycle.yaw_rate)
-            / rim,
-            sinkage=sinkage - rut_share * met,
-            load=load,
-            strength=x[SHEAR_STRENGTH] + x[layout.shear_error],
-            shear_modulus=float(x[SHEAR_MODULUS]),
-            centroid=float(x[CENTROID]),
-            mound=float(x[MOUND]),
+        speed = direction * headings.speeds(float(x[SPEED]), cycle.yaw_rate)
+        states = contact_states(x, layout, load, rut)._replace(
+            speed_ratio=sheared * speed / rim,
             rim_speed=rim,
             leaving_angle=None if np.isnan(measured).all() else measured,
         )
@@ -167,6 +157,26 @@ class Linearisation(Component[FloatArray]):
         other = change > _NEW_CONTACT * moment
         slopes[:, 1:] = np.where(other, new[:, 1:], slopes[:, 1:])
         return np.where(turning, slopes, old)
+
+
+def contact_states(
+    x: FloatArray, layout: StateLayout, loads: FloatArray | Floats, ruts: FloatArray | Floats
+) -> WheelStates:
+    """Return the state of wheels at no slip, in the ruts that they meet [m]; arguments are (n,)."""
+    return WheelStates(
+        speed_ratio=1.0,
+        sinkage=x[layout.sinkage] - float(x[RUT_SHARE]) * _met(x, layout, ruts),
+        load=np.asarray(loads),
+        strength=x[SHEAR_STRENGTH] + x[layout.shear_error],
+        shear_modulus=float(x[SHEAR_MODULUS]),
+        centroid=float(x[CENTROID]),
+        mound=float(x[MOUND]),
+    )
+
+
+def _met(x: FloatArray, layout: StateLayout, ruts: FloatArray | Floats) -> FloatArray:
+    """Return the ruts that wheels meet (n,) [m]: none stands higher than its rut."""
+    return np.minimum(ruts, np.maximum(x[layout.sinkage], 0.0))
 
 
 def turning_wheels(rover: Rover, rims: Floats, loads: Floats) -> tuple[bool, ...]:

@@ -9,7 +9,6 @@ bottom of its rut. How much of that rut stays is learned (``RUT_SHARE`` of the s
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
@@ -72,14 +71,6 @@ class Ruts(Component[RutState]):
             gain = -math.expm1(-travel / max(way, _LEAST_WAY)) if before.direction else 1.0
             depths.append(before.depth[i] + gain * (rut - before.depth[i]))
         self.state = RutState(tuple(depths), direction)
-
-
-def contact_depths(sinkage: Sequence[float], ruts: Floats, share: float) -> list[float]:
-    """Return how deep wheels stand below the ground that they meet [m].
-
-    `share` is that of the rut which stays pressed; no wheel stands higher than its rut.
-    """
-    return [z - share * min(rut, max(z, 0.0)) for z, rut in zip(sinkage, ruts, strict=True)]
 
 
 def curvature_of(speed: float, yaw_rate: float) -> float:

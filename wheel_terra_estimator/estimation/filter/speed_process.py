@@ -23,13 +23,13 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
+from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
 from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
-from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
+from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of, known, median
 
@@ -289,33 +289,12 @@ class SpeedProcess(Component[SpeedState]):
         )
         return self.combined(by_wheels, self.since_cycle(time), window)
 
-    def predict(
-        self,
-        prediction: Prediction,
-        step: SpeedStep,
-        dt: float,
-        *,
-        rim: float,
-        demand_change: float,
-        stated: StatedNoise = NOTHING_STATED,
-    ) -> None:
+    def predict(self, prediction: Prediction, step: SpeedStep, cycle: Cycle) -> None:
         """Add speed, gravity bias and slip per demand to a prediction.
 
-        Parameters
-        ----------
-        prediction : Prediction
-            Is filled in.
-        step : SpeedStep
-            How the speed goes on.
-        dt : float
-            Length of the cycle [s].
-        rim : float
-            Typical rim speed [m/s]; nan = unknown.
-        demand_change : float
-            By how much more the ground asks, as a share of the load [-].
-        stated : StatedNoise
-            By the messages of the IMU.
+        `step` says how the speed goes on without a change of what the ground asks.
         """
+        dt, rim, demand_change = cycle.dt, cycle.yaw_compensated.typical, cycle.demand_change
         mean, F, Q = prediction
         mean[SPEED] = (
             step.speed_gain * mean[SPEED] + step.bias_gain * mean[GRAVITY_BIAS] + step.constant
@@ -323,7 +302,7 @@ class SpeedProcess(Component[SpeedState]):
         F[SPEED, SPEED] = step.speed_gain
         F[SPEED, GRAVITY_BIAS] = step.bias_gain
         Q[SPEED, SPEED] = step.variance
-        Q[GRAVITY_BIAS, GRAVITY_BIAS] = self.acceleration_noise(stated).bias_walk * dt
+        Q[GRAVITY_BIAS, GRAVITY_BIAS] = self.acceleration_noise(cycle.window.stated).bias_walk * dt
         if demand_change and not isnan(rim):
             # v = (1 - s) rim, and ds = slip_per_demand times the change of the demand.
             gain = -step.wheel_weight * rim * demand_change
@@ -384,19 +363,20 @@ class SpeedProcess(Component[SpeedState]):
         return max(spread(changes) - self._rim_noise, 0.0)
 
     def towards_equilibrium_slip(
-        self, step: SpeedStep, dt: float, rim: float, *, direction: float, slope_share: float
+        self, step: SpeedStep, cycle: Cycle, direction: float
     ) -> SpeedStep:
         """Without a reference velocity, let v / rim speed return to what such a slope takes.
 
         On deep or saturated contacts torque and pull hardly change with slip. There the posterior
         is the prior, and a random walk is no prior: it ends anywhere.
         """
+        rim, demand = cycle.yaw_compensated.typical, direction * cycle.loads.slope_share
         if not abs(rim) >= self._rover.low_rim:
             return step
         most = _MOST_EQUILIBRIUM_SLIP
-        slip = self._equilibrium_slip.at(direction * slope_share, beyond=most)
+        slip = self._equilibrium_slip.at(demand, beyond=most)
         usual = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
-        keep = math.exp(-abs(rim) * dt / USUAL_LENGTH)
+        keep = math.exp(-abs(rim) * cycle.dt / USUAL_LENGTH)
         return SpeedStep(
             keep * step.speed_gain,
             keep * step.bias_gain,
@@ -435,9 +415,7 @@ class SpeedProcess(Component[SpeedState]):
             spread = max(_FIRST_SIGHT_SHARE * abs(rims.typical), self._rover.rest_speed)
             ekf.set(SPEED, self.state.ratio * rims.typical, spread * spread)
 
-    def remove_start_transient(
-        self, ekf: GatedFilter, rim: float, stated: StatedNoise = NOTHING_STATED
-    ) -> None:
+    def remove_start_transient(self, ekf: GatedFilter, cycle: Cycle) -> None:
         """Let a rover that starts without a reference velocity roll as it did before.
 
         A start-up transient of the accelerometer weighs much while the wheels turn slowly, and from
@@ -445,9 +423,10 @@ class SpeedProcess(Component[SpeedState]):
         wheels that spin up at once, differ by more than the accelerometer's noise.
         """
         state = self.state
+        rim = cycle.yaw_compensated.typical
         usual = state.ratio * rim
         off = abs(float(ekf.mean[SPEED]) - usual)
-        noise = _START_NOISE * self.acceleration_noise(stated).density
+        noise = _START_NOISE * self.acceleration_noise(cycle.window.stated).density
         if abs(rim) > self._rover.low_rim and _START_SHARE * abs(usual) < off < noise:
             ekf.set(SPEED, usual, (state.ratio_std * rim) ** 2)
 
