@@ -26,6 +26,7 @@ from wheel_terra_estimator.estimation.judgement.slip_on_slope import OncePerSeco
 from wheel_terra_estimator.estimation.judgement.stuck.memory import StuckMemory
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
+from wheel_terra_estimator.estimation.scalars import NANOSECOND, SECOND
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.estimation.timing.clock_watch import (
@@ -44,7 +45,6 @@ from wheel_terra_estimator.estimation.timing.lag import LagLearner
 from wheel_terra_estimator.estimation.timing.step_grid import StepGrid
 from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline, TimeSettings
 
-_SECOND = 1_000_000_000
 _FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
 """What a step of the estimator may end with."""
 
@@ -202,7 +202,7 @@ ReferenceVelocity
         result |= self._timeline.counts | log.counts
         newest = self._watch.newest
         hold = self._lags.hold(newest) if newest is not None else 0
-        result['held_back_s'] = hold * 1e-9
+        result['held_back_s'] = hold * NANOSECOND
         result['clock_steps_back'] = self._clock_steps
         result['resets'] = self._resets
         own = self._estimator.health()
@@ -337,4 +337,4 @@ def _rerun_rate(configuration: Configuration) -> float:
 
 
 def _nanoseconds(seconds: float) -> int:
-    return round(seconds * _SECOND)
+    return round(seconds * SECOND)

@@ -31,6 +31,7 @@ from wheel_terra_estimator.estimation.judgement.slip import WheelSlip
 from wheel_terra_estimator.estimation.judgement.stuck.forecast import LONGEST_TIME, WheelForecast
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import TINY
 from wheel_terra_estimator.estimation.sideways import Sideways
 from wheel_terra_estimator.estimation.taught import with_model_errors
 from wheel_terra_estimator.estimation.words import (
@@ -40,7 +41,6 @@ from wheel_terra_estimator.estimation.words import (
 )
 
 Floats = tuple[float, ...]
-_LEAST_VARIANCE = 1e-12  # of a speed [(m/s)^2]
 _UNKNOWN_STD = 1.0  # of a slip velocity [m/s]
 _UNLOADED_STD = 1.0  # of the pull of a wheel in the air [N]
 _BELIEVED_LOAD = 0.1
@@ -142,7 +142,7 @@ class Outputs:
             soil=soil,
             soil_std=soil_std,
             forward_velocity=given.speed,
-            forward_velocity_variance=max(given.speed_variance, _LEAST_VARIANCE),
+            forward_velocity_variance=max(given.speed_variance, TINY),
             yaw_rate=given.yaw_rate,
             yaw_rate_variance=given.yaw_rate_std**2,
             stuck=given.assessment.stuck,

@@ -8,6 +8,12 @@ import math
 from collections.abc import Iterable, Sequence
 
 NAN = math.nan
+TINY = 1e-12
+"""Least divisor: what is below it is nothing, in any unit here."""
+SECOND = 1_000_000_000  # [ns]
+NANOSECOND = 1e-9  # [s]
+TIME_ROUNDING = 1e-6
+"""By which times that should be the same may differ [s]."""
 
 
 def median(values: Sequence[float]) -> float:

@@ -25,6 +25,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.scalars import SECOND
 
 
 @dataclass(frozen=True)
@@ -70,10 +71,10 @@ class SensorErrors:
         inertial = self.specific_force_bias, self.angular_rate_bias, self._imu_position
         self._none_inertial = not any(values.any() for values in inertial)
         self._late: dict[type, int] = {
-            WheelOdometry: round(sensors.wheel_odometry_stamp_offset * 1e9),
-            InertialReading: round(sensors.imu_stamp_offset * 1e9),
-            SinkageReading: round(sensors.sinkage_stamp_offset * 1e9),
-            ReferenceVelocity: round(sensors.reference_stamp_offset * 1e9),
+            WheelOdometry: round(sensors.wheel_odometry_stamp_offset * SECOND),
+            InertialReading: round(sensors.imu_stamp_offset * SECOND),
+            SinkageReading: round(sensors.sinkage_stamp_offset * SECOND),
+            ReferenceVelocity: round(sensors.reference_stamp_offset * SECOND),
         }
 
     def corrected(self, measurement: Measurement) -> Measurement:

@@ -25,6 +25,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.estimation.scalars import TINY
 
 Floats = tuple[float, ...]
 
@@ -156,7 +157,7 @@ class SidewaysMotion(Component[SidewaysState]):
         loads = np.array(given.loads)
         last = self.state.told or Sideways.unknown(given.loads)
         total, std = _felt_force(self._rover, given)
-        share = loads / max(float(loads.sum()), 1e-9)
+        share = loads / max(float(loads.sum()), TINY)
         force_std = np.hypot(np.abs(total * share), std * share) + _LOAD_SHARE * loads
         return Sideways(
             last.angle,
@@ -186,7 +187,7 @@ class SidewaysMotion(Component[SidewaysState]):
         forces = _wheel_forces(contacts, velocity, rover.rest_speed, given.shear_modulus)
         _, std = _felt_force(rover, given)
         loads = np.array(given.loads)
-        shared = std * loads / max(float(loads.sum()), 1e-9)
+        shared = std * loads / max(float(loads.sum()), TINY)
         force_std = np.hypot(_FORCE_SHARE * np.abs(forces), shared)
         return Sideways(
             _floats(angle),
@@ -194,7 +195,7 @@ class SidewaysMotion(Component[SidewaysState]):
             _floats(forces),
             _floats(np.maximum(force_std, 1e-3)),
             float(velocity),
-            max(variance, 1e-12),
+            max(variance, TINY),
         )
 
 
@@ -266,7 +267,7 @@ def _wheel_forces(
     fastest = np.maximum(np.maximum(np.abs(turned), np.hypot(along, across)), rest_speed)
     scale = radius / fastest
     back, aside = scale * (turned * swept - along * covered), scale * across * swept
-    displacement = np.maximum(np.hypot(back, aside), 1e-12)
+    displacement = np.maximum(np.hypot(back, aside), TINY)
     share = -np.expm1(-displacement / shear_modulus)
     return np.asarray(-strength * share * aside / displacement)
 
@@ -290,7 +291,7 @@ def model_speed(rover: Rover, given: SidewaysInputs, contacts: _Contacts) -> tup
     stiffness = float(ends[1] - ends[0]) / (2.0 * step)
     # Softer towards the limit of the strength: there little is known of a speed.
     doubt = math.hypot(felt_std, _STRENGTH_SHARE * felt)
-    std = min(doubt / max(stiffness, 1e-9), reach)
+    std = min(doubt / max(stiffness, TINY), reach)
     variance = std**2 + (_SOIL_SHARE * (lateral - free)) ** 2
     return lateral, variance + (_SPEED_SHARE * pace) ** 2
 

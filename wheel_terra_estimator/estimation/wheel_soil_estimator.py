@@ -97,7 +97,7 @@ from wheel_terra_estimator.estimation.learned import Learned
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
 from wheel_terra_estimator.estimation.outputs import Outputs, Sources
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN, known, median
+from wheel_terra_estimator.estimation.scalars import NAN, NANOSECOND, known, median
 from wheel_terra_estimator.estimation.sideways import (
     SidewaysInputs,
     SidewaysMotion,
@@ -107,7 +107,6 @@ from wheel_terra_estimator.estimation.taught import Taught, Teaching, with_model
 from wheel_terra_estimator.estimation.words import MissingInputs
 
 Floats = tuple[float, ...]
-_SECOND = 1e-9  # of a nanosecond
 _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
 _SHARP_TURN = 0.3
@@ -241,8 +240,8 @@ class WheelSoilEstimator:
             self._begin_with(stated)
             self._ekf.restore(with_soil_of(soil, self._ekf.snapshot(), self._layout))
             self._zero_velocity.keep_zero_of(gyro)
-            self._reference.keep_count(rejected[0])
-            self._sinkage.keep_count(rejected[1])
+            self._reference.state = self._reference.state._replace(rejected=rejected[0])
+            self._sinkage.state = self._sinkage.state._replace(rejected=rejected[1])
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return what `restore` needs to come back to this state."""
@@ -260,7 +259,7 @@ class WheelSoilEstimator:
         """Bring the state to a stamp [ns] with the measurements of that stamp."""
         clock = self._clock
         origin = clock.origin or stamp
-        time = (stamp - origin) * _SECOND
+        time = (stamp - origin) * NANOSECOND
         self._clock = _Clock(origin, stamp, time, clock.assessment)
         self._take(time, inputs)
         rolled = inputs.wheel_odometry is not None

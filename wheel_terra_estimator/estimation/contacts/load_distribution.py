@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.estimation.scalars import TINY
 
 Vector = Sequence[float] | FloatArray
 
@@ -70,7 +71,7 @@ class LoadDistribution:
         if loads.min() < 0.0:
             total = loads.sum()
             loads = np.maximum(loads, 0.0)
-            loads *= max(total, 0.0) / max(loads.sum(), 1e-12)
+            loads *= max(total, 0.0) / max(loads.sum(), TINY)
         return loads
 
 

@@ -10,12 +10,12 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.estimation.scalars import TINY
 
 Floats = tuple[float, ...]
 LEAST_LOAD = 1e-3
 """Of a wheel on the ground [N]: with less it is in the air."""
 _LEAST_FORCE = 0.1  # specific force on z [m/s^2] below which a slope is not defined
-_LEAST_TOTAL = 1e-9  # of the loads [N]
 
 
 class LoadState(NamedTuple):
@@ -71,6 +71,6 @@ class WheelLoads(Component[LoadState]):
             if any(unloaded):
                 total = sum(loads)
                 loads = [0.0 if off else w for w, off in zip(loads, unloaded, strict=True)]
-                loads = [w * total / max(sum(loads), _LEAST_TOTAL) for w in loads]
+                loads = [w * total / max(sum(loads), TINY) for w in loads]
             self.state = LoadState(tuple(loads), force, force_known=True)
         return self.state

@@ -21,7 +21,7 @@ from wheel_terra_estimator.estimation.contacts.linearisation import ContactForce
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import clipped
+from wheel_terra_estimator.estimation.scalars import TINY, clipped
 
 Floats = tuple[float, ...]
 
@@ -38,7 +38,6 @@ _EXCESS_GAIN = 0.2  # smoothing of reading less model, per cycle
 _SHRINKAGE = 2.0
 """Noise variances taken off the square of an excess (James and Stein 1961): nothing below its
 noise is believed, all of what is far above it."""
-_LEAST_EXCESS = 1e-12  # square of it [N^2 m^2]
 _TURNING_LOSS = 5.0  # trust in an excess lost per lateral motion
 _SCRUB_STD = 0.1  # of the load at full lateral motion: pushed sideways
 
@@ -205,6 +204,6 @@ class Pulls(Component[PullState]):
             + sensors.torque_zero_std**2
             + (sensors.torque_gain_std * reading) ** 2
         )
-        square = max(excess * excess, _LEAST_EXCESS)
+        square = max(excess * excess, TINY)
         believed = max(1.0 - _SHRINKAGE * noise / square, 0.0)
         return excess * believed * max(1.0 - _TURNING_LOSS * lateral_motion, 0.0)

@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from wheel_terra_estimator.estimation.scalars import clipped, known
+from wheel_terra_estimator.estimation.scalars import TINY, clipped, known
 
 SAME_GROUND = 0.15
 """Rim travel over which the errors of the models are the same [m]; tuned on seeds 1000, 1001."""
-_MOST, _LEAST_TRAVEL = 100.0, 1e-9
+_MOST = 100.0
 
 
 def correlated_cycles(rims: tuple[float, ...], dt: float) -> float:
@@ -19,4 +19,4 @@ def correlated_cycles(rims: tuple[float, ...], dt: float) -> float:
     Uhlmann 2001).
     """
     travel = dt * max((abs(rim) for rim in known(rims)), default=0.0)
-    return clipped(SAME_GROUND / max(travel, _LEAST_TRAVEL), 1.0, _MOST)
+    return clipped(SAME_GROUND / max(travel, TINY), 1.0, _MOST)

@@ -113,10 +113,6 @@ class ReferenceUpdate(Component[ReferenceState]):
         """Say whether the present speed rests on a reference."""
         return time - self.state.time < _FRESH_TIME
 
-    def keep_count(self, rejected: int) -> None:
-        """Go on with the count of rejected references of an old run."""
-        self.state = self.state._replace(rejected=rejected)
-
     @property
     def model_variance_factor(self) -> float:
         """Factor on the variance of the wheel-soil models [-]: 1 while the references scatter.

@@ -45,10 +45,6 @@ class SinkageUpdate(Component[SinkageUpdateState]):
         self._gate = float(configuration.filter.gate)
         self._layout = layout
 
-    def keep_count(self, rejected: int) -> None:
-        """Go on with the count of rejected readings of an old run."""
-        self.state = self.state._replace(rejected=rejected)
-
     def unread(self, time: float) -> list[int]:
         """Return the wheels whose sinkage was not read of late."""
         return [i for i, when in enumerate(self.state.time) if time - when >= _AGE]

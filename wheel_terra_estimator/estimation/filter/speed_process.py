@@ -31,7 +31,14 @@ from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SLIP_PER
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of, known, median
+from wheel_terra_estimator.estimation.scalars import (
+    NAN,
+    TIME_ROUNDING,
+    clipped,
+    gain_of,
+    known,
+    median,
+)
 
 Floats = tuple[float, ...]
 LEAST_SLIP_STD = 0.02
@@ -96,7 +103,6 @@ _START_SHARE = 0.5
 the accelerometer."""
 _START_NOISE = 3.0
 """Times the accelerometer's noise over a second: what is more is no transient but a slide."""
-_PRESENT = 1e-6  # [s]: a cycle no older is the present
 
 
 class SpeedStep(NamedTuple):
@@ -396,7 +402,7 @@ class SpeedProcess(Component[SpeedState]):
         """Return speed and variance at a time [s], carried on from the last cycle."""
         x, P = ekf.mean, ekf.covariance
         speed, variance = float(x[SPEED]), float(P[SPEED, SPEED])
-        if self.since_cycle(time) < _PRESENT:
+        if self.since_cycle(time) < TIME_ROUNDING:
             return speed, variance
         a, b, constant, noise, _ = self.step(time, rims, window, inflated=inflated)
         carried = a * speed + b * float(x[GRAVITY_BIAS]) + constant

@@ -20,11 +20,9 @@ import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.scalars import NAN
+from wheel_terra_estimator.estimation.scalars import NAN, NANOSECOND, TIME_ROUNDING
 
 UNKNOWN = int(SlipClass.UNKNOWN)
-_SECOND = 1e-9
-_TIME_ROUNDING = 1e-9  # [s]
 
 
 class ClassState(NamedTuple):
@@ -73,7 +71,7 @@ class SlipClassifier:
             if target == current:
                 return ClassState(current)
         since = time if isnan(left) else left
-        if time - since >= self._dwell - _TIME_ROUNDING:
+        if time - since >= self._dwell - TIME_ROUNDING:
             return ClassState(target)
         return ClassState(current, since)
 
@@ -119,7 +117,7 @@ class PublishedClasses:
         A wheel whose class is unknown in the set given stays so; one that drives and is stuck
         has no rim travel and no time left.
         """
-        time = estimates.stamp * _SECOND
+        time = estimates.stamp * NANOSECOND
         update, most_std = self._classifier.update, self._most_std
         self._states = [
             ClassState() if told == UNKNOWN or std > most_std else update(state, time, slip)

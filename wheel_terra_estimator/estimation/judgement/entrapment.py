@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.estimation.scalars import TIME_ROUNDING
 
 ENTRAPPED_SLIP = 0.9
 """Median driving slip above which a rover makes no way that matters: class *stuck*."""
@@ -26,7 +27,6 @@ NEAR_MISS_SLIP = 0.75
 """Median |slip| above which a warning without an entrapment was a near miss."""
 FORESIGHT = 20.0
 """Time within which a warning comes true, or was false [s]."""
-_TIME_ROUNDING = 1e-6  # [s]
 
 
 class Entrapments(NamedTuple):
@@ -74,7 +74,7 @@ def entrapments(time: FloatArray, slip: FloatArray) -> Entrapments:
     begins, there = [], []
     under_way = np.zeros(len(time), dtype=bool)
     for start, end in zip(starts, ends, strict=True):
-        full = int(np.searchsorted(time, time[start] + HELD - _TIME_ROUNDING))
+        full = int(np.searchsorted(time, time[start] + HELD - TIME_ROUNDING))
         if full < end:
             begins.append(start)
             there.append(full)

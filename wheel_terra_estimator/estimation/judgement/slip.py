@@ -11,10 +11,9 @@ from typing import NamedTuple
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN
+from wheel_terra_estimator.estimation.scalars import NAN, TIME_ROUNDING
 
 Floats = tuple[float, ...]
-_TIME_ROUNDING = 1e-6  # [s]
 
 
 # Deviations of the slip that no model of the filter has.
@@ -91,7 +90,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
     def _at_rest(self, before: WheelSlip, time: float) -> WheelSlip:
         """Return a wheel that stands: its slip holds its last value."""
         since = time if isnan(before.rest_since) else before.rest_since
-        resting = time - since >= self._rover.rest_time - _TIME_ROUNDING
+        resting = time - since >= self._rover.rest_time - TIME_ROUNDING
         judged = before.judged and not resting
         return before._replace(rest_since=since, resting=resting, judged=judged)
 

@@ -33,12 +33,11 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.estimates import SLOPES, SlipOnSlope
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
-from wheel_terra_estimator.estimation.scalars import gain_of
+from wheel_terra_estimator.estimation.scalars import SECOND, TINY, gain_of
 
 _DEMANDS = np.tan(np.radians(SLOPES))
 _DRAWS = 64
 _BASES = 2, 3, 5, 7  # of the Halton sequence
-_LEAST = 1e-12  # share of a thrust: its logarithm is beyond any slip
 
 
 @dataclass(frozen=True)
@@ -202,14 +201,14 @@ def slips_at(
     beyond : numpy.ndarray or float
         (11,) deviation of ln p_max that comes on top, of slopes beyond those driven.
     """
-    lower = np.linalg.cholesky(covariance + 1e-12 * np.eye(3))
+    lower = np.linalg.cholesky(covariance + TINY * np.eye(3))
     offset, scale, greatest = (mean + _STANDARD[:, :3] @ lower.T).T[:, :, None]
     scale = np.exp(scale)
     unused = 1.0 - _DEMANDS / np.exp(greatest + _STANDARD[:, 3:] * beyond)
     rolling = np.maximum(offset, 0.0)
     braked = unused * np.exp(-rolling / scale)  # over 1: the soil brakes
-    driving = offset - scale * np.log(np.maximum(unused, _LEAST))
-    braking = offset - rolling + scale * np.log(np.maximum(2.0 - braked, _LEAST))
+    driving = offset - scale * np.log(np.maximum(unused, TINY))
+    braking = offset - rolling + scale * np.log(np.maximum(2.0 - braked, TINY))
     slip = np.where(braked <= 1.0, driving, braking)
     slip = np.clip(slip, -1.0, 1.0)
     beyond = (slip - ENTRAPPED_SLIP) / scatter
@@ -233,7 +232,7 @@ class OncePerSecond:
         """Return whether the set of a stamp [ns] states them."""
         if self._first is None:
             self._first = stamp
-        second = (stamp - self._first) // 1_000_000_000
+        second = (stamp - self._first) // SECOND
         if second == self._second:
             return False
         self._second = second

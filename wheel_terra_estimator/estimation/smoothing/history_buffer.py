@@ -45,13 +45,6 @@ class Mark(NamedTuple):
     content: Any
 
 
-class TapeLength(NamedTuple):
-    """What `HistoryBuffer.restore` needs."""
-
-    transitions: int
-    marks: int
-
-
 class HistoryBuffer:
     """Transitions and marks of a drive in the order of their stamps.
 
@@ -107,14 +100,14 @@ class HistoryBuffer:
     def reset(self) -> None:
         """Leave everything: a new run of the same recording goes on behind the cut."""
 
-    def snapshot(self) -> TapeLength:
-        """Return how far the buffer is."""
-        return TapeLength(len(self), len(self.marks))
+    def snapshot(self) -> tuple[int, int]:
+        """Return how far the buffer is: transitions and marks."""
+        return len(self), len(self.marks)
 
-    def restore(self, snapshot: TapeLength) -> None:
+    def restore(self, snapshot: tuple[int, int]) -> None:
         """Wind the buffer back."""
-        self._transitions.truncate(snapshot.transitions)
-        self.marks.truncate(snapshot.marks)
+        self._transitions.truncate(snapshot[0])
+        self.marks.truncate(snapshot[1])
 
 
 def packed(state: Gaussian) -> tuple[FloatArray, FloatArray]:

@@ -17,6 +17,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.estimation.scalars import TIME_ROUNDING
 from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian
 from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant
 
@@ -27,7 +28,6 @@ HALF_WIDTH = 0.5
 LONGEST_GAP = 0.25  # between two sets of a window [s]
 TURNING = 5e-3
 """Rim speed above which a wheel turns [m/s]."""
-_ROUNDING = 1e-6  # [s]
 
 
 class Moment(NamedTuple):
@@ -66,11 +66,11 @@ def centred(
             continue
         time = moment.instant.time
         places.append(_Place(companion, moment, places[-1].begin if places else time))
-        while places[given].moment.instant.time + HALF_WIDTH <= time + _ROUNDING:
+        while places[given].moment.instant.time + HALF_WIDTH <= time + TIME_ROUNDING:
             place = places[given]
             yield place.companion, _mean_around(place, places, time)
             given += 1
-        oldest = places[given].moment.instant.time - HALF_WIDTH - _ROUNDING
+        oldest = places[given].moment.instant.time - HALF_WIDTH - TIME_ROUNDING
         while places[0].moment.instant.time < oldest:
             places.popleft()
             given -= 1
@@ -90,7 +90,7 @@ def _mean_around(place: _Place[Companion], places: deque[_Place[Companion]], end
     """Return the mean around a place within its stretch, which ends at `end` [s] or later."""
     moment = place.moment
     time = moment.instant.time
-    half = min(HALF_WIDTH, time - place.begin, end - time) + _ROUNDING
+    half = min(HALF_WIDTH, time - place.begin, end - time) + TIME_ROUNDING
     near = [p.moment for p in places if abs(p.moment.instant.time - time) <= half]
     load = np.array(moment.instant.sources.loads.load)
     share = np.mean([m.pull / _load(m) for m in near], axis=0)

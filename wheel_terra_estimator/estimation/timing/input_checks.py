@@ -26,6 +26,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.scalars import SECOND
 
 GREATEST_SPEED = 50.0  # rim or body [m/s]; far above any rover
 GREATEST_STEERING = math.pi  # [rad]
@@ -36,7 +37,7 @@ WILD_FORCE = 30.0  # change of the specific force from one message to the next [
 WILD_RATE = 5.0  # change of the angular rate from one message to the next [rad/s]
 WILD_TIME = 500_000_000  # messages further apart are not compared [ns]
 GREATEST_VARIANCE = GREATEST_SPEED**2  # says that nothing is known
-LATEST_STAMP = 2**31 * 1_000_000_000  # builtin_interfaces/Time ends in 2038 [ns]
+LATEST_STAMP = 2**31 * SECOND  # builtin_interfaces/Time ends in 2038 [ns]
 
 CHANNELS: dict[type, int] = {
     WheelOdometry: 0,

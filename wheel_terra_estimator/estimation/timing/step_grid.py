@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import math
 
+from wheel_terra_estimator.estimation.scalars import SECOND
+
 LEAST_STEP_RATE = 20.0  # [Hz] at which a rover's speed and slip are followed
 LONGEST_STEP = 120_000_000
 """Without wheel odometry to end it, a step ends after this time [ns]."""
-
-_SECOND = 1_000_000_000  # [ns]
 
 
 class StepGrid:
@@ -34,7 +34,7 @@ class StepGrid:
         self._steps_per_set = max(math.ceil(LEAST_STEP_RATE / rate - 1e-9), 1)
         self.step_rate = rate * self._steps_per_set
         self._steps, seconds = self.step_rate.as_integer_ratio()
-        self._nanoseconds = seconds * _SECOND  # of so many steps
+        self._nanoseconds = seconds * SECOND  # of so many steps
 
     def step_index(self, elapsed: int) -> int:
         """Return the last multiple of the step's period at or before a time [ns] of the run."""

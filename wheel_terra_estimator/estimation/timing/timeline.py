@@ -16,14 +16,13 @@ from enum import Enum
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.estimation.scalars import SECOND
 from wheel_terra_estimator.estimation.timing.input_checks import WHEEL_ODOMETRY
 from wheel_terra_estimator.estimation.timing.input_log import InputLog
 
 GREATEST_LENGTH = 100_000
 """Inputs that the log holds at most, so that no publisher can fill the memory."""
 ALLOWANCE = 2.0  # [s] over which steps that are run again may be saved up
-
-_SECOND = 1_000_000_000
 
 
 class Fate(Enum):
@@ -145,7 +144,7 @@ class Timeline:
         self._overdue = overdue
         if self._newest is None or newest > self._newest:
             rate = self.settings.rerun_rate
-            elapsed = 0.0 if self._newest is None else (newest - self._newest) / _SECOND
+            elapsed = 0.0 if self._newest is None else (newest - self._newest) / SECOND
             self._allowance = min(self._allowance + rate * elapsed, rate * ALLOWANCE)
             self._newest = newest
         if self._deferred:

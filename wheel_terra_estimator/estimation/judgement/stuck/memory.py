@@ -16,8 +16,8 @@ import numpy as np
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.scalars import NANOSECOND
 
-_SECOND = 1e-9
 _LONGEST_GAP = 1.0  # [s] between two sets of one drive, or two of their periods
 
 
@@ -94,7 +94,7 @@ class StuckMemory:
         return estimates
 
     def _age(self, stamp: int) -> str:
-        age = (stamp - self.state.stamp) * _SECOND
+        age = (stamp - self.state.stamp) * NANOSECOND
         return f' {age:.0f} s ago,' if self.state.stamp > 0 and age >= 0.0 else ''
 
     def _is_clear(self, estimates: EstimateSet) -> bool:
@@ -109,10 +109,10 @@ class StuckMemory:
             self._free = None
             return False
         stamp = estimates.stamp
-        if self._free is None or not 0 <= (stamp - self._free[1]) * _SECOND <= self._longest_gap:
+        if self._free is None or not 0 <= (stamp - self._free[1]) * NANOSECOND <= self._longest_gap:
             self._free = stamp, stamp
         self._free = self._free[0], stamp
-        return (stamp - self._free[0]) * _SECOND >= self._clear_time
+        return (stamp - self._free[0]) * NANOSECOND >= self._clear_time
 
 
 def _reason(estimates: EstimateSet) -> str:
