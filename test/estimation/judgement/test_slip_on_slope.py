@@ -10,9 +10,10 @@ from fake_estimator import make_core, odometry, play
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.estimates import SLOPE_NAMES, SLOPES, SlipOnSlope
+from wheel_terra_estimator.estimation.judgement import slip_on_slope
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import (
-    CurveTuning,
+    CurveState,
     Instant,
     OncePerSecond,
     SlopeCurve,
@@ -102,10 +103,12 @@ def test_ground_far_beyond_the_soil_leaves_finite_numbers():
 
 @pytest.mark.parametrize('offset', [-0.1, 0.2])
 @pytest.mark.parametrize('demand', [-0.4, -0.1, 0.2])
-def test_a_slip_that_fits_the_curve_moves_nothing(offset, demand):
+def test_a_slip_that_fits_the_curve_moves_nothing(offset, demand, monkeypatch):
     """Driving and braking, the curve that teaches is the one that is told."""
     mean = np.array([offset, math.log(0.4), math.log(0.6)])
-    curve = SlopeCurve(CurveTuning(mean=tuple(mean), std=(1e-3, 1e-3, 1e-3), walk=0.0))
+    monkeypatch.setattr(slip_on_slope, 'WALK', 0.0)
+    curve = SlopeCurve()
+    curve.state = CurveState(mean, 1e-6 * np.eye(3))
     told = slips_at(mean, 1e-12 * np.eye(3), 1e-9).slip
     slip = float(np.interp(demand, np.tan(np.radians(SLOPES)), told))
     for i in range(100):

@@ -23,7 +23,6 @@ on, nor that the soil does: there p_max is less known, in proportion to how far 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -40,22 +39,19 @@ _DRAWS = 64
 _BASES = 2, 3, 5, 7  # of the Halton sequence
 
 
-@dataclass(frozen=True)
-class CurveTuning:
-    """Prior, walks and noise of the curve; set on simulators A, B and C, seeds 6000 to 6002."""
-
-    mean: tuple[float, float, float] = (0.05, math.log(0.5), math.log(0.6))
-    std: tuple[float, float, float] = (0.1, 0.5, 0.6)
-    walk: float = 0.03  # of a, per root metre of rim travel
-    reversal_std: float = 0.2  # of a, at a change of direction
-    demand_time: float = 0.4  # low-pass of the demand [s]
-    most_share: float = 0.97  # of p_max in the gradient
-    freedom: float = 4.0  # of the heavy tail of a slip (Student t)
-    scatter: float = 0.03  # of the slip from place to place [-]
-    correlation: float = 1.0  # rim travel within which slips are one piece of information [m]
-    most_std: float = 0.4  # of a slip that teaches
-    beyond_std: float = 1.5  # of ln p_max, per unit of demand beyond those driven
-    level: float = 0.05  # demand within which nothing is seen of braking [-]; assumed
+# Prior, walks and noise of the curve; set on simulators A, B and C, seeds 6000 to 6002.
+MEAN = (0.05, math.log(0.5), math.log(0.6))
+STD = (0.1, 0.5, 0.6)
+WALK = 0.03  # of a, per root metre of rim travel
+_REVERSAL_STD = 0.2  # of a, at a change of direction
+_DEMAND_TIME = 0.4  # low-pass of the demand [s]
+_MOST_SHARE = 0.97  # of p_max in the gradient
+_FREEDOM = 4.0  # of the heavy tail of a slip (Student t)
+SCATTER = 0.03  # of the slip from place to place [-]
+_CORRELATION = 1.0  # rim travel within which slips are one piece of information [m]
+_MOST_STD = 0.4  # of a slip that teaches
+_BEYOND_STD = 1.5  # of ln p_max, per unit of demand beyond those driven
+_LEVEL = 0.05  # demand within which nothing is seen of braking [-]; assumed
 
 
 class Instant(NamedTuple):
@@ -85,50 +81,45 @@ class CurveState(NamedTuple):
 class SlopeCurve(Component[CurveState]):
     """Learns the curve of a drive and reads it at the slopes once a second."""
 
-    def __init__(self, tuning: CurveTuning = CurveTuning()) -> None:
-        mean, std = np.array(tuning.mean), np.array(tuning.std)
-        super().__init__(CurveState(mean, np.diag(std**2)))
-        self._tuning = tuning
+    def __init__(self) -> None:
+        super().__init__(CurveState(np.array(MEAN), np.diag(np.array(STD) ** 2)))
 
     def update(self, now: Instant) -> None:
         """Learn from an instant."""
-        tuning, old = self._tuning, self.state
+        old = self.state
         dt = 0.0 if math.isnan(old.time) else max(now.time - old.time, 0.0)
         state = old._replace(time=now.time, direction=now.direction or old.direction)
         if math.isnan(now.demand):
             state = state._replace(demand=math.nan)
         else:
-            gain = 1.0 if math.isnan(old.demand) else gain_of(dt, tuning.demand_time)
+            gain = 1.0 if math.isnan(old.demand) else gain_of(dt, _DEMAND_TIME)
             before = now.demand if math.isnan(old.demand) else old.demand
             state = state._replace(demand=before + gain * (now.demand - before))
-            if now.travel > 0.0 and now.slip_std < tuning.most_std:
+            if now.travel > 0.0 and now.slip_std < _MOST_STD:
                 reversed_ = old.direction * state.direction < 0.0
                 state = self._corrected(state, now, reversed_)
         second = int(now.time)
         if second != state.told_second:
-            told = slips_at(
-                state.mean, state.covariance, tuning.scatter, self._beyond(state.driven)
-            )
+            told = slips_at(state.mean, state.covariance, SCATTER, self._beyond(state.driven))
             state = state._replace(told=told, told_second=second)
         self.state = state
 
     def _beyond(self, driven: tuple[float, float]) -> FloatArray:
         """Return the deviation of ln p_max at the slopes (11,) for demands that were not driven."""
-        tuning, (least, greatest) = self._tuning, driven
+        least, greatest = driven
         beyond = np.maximum(np.maximum(_DEMANDS - greatest, least - _DEMANDS), 0.0)
         # Where nobody drove downhill, how well the soil brakes is as unknown as at the start.
-        unseen = (_DEMANDS < 0.0) & (least > -tuning.level)
-        return np.hypot(tuning.beyond_std * beyond, tuning.std[2] * unseen)
+        unseen = (_DEMANDS < 0.0) & (least > -_LEVEL)
+        return np.hypot(_BEYOND_STD * beyond, STD[2] * unseen)
 
     def _linearised(self, mean: FloatArray, demand: float) -> tuple[float, FloatArray]:
         """Return the slip that the curve has for a demand, and its gradient by the curve, (3,)."""
-        tuning = self._tuning
         offset, scale, greatest = mean[0], math.exp(mean[1]), math.exp(mean[2])
         rolling = max(offset, 0.0)
-        share = min(demand / greatest, tuning.most_share)
+        share = min(demand / greatest, _MOST_SHARE)
         unused = 1.0 - share  # of the greatest pull
         eased = math.exp(-rolling / scale)
-        braked = min(unused * eased, 1.0 + tuning.most_share)  # over 1: the soil brakes
+        braked = min(unused * eased, 1.0 + _MOST_SHARE)  # over 1: the soil brakes
         if braked <= 1.0:
             slip = offset - scale * math.log(unused)
             gradient = np.array([1.0, slip - offset, -scale * share / unused])
@@ -147,16 +138,16 @@ class SlopeCurve(Component[CurveState]):
         return slip, gradient
 
     def _corrected(self, state: CurveState, now: Instant, reversed_: bool) -> CurveState:
-        tuning, mean = self._tuning, state.mean
+        mean = state.mean
         covariance = state.covariance.copy()
-        covariance[0, 0] += tuning.walk**2 * now.travel + (tuning.reversal_std * reversed_) ** 2
+        covariance[0, 0] += WALK**2 * now.travel + (_REVERSAL_STD * reversed_) ** 2
         slip, gradient = self._linearised(mean, state.demand)
         residual = now.slip - slip
-        repeats = tuning.correlation / min(now.travel, tuning.correlation)
-        noise = (now.slip_std**2 + tuning.scatter**2) * repeats
+        repeats = _CORRELATION / min(now.travel, _CORRELATION)
+        noise = (now.slip_std**2 + SCATTER**2) * repeats
         column = covariance @ gradient
         spread = float(gradient @ column)
-        tail = (tuning.freedom + residual**2 / (spread + noise)) / (tuning.freedom + 1.0)
+        tail = (_FREEDOM + residual**2 / (spread + noise)) / (_FREEDOM + 1.0)
         gain = column / (spread + noise * max(tail, 1.0))
         covariance -= np.outer(gain, column)
         covariance = 0.5 * (covariance + covariance.T)

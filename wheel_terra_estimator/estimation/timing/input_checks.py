@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -59,6 +59,7 @@ REMEDIES = {
 """Reason for leaving something out -> what corrects it."""
 
 
+_Range = tuple[float, float]
 _UNKNOWN = np.full(3, math.nan)
 _UNKNOWN.setflags(write=False)
 
@@ -99,8 +100,12 @@ class InputChecks:
         self._inertial_before: InertialReading | None = None
         self._wild: InertialReading | None = None
         self._count = wheels.count
-        self._radius = wheels.radius.tolist()
-        self._greatest_rate = (GREATEST_SPEED / wheels.slip_radius).tolist()
+        self._rates = _symmetric((GREATEST_SPEED / wheels.slip_radius).tolist())
+        self._torques = _symmetric([GREATEST_TORQUE] * self._count)
+        self._steering = _symmetric([GREATEST_STEERING] * self._count)
+        self._angles = _symmetric([0.5 * math.pi] * self._count)
+        self._deepest = [(-math.inf, radius) for radius in wheels.radius.tolist()]
+        self._highest = [(-0.5 * radius, math.inf) for radius in wheels.radius.tolist()]
         self._checks: tuple[Callable[[Any], Any], ...] = (
             self._wheel_odometry,
             self._inertial,
@@ -134,27 +139,19 @@ class InputChecks:
         if len(m.rate) != self._count or len(m.torque) != self._count:
             self.refuse(WHEEL_ODOMETRY, 'wrong number of wheels')
             return None
-        rates, torques = m.rate.tolist(), m.torque.tolist()
-        bad_rates = [i for i, rate in enumerate(rates) if abs(rate) > self._greatest_rate[i]]
-        bad_torques = [i for i, torque in enumerate(torques) if abs(torque) > GREATEST_TORQUE]
-        if bad_rates or bad_torques:
-            # Infinite values fail these bounds too; nan passes, it marks an unknown.
-            if bad_rates:
-                self.reject(WHEEL_ODOMETRY, 'wheel rate infinite or absurd')
-            if bad_torques:
-                self.reject(WHEEL_ODOMETRY, 'torque infinite or absurd')
-            m = replace(m, rate=_without(m.rate, bad_rates), torque=_without(m.torque, bad_torques))
+        rate = self._within(WHEEL_ODOMETRY, m.rate, self._rates, 'wheel rate infinite or absurd')
+        torque = self._within(WHEEL_ODOMETRY, m.torque, self._torques, 'torque infinite or absurd')
+        if rate is not m.rate or torque is not m.torque:
+            m = replace(m, rate=rate, torque=torque)
         return m if m.steering is None else self._steered(m, m.steering)
 
     def _steered(self, m: WheelOdometry, steering: FloatArray) -> WheelOdometry:
         if len(steering) != self._count:
             self.reject(WHEEL_ODOMETRY, 'wrong number of steering angles')
             return replace(m, steering=None)
-        bad = [i for i, angle in enumerate(steering.tolist()) if abs(angle) > GREATEST_STEERING]
-        if not bad:
-            return m
-        self.reject(WHEEL_ODOMETRY, 'steering angle beyond half a turn')
-        return replace(m, steering=_without(steering, bad))
+        reason = 'steering angle beyond half a turn'
+        kept = self._within(WHEEL_ODOMETRY, steering, self._steering, reason)
+        return m if kept is steering else replace(m, steering=kept)
 
     def _inertial(self, m: InertialReading) -> InertialReading | None:
         """Keep the good fields of a message; nan stands for one that is not there."""
@@ -213,29 +210,20 @@ class InputChecks:
         return replace(m, orientation=orientation / norm)
 
     def _sinkage(self, m: SinkageReading) -> SinkageReading | None:
-        values = self._wheel_values(SINKAGE, m.sinkage)
-        if values is None:
+        if len(m.sinkage) != self._count:
+            self.refuse(SINKAGE, 'wrong number of wheels')
             return None
-        radius = self._radius
-        deep = [i for i, z in enumerate(values) if z > radius[i]]
-        high = [i for i, z in enumerate(values) if z < -0.5 * radius[i]]
-        if not deep and not high:
-            return m
-        if deep:
-            self.reject(SINKAGE, _TOO_DEEP)
-        if high:
-            self.reject(SINKAGE, 'sinkage far above the surface')
-        return SinkageReading(m.stamp, _without(m.sinkage, deep + high))
+        kept = self._within(SINKAGE, m.sinkage, self._deepest, _TOO_DEEP)
+        kept = self._within(SINKAGE, kept, self._highest, 'sinkage far above the surface')
+        return m if kept is m.sinkage else SinkageReading(m.stamp, kept)
 
     def _leaving_angle(self, m: LeavingAngleReading) -> LeavingAngleReading | None:
-        values = self._wheel_values(LEAVING_ANGLE, m.leaving_angle)
-        if values is None:
+        if len(m.leaving_angle) != self._count:
+            self.refuse(LEAVING_ANGLE, 'wrong number of wheels')
             return None
-        bad = [i for i, angle in enumerate(values) if abs(angle) > 0.5 * math.pi]
-        if not bad:
-            return m
-        self.reject(LEAVING_ANGLE, 'leaving angle not within a quarter turn')
-        return LeavingAngleReading(m.stamp, _without(m.leaving_angle, bad))
+        reason = 'leaving angle not within a quarter turn'
+        kept = self._within(LEAVING_ANGLE, m.leaving_angle, self._angles, reason)
+        return m if kept is m.leaving_angle else LeavingAngleReading(m.stamp, kept)
 
     def _reference(self, m: ReferenceVelocity) -> ReferenceVelocity | None:
         if not abs(m.forward) <= GREATEST_SPEED:
@@ -249,18 +237,25 @@ class InputChecks:
             return replace(m, variance=0.0)
         return m
 
-    def _wheel_values(self, channel: int, values: FloatArray) -> list[float] | None:
-        if len(values) != self._count:
-            self.refuse(channel, 'wrong number of wheels')
-            return None
-        listed: list[float] = values.tolist()
-        return listed
+    def _within(
+        self, channel: int, values: FloatArray, bounds: list[_Range], reason: str
+    ) -> FloatArray:
+        """Return the values of the wheels, those out of their bounds marked as unknown.
+
+        Infinite values are out of bounds; nan passes, it marks an unknown already.
+        """
+        bad = [
+            i
+            for i, (value, (low, high)) in enumerate(zip(values.tolist(), bounds, strict=True))
+            if value < low or value > high
+        ]
+        if not bad:
+            return values
+        self.reject(channel, reason)
+        kept = np.array(values, dtype=float)
+        kept[bad] = math.nan
+        return kept
 
 
-def _without(values: FloatArray, indices: list[int]) -> FloatArray:
-    """Return the values with some of them marked as unknown."""
-    if not indices:
-        return values
-    cleaned = np.array(values, dtype=float)
-    cleaned[indices] = math.nan
-    return cleaned
+def _symmetric(bounds: Iterable[float]) -> list[_Range]:
+    return [(-bound, bound) for bound in bounds]
