@@ -221,7 +221,7 @@ def test_a_fast_rover_is_not_stopped_at_once(parts):
 # -- Sinkage ----------------------------------------------------------------------------------
 
 
-def test_a_spike_of_the_sinkage_is_dropped_and_eight_in_a_row_are_believed(parts, ekf):
+def test_a_spike_of_the_sinkage_is_dropped_and_three_in_a_row_are_believed(parts, ekf):
     noise = parts.sensors.sinkage_std**2
     update = SinkageUpdate(parts.configuration, parts.layout)
     zi = parts.layout.sinkage.start
@@ -233,8 +233,8 @@ def test_a_spike_of_the_sinkage_is_dropped_and_eight_in_a_row_are_believed(parts
 
     for i in range(20):
         assert read(0.1 * i, 0.03) == 1
-    assert [read(2.0 + 0.1 * i, 0.1) for i in range(8)] == [0] * 7 + [1]
-    assert update.state.rejected == 8
+    assert [read(2.0 + 0.1 * i, 0.1) for i in range(3)] == [0, 0, 1]
+    assert update.state.rejected == 3
     assert ekf.mean[zi] == pytest.approx(0.1, abs=0.002)
     assert update.unread(3.0) == [1, 2, 3, 4, 5]
     assert update.unread(9.0) == list(range(6))

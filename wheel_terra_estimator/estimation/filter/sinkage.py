@@ -17,7 +17,7 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
 
 # Tuned on simulated drives, seeds 1000 to 1019.
-_BELIEVED_AFTER = 8
+_BELIEVED_AFTER = 3
 """Rejected readings in a row after which they are no spikes: the wheel is somewhere else."""
 _FIRST_BELIEVED_AFTER = 2
 """The same at the start, where the configured soil or the first reading may be far off; later
