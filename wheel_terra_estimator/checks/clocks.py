@@ -24,7 +24,6 @@ from wheel_terra_estimator.checks.statistics import (
     averaged,
     correlation,
     even_times,
-    lag,
     moving_mean,
     without_drift,
 )
@@ -63,29 +62,29 @@ SMOOTHING = 0.4
 
 
 class Lag(NamedTuple):
-    """How late the second sensor's stamps are [s], by which motion, and what the trial showed."""
+    """How late the second sensor's stamps are [s], by which motion, on halves, and its trial."""
 
     value: float
-    own_std: float
     by: str
-    trial: Trial
     halves: tuple[float, float]
+    trial: Trial
     alone: bool = True  # nothing else may be it
+
+    @property
+    def std(self) -> float:
+        """Deviation by the halves [s]."""
+        return max(0.5 * abs(self.halves[0] - self.halves[1]), 0.2 * STEP)
 
     @property
     def steady(self) -> bool:
         """Whether both halves of the drive show the same."""
-        return abs(self.halves[0] - self.halves[1]) < max(APART, 3.0 * self.own_std)
+        return 2.0 * self.std < APART
 
-    @property
-    def std(self) -> float:
-        """Deviation, of the halves as well [s]."""
-        return max(self.own_std, 0.5 * abs(self.halves[0] - self.halves[1]))
-
-    def counts(self, least: float) -> bool:
-        """Whether it is a lag and stood its trial."""
-        clear = abs(self.value) > max(least, SIGMAS * self.std)
-        return clear and self.trial.after < FALLS[self.by] * self.trial.before
+    def counts(self, evidence: Evidence, name: str) -> bool:
+        """Whether it is a lag of a channel and stood its trial."""
+        periods = LEAST_PERIODS * _channel(evidence, name).period if name == 'reference' else 0.0
+        clear = max(LEAST_OFFSET, 1.5 * evidence.period, periods, SIGMAS * self.std)
+        return abs(self.value) > clear and self.trial.after < FALLS[self.by] * self.trial.before
 
     def of_the_first(self) -> Lag:
         """Return how late the first sensor's stamps are."""
@@ -128,27 +127,18 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     for name, off in _blamed(evidence, lags).items():
         outcomes.append(_outcome(evidence, name, off))
     reference, velocity = lags.get('reference'), evidence.recording.reference
-    if reference is not None and velocity is not None and _counts(evidence, 'reference', reference):
+    if reference and velocity is not None and reference.counts(evidence, 'reference'):
         stamp = shifted(velocity, round(reference.value * 1e9)).stamp
         evidence = evidence.with_channel('reference', stamp=stamp)
     return outcomes, evidence
 
 
-def _counts(evidence: Evidence, name: str, told: Lag) -> bool:
-    least = max(LEAST_OFFSET, 1.5 * evidence.period)
-    if name == 'reference' and evidence.recording.reference is not None:
-        least = max(least, LEAST_PERIODS * evidence.recording.reference.period)
-    return told.counts(least)
-
-
 def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
     """Return the sensor whose stamps are off: the one that is off against both others."""
-    late = {name: told for name, told in lags.items() if _counts(evidence, name, told)}
+    late = {name: told for name, told in lags.items() if told.counts(evidence, name)}
     if len(late) == 2:
         imu, reference = late['imu'], late['reference']
-        std = math.hypot(
-            _whole_std(evidence, 'imu', imu), _whole_std(evidence, 'reference', reference)
-        )
+        std = math.hypot(*(_whole_std(evidence, *told) for told in late.items()))
         if abs(imu.value - reference.value) < max(APART, 3.0 * std):
             return {'wheel_odometry': imu.of_the_first()}
         return late
@@ -192,12 +182,9 @@ def _channel(evidence: Evidence, name: str) -> Channel:
 def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
     channel = _channel(evidence, name)
     if not told.steady:
-        return NotChecked(
-            'delay',
-            f'{channel.topic}: its stamps run {told.halves[0]:+.2f} s off in the first half of the '
-            f'drive and {told.halves[1]:+.2f} s in the second: the clocks drift; synchronise them '
-            '(chrony, PTP)',
-        )
+        off = f'{told.halves[0]:+.2f} s off in the first half and {told.halves[1]:+.2f} s in the second'
+        reason = f'{channel.topic}: its stamps run {off}: the clocks drift; synchronise them'
+        return NotChecked('delay', reason)
     std = _whole_std(evidence, name, told)
     against = told.by + told.trial.words('unlike part', '')
     told_of = of_offset(name, told.value, std, against, evidence.facts.configuration)
@@ -233,17 +220,13 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
         started = lag_of(time, change, time, felt, 'imu', 'starts')
     best = turned or started
     if best is None:
-        reason = 'IMU against wheels: no clear turns in it; drive a circle'
+        return NotChecked('delay', 'IMU against wheels: no clear turns in it; drive a circle')
+    apart = 0.0 if turned is None or started is None else abs(turned.value - started.value)
+    if started is not None and started.steady and apart > APART + 3.0 * best.std:
+        reason = (
+            f'IMU against wheels: turns and starts are {apart:.2f} s apart: no offset does that'
+        )
         return NotChecked('delay', reason)
-    if turned is not None and started is not None and started.steady:
-        apart = abs(turned.value - started.value)
-        if apart > max(APART, 3.0 * math.hypot(turned.std, started.std)):
-            reason = (
-                f'turns are {turned.value:+.2f} s apart, starts and stops {started.value:+.2f} s'
-            )
-            return NotChecked(
-                'delay', f'IMU against wheels: {reason}: no offset of stamps does that'
-            )
     evidence.figures['imu.delay_s'] = round(best.value, 3)
     return best
 
@@ -254,13 +237,10 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     if reference is None or reference.stamp.size < 10:
         return NotChecked('delay', 'no reference velocity in it (visual odometry, GNSS)')
     time, at = even_times(evidence.time, STEP), evidence.seconds(reference)
-    if time.size < 2:
-        return NotChecked('delay', 'reference: the drive is too short')
     order = np.argsort(at, kind='stable')
-    period = float(np.median(np.diff(at[order])))
-    forward = reference.velocity[order, 0]
-    rim = _even(evidence, evidence.rim, time)
-    if period > SLOWEST or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
+    forward, rim = reference.velocity[order, 0], _even(evidence, evidence.rim, time)
+    slow = time.size < 2 or float(np.median(np.diff(at[order]))) > SLOWEST
+    if slow or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')
     told = lag_of(time - STEP, rim, at[order], forward, 'reference', 'speeds')  # means up to then
     if told is None:
@@ -282,21 +262,53 @@ def lag_of(
     """
     limit = min(LONGEST[of], float(time[-1] - time[0]) / IN_A_DRIVE)
     whole = lag(time, first, at, second, limit)
-    if whole is None or whole.fit < LEAST_FIT[by]:
+    if whole is None or whole[1] < LEAST_FIT[by]:
         return None
-    plain = np.interp(at, time, first)
     calm = first if by == 'starts' else np.gradient(moving_mean(first, round(SMOOTHED / STEP)))
     parts = halves(np.interp(at, time, (calm - calm.mean()) ** 2))
-    a, b = (lag(time, first, at[part], second[part], limit) for part in parts)
-    if a is None or b is None:
+    both = [lag(time, first, at[part], second[part], limit) for part in parts]
+    if both[0] is None or both[1] is None:
         return None
+    late = both[0][0], both[1][0]
     trials = []
-    for part, other in zip(parts, (b, a), strict=True):
-        moved = np.interp(at[part] - other.value, time, first)
-        trials.append(Trial(unlike(plain[part], second[part]), unlike(moved, second[part])))
-    return Lag(whole.value, whole.std, by, worst(trials), (a.value, b.value))
+    for part, other in zip(parts, late[::-1], strict=True):
+        left = [
+            1.0 - _fits(np.interp(at[part] - off, time, first)[None], second[part])[0]
+            for off in (0.0, other)
+        ]
+        trials.append(Trial(*left))
+    return Lag(whole[0], by, late, worst(trials))
 
 
-def unlike(first: FloatArray, second: FloatArray) -> float:
-    """Return the unlike part of two series [-]."""
-    return 1.0 - correlation(first - first.mean(), second - second.mean())
+def lag(
+    time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, limit: float
+) -> tuple[float, float] | None:
+    """Return how much later a series at ``at`` is than one on an even grid [s], and their fit then.
+
+    The first is read where the second was measured, never the second in between. None: nothing to
+    correlate, or it is too short for lags up to ``limit`` [s].
+    """
+    if time.size < 2 or not at.size or at[-1] - at[0] < 6.0 * limit:
+        return None
+    step = float(np.median(np.diff(time)))
+    reach = max(round(limit / step), 1)
+    inner = (at >= time[0] + reach * step) & (at <= time[-1] - reach * step)
+    at, second = at[inner], second[inner]
+    if at.size < 3 or not first.std() or not second.std():
+        return None
+    shifts = step * np.arange(-reach, reach + 1)
+    fits = _fits(np.interp(at - shifts[:, None], time, first), second)
+    peak, offset = int(np.argmax(fits)), 0.0
+    if 0 < peak < fits.size - 1:  # top of a parabola through three points
+        left, middle, right = fits[peak - 1 : peak + 2]
+        bend = left - 2.0 * middle + right
+        offset = 0.5 * float(left - right) / float(bend) if bend else 0.0
+    return step * (peak + offset - reach), float(fits[peak])
+
+
+def _fits(table: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the correlation of each of (m, k) series with a series (k,)."""
+    table = table - table.mean(axis=1, keepdims=True)
+    second = second - second.mean()
+    energy = (table**2).sum(axis=1) * float(second @ second)
+    return np.asarray(table @ second / np.sqrt(np.maximum(energy, 1e-300)))

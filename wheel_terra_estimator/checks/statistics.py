@@ -35,8 +35,6 @@ SAME_VALUE = 1e-6
 """Share of the greatest value below which two values are one."""
 OFF_A_STEP = 0.05
 """Distance from a multiple of a step, as a share of it."""
-ALIKE = 0.05
-"""Parts of a record that fit this much worse than the whole say nothing of the lag."""
 
 
 class Estimate(NamedTuple):
@@ -191,56 +189,6 @@ def averaged(time: FloatArray, values: FloatArray, at: FloatArray, width: float)
     mean = (total[last] - total[first]) / np.maximum(count, 1)
     middle = np.column_stack([np.interp(at - 0.5 * width, time, column) for column in values.T])
     return np.where(count > 0, mean, middle)
-
-
-class Lag(NamedTuple):
-    """How much later a series is than another [s], its deviation, and how well they fit then."""
-
-    value: float
-    std: float
-    fit: float
-
-
-def lag(
-    time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, limit: float
-) -> Lag | None:
-    """Return by how much a series at times ``at`` lags one on an even grid, at most ``limit`` [s].
-
-    The first is read where the second was measured, never the second in between. The deviation is
-    that of the lags of thirds of the record. None: nothing to correlate.
-    """
-    if time.size < 2 or not at.size or at[-1] - at[0] < 6.0 * limit:
-        return None
-    step = float(np.median(np.diff(time)))
-    reach = max(round(limit / step), 1)
-    inner = (at >= time[0] + reach * step) & (at <= time[-1] - reach * step)
-    at, second = at[inner], second[inner]
-    if at.size < 3 or not first.std() or not second.std():
-        return None
-    shifts = step * np.arange(-reach, reach + 1)
-    table = np.interp(at - shifts[:, None], time, first)
-    value, fit = _best_shift(table, second)
-    parts = []
-    if (time[-1] - time[0]) / 3.0 > 3.0 * limit:
-        thirds = np.array_split(np.arange(at.size), 3)
-        parts = [_best_shift(table[:, third], second[third]) for third in thirds]
-    good = [shift for shift, fits in parts if fits > fit - ALIKE]
-    std = float(np.std(good, ddof=1) / math.sqrt(len(good))) if len(good) > 1 else 1.0
-    return Lag(step * (value - reach), step * max(std, 0.2), fit)
-
-
-def _best_shift(table: FloatArray, second: FloatArray) -> tuple[float, float]:
-    """Return the row of (m, k) shifted series that fits a series (k,) best, and how well."""
-    table = table - table.mean(axis=1, keepdims=True)
-    second = second - second.mean()
-    energy = (table**2).sum(axis=1) * float(second @ second)
-    fits = table @ second / np.sqrt(np.maximum(energy, 1e-300))
-    peak, offset = int(np.argmax(fits)), 0.0
-    if 0 < peak < fits.size - 1:  # top of a parabola through three points
-        left, middle, right = fits[peak - 1 : peak + 2]
-        bend = left - 2.0 * middle + right
-        offset = 0.5 * (left - right) / bend if bend else 0.0
-    return peak + float(offset), float(fits[peak])
 
 
 def step_of(values: FloatArray) -> float:
