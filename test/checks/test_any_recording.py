@@ -119,7 +119,7 @@ def one_backwards():
     """A short drive with one wheel that counts backwards: the only finding."""
     whole = recording(starts_and_curves())
     flip = np.array([-1.0, 1.0, 1.0, 1.0])
-    joints = replace(whole.joints, rate=whole.joints.rate * flip)
+    joints = replace(whole.joints, rate=whole.joints.rate * flip, torque=whole.joints.torque * flip)
     faulty = replace(whole, joints=joints)
     assert [f.wheel for f in check_recording(faulty, CONFIGURATION).findings] == ['front_left']
     return faulty

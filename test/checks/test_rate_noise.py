@@ -65,12 +65,3 @@ def test_rates_in_counts_per_second():
     assert finding.kind == 'unit' and 'counts' in finding.words
     assert finding.value == pytest.approx(2.0 * math.pi / 4096, rel=0.05)
     assert 'multiply velocity' in finding.cure
-
-
-def test_rates_in_counts_told_by_turns_alone():
-    joints = WHOLE.joints
-    counts = replace(joints, rate=joints.rate * 16_384 / (2.0 * math.pi))
-    report = check_recording(replace(WHOLE, joints=counts, reference=None), rolling.rover())
-    (finding,) = report.findings
-    assert finding.kind == 'unit' and 'gyro in turns' in finding.words
-    assert 0.5 < finding.value / (2.0 * math.pi / 16_384) < 2.5

@@ -68,7 +68,6 @@ class Lag(NamedTuple):
     by: str
     halves: tuple[float, float]
     trial: Trial
-    alone: bool = True  # nothing else may be it
 
     @property
     def std(self) -> float:
@@ -147,25 +146,19 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
         if other is not None and other.steady:
             wheels = abs(other.value - told.value) < abs(other.value)
         else:
-            by_arrival = _by_arrival(evidence, name, told.value)
-            wheels, late[name] = by_arrival > 0, told._replace(alone=by_arrival != 0)
+            wheels = _by_arrival(evidence, name, told.value)
         if wheels:
             return {'wheel_odometry': told.of_the_first()}
     return late
 
 
-def _by_arrival(evidence: Evidence, name: str, late: float) -> int:
-    """Return whose stamps lie off their arrival: 1 the wheels', -1 the other's, 0 nobody's.
-
-    ``late`` is what the other sensor seems late [s].
-    """
+def _by_arrival(evidence: Evidence, name: str, late: float) -> bool:
+    """Return whether the wheels' stamps lie off their arrival, not those of one ``late`` [s]."""
     channels = evidence.joints, _channel(evidence, name)
     own, others = (float(np.median(channel.late)) for channel in channels)
     if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
-        by_age = abs(own - late) < abs(own) - 0.5 * abs(late)
-        return 1 if by_age or own < FUTURE < others else -1
-    by_wheels = abs(others) + abs(own - late) - abs(own) - abs(others + late)
-    return 0 if abs(by_wheels) <= 0.5 * abs(late) else int(-np.sign(by_wheels))
+        return abs(own - late) < abs(own) - 0.5 * abs(late) or own < FUTURE < others
+    return abs(others) + abs(own - late) < abs(own) + abs(others + late)
 
 
 def _whole_std(evidence: Evidence, name: str, told: Lag) -> float:
@@ -182,16 +175,13 @@ def _channel(evidence: Evidence, name: str) -> Channel:
 def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
     channel = _channel(evidence, name)
     if not told.steady:
-        off = f'{told.halves[0]:+.2f} s off in the first half and {told.halves[1]:+.2f} s in the second'
-        reason = f'{channel.topic}: its stamps run {off}: the clocks drift; synchronise them'
+        off = ' and '.join(f'{late:+.2f} s' for late in told.halves)
+        reason = f'{channel.topic}: stamps run {off} off in the halves: a clock drifts; synchronise'
         return NotChecked('delay', reason)
     std = _whole_std(evidence, name, told)
     against = told.by + told.trial.words('unlike part', '')
     told_of = of_offset(name, told.value, std, against, evidence.facts.configuration)
-    if not told.alone:
-        side = 'early' if told.value > 0.0 else 'late'
-        told_of['against'] += f', or those of the wheels are too {side}'
-    return evidence.found(f'{name}_offset', 0.97 if told.alone else 0.5, **told_of)
+    return evidence.found(f'{name}_offset', 0.97, **told_of)
 
 
 # Lags of pairs -----------------------------------------------------------------------------------

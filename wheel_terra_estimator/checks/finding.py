@@ -8,30 +8,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
-KINDS = (
-    'sign',
-    'swapped_sides',
-    'exchanged_wheels',
-    'missing_wheel',
-    'unknown_name',
-    'unit',
-    'mounting',
-    'gravity',
-    'placeholder',
-    'zero',
-    'gain',
-    'delay',
-    'noise',
-    'frozen',
-    'drop_outs',
-    'order',
-    'radius',
-    'track',
-    'mass',
-    'covariance',
-    'jumps',
-)
-"""All kinds of findings."""
 SUREST = 0.99
 """Confidence that is said at most: nothing is certain."""
 INTERNAL_ERROR = 'internal error, see --debug'
@@ -45,7 +21,7 @@ class Finding:
     Attributes
     ----------
     kind : str
-        One of ``KINDS``.
+        What it is, such as sign, unit or delay; see `faults.yaml`.
     topic : str
         Topic in the recording.
     wheel : str or None

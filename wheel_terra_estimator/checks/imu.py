@@ -34,9 +34,10 @@ from wheel_terra_estimator.checks.statistics import (
     block_fit,
     confidence,
     correlation,
+    lonely,
     moving_mean,
     probability,
-    robust_std_of_rows,
+    robust_std,
     runs,
     step_of,
 )
@@ -75,8 +76,6 @@ EVEN = 0.6
 """Length of the mean direction of the headings in turns, 0 where all occur alike, at most [-]."""
 NOISE_FACTOR = 4.0
 """Noise above so many times the stated one is a finding."""
-DEGREES = (0.15, 4.0)
-"""Noise of a gyro over the one stated if it were in degrees per second, as it then may be [-]."""
 BIAS_FACTOR = 6.0
 """A bias above so many stated deviations is a finding."""
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
@@ -84,8 +83,6 @@ LEAST_STANDSTILL = 3.0  # [s]
 BIAS_SIGMAS = 5.0
 TILT_IS_MOUNTING = 0.7
 """Probability that a tilt seen in circles is the mounting and not the accelerometer's zero [-]."""
-NO_ZERO = 0.97
-"""The same, from which the mounting is named alone [-]."""
 CROSS_AXIS = 0.01
 """Misalignment of the axes of gyro and accelerometer in one housing [rad]; data sheets of MEMS."""
 LEAST_TURNING = 10.0
@@ -102,10 +99,6 @@ UNIT_TOLERANCE = 0.12
 """Share by which the mean specific force may lie off gravity in another unit."""
 ORIENTATION_DEGREES = (30.0, 110.0)
 """Gyro over turning of the orientation that a gyro in degrees per second gives [-]."""
-UP_APART = math.radians(25.0)
-"""Angle between up by orientation and by specific force that no acceleration makes [rad]."""
-MOST_COMPARED = 5000
-"""Messages in which both are compared."""
 FROZEN_SHARE = 0.3
 """Share of messages that repeat the one before."""
 MOUNTING = tuple(f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw'))
@@ -159,33 +152,12 @@ def check_imu(state: ImuState) -> Judged:
         (_frozen, force, gyro),
         (_gravity, force),
         (_wild, force, gyro),
-        (_up_by_orientation, force),
         (_against_orientation, gyro),
     ):
         if all(getattr(state, name) for name in needed):
             told, state = check(state)
             outcomes += told
     return outcomes, state
-
-
-def _up_by_orientation(state: ImuState) -> Judged:
-    """Return an orientation that has up elsewhere than the specific force, both in its frame."""
-    from scipy.spatial.transform import Rotation  # heavy
-
-    imu = state.imu
-    norm = np.linalg.norm(imu.orientation, axis=1)
-    known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
-    if known.size < LEAST_MESSAGES:
-        return [], state
-    some = known[np.linspace(0, known.size - 1, min(known.size, MOST_COMPARED)).astype(int)]
-    up = Rotation.from_quat(imu.orientation[some]).inv().apply([0.0, 0.0, 1.0])
-    cosine = (up * imu.force[some]).sum(axis=1) / np.linalg.norm(imu.force[some], axis=1)
-    apart = math.acos(float(np.clip(np.median(cosine), -1.0, 1.0)))
-    upright = float((state.rotation @ np.median(imu.force, axis=0))[2]) > 0.0
-    if apart < UP_APART or (apart > math.pi - UP_APART and not upright):  # see `check_upside`
-        return [], state
-    told = state.found('orientation_tilt', 0.97, apart=math.degrees(apart))
-    return [told], state.with_values(orientation=np.full_like(imu.orientation, np.nan))
 
 
 def _placeholders(state: ImuState) -> Judged:
@@ -198,9 +170,10 @@ def _placeholders(state: ImuState) -> Judged:
         usable[f'usable_{name}'] = bool(np.any(np.nan_to_num(values)))
         if there and not usable[f'usable_{name}']:
             outcomes.append(state.found('force_zero', 0.999, field=field))
-        elif not there and name == 'force':
-            reason = 'the IMU says that it has no linear_acceleration: nothing tells slope and load'
-            outcomes.append(NotChecked('gravity', reason))
+        elif not there:
+            of, tells = ('gravity', 'slope and load') if name == 'force' else ('sign', 'turns')
+            reason = f'the IMU has no {field}, or says so: nothing tells {tells}'
+            outcomes.append(NotChecked(of, reason))
     state = replace(state, **usable)
     known = np.isfinite(imu.orientation).all(axis=1)
     orientation = imu.orientation[known]
@@ -233,12 +206,11 @@ def _frozen(state: ImuState) -> Judged:
 
 def _wild(state: ImuState) -> Judged:
     """Leave out single samples that no body can make; the node does so by the same limits."""
-    force = np.abs(np.diff(state.imu.force, axis=0))
-    far = (force > WILD_FORCE).any(axis=1)  # a gyro may yet turn out to be in degrees
-    wild = np.concatenate([[False], far]) & np.concatenate([far, [False]])
+    off = lonely(state.imu.force).max(axis=1)
+    wild = off > WILD_FORCE  # a gyro may yet turn out to be in degrees
     if wild.sum() < LEAST_WILD or np.mean(wild) > MOST_WILD:
         return [], state
-    told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'most': float(force.max())}
+    told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'most': float(off.max())}
     return [state.found('imu_wild', 0.97, **told)], state.with_imu(rows_of(state.imu, ~wild))
 
 
@@ -265,8 +237,8 @@ def _gravity(state: ImuState) -> Judged:
     for place, there in GRAVITIES.items():
         if abs(size / there - 1.0) <= GRAVITY_TOLERANCE:
             return told('planet', there, place=place), replace(state, gravity=there)
-    gain = gravity / size
-    return told('force_scale', gain), state.with_values(force=imu.force * gain)
+    reason = f'mean specific force is {size:.3g}, gravity {gravity:.4g} m/s^2: scale, or gravity'
+    return [NotChecked('gravity', reason)], state
 
 
 def _against_orientation(state: ImuState) -> Judged:
@@ -372,7 +344,7 @@ def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
     rest = evidence.at_rest & (evidence.time <= evidence.seconds(imu).max())
     if rest.sum() * evidence.period < LEAST_STANDSTILL:
         return None
-    spread = robust_std_of_rows(gyro[rest].T)
+    spread = np.array([robust_std(column) for column in gyro[rest].T])
     return np.median(gyro[rest], axis=0), spread / math.sqrt(max(rest.sum() / 4.0, 1.0))
 
 
@@ -467,9 +439,6 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
         return [], evidence
-    if not trial.falls:
-        reason = 'yaw of the IMU: both halves of the drive say another'
-        return [NotChecked('mounting', reason)], evidence
     words: dict[str, Any] = {
         'angle': math.degrees(seen.value),
         'off': math.degrees(seen.std),
@@ -553,14 +522,12 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words = {'size': math.degrees(size), 'zero': math.sin(size) * gravity, 'biases': zero}
     sure = confidence(tilt.sigmas) * max(tilt.sure, 1.0 - tilt.sure)
     if tilt.sure < 0.5:
-        words['rival'] = ', or its axes are tilted' if tilt.sure > 1.0 - NO_ZERO else ''
+        words['rival'] = ', or its axes are tilted'
         worst = int(np.argmax(np.abs(off)))
         words |= {'value': round(float((biases + off)[worst]), 3), 'std': gravity * tilt.std}
         told_of = evidence.found('force_bias', sure, **words)
         return [told_of], replace(evidence, force=evidence.force - off)
-    if tilt.sure < NO_ZERO:
-        words['rival'] = f' (or its accelerometer is off by {words["zero"]:.2g} m/s^2)'
-        words['separate'] = f'  (or {zero}, in the frame that is mounted so now)'
+    words['rival'] = f' (or its accelerometer is off by {words["zero"]:.2g} m/s^2)'
     mended = evidence.turned(tilt.taken_off(evidence.rotation))
     return [mounting_finding('imu_tilt', evidence, mended, std, sure, **words)], mended
 
@@ -598,8 +565,6 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         return []
     outcomes: list[Outcome] = []
     sensors = configuration.sensors
-    track = track_ratio(evidence) if evidence.facts.known else None
-    by_noise = track is None or not ordinary_track(track)  # else the turns tell the unit
     for values, key, unit in (
         (imu.force, 'specific_force_std', 'm/s^2'),
         (imu.rate, 'angular_rate_std', 'rad/s'),
@@ -611,14 +576,9 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         noise = math.hypot(noise, UNIFORM_STD * step)
         stated = getattr(sensors, key)
         evidence.figures[f'imu.{key}'] = float(f'{noise:.3g}')
-        in_degrees = math.radians(noise) / stated if by_noise and values is imu.rate else 0.0
-        told: dict[str, Any] = {'noise': noise, 'stated': stated, 'unit': unit}
-        told |= {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}'}
-        if DEGREES[0] < in_degrees < DEGREES[1]:  # which of both, a turn would tell
-            reason = f'gyro: noise of {noise:.2g}: vibration, or degrees per second; drive a circle'
-            outcomes += [NotChecked(kind, reason) for kind in ('unit', 'noise')]
-        elif noise > NOISE_FACTOR * stated:
-            by_noise = False  # vibration, which a gyro has as well
+        if noise > NOISE_FACTOR * stated:
+            told: dict[str, Any] = {'noise': noise, 'stated': stated, 'unit': unit}
+            told |= {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}'}
             outcomes.append(evidence.found('imu_noise', confidence(noise / stated), **told))
     seen = gyro_bias(evidence)
     if seen is None:
@@ -630,21 +590,14 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
     least = max(BIAS_FACTOR * sensors.angular_rate_bias_std, LEAST_GYRO_BIAS)
     if abs(bias[worst]) > max(least, BIAS_SIGMAS * std[worst]):
         whole = bias + sensors.angular_rate_bias
-        value, biases = float(f'{whole[worst]:.4g}'), listed(whole, '.5f')
-        told = {'axis': 'xyz'[worst], 'bias': float(bias[worst]), 'biases': biases}
-        outcomes.append(
-            evidence.found('gyro_bias', 0.99, value=value, std=float(std[worst]), **told)
-        )
+        told = {'axis': 'xyz'[worst], 'bias': float(bias[worst]), 'biases': listed(whole, '.5f')}
+        told |= {'value': float(f'{whole[worst]:.4g}'), 'std': float(std[worst])}
+        outcomes.append(evidence.found('gyro_bias', 0.99, **told))
     return outcomes
 
 
 def _upper_rms(values: FloatArray) -> float:
-    values = values[np.isfinite(values)]
-    if not values.size:
-        return math.nan
-    blocks = min(max(values.size // 50, 1), 200)
-    size, longer = divmod(values.size, blocks)  # so many are longer by one
-    split = longer * (size + 1)
-    rows = values[:split].reshape(longer, size + 1), values[split:].reshape(-1, size)
-    deviations = np.concatenate([robust_std_of_rows(block) for block in rows if block.size])
-    return float(np.median(np.sort(deviations)[deviations.size // 2 :]))
+    """Return the noise of the livelier half of the blocks of (k,) changes."""
+    blocks = np.array_split(values, min(max(values.size // 50, 1), 200))
+    noise = sorted(robust_std(block) for block in blocks)
+    return float(np.median(noise[len(noise) // 2 :]))

@@ -5,19 +5,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.series import VelocitySeries
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,
-    correlation,
     integrated,
+    lonely,
     moving_mean,
     robust_std,
 )
@@ -126,25 +125,15 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
     if not _sideways(reference):
         return [], evidence
 
-    def along_x(speed: FloatArray) -> Evidence:
-        velocity = np.column_stack([speed, 0.0 * speed, 0.0 * speed])
-        return evidence.with_channel('reference', velocity=velocity)
-
     kept = _kept_direction(evidence, reference, rim)
-    clear = kept.turn > CLEAR_HEADING
-    if clear and kept.in_world > max(STEADY, 0.5 * (1.0 + kept.in_body)):
-        return [evidence.found('reference_world', 0.95)], along_x(size * np.sign(rim))
+    if kept.turn > CLEAR_HEADING and kept.in_world > max(STEADY, 0.5 * (1.0 + kept.in_body)):
+        speed = size * np.sign(rim)
+        velocity = np.column_stack([speed, 0.0 * speed, 0.0 * speed])
+        mended = evidence.with_channel('reference', velocity=velocity)
+        return [evidence.found('reference_world', 0.95)], mended
     if kept.in_body < STEADY:
         reason = 'reference: its direction keeps neither to the rover nor to the world'
         return [NotChecked('mounting', reason)], evidence
-    along, across = correlation(rim, forward), correlation(rim, side)
-    if abs(across) > 0.7 and abs(across) > abs(along):
-        angle = math.degrees(math.atan2(float(rim @ side), float(rim @ forward)))
-        told: dict[str, Any] = {'value': round(angle, 1), 'std': 5.0, 'turn': -angle, 'rival': ''}
-        sure = 0.95
-        if not clear or kept.in_body < 0.5 * (1.0 + kept.in_world):
-            told['rival'], sure = ', or is given in the world frame: drive a circle', 0.6
-        return [evidence.found('reference_axis', sure, **told)], along_x(np.sign(across) * side)
     return [], evidence
 
 
@@ -209,28 +198,13 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             velocity=reference.velocity / factor,
             variance=reference.variance / factor**2,
         )
-        track = turning.track_ratio(evidence)
-        either = [] if track and turning.ordinary_track(track) else either_unit(evidence, ratio)
-        return either or [evidence.found('reference_unit', 0.9, **told)], mended
+        return [evidence.found('reference_unit', 0.9, **told)], mended
     return [], evidence
 
 
 def hardly_moves(speed: FloatArray, rows: Mask) -> bool:
     """Return whether a speed (k,) is little more than its noise in some rows: no unit is told."""
     return float(np.quantile(np.abs(speed[rows]), 0.8)) < CLEAR_SPEED * bend_noise(speed)
-
-
-def either_unit(evidence: Evidence, ratio: float | None) -> list[Outcome]:
-    """Return that rates in m/s of the rim or a reference of another unit give a ratio of speeds."""
-    radius, fitting = float(np.nanmean(evidence.facts.radius)), reference_units(ratio or 0.0)
-    if not fitting or ratio is None or not SLIPPING < ratio * radius < 1.25:
-        return []
-    unit, factor = next(iter(fitting.items()))
-    of_rims, how = 'metres per second of the rim', 'reference, or that is in ' + unit
-    return [
-        evidence.found('rate_unit', 0.45, value=1.0 / radius, unit=of_rims, how=how),
-        evidence.found('reference_unit', 0.45, value=1.0 / factor, ratio=ratio, unit=unit),
-    ]
 
 
 def reference_units(ratio: float) -> dict[str, float]:
@@ -247,25 +221,14 @@ def check_jumps(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < LEAST_REFERENCES:
         return [NotChecked('jumps', 'hardly any reference velocity in it')], evidence
-    forward = reference.velocity[:, 0]
-    beside = np.median(np.stack([forward[:-4], forward[1:-3], forward[3:-1], forward[4:]]), axis=0)
-    off = forward[2:-2] - beside
-    speed = float(np.quantile(np.abs(forward), 0.8))
-    wild = np.abs(off) > max(JUMP_FACTOR * max(robust_std(off), 1e-6), LEAST_JUMP * speed)
-    # Starts and stops are no jumps: the wheels change as well.
-    around = 1.5 * reference.period
-    calm = [
-        np.nan_to_num(evidence.rim_at(reference.stamp, rows.astype(float), around)) > 0.99
-        for rows in (evidence.steady, evidence.at_rest)
-    ]
-    if evidence.facts.known:
-        fastest = max(speed, float(np.quantile(np.abs(evidence.rim), 0.99)))
-        calm.append(np.abs(forward) > BEYOND * fastest)
-    wild &= np.any(calm, axis=0)[2:-2]
+    forward, at = reference.velocity[:, 0], evidence.seconds(reference)
+    off, speed = lonely(forward[:, None])[:, 0], float(np.quantile(np.abs(forward), 0.8))
+    usual = max(robust_std(np.diff(forward)), 1e-6)
+    wild = off > max(JUMP_FACTOR * usual, LEAST_JUMP * speed)
     if not wild.any():
         return [], evidence
     velocity = reference.velocity.copy()
-    velocity[2:-2, 0] = np.where(wild, beside, forward[2:-2])
+    velocity[wild, 0] = np.interp(at[wild], at[~wild], forward[~wild])
     mended, share = evidence.with_channel('reference', velocity=velocity), float(np.mean(wild))
     if share < JUMP_SHARE or wild.sum() < LEAST_JUMPS:
         return [], mended
@@ -294,22 +257,13 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     stated = reference.variance[np.isfinite(reference.variance)]
     usual = math.sqrt(max(float(np.median(stated)), 0.0)) if stated.size else 0.0
     evidence.figures['reference.stated_std_m_s'] = float(f'{usual:.3g}')
-    constant = bool(np.ptp(stated) == 0.0) if stated.size else True
-    configuration, told = evidence.facts.configuration, {'noise': noise, 'variance': noise**2}
-    if usual == 0.0:
-        own = configuration.sensors.reference_std if configuration is not None else None
-        if own is not None and own / COVARIANCE_FACTOR < noise < COVARIANCE_FACTOR * own:
-            return []  # the rover file decides, and says what is seen
-        words = 'states no variance (0): the rover file decides'
-        if own is not None and noise > COVARIANCE_FACTOR * own:
-            words = f'states no variance (0) and scatters by {noise:.2g} m/s'
-    elif constant and (usual > COVARIANCE_FACTOR * noise or usual * COVARIANCE_FACTOR < noise):
-        words = f'states {usual:.2g} m/s, always the same, and scatters by {noise:.2g} m/s'
-    elif noise > COVARIANCE_FACTOR * usual:
-        value = float(f'{noise:.2g}')
-        return [evidence.found('reference_noise', 0.9, value=value, stated=usual, **told)]
-    else:
+    configuration, constant = evidence.facts.configuration, not stated.size or not np.ptp(stated)
+    own = configuration.sensors.reference_std if configuration is not None else 0.0
+    expected = usual or float(own or 0.0)  # what the estimator goes by
+    beyond = noise > COVARIANCE_FACTOR * expected
+    if expected and not beyond and not (constant and expected > COVARIANCE_FACTOR * noise):
         return []
     noise = max(noise, LEAST_STD)
-    told = {'noise': noise, 'variance': noise**2}
-    return [evidence.found('covariance', 0.9, value=float(f'{noise:.2g}'), how=words, **told)]
+    told = {'noise': noise, 'variance': noise**2, 'stated': usual}
+    key = 'covariance' if constant else 'reference_noise'
+    return [evidence.found(key, 0.9, value=float(f'{noise:.2g}'), **told)]

@@ -47,14 +47,11 @@ def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes, evidence = _reference(evidence)
     imu = evidence.recording.imu
     for name, field in (('force', 'linear_acceleration'), ('gyro', 'angular_velocity')):
-        if imu is None or getattr(evidence, name) is None:
-            continue
-        dead = stays(evidence, evidence.seconds(imu), imu.force if name == 'force' else imu.rate)
-        if dead is not None:
-            outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
-            evidence = (
-                replace(evidence, force=None) if name == 'force' else replace(evidence, gyro=None)
-            )
+        if imu is not None and getattr(evidence, name) is not None:
+            readings = imu.force if name == 'force' else imu.rate
+            if dead := stays(evidence, evidence.seconds(imu), readings):
+                outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
+                evidence = replace(evidence, **{name: None})  # type: ignore[arg-type]
     torques, evidence = _torques(evidence)
     return [*outcomes, *torques, *deep], evidence
 

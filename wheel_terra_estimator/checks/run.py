@@ -224,7 +224,6 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('missing_wheel', wheel_rates, 'check_dead_wheels', DRIVING),
     ('frozen', repeats, 'check_repeats', DRIVING),
     ('jumps', wheel_rates, 'check_wild'),
-    ('unit', wheel_rates, 'check_positions'),
     ('unit', turning, 'check_steering_unit'),
     ('radius', wheel_rates, 'check_scales'),
     ('sign', turning, 'check_signs', DRIVING),

@@ -24,9 +24,6 @@ from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorE
 DEEPEST = 1.2
 """Sinkage over radius that no wheel gets out of [-]."""
 LEAST_READINGS = 50
-NOISE_FACTOR = 4.0
-LEAST_SURE = 0.6
-"""Confidence of noise below which nothing else is told."""
 ANOTHER_UNIT = 30.0
 """Noise over the stated one from which it may be another unit [-]."""
 BELOW_ZERO = 0.006
@@ -35,8 +32,6 @@ BURIED = 0.5
 """Depth over radius that no drive has all the time [-]."""
 DRAGS = 0.3
 """Correlation of depth with thrust or slip from which deep wheels are seen to be dragged [-]."""
-LIKE_OTHERS = 0.2
-"""Correlation with the other wheels of one that counts downwards as they do [-]."""
 ALIKE_SHARE = 0.4
 """Share by which the offset of a wheel may change over a drive to count as its zero [-]."""
 DEEP_STD = 0.02
@@ -63,29 +58,29 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if sinkage is None:
         return [NotChecked('zero', 'no sinkage in the recording')], evidence
     outcomes: list[Outcome] = [ORDER, STAMPS]
-    mute = [name for name in _own_names(evidence.facts, sinkage) if name not in sinkage.names]
-    if mute:
-        outcomes.append(evidence.found('sinkage_missing', 0.9, wheel=', '.join(mute)))
     names, table = without_stated_errors(evidence.facts, sinkage)
-    if not names or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS:
-        return [*outcomes, NotChecked('zero', 'hardly any sinkage readings')], evidence
-    if not np.nan_to_num(table).any():
-        reason = 'sinkage is 0 in every message: firm ground, or nothing is measured'
-        return [*outcomes, NotChecked('placeholder', reason)], evidence
+    few = not names or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS
+    if few or not np.nan_to_num(table).any():
+        reason = 'hardly any readings' if few else '0 in every message: firm ground, or nothing'
+        kind = 'zero' if few else 'placeholder'
+        return [*outcomes, NotChecked(kind, f'sinkage: {reason}')], evidence
     unit, table = _unit(evidence, table)
     middle = np.array([_median(column) for column in table.T])
     evidence.figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
-    noise = _noise(evidence, table)
-    if noise and noise[0].confidence < LEAST_SURE:  # zeros and signs would be those of noise
-        unknown = np.full_like(sinkage.sinkage, np.nan)
-        return [*outcomes, *unit, *noise], evidence.with_channel('sinkage', sinkage=unknown)
+    evidence.figures['sinkage.noise_m'] = noise = float(f'{_reading_noise(table):.3g}')
+    configuration = evidence.facts.configuration
+    if configuration and noise > ANOTHER_UNIT * float(configuration.sensors.sinkage_std):
+        reason = f'sinkage scatters by {noise:.2g} m: noise, or another unit; drive in soft ground'
+        unknown = np.full_like(sinkage.sinkage, np.nan)  # zeros and signs would be those of noise
+        mended = evidence.with_channel('sinkage', sinkage=unknown)
+        return [*outcomes, *unit, NotChecked('unit', reason)], mended
     told = _sign_and_zero(evidence, names, table, middle)
-    outcomes += [*unit, *told, *noise]
+    outcomes += [*unit, *told]
     known = sinkage.sinkage
     for finding in told:
         if isinstance(finding, Finding):  # a zero is left unknown, as what may be one is
             wrong = [finding.wheel in (None, name) for name in sinkage.names]
-            sign = finding.fault == 'sinkage_sign' and finding.confidence > LEAST_SURE
+            sign = finding.fault == 'sinkage_sign' and len(told) == 1
             known = known * np.where(wrong, -1.0 if sign else np.nan, 1.0)
     return outcomes, evidence.with_channel('sinkage', sinkage=known)
 
@@ -144,22 +139,6 @@ def _reading_noise(table: FloatArray) -> float:
     return float(np.median([bend_noise(c) for c in columns if c.size > 12] or [0.0]))
 
 
-def _noise(evidence: Evidence, table: FloatArray) -> list[Finding]:
-    """Return noise beyond the stated one; far beyond it may be another unit."""
-    if evidence.facts.configuration is None:
-        return []
-    noise, stated = _reading_noise(table), float(evidence.facts.configuration.sensors.sinkage_std)
-    evidence.figures['sinkage.noise_m'] = float(f'{noise:.3g}')
-    if noise <= NOISE_FACTOR * stated:
-        return []
-    words: dict[str, Any] = {'noise': noise, 'noise_mm': 1000 * noise, 'stated': 1000 * stated}
-    sure = 0.95
-    if noise > ANOTHER_UNIT * stated:
-        sure = 0.5
-        words['rival'] = ', or it is in centimetres or millimetres: drive where it is soft'
-    return [evidence.found('sinkage_noise', sure, value=float(f'{noise:.2g}'), **words)]
-
-
 def _sign_and_zero(
     evidence: Evidence, names: list[str], table: FloatArray, middle: FloatArray
 ) -> list[Outcome]:
@@ -190,17 +169,6 @@ def _sign_and_zero(
         far = own - typical
         spread = max(float(np.nanmax(others) - np.nanmin(others)), 0.1 * abs(far))
         how = f'reads {1000 * far:+.0f} mm off the other wheels all the time'
-        if own < -limit < float(np.nanmin(others)):
-            beside_it = np.nanmedian(np.delete(table, index, axis=1), axis=1)
-            alike = correlation(table[:, index] - own, beside_it - typical) > LIKE_OTHERS
-            like_sign = not alike and abs(-own - typical) < 0.6 * typical
-            if like_sign:
-                beside = f', the others {1000 * typical:.0f} mm'
-                told = {'reading': 1000 * own, 'others': beside, 'of': f' of {name}'}
-                outcomes.append(evidence.found('sinkage_sign', 0.9, wheel=name, value=-1.0, **told))
-            elif abs(far) > ODD_ZERO:
-                outcomes.append(_zero(evidence, [name], far, spread, how))
-            continue
         odd = max(ODD_ZERO, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
         if abs(far) > odd and _lasting(table, index, far):
             outcomes.append(_zero(evidence, [name], far, spread, how))
@@ -208,15 +176,13 @@ def _sign_and_zero(
 
 
 def _dragged_where_deep(evidence: Evidence, table: FloatArray) -> float:
-    """Return how well readings (k, p) follow the thrust, else the slip, of straights [-].
+    """Return how well readings (k, p) follow the thrust of straights [-].
 
-    What a wheel sinks by costs thrust, and slip digs: a reversed sign follows both downwards.
+    What a wheel sinks by costs thrust: a reversed sign follows it downwards.
     """
-    sinkage, speed = evidence.recording.sinkage, evidence.reference_speed
+    sinkage = evidence.recording.sinkage
     assert sinkage is not None
     effort = np.abs(thrust(evidence))
-    if not effort.any() and speed is not None:
-        effort = np.clip(1.0 - speed / np.maximum(np.abs(evidence.rim), 1e-3), -1.0, 1.0)
     depth, there = row_medians(table), np.isfinite(table).any(axis=1)
     rows = there & (evidence.rim_at(sinkage.stamp, evidence.unturned.astype(float)) > 0.99)
     if rows.sum() < LEAST_READINGS:

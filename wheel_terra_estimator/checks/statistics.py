@@ -76,12 +76,6 @@ def middle(values: FloatArray) -> float:
     return float(above if values.size % 2 else 0.5 * (below + above))
 
 
-def robust_std_of_rows(rows: FloatArray) -> FloatArray:
-    """Return `robust_std` of each row of (k, n) finite values."""
-    off = np.abs(rows - np.median(rows, axis=1, keepdims=True))
-    return np.asarray(MAD_TO_STD * np.median(off, axis=1))
-
-
 def block_fit(
     design: FloatArray, target: FloatArray, instruments: FloatArray | None = None
 ) -> list[Estimate]:
@@ -144,6 +138,13 @@ def without_drift(values: NDArray[Any], period: float, drift: float = DRIFT) -> 
 def bend_noise(values: FloatArray) -> float:
     """Return the noise of (k,) even readings of something smooth, by their second differences."""
     return robust_std(np.diff(values, 2, axis=0).ravel()) / math.sqrt(6.0)
+
+
+def lonely(values: FloatArray) -> FloatArray:
+    """Return by how much values (k, n) leave both the one before and after to the same side."""
+    steps = np.diff(np.pad(values, ((1, 1), (0, 0)), constant_values=np.nan), axis=0)
+    off = np.minimum(np.abs(steps[:-1]), np.abs(steps[1:]))
+    return np.nan_to_num(off * (steps[:-1] * steps[1:] < 0.0))
 
 
 def runs(same: BoolArray) -> list[tuple[int, int]]:

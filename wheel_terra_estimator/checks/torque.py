@@ -51,8 +51,9 @@ GAIN_MODEL_STD = 0.05
 """What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
 SLOPE_TIME = 2.0
 """Forces are averaged over this for a slope that a sign is told on [s]."""
-MOST_UNLIKE_SHARES = 2.5
-"""Most over least that slopes cost of the torques of single wheels [-]."""
+ODD_GAIN, SAME_GAIN = math.log(1.3), 0.25
+"""Torque over that of the wheel across that is another scale [ln], and by how much it may differ on
+slopes and on the level: a load, a zero or another radius changes one of them."""
 SMOOTH_ROWS = 20
 """Rows over which slopes are averaged."""
 LEAST_BACK_ROWS = 10
@@ -87,6 +88,8 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return outcomes, evidence
     if not known.all():
         return [*outcomes, *_not_told('a wheel without torque: the sum is not known')], evidence
+    odd, evidence = _odd_scale(evidence)
+    outcomes += odd
     zeros = torque_zeros(evidence)
     without = evidence
     if zeros is not None:  # a zero looks like a resistance that no soil has, not the other way
@@ -120,7 +123,8 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     for i, (answer, level) in enumerate(told):
         brakes = -level.value > SIGN_SIGMAS * level.std
         clear = answer.sigmas_from(0.0) > SIGN_SIGMAS or (brakes and agree)
-        if answer.value < -LEAST_ANSWER * usual and clear:
+        drives = level.value > SIGN_SIGMAS * level.std
+        if answer.value < -LEAST_ANSWER * usual and clear and not drives:
             wrong.append(i)
         elif brakes:
             unsure.append(facts.names[i])
@@ -195,17 +199,8 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     open_to = 1.0 + 3.0 * float(facts.configuration.sensors.torque_gain_std)
     if size >= LEAST_TRACTION and traction <= MOST_TRACTION * open_to:
         return [], evidence
-    fit = slope_fit(evidence)
-    told: dict[str, Any] = {'gains': '...'}
-    if isinstance(fit, Slopes) and fit.gain.value > GAIN_SIGMAS * max(
-        fit.gain.std, fit.trial.after
-    ):
-        whole = whole_gain(evidence, fit.gain.value)
-        mean = float(np.mean(whole))
-        told = {'value': mean, 'std': mean * fit.gain.std / fit.gain.value}
-        told |= {'gains': listed(whole, '.3g')}
     seen = traction if size >= LEAST_TRACTION else size
-    finding = evidence.found('torque_scale', 0.8, traction=seen, **told)
+    finding = evidence.found('torque_scale', 0.8, traction=seen)
     return [finding, NotChecked('mass', 'torques have no credible scale')], evidence
 
 
@@ -218,14 +213,14 @@ def _middle_mean(values: FloatArray) -> float:
 class Slopes(NamedTuple):
     """Thrust over mass times specific force: torque gain times true over stated mass; its trial.
 
-    ``scatter`` is that of the specific force along the drive [m/s^2]; ``unlike``: the wheels take
-    shares too unlike for loads to explain it.
+    ``scatter`` is that of the specific force along the drive [m/s^2]; ``shares`` (n, 2) what slopes
+    and rolling take of each torque [kg m] and [N m].
     """
 
     gain: Estimate
     trial: Trial
     scatter: float
-    unlike: bool
+    shares: FloatArray
 
 
 def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
@@ -255,10 +250,49 @@ def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
         1.0,
         (along - along.mean()) ** 2,
     )
-    single = [moving_mean(column, SMOOTH_ROWS)[rows] for column in evidence.torque.T]
-    shares = sorted(block_fit(design, column)[0].value for column in single)
-    unlike = shares[-1] > MOST_UNLIKE_SHARES * shares[0]
-    return Slopes(block_fit(design, pushed)[0], trial, scatter, unlike)
+    table = np.nan_to_num(evidence.torque)
+    single = [moving_mean(column, SMOOTH_ROWS)[rows] for column in table.T]
+    shares = np.array([[one.value for one in block_fit(design, column)[:2]] for column in single])
+    return Slopes(block_fit(design, pushed)[0], trial, scatter, shares)
+
+
+def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return a torque of another scale than that of the wheel across, and it mended.
+
+    Only a scale changes what slopes and what rolling take of it alike.
+    """
+    facts, fit = evidence.facts, slope_fit(evidence)
+    if isinstance(fit, NotChecked) or facts.configuration is None or not facts.has_sides():
+        return [], evidence
+    x = facts.configuration.wheels.x
+    across = [
+        int(np.argmin(np.where(facts.side == -side, np.abs(x - here), np.inf)))
+        for side, here in zip(facts.side, x, strict=True)
+    ]
+    size = np.log(np.maximum(fit.shares, 1e-9))
+    apart = size - size[across]
+    by = np.abs(apart).min(axis=1) * (np.abs(apart[:, 0] - apart[:, 1]) < SAME_GAIN)
+    pair = [int(np.argmax(by)), across[int(np.argmax(by))]]
+    others = np.delete(size[:, 1], pair)
+    unlike = np.abs(np.delete(apart[:, 1], pair)).max(initial=0.0)
+    if by[pair[0]] < max(ODD_GAIN, 2.0 * unlike) or not others.size:
+        return [], evidence
+    far = np.abs(size[pair, 1] - np.median(others))  # the one of both that is unlike all others
+    wheel, gain = pair[int(np.argmax(far))], np.ones(size.shape[0])
+    gain[wheel] = math.exp(float(apart[wheel].mean()))
+    rival = facts.names[pair[int(np.argmin(far))]] if 2.0 * far.min() > far.max() else ''
+    whole = whole_gain(evidence, 1.0) * gain
+    told = evidence.found(
+        'wheel_torque',
+        0.5 if rival else 0.9,
+        wheel=facts.names[wheel],
+        value=round(float(whole[wheel]), 3),
+        std=round(float(whole[wheel] * max(0.5 * np.ptp(apart[wheel]), GAIN_MODEL_STD)), 3),
+        times=float(gain[wheel]),
+        rival=f', or that of {rival}' if rival else '',
+        gains=listed(whole, '.3f'),
+    )
+    return [told], evidence.with_rate(evidence.rate, evidence.torque / gain)
 
 
 def whole_gain(evidence: Evidence, left: float) -> FloatArray:
@@ -294,12 +328,6 @@ def torque_gain(evidence: Evidence) -> Slopes | NotChecked:
         return NotChecked(
             'gain',
             'torque: its scale by one half of the drive does not fit the slopes of the other',
-        )
-    if abs(fit.gain.value - 1.0) > LEAST_GAIN_ERROR and fit.unlike:
-        return NotChecked(
-            'gain',
-            'torque: slopes cost each wheel another share: scale, sign or zero of single torques; '
-            'lift the wheels and load each alike',
         )
     apart = min(0.5 * fit.trial.after, 1.0)
     # A body that digs in reads uphill where thrust rises: slopes seem to cost less, never more.
@@ -438,14 +466,11 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     if not wrong:
         return []
     whole = whole_zeros(evidence, zeros)
-    rivals = []  # with another scale every zero is another; a slope that is none is in all of them
-    if evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION:
-        rivals.append('the torques have another scale')
-    if like_a_pitch(evidence, zeros):
-        rivals.append('the IMU is pitched: drive a level circle')
+    pitch = like_a_pitch(evidence, zeros)  # a slope that is none is in all of them
     sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong))
-    sure *= 0.5 if rivals or where == 'standing' else 1.0
-    told: dict[str, Any] = {'where': where, 'rival': ''.join(f', or {rival}' for rival in rivals)}
+    sure *= 0.5 if pitch or where == 'standing' else 1.0
+    told: dict[str, Any] = {'where': where}
+    told['rival'] = ', or the IMU is pitched: drive a level circle' if pitch else ''
     told['left'] = listed((zeros[i].value for i in wrong), '.2f')
     told['zeros'] = listed((zero.value for zero in whole), '.2f')
     told['wheel'] = ', '.join(facts.names[i] for i in wrong)

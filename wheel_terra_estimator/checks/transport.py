@@ -46,7 +46,7 @@ def check_transport(
 ) -> tuple[list[Outcome], dict[str, float]]:
     """Return what is wrong with the stamps, and how late those of a channel are by log time [s]."""
     outcomes: list[Outcome] = []
-    delays = {}
+    late, shifts = dict[str, float](), dict[str, float]()
     for name in ('joints', 'imu', 'sinkage', 'reference'):
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
@@ -54,46 +54,38 @@ def check_transport(
         most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
         outcomes += _order(channel, most_back) or _drop_outs(name, channel, figures)
         if channel.late.size:
-            delays[name] = float(np.median(channel.late))
-    late: dict[str, float] = {}
-    if 'joints' not in delays:
-        return outcomes, late
-    if recording.joints is not None and recording.imu is not None and 'imu' in delays:
-        shifted = _shifted(recording.joints, recording.imu)
-        if shifted:
-            return outcomes + shifted, late
-    left = delays['joints'] - delays.get('imu', delays['joints'])
-    if abs(left) > CLOCK_DIFFERENCE:
+            ends = np.array_split(channel.late, 4)[:: 3 if channel.late.size > 3 else 1]
+            late[name] = float(np.median(channel.late))
+            shifts[name] = float(np.median(ends[0]) - np.median(ends[-1]))
+    if 'joints' not in late:
+        return outcomes, {}
+    assert recording.joints is not None
+    if max(shifts.values()) - min(shifts.values()) > CLOCK_DIFFERENCE:  # no offset mends that
+        name = max(shifts, key=lambda one: abs(shifts[one]))
+        how = f'its stamps shift by {shifts[name]:.2g} s against log time: a clock set, or drifting'
+        topic = getattr(recording, name).topic
+        return [*outcomes, found('order', topic, 0.97, how=how)], {}
+    off, joints = {}, late['joints']
+    if abs(joints - late.get('imu', joints)) > CLOCK_DIFFERENCE:
         # Stamps lie near their arrival: those that are farther off are wrong.
-        by_wheels = abs(delays['joints']) > abs(delays['imu'])
-        late = {'joints': -left} if by_wheels else {'imu': left}
-    if delays.get('sinkage', 0.0) < FUTURE < delays['joints']:  # its age is honest
-        late['sinkage'] = delays['joints'] - delays['sinkage']
-    for key, value in late.items():
+        by_wheels = abs(joints) > abs(late['imu'])
+        off = {'joints': joints - late['imu']} if by_wheels else {'imu': late['imu'] - joints}
+    for name in ('sinkage', 'reference'):  # their age is honest
+        ahead = name == 'sinkage' and late.get(name, 0.0) < FUTURE < joints
+        if ahead or abs(late.get(name, joints) - joints) > MOST_OFFSET:
+            off[name] = late[name] - joints
+    told = dict[str, float]()
+    for key, value in off.items():
         channel, name = getattr(recording, key), 'wheel_odometry' if key == 'joints' else key
-        assert recording.joints is not None
         if abs(value) > MOST_OFFSET:
             how = f'its stamps lie {abs(value):.3g} s off: another clock, such as time since start'
             outcomes.append(found('order', channel.topic, 0.99, how=how))
             continue
         std = math.hypot(robust_std(channel.late), robust_std(recording.joints.late), ARRIVAL_STD)
-        told = of_offset(name, value, std, 'log time: two clocks', configuration)
-        outcomes.append(found(f'{name}_offset', channel.topic, 0.999, **told))
-    return outcomes, late
-
-
-def _shifted(joints: Channel, imu: Channel) -> list[Outcome]:
-    """Return that one of two clocks runs apart from the other: no offset mends that."""
-    shifts = {}
-    for channel in (joints, imu):
-        late, quarter = channel.late, max(channel.late.size // 4, 1)
-        shifts[channel.topic] = float(np.median(late[-quarter:]) - np.median(late[:quarter]))
-    of_joints, of_imu = shifts[joints.topic], shifts[imu.topic]
-    if abs(of_joints - of_imu) < CLOCK_DIFFERENCE:
-        return []
-    topic, shift = max(shifts.items(), key=lambda item: abs(item[1]))
-    how = f'its stamps shift by {-shift:.2g} s against log time: a clock is set, or drifts'
-    return [found('order', topic, 0.97, how=how)]
+        words = of_offset(name, -value, std, 'log time: two clocks', configuration)
+        outcomes.append(found(f'{name}_offset', channel.topic, 0.999, **words))
+        told[key] = -value
+    return outcomes, told
 
 
 def _order(channel: Channel, most_back: float) -> list[Outcome]:
@@ -106,6 +98,8 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     again = (step == 0.0) & _of_one_joint(channel)[stamped][1:]
     repeated = float(np.mean(again)) if step.size else 0.0
     far = int(np.sum(step < -FAR_BACK))
+    arrival = np.diff(channel.log_time[stamped]) * 1e-9
+    leap = float(np.max(step * ((step > FAR_BACK) & (arrival < 0.5 * step)), initial=0.0))
     words = []
     if zero > 0.01:
         words.append(f'{100 * zero:.0f} % of the stamps are 0')
@@ -115,6 +109,8 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
         )
     if repeated > BACKWARD_SHARE:
         words.append(f'{100 * repeated:.0f} % of the stamps repeat the one before')
+    if leap:
+        words.append(f'they leap by up to {leap:.3g} s between messages that arrive together')
     if not words:
         return []
     return [found('order', channel.topic, 0.99, how='; '.join(words))]

@@ -58,8 +58,6 @@ CLEAR_DIRECTION = 0.8
 """Cosine of the angle by which starts and curves are felt turned that tells the sense [-]."""
 SAME_SENSE = 0.5
 """Share of the way by the reference that goes where the wheels turn, less the rest, that tells."""
-OPPOSED = -0.3
-"""Correlation of torque and rate of a wheel that takes power, if one of them is reversed [-]."""
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0
 """Correlation of turns by two sensors that tells a scale, its least error [-] and deviations."""
 HEADING_TIME = 3.0
@@ -137,12 +135,11 @@ class Fit(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """The best hypothesis, its fit, its trial on the halves, and the best other one."""
+    """The best hypothesis, its fit, and its trial on the halves beside the best other one."""
 
     fix: Fix
     fit: Fit
     trial: Trial
-    rival: Fix | None
 
 
 def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
@@ -173,11 +170,6 @@ def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
     return [Fit(*map(float, one)) for one in zip(cost, track, alike, strict=True)]
 
 
-def fit_of(fix: Fix, stretch: Turning) -> Fit:
-    """Return how well one hypothesis accounts for wheels and gyro."""
-    return fits_of([fix], stretch)[0]
-
-
 def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
     """Compare hypotheses, the first of which is that nothing is wrong."""
     whole = fits_of(fixes, stretch)
@@ -203,8 +195,7 @@ def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
         )
         for part in parts
     ]
-    told = None if rival is None else fixes[rival]
-    return Comparison(fixes[best], whole[best], worst(trials), told)
+    return Comparison(fixes[best], whole[best], worst(trials))
 
 
 def sign_fixes(count: int) -> list[Fix]:
@@ -283,13 +274,26 @@ def check_steering_sign(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not there or track is None or track < 0.0 or rows.sum() < LEAST_TURNING_ROWS:
         return [], evidence
     assert facts.configuration is not None
-    aside = evidence.speed * np.tan(np.nan_to_num(evidence.steering))  # w_z x
-    turn = evidence.yaw[:, None] * facts.configuration.wheels.x
-    fits = [correlation(a, b) for a, b in zip(aside[rows].T, turn[rows].T, strict=True)]
-    wrong = np.array(fits) < -LEAST_CORRELATION
+    steering, turn = np.nan_to_num(evidence.steering[rows]), evidence.yaw[rows, None]
+
+    def fits(angles: FloatArray) -> FloatArray:
+        """How well w_z x as of the wheels agrees with that by the gyro, per wheel."""
+        pairs = zip((evidence.speed[rows] * np.tan(angles)).T, (turn * wheels.x).T, strict=True)
+        return np.array([correlation(aside, by_gyro) for aside, by_gyro in pairs])
+
+    wheels = facts.configuration.wheels
+    wrong = fits(steering) < -LEAST_CORRELATION
     if not wrong.any():
         return [], evidence
-    told = evidence.found('steering_sign', 0.95, wheel=facts.named(wrong), value=-1.0)
+    order = [facts.names.index(name) for name in _sides_exchanged(facts)]
+    either = bool((fits(steering[:, order])[wrong] > LEAST_CORRELATION).all())  # on the spot
+    told = evidence.found(
+        'steering_sign',
+        0.5 if either else 0.95,
+        wheel=facts.named(wrong),
+        value=-1.0,
+        rival=', or left and right joints are exchanged' if either else '',
+    )
     return [told], replace(evidence, steering=evidence.steering * np.where(wrong, -1.0, 1.0))
 
 
@@ -319,10 +323,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if (signs < 0.0).any():
         finding, mended = _backwards(evidence, mended, signs, chosen)
         outcomes.append(finding)
-    if turn < 0.0 and not _lasting(mended, there, rows, signs):
-        reason = 'wheels turn against the gyro now and then: slip; drive a circle both ways'
-        outcomes.append(NotChecked('swapped_sides', reason))
-    elif turn < 0.0:
+    if turn < 0.0:
         outcomes += _swapped(evidence)
         mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
         if np.isfinite(mended.steering).any():  # steering joints are named as before, or with it
@@ -351,43 +352,19 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     # Nothing is clearly better than what the rover file says, or good enough.
     steered = np.isfinite(evidence.steering).any()
     if not best.trial.falls or best.trial.after > (MOST_LEFT_STEERED if steered else MOST_LEFT):
-        track = fit_of(Fix((1,) * count), stretch).clear_track
-        return _Chosen(signs, track)
+        return _Chosen(signs, fits_of([Fix((1,) * count)], stretch)[0].clear_track)
     turn = best.fit.clear_track
     signs[there] = best.fix.signs
-    if evidence.gyro is None and _like_a_spin(evidence, signs):
-        return _Chosen(np.ones(signs.size))
+    facts = evidence.facts
+    if evidence.gyro is None and facts.has_sides() and not np.ptp(signs * facts.side):
+        return _Chosen(np.ones(signs.size))  # it may be a turn on the spot
     doubled = 2 * int(np.sum(signs < 0.0))
     if doubled > count or (doubled == count and turn < 0.0):
         signs, turn = -signs, -turn  # the pair with fewer reversed wheels is meant
     trial = best.trial.words('wheels apart', 'of their speed')
-    if not best.trial.passes and best.rival is not None:
-        names = [evidence.facts.names[i] for i in there]
-        trial += f', or {_told(best.rival, names)}: drive straight'
+    trial += '' if best.trial.passes else ', or others do: drive straight'
     exchanged = tuple((int(there[a]), int(there[b])) for a, b in best.fix.exchanged)
     return _Chosen(signs, turn, exchanged, trial, 0.99 if best.trial.passes else 0.5)
-
-
-def _lasting(evidence: Evidence, there: NDArray[np.intp], rows: Mask, signs: FloatArray) -> bool:
-    """Whether the turns of both halves are those of an ordinary track, the sides swapped."""
-    stretch = stretch_of(evidence, there, rows & evidence.turning)
-    fix = Fix(tuple(int(sign) for sign in signs[there]))
-    tracks = [fit_of(fix, stretch.rows(half)).clear_track for half in halves(stretch.yaw**2)]
-    return all(track < 0.0 and ordinary_track(track) for track in tracks)
-
-
-def _told(fix: Fix, names: Sequence[str]) -> str:
-    if fix.exchanged:
-        return ', '.join(f'{names[a]} and {names[b]} exchanged' for a, b in fix.exchanged)
-    backwards = [name for name, sign in zip(names, fix.signs, strict=True) if sign < 0]
-    return f'{", ".join(backwards)} backwards'
-
-
-def _like_a_spin(evidence: Evidence, signs: FloatArray) -> bool:
-    """Whether a whole side is reversed and no reference says that this is no turn on the spot."""
-    if not evidence.facts.has_sides() or np.ptp(signs * evidence.facts.side) > 0.0:
-        return False
-    return _told_direction(evidence, signs).reference is None
 
 
 class _Told(NamedTuple):
@@ -415,9 +392,8 @@ def _blame(told: _Told, half_reversed: bool, turn: float) -> str:
     if told.reference >= 0.0:
         return ''
     # Wheels or reference are backwards: with the turns on their side it is not the wheels.
-    if half_reversed and turn <= 0.0:
-        return 'wheels'  # the other half counts backwards
-    return 'wheels' if turn < 0.0 or (not turn and against_force) else 'reference'
+    others = half_reversed and turn <= 0.0  # it is the other half that counts backwards
+    return 'wheels' if others or turn < 0.0 or (not turn and against_force) else 'reference'
 
 
 def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
@@ -444,20 +420,12 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
 def _backwards(
     evidence: Evidence, mended: Evidence, signs: FloatArray, chosen: _Chosen
 ) -> tuple[Finding, Evidence]:
-    facts, rows = evidence.facts, evidence.moving
-    kept = [  # wheels that count backwards and whose torque does not: the cure flips both
-        sign < 0.0 and correlation(torque[rows], rate[rows]) < OPPOSED
-        for sign, torque, rate in zip(signs, evidence.torque.T, evidence.rate.T, strict=True)
-    ]
-    right = facts.named(kept)
-    told: dict[str, Any] = {'trial': chosen.trial, 'wheel': facts.named(signs < 0.0), 'torque': ''}
-    if right:
-        told['torque'] = f' and negate effort of {right} in the driver (it is right as it is)'
+    facts = evidence.facts
+    told: dict[str, Any] = {'trial': chosen.trial, 'wheel': facts.named(signs < 0.0)}
     told['directions'] = listed(facts.direction * signs, '.0f')
     value = float(-facts.direction[signs < 0.0][0])
     finding = evidence.found('backwards', chosen.sure, value=value, **told)
-    torque = mended.torque * np.where(kept, 1.0, signs)
-    return finding, mended.with_rate(mended.rate * signs, torque)
+    return finding, mended.with_rate(mended.rate * signs, mended.torque * signs)
 
 
 def _swapped(evidence: Evidence) -> list[Outcome]:
@@ -565,7 +533,8 @@ def track_ratio(evidence: Evidence) -> float | None:
     there, rows = _known(evidence)
     if evidence.gyro is None or not evidence.facts.has_sides() or rows.sum() < LEAST_TURNING_ROWS:
         return None
-    return fit_of(Fix((1,) * there.size), stretch_of(evidence, there, rows)).clear_track or None
+    nothing = Fix((1,) * there.size)
+    return fits_of([nothing], stretch_of(evidence, there, rows))[0].clear_track or None
 
 
 def skids(evidence: Evidence) -> bool:
@@ -589,7 +558,7 @@ def _left_in_turns(evidence: Evidence) -> float:
     """Return the residual of the wheels in turns [-]."""
     there, rows = _known(evidence)
     stretch = stretch_of(evidence, there, rows & evidence.turning)
-    return fit_of(Fix((1,) * there.size), stretch).cost
+    return fits_of([Fix((1,) * there.size)], stretch)[0].cost
 
 
 def ordinary_track(ratio: float) -> bool:

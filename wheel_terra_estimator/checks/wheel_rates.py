@@ -15,11 +15,11 @@ from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask, row_medians
 from wheel_terra_estimator.checks.faults import RATE_UNITS, listed
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
-from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, either_unit, hardly_moves
+from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, hardly_moves
 from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import (
     correlation,
-    moving_mean,
+    lonely,
     robust_std,
     runs,
     step_of,
@@ -27,10 +27,6 @@ from wheel_terra_estimator.checks.statistics import (
 
 MOST_COUNT = 0.07
 """Speed over rim speed below which wheels that fit no unit are in counts (90 in a turn) [-]."""
-MOST_TRACK = 500.0
-"""Effective over geometric track above which wheels are in counts [-]."""
-USUAL_TRACK = 2.0
-"""The same, of rovers that turn by skidding [-]."""
 ONLY_BY_SPEED = ('thousandths of rad/s',)
 """Units that a skidding rover's turns do not tell from counts of an encoder."""
 UNIT_BAND = (0.7, 1.25)
@@ -47,14 +43,6 @@ LEAST_ROLLING_TRACK = 0.9
 """Effective over stated track of a rover whose rates are in rad/s; skidding makes it larger [-]."""
 LARGE_WHEEL = 0.6
 """Radius above which the speed of a rim in m/s is too near to its rate in rad/s [m]."""
-POSITION_TIME = 2.0
-"""Over which the change of a position is taken [s]."""
-POSITION_RATIO = (0.5, 5.0)
-"""Change of a position over the speed seen, with skid and slip in it [-]."""
-POSITION_SHARE = 0.8
-"""Share of a drive in which what changes is a position [-]."""
-MOST_TURNED_BACK = 0.2
-"""How often a position begins to fall or rise; rates do at each change of the speed [1/s]."""
 FROZEN_TIME = 5.0
 """A rate that does not change in the last digit for this long [s] while the others do."""
 LIVELY = 0.3
@@ -65,16 +53,14 @@ SAME_SPEED = 0.05
 """Speed of a side against the middle, as a share of it, in which all wheels roll alike [-]."""
 LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0
 """Speed of an odd wheel over that of the others [ln]: least, most of a radius; over scatter [-]."""
+LEAST_COUNTS = 0.2
+"""Speed of a wheel with fewer counts over that of the others; slower ones stand [-]."""
 WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0
 """Change to and fro that no wheel makes over the greatest usual value, and the usual change [-]."""
 LEAST_WILD, MOST_WILD = 3, 0.1
 """Number and share of single wild values that are told."""
 LONG_FROZEN_TIME = 10.0
 """Time of driving in which an encoder that repeats itself is told from a coarse one [s]."""
-LEAST_CHANGES = 20.0
-"""Changes that a rate would have had meanwhile by those of the other wheels, at least [-]."""
-LEAST_STEPS = 3.0
-"""Range of these over a usual step of theirs: a coarse rate near a step goes to and fro [-]."""
 HELD_TORQUE = 1.5
 """Torque of a standing wheel over that of the others meanwhile, above which it is held [-]."""
 NOISE_FACTOR = 5.0
@@ -99,27 +85,20 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if moving.sum() < LEAST_MOVING_ROWS or evidence.rate.shape[1] < 2:
         return [], evidence
     outcomes: list[Outcome] = []
-    whole = stays(evidence, evidence.time, evidence.rate)
-    if whole is not None and whole.longest > LONG_FROZEN_TIME:
-        names, how = evidence.facts.names, f'do not change for up to {whole.longest:.1f} s'
-        outcomes.append(evidence.found('rate_frozen', 0.97, wheel=', '.join(names), how=how))
-        evidence = evidence.with_rate(np.where(whole.rows[:, None], np.nan, evidence.rate))
     for look in (_stands, _stays):  # beside a dead one none is frozen
-        mended = evidence.rate.copy()
+        rate, dead = evidence.rate.copy(), dict[str, float]()
         for index, name in enumerate(evidence.facts.names):
-            how = look(evidence, index)
-            if how:
-                how += ' while the other wheels change'
-                outcomes.append(evidence.found('rate_frozen', 0.97, wheel=name, how=how))
-                mended[:, index] = np.nan
-            elif look is _stands and not evidence.rate[moving, index].any():
-                reason = f'{name} stands all along: blocked, or its encoder dead; lift and turn it'
-                outcomes.append(NotChecked('frozen', reason))
-        evidence = evidence.with_rate(mended) if np.isnan(mended).any() else evidence
+            if longest := look(evidence, index):
+                dead[name] = longest
+                rate[:, index] = np.nan
+        if dead:
+            how = f'does not change for up to {max(dead.values()):.1f} s of driving'
+            outcomes.append(evidence.found('rate_frozen', 0.97, wheel=', '.join(dead), how=how))
+            evidence = evidence.with_rate(rate)
     return outcomes, evidence
 
 
-def _stands(evidence: Evidence, index: int) -> str:
+def _stands(evidence: Evidence, index: int) -> float:
     """Return how long a rate is 0 while the others turn and no torque holds the wheel."""
     own, others = evidence.rate[:, index], np.delete(evidence.rate, index, axis=1)
     busy = row_medians(np.abs(others)) > LIVELY * evidence.working_rate
@@ -129,7 +108,7 @@ def _stands(evidence: Evidence, index: int) -> str:
         rows = np.flatnonzero(busy[start:end]) + start
         if rows.size * evidence.period > FROZEN_TIME and not _held(evidence, index, rows):
             longest = max(longest, rows.size * evidence.period)
-    return f'does not change for up to {longest:.1f} s' if longest else ''
+    return longest
 
 
 def _about_a_side(evidence: Evidence, index: int) -> Mask:
@@ -146,23 +125,10 @@ def _about_a_side(evidence: Evidence, index: int) -> Mask:
     return np.asarray(stands if speed is None else stands & (speed < GOES_ON * live))
 
 
-def _stays(evidence: Evidence, index: int) -> str:
-    """Return how long a rate stays the same while the others change."""
-    rate, moving = evidence.rate, evidence.moving
-    known = np.flatnonzero(np.isfinite(rate[:, index]))
-    own = np.diff(rate[known, index]) != 0.0
-    others = row_medians(np.delete(rate, index, axis=1))[known]
-    change = np.abs(np.diff(others)) * moving[known][1:]
-    total, longest = np.concatenate([[0.0], np.cumsum(change != 0.0)]), 0.0
-    for first, last in runs(~own):
-        meanwhile, steps = total[last] - total[first], change[first:last]
-        usual = own.sum() / max(total[-1] - meanwhile, 1.0) if own.any() else 1.0
-        if not rate[known[first], index] or meanwhile * usual < LEAST_CHANGES:
-            continue
-        low, high = np.quantile(others[first:last], (0.05, 0.95))
-        if high - low > LEAST_STEPS * np.median(steps[steps > 0.0]):  # more than to and fro
-            longest = max(longest, float(moving[known[first : last + 1]].sum()) * evidence.period)
-    return f'does not change for up to {longest:.1f} s' if longest > LONG_FROZEN_TIME else ''
+def _stays(evidence: Evidence, index: int) -> float:
+    """Return how long a rate stays the same."""
+    dead = stays(evidence, evidence.time, evidence.rate[:, index : index + 1])
+    return dead.longest if dead is not None and dead.longest > LONG_FROZEN_TIME else 0.0
 
 
 def _repeats(rate: FloatArray) -> float:
@@ -184,10 +150,8 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return single rates and torques that leave the ones before and after; left out from here."""
     outcomes, mended = list[Outcome](), []
     for name, table in (('velocity', evidence.rate), ('effort', evidence.torque)):
-        steps = np.diff(np.pad(table, ((1, 1), (0, 0)), constant_values=np.nan), axis=0)
-        off = np.minimum(np.abs(steps[:-1]), np.abs(steps[1:])) * (steps[:-1] * steps[1:] < 0.0)
-        usual = np.nanquantile(np.abs(table), 0.98, axis=0)
-        noise = np.array([robust_std(column) for column in steps.T])
+        off, usual = lonely(table), np.nanquantile(np.abs(table), 0.98, axis=0)
+        noise = np.array([robust_std(column) for column in np.diff(table, axis=0).T])
         wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
         if LEAST_WILD <= wild.sum() < MOST_WILD * wild.size:
             wheels = evidence.facts.named(wild.any(axis=0))
@@ -214,7 +178,7 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes, rate, rolling = list[Outcome](), evidence.rate.copy(), facts.radius.copy()
     for i, name in enumerate(facts.names):
         beside = max(float(np.nanmax(np.abs(np.delete(whole, i)))), abs(first[i] - second[i]))
-        if not abs(whole[i]) > max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LIVELY):
+        if not abs(whole[i]) > max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LEAST_COUNTS):
             continue
         times = math.exp(whole[i])
         told = {'times': times, 'by': 1.0 / times}
@@ -225,7 +189,8 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         rolling[i] /= times
         radii = facts.configuration.wheels.radius + rolling - facts.radius  # lugs stay
         told |= {'value': round(float(radii[i]), 5), 'std': round(float(radii[i]) * beside, 5)}
-        finding = evidence.found('wheel_scale', 0.9, wheel=name, radii=listed(radii), **told)
+        sure = 0.9 if beside < LEAST_ODD / ODD else 0.5  # what is written is right to 3 %
+        finding = evidence.found('wheel_scale', sure, wheel=name, radii=listed(radii), **told)
         outcomes.append(finding)
     if not outcomes:
         return [], evidence
@@ -235,41 +200,12 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 # Units -------------------------------------------------------------------------------------------
 
 
-def check_positions(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return rates that are positions, and the evidence with what these change by.
-
-    A position changes by the way that is driven; no rate changes by as much all the time.
-    """
-    facts, speed, rows = evidence.facts, evidence.reference_speed, evidence.rows_in(POSITION_TIME)
-    nothing = speed is None and evidence.gyro is None
-    if not facts.known or nothing or evidence.time.size < 2 * rows:
-        return [], evidence
-    seen = np.hypot(0.0 if speed is None else speed, evidence.yaw * np.abs(facts.lateral).max())
-    seen = moving_mean(seen, rows)[rows:]
-    spans = (evidence.time[rows:] - evidence.time[:-rows])[:, None]
-    change = (evidence.rate[rows:] - evidence.rate[:-rows]) / np.maximum(spans, 1e-9)
-    going = seen > 0.5 * max(float(np.quantile(seen, 0.9)), 1e-9)
-    ratio = row_medians(np.abs(change[going]) * evidence.radius) / seen[going]
-    share = float(np.mean((ratio > POSITION_RATIO[0]) & (ratio < POSITION_RATIO[1])))
-    turned_back = float(np.mean(np.diff(np.sign(change[going]), axis=0) != 0.0))
-    if not share > POSITION_SHARE or turned_back / evidence.period > MOST_TURNED_BACK:
-        return [], evidence
-    ends = (rows // 2, rows - rows // 2), (0, 0)  # a change is that of the middle of its time
-    rate = np.pad(change, ends, mode='edge')
-    return [evidence.found('rate_positions', 0.97, share=100.0 * share)], evidence.with_rate(rate)
-
-
 def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return the unit of the rates where speeds or turns tell it is not rad/s."""
-    facts, odometry = evidence.facts, evidence.recording.wheel_odometry
+    facts = evidence.facts
     if not facts.known:
         return [NotChecked('unit', 'wheel rates: no radius without a rover file')], evidence
     ratio, how = _speed_ratio(evidence), 'speed of the reference'
-    if ratio is None and odometry is not None:
-        rim, rows = ahead(evidence, odometry, 0.3)
-        how = f'speed of {odometry.topic}'
-        if rows.sum() > LEAST_ROWS:
-            ratio = float(np.median(np.abs(odometry.velocity[rows, 0]) / rim[rows]))
     track = turning.track_ratio(evidence)
     if ratio is None and track is None:
         reason = 'wheel rates: neither reference nor turn in it; drive a circle'
@@ -284,13 +220,8 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     doubtful = False  # no unit with a usual slip, and perhaps counts
     if ratio is not None and ratio < MOST_COUNT and units:
         doubtful = not UNIT_BAND[0] < ratio / min(units.values()) < OUTRUN
-    either = either_unit(evidence, ratio) if rim_unit and track is None else []
-    if either:
-        return either, evidence.with_rate(evidence.rate / float(np.nanmean(facts.radius)))
     if units and not doubtful:
         return _unit_findings(evidence, units, how if ratio else 'turns seen by the gyro')
-    if ratio is None and track is not None and abs(track) > MOST_TRACK:
-        ratio, how = float(f'{USUAL_TRACK / abs(track):.1g}'), 'gyro in turns'
     if ratio is None or not 0.0 < ratio < MOST_COUNT:
         return [], evidence
     evidence.figures['wheels.rad_per_count'] = value = float(f'{ratio:.4g}')
@@ -364,42 +295,36 @@ def check_noise(evidence: Evidence) -> list[Outcome]:
     if configuration is None or rows.sum() < 60:
         return []
     stated = float(configuration.sensors.wheel_rate_std)
-    noises, steps = {}, {}
-    for name, rate in zip(evidence.facts.names, evidence.rate.T, strict=True):
+    interval, noise, by_steps = _intervals(evidence.time)[rows], [], []
+    for rate in evidence.rate.T:
         bend = np.diff(rate, 2)[rows[1:-1]] / math.sqrt(6.0)
         bend = bend[np.isfinite(bend)]
-        if bend.size > 50:
-            noises[name] = max(robust_std(bend), 0.5 * float(np.std(bend)))
-            steps[name] = rate_step(rate[rows], _intervals(evidence.time)[rows])
-    if not noises:
+        enough = bend.size > 50
+        noise.append(_scatter(bend) if enough else 0.0)
+        by_steps.append(rate_step(rate[rows], interval) * COUNTING_STD if enough else 0.0)
+    figures, working = evidence.figures, evidence.working_rate
+    figures['wheels.rate_noise_rad_s'] = float(f'{np.median(noise):.3g}')
+    if np.median(by_steps):
+        figures['wheels.rate_step_rad_s'] = float(f'{np.median(by_steps) / COUNTING_STD:.3g}')
+    coarse = np.array(by_steps) > max(STEP_FACTOR * stated, LEAST_STEP_SHARE * working)
+    noisy = np.array(noise) > max(NOISE_FACTOR * stated, LEAST_NOISE_SHARE * working)
+    if not (coarse | noisy).any():
         return []
-    typical = float(np.median(list(noises.values())))
-    typical_step = float(np.median(list(steps.values())))
-    evidence.figures['wheels.rate_noise_rad_s'] = float(f'{typical:.3g}')
-    if typical_step:
-        evidence.figures['wheels.rate_step_rad_s'] = float(f'{typical_step:.3g}')
-    working = evidence.working_rate
-    limit = max(NOISE_FACTOR * stated, LEAST_NOISE_SHARE * working)
-    coarse = max(STEP_FACTOR * stated, LEAST_STEP_SHARE * working)
-    outcomes: list[Outcome] = []
-    for name, noise in noises.items():
-        step = steps[name]
-        by_steps = step * COUNTING_STD
-        alone = noise > 4.0 * typical or step > 4.0 * typical_step
-        if not (alone or name == next(iter(noises))) or (by_steps <= coarse and noise <= limit):
-            continue
-        key, seen = ('rate_steps', by_steps) if by_steps > coarse else ('rate_noise', noise)
-        told = {
-            'noise': seen,
-            'stated': stated,
-            'step': step,
-            'share': 100.0 * step / max(working, 1e-9),
-            'counts': 2.0 * math.pi / (step * evidence.period) if step else math.inf,
-            'period': evidence.period,
-        }
-        wheel, value = name if alone else None, float(f'{seen:.2g}')
-        outcomes.append(evidence.found(key, 0.95, wheel=wheel, value=value, **told))
-    return outcomes
+    key, wrong, sizes = (
+        ('rate_steps', coarse, by_steps) if coarse.any() else ('rate_noise', noisy, noise)
+    )
+    seen = float(np.median(np.array(sizes)[wrong]))
+    step, period = seen / COUNTING_STD, evidence.period
+    told: dict[str, Any] = {'noise': seen, 'stated': stated, 'step': step, 'period': period}
+    told |= {'share': 100.0 * step / max(working, 1e-9), 'counts': 2.0 * math.pi / (step * period)}
+    wheel = None if 2 * wrong.sum() > wrong.size else evidence.facts.named(wrong)
+    return [evidence.found(key, 0.95, wheel=wheel, value=float(f'{seen:.2g}'), **told)]
+
+
+def _scatter(bend: FloatArray) -> float:
+    """Return the deviation of values many of which may be 0, and few wild."""
+    inner = np.clip(bend, *np.quantile(bend, [0.05, 0.95]))
+    return max(robust_std(bend), 0.5 * float(np.std(inner)))
 
 
 def _intervals(time: FloatArray) -> FloatArray:
