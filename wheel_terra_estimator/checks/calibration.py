@@ -22,12 +22,9 @@ from wheel_terra_estimator.errors import UserError
 
 WORTH_CHANGING = 0.2
 """Relative change of a noise or a rate below which the rover file keeps its number [-]."""
-NOISE_STD = 0.1
-"""Relative deviation of a noise that a drive tells [-]."""
-LEAST_SURE = 0.8
-"""Confidence from which a cure is written [-]."""
-CLEAR = 2.0
-"""Deviations by which a number is off, from which another is written [-]."""
+NOISE_STD = 0.1  # relative deviation of a noise that a drive tells [-]
+LEAST_SURE = 0.8  # confidence from which a cure is written [-]
+CLEAR = 2.0  # deviations by which a number is off, from which another is written [-]
 BLUNT_REFERENCE = 0.005
 """Deviation of the radius by the noise of the reference alone, as a share, that is told [-]."""
 
@@ -62,13 +59,7 @@ class Calibration:
 def calibrate(
     recording: Recording, configuration: Configuration, remapped: Sequence[str] = ()
 ) -> Calibration:
-    """Return what a recording tells of the rover file; see `check_recording`.
-
-    Raises
-    ------
-    UserError
-        The recording has no usable wheel rates.
-    """
+    """Return what a recording tells of the rover file; without wheel rates a `UserError`."""
     report, evidence = examine(recording, configuration, remapped)
     if evidence is None:
         raise UserError(f'{recording.name}: no wheel rates in it to calibrate with')

@@ -22,70 +22,45 @@ from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 Mask = BoolArray
 
-REST_RATE = 0.02
-"""Wheel rate below which a wheel stands, as a share of its working rate [-]."""
+REST_RATE = 0.02  # wheel rate below which a wheel stands, as a share of its working rate [-]
 NOISY_REST = 0.15
 """Noise of a mean rate, as a share of the working rate, in which no standstill is seen [-]."""
-SHORTEST_REST = 1.0
-"""A standstill counts as rest after this time [s]."""
-LEAST_REST = 0.4
-"""Rest that tells the bias of a gyro [s]."""
-SETTLING = 0.5
-"""A speed counts as steady this long after it changed [s]."""
+SHORTEST_REST = 1.0  # A standstill counts as rest after this time [s]
+LEAST_REST = 0.4  # rest that tells the bias of a gyro [s]
+SETTLING = 0.5  # A speed counts as steady this long after it changed [s]
 STRAIGHT_SHARE = 0.25
 """Speed of the sides against the middle, as a share of it, below which a drive is straight [-]."""
 STANDING_SHARE = 0.1
 """Speed of the reference over rim speed below which the rover stands while its wheels turn [-]."""
 FREE_TRACTION = 0.12
 """Sum of T/r over the weight that wheels in the air stay below; stuck ones take more [-]."""
-SMOOTH_ROWS = 5
-"""Messages over which speed and torque are averaged for that."""
-SHORTEST_FREE = 3.0
-"""Wheels that turn so long while the rover stands may be in the air [s]."""
-LEAST_MOVING_ROWS = 30
-"""Fewer rows of driving than these tell nothing."""
+SMOOTH_ROWS = 5  # messages over which speed and torque are averaged for that
+SHORTEST_FREE = 3.0  # wheels that turn so long while the rover stands may be in the air [s]
+LEAST_MOVING_ROWS = 30  # fewer rows of driving than these tell nothing
 EVEN_GROUND_STD = math.radians(0.8)
 """Deviation of a tilt seen in circles [rad] above which they lay on no plane."""
-LONGEST_GAP = 1.0
-"""Time without IMU in which a turn may pass unseen [s]."""
-AROUND = 0.25
-"""Half of the time around a velocity that rim speeds are averaged over [s]."""
+LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
+AROUND = 0.25  # half of the time around a velocity that rim speeds are averaged over [s]
 
 
 @dataclass(frozen=True)
 class Evidence:
     """The recording, the rover and what follows from both.
 
-    Attributes
-    ----------
-    recording, facts : Recording, RoverFacts
-        As read.
-    time : numpy.ndarray
-        (k,) stamps of the wheel odometry since the first one [s], increasing.
-    rate, torque : numpy.ndarray
-        (k, n) per wheel of ``facts.names`` [rad/s] and [N m], positive forward; nan where not
-        there. Torques, forces and angular rates are without the errors that the rover file states.
-    force, gyro : numpy.ndarray or None
-        (k, 3) specific force and angular rate in ``base_link`` as the rover file has it, averaged
-        over the period of the wheel odometry.
-    rotation : numpy.ndarray
-        (3, 3) from the IMU's frame into ``base_link``.
-    figures : dict
-        What the report shows beside findings; the checks write into it.
-    steering : numpy.ndarray
-        (k, n) steering angles, positive left [rad]; nan of a wheel that has none in the recording.
+    Rates, torques, forces and angular rates are in the rover's signs, without the errors that the
+    rover file states.
     """
 
     recording: Recording
     facts: RoverFacts
-    time: FloatArray
-    rate: FloatArray
-    torque: FloatArray
-    force: FloatArray | None
-    gyro: FloatArray | None
-    rotation: FloatArray
-    figures: dict[str, Any]
-    steering: FloatArray
+    time: FloatArray  # (k,) stamps of the wheel odometry since the first one [s], increasing
+    rate: FloatArray  # (k, n) per wheel of ``facts.names`` [rad/s]; nan where not there
+    torque: FloatArray  # (k, n) [N m]
+    force: FloatArray | None  # (k, 3) in base_link, over the period of the wheel odometry [m/s^2]
+    gyro: FloatArray | None  # (k, 3) likewise [rad/s]
+    rotation: FloatArray  # (3, 3) from the IMU's frame into base_link
+    figures: dict[str, Any]  # what the report shows beside findings; the checks write into it
+    steering: FloatArray  # (k, n) angles, positive left [rad]; nan of a wheel that has none
 
     def found(self, key: str, confidence: float, **told: Any) -> Finding:
         """Return a finding on the topic of its fault's channel; see `faults.found`."""

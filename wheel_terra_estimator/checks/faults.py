@@ -20,10 +20,8 @@ RATE_UNITS = {
     'thousandths of rad/s': 1e-3,
 }
 """Units that wheel rates come in by mistake: factor to rad/s."""
-SKID_TRACKS = (0.7, 6.0)
-"""Effective over geometric track of rovers, skidding or not [-]."""
-LEAST_TURN_RATE = 0.01
-"""Yaw rate [rad/s] below which sides are not compared."""
+SKID_TRACKS = (0.7, 6.0)  # effective over geometric track of rovers, skidding or not [-]
+LEAST_TURN_RATE = 0.01  # yaw rate [rad/s] below which sides are not compared
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 
 
@@ -45,8 +43,7 @@ FAULTS = {
     for name, entry in plain_table(Path(__file__).with_name('faults.yaml')).items()
 }
 """The faults, worst first: one table for recordings and while driving."""
-RANK = {key: rank for rank, key in enumerate(FAULTS)}
-"""Place of a fault, worst first."""
+RANK = {key: rank for rank, key in enumerate(FAULTS)}  # place of a fault, worst first
 
 
 def found(
@@ -59,23 +56,7 @@ def found(
     std: float | None = None,
     **figures: Any,
 ) -> Finding:
-    """Return a finding in the words of its fault.
-
-    Parameters
-    ----------
-    key : str
-        A name of ``FAULTS``.
-    topic : str
-        Topic in the recording.
-    confidence : float
-        Probability that it is so.
-    wheel : str, optional
-        The wheel concerned, or several with commas between.
-    value, std : float, optional
-        Of the parameter.
-    figures
-        What the words name.
-    """
+    """Return a finding in the words of its fault, which name further figures; see `Finding`."""
     fault = FAULTS[key]
     figures = {'trial': '', 'rival': '', 'separate': '', 'wheels': wheel, 'topic': topic} | figures
     figures.setdefault('value', value)

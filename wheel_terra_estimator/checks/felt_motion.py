@@ -24,32 +24,16 @@ Complex: TypeAlias = NDArray[np.complex128]
 LEAST_YAW = math.radians(12.0)
 """Yaw of the mounting below which starts, stops and slopes do not tell it [rad]."""
 YAW_SIGMAS = 4.0
-LEAST_FELT = 0.4
-"""What is felt along an axis over what wheels and gyro say, at least [-]."""
-FELT_BLOCKS = 10
-"""Parts of a drive that a deviation comes from."""
-
-
-def felt_motion(evidence: Evidence, drift: float = DRIFT) -> tuple[Complex, float] | None:
-    """Return sums over blocks of acceleration felt times that of the wheels, and their energy.
-
-    Along x the acceleration of starts and stops, along y that of curves, as complex numbers; what
-    changes more slowly than over ``drift`` [s] is the slope. None without an IMU.
-    """
-    both = _motions(evidence, drift)
-    if both is None:
-        return None
-    motion, seen = both
-    energy = np.cumsum(np.abs(motion) ** 2)
-    edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], FELT_BLOCKS + 1)[1:-1])
-    parts = np.array(
-        [np.vdot(m, s) for m, s in zip(np.split(motion, edges), np.split(seen, edges), strict=True)]
-    )
-    return parts, float(energy[-1])
+LEAST_FELT = 0.4  # what is felt along an axis over what wheels and gyro say, at least [-]
+FELT_BLOCKS = 10  # parts of a drive that a deviation comes from
 
 
 def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None:
-    """Return what wheels and gyro say that is felt, and what is (k,) [m/s^2]; see `felt_motion`."""
+    """Return what wheels and gyro say that is felt, and what is (k,) [m/s^2]; None without an IMU.
+
+    Along x the acceleration of starts and stops, along y that of curves, as complex numbers; what
+    changes more slowly than over ``drift`` [s] is the slope.
+    """
     if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
         return None
     period = evidence.period
@@ -81,14 +65,19 @@ def reversed_axis(evidence: Evidence) -> tuple[str, bool]:
     return 'x' if starts < 0.0 else 'y', True
 
 
-def felt_yaw(evidence: Evidence) -> Estimate | None:
+def felt_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
     """Return the angle by which a motion is felt turned [rad]; None where it is not clear."""
-    felt = felt_motion(evidence)
-    if felt is None:
+    both = _motions(evidence, drift)
+    if both is None:
         return None
-    (parts, energy), total = felt, felt[0].sum()
-    spread = float(np.sqrt(np.sum(np.abs(parts - total / parts.size) ** 2)))
-    if energy <= 0.0 or not 0.5 < abs(total) / energy < 2.0 or abs(total) < 3.0 * spread:
+    motion, seen = both
+    energy = np.cumsum(np.abs(motion) ** 2)
+    edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], FELT_BLOCKS + 1)[1:-1])
+    blocks = zip(np.split(motion, edges), np.split(seen, edges), strict=True)
+    parts = np.array([np.vdot(wheels, felt) for wheels, felt in blocks])
+    total = parts.sum()
+    spread = float(np.linalg.norm(parts - total / parts.size))
+    if not 0.5 * energy[-1] < abs(total) < 2.0 * energy[-1] or abs(total) < 3.0 * spread:
         return None
     aside = (parts * np.conj(total)).imag / abs(total) ** 2  # along it they differ without a turn
     return Estimate(float(np.angle(total)), float(np.linalg.norm(aside)))

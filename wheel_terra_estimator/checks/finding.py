@@ -8,48 +8,24 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
-SUREST = 0.99
-"""Confidence that is said at most: nothing is certain."""
-INTERNAL_ERROR = 'internal error, see --debug'
-"""Why a check that failed has nothing to say."""
+SUREST = 0.99  # confidence that is said at most: nothing is certain
+INTERNAL_ERROR = 'internal error, see --debug'  # why a check that failed has nothing to say
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """Something wrong, and what mends it.
+    """Something wrong, and what mends it."""
 
-    Attributes
-    ----------
-    kind : str
-        What it is, such as sign, unit or delay; see `faults.yaml`.
-    topic : str
-        Topic in the recording.
-    wheel : str or None
-        Name of the wheel concerned; None: all, or none in particular.
-    parameter : str or None
-        Key of the rover file that mends it.
-    value, std : float or None
-        Its value as it stands in a file, with one standard deviation.
-    confidence : float
-        Probability that it is so, from the scatter of the evidence.
-    words : str
-        What was seen, with figures.
-    cure : str
-        What to do, ready to copy where a parameter or a remap does it.
-    fault : str
-        Its name in ``faults.FAULTS``.
-    """
-
-    kind: str
-    topic: str
-    wheel: str | None = None
-    parameter: str | None = None
-    value: float | None = None
+    kind: str  # what it is, such as sign, unit or delay
+    topic: str  # in the recording
+    wheel: str | None = None  # concerned, or several with commas between; None: all
+    parameter: str | None = None  # of the rover file that mends it
+    value: float | None = None  # of the parameter, with one standard deviation
     std: float | None = None
-    confidence: float
-    words: str
-    cure: str
-    fault: str = ''
+    confidence: float  # probability that it is so
+    words: str  # what was seen, with figures
+    cure: str  # what to do, ready to copy where a parameter or a remap does it
+    fault: str = ''  # its name in `faults.FAULTS`
 
     def __str__(self) -> str:
         wheel = f' {self.wheel}:' if self.wheel else ''
@@ -68,8 +44,7 @@ class NotChecked:
 Outcome: TypeAlias = 'Finding | NotChecked'
 
 
-SHOWN = 5
-"""Findings that a terminal shows."""
+SHOWN = 5  # findings that a terminal shows
 ALWAYS_SHOWN = ('sign', 'unit', 'swapped_sides', 'exchanged_wheels', 'missing_wheel', 'drop_outs')
 """Kinds without whose cure nothing else counts: never cut."""
 

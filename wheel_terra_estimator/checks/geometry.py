@@ -29,45 +29,36 @@ from wheel_terra_estimator.checks.torque import SOFT_TRACTION, both_ways, thrust
 from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.checks.wheel_rates import OF_RADII, rounding
 
-LEAST_RADIUS_ERROR = 0.025
-"""Share by which a radius is wrong before it is a finding [-]."""
+LEAST_RADIUS_ERROR = 0.025  # share by which a radius is wrong before it is a finding [-]
 RADIUS_SIGMAS = 4.0
 LEAST_OF_SIDES = 0.05
 """Share by which the radii of the sides differ, at least [-]; a cross slope makes a side slip."""
-OUTRUN_STD = 0.01
-"""Slip that is left open where a rover outruns its wheels [-]."""
+OUTRUN_STD = 0.01  # slip that is left open where a rover outruns its wheels [-]
 PRIOR_OF_RADIUS = 0.85
 """Probability that a ratio of speeds is the radius and not the scale of the reference [-]."""
-SURE = 0.97
-"""Probability beside its rival from which a fault is named alone [-]."""
-TRACK_STD = 0.02
-"""Deviation that slip leaves in a scale of speed by turns, at least [-]."""
+SURE = 0.97  # probability beside its rival from which a fault is named alone [-]
+TRACK_STD = 0.02  # deviation that slip leaves in a scale of speed by turns, at least [-]
 RESISTANCE = Estimate(0.08, 0.05)
 """Rolling resistance of firm ground over the weight: mean, deviation [-]."""
 UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)
 """The same where no torque tells how firm the ground is [-]."""
-SOFT_DEPTH = 0.06
-"""Sinkage over radius above which ground is not taken for firm [-]."""
+SOFT_DEPTH = 0.06  # sinkage over radius above which ground is not taken for firm [-]
 MOST_ROUNDING = 0.02
 """Error of the mean rate by rounding, over the working rate, with which a scale is told [-]."""
 ROUNDED = 'rates are rounded to coarse steps, so their mean is off; publish more digits'
 SLOPE_OF_SLIP = Estimate(0.2, 0.2)
 """Slip over traction of firm ground where the drive does not tell it: mean, deviation [-]."""
-NOT_SEEN = Estimate(0.0, 1e3)
-"""The same where there are no slopes."""
+NOT_SEEN = Estimate(0.0, 1e3)  # the same where there are no slopes
 LEAST_SEEN = 0.5
 """Weight of the drive beside what firm ground does elsewhere from which it tells its slip [-]."""
 FIRM_DEPTH = Estimate(0.02, 0.015)
 """Sinkage over radius of firm ground where no sensor tells it: mean, deviation [-]."""
-DEEPEST = 0.3
-"""The same, beyond which a sensor is not believed (another unit) [-]."""
+DEEPEST = 0.3  # the same, beyond which a sensor is not believed (another unit) [-]
 LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
-STEERED_STD = 0.04
-"""Slip of steered wheels in curves, as a share of the track, one deviation [-]."""
-CLEAR_TURN = 0.95
-"""Correlation of gyro and difference of the sides that a turn has [-]."""
+STEERED_STD = 0.04  # slip of steered wheels in curves, as a share of the track, one deviation [-]
+CLEAR_TURN = 0.95  # correlation of gyro and difference of the sides that a turn has [-]
 
 
 class Told(NamedTuple):
@@ -350,16 +341,16 @@ def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
     """
     odds = math.log(PRIOR_OF_RADIUS / (1.0 - PRIOR_OF_RADIUS))
     gain, off = (evidence.figures.get(f'torque.gain{end}', math.nan) for end in ('', '_std'))
-    of_scale, of_radius = abs(gain - 1.0) / off, abs(gain - ratio.value) / off
-    if min(of_scale, of_radius) < 1.0:  # the torque over the radius is what slopes ask for
-        odds += 0.5 * (of_scale**2 - of_radius**2)
+    # The torque over the radius is what slopes ask for; a track of the rims is what they turn by.
+    told = [(Estimate(gain, off), ratio.value)]
     turns = None if turning.skids(evidence) else track_ratio(evidence)
     if isinstance(turns, Told):
         std = math.hypot(turns.ratio.std, TRACK_STD, ratio.std)
         rolling = 1.0 / evidence.figures['rover.speed_over_rim_speed']
-        of_scale = abs(turns.ratio.value - 1.0) / std
-        of_radius = abs(turns.ratio.value - rolling) / std
-        if min(of_scale, of_radius) < 1.0:  # else the track is another as well
+        told.append((Estimate(turns.ratio.value, std), rolling))
+    for seen, by_radius in told:
+        of_scale, of_radius = seen.sigmas_from(1.0), seen.sigmas_from(by_radius)
+        if min(of_scale, of_radius) < 1.0:  # else it is off as well
             odds += 0.5 * (of_scale**2 - of_radius**2)
     return probability(odds)
 

@@ -21,7 +21,6 @@ from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
 from wheel_terra_estimator.checks.felt_motion import (
     LEAST_YAW,
     YAW_SIGMAS,
-    felt_motion,
     felt_yaw,
     reversed_axis,
 )
@@ -41,43 +40,34 @@ from wheel_terra_estimator.checks.statistics import (
     runs,
     step_of,
 )
-from wheel_terra_estimator.checks.trial import Trial
 from wheel_terra_estimator.checks.turning import ordinary_track, track_ratio
 from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
 
 GRAVITY_TOLERANCE = 0.1
 """Share by which the mean specific force may differ from gravity (slopes, bias, vibration)."""
-GRAVITY_BIAS = 0.3
-"""The same as an acceleration: biases [m/s^2]."""
+GRAVITY_BIAS = 0.3  # the same as an acceleration: biases [m/s^2]
 GRAVITIES = {'the Moon': 1.62, 'Mars': 3.71, 'the Earth': 9.81}  # [m/s^2]
-UPRIGHT_SHARE = 0.5
-"""Share of the mean specific force along z that gravity has on a rover [-]."""
+UPRIGHT_SHARE = 0.5  # share of the mean specific force along z that gravity has on a rover [-]
 UPSIDE_TILT = math.radians(35.0)
 """Mean tilt that no rover drives at [rad]: the mounting is wrong, whatever the slope."""
 STEEPEST_MEAN = math.radians(20.0)
 """Mean slope of a drive [rad]: what is within it of an axis is a quarter turn on a slope."""
-LEAST_SHOWN = 0.01
-"""Change of an angle [deg] below which a cure leaves it out."""
-LEAST_MOUNTING = math.radians(1.5)
-"""Mounting errors below this [rad] are left to calibration."""
-LEAST_TURN = 4.5
-"""Heading that a drive has to cover for the mounting to be told from a slope [rad]."""
+LEAST_SHOWN = 0.01  # change of an angle [deg] below which a cure leaves it out
+LEAST_MOUNTING = math.radians(1.5)  # mounting errors below this [rad] are left to calibration
+LEAST_TURN = 4.5  # heading that a drive has to cover for the mounting to be told from a slope [rad]
 FLAT_TURN_STD = math.radians(0.1)
 """Part of the mounting that unevenness of the ground leaves open [rad]."""
 TURNED_ROUND = 0.75
 """Probability that an IMU that no curve shows is turned round, not its x axis reversed [-]."""
 YAW_MODEL_STD = math.radians(1.0)
 """Yaw that a body which pitches and rolls as it starts and turns leaves open [rad]."""
-LEAST_QUARTER = math.radians(45.0)
-"""Least yaw of a quarter turn [rad]."""
+LEAST_QUARTER = math.radians(45.0)  # least yaw of a quarter turn [rad]
 ALONG_AXIS = math.cos(math.radians(25.0))
 """Cosine of the angle to an axis within which that axis is meant [-]."""
 EVEN = 0.6
 """Length of the mean direction of the headings in turns, 0 where all occur alike, at most [-]."""
-NOISE_FACTOR = 4.0
-"""Noise above so many times the stated one is a finding."""
-BIAS_FACTOR = 6.0
-"""A bias above so many stated deviations is a finding."""
+NOISE_FACTOR = 4.0  # noise above so many times the stated one is a finding
+BIAS_FACTOR = 6.0  # A bias above so many stated deviations is a finding
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
 LEAST_STANDSTILL = 3.0  # [s]
 BIAS_SIGMAS = 5.0
@@ -89,22 +79,18 @@ LEAST_TURNING = 10.0
 """Time of turning [s] in which wheels that dig do not agree with a gyro by chance."""
 UNTURNED = 0.85
 """Probability that an IMU that no turn shows is upside down, not its accelerometer reversed [-]."""
-CLEAR_AGREEMENT = 0.8
-"""Correlation of gyro and wheels in turns that are the same way round [-]."""
+CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_WILD = 3
 MOST_WILD = 0.2
 """Share of wild samples beyond which it is not single ones: vibration, or another unit [-]."""
 LEAST_MESSAGES = 20
-UNIT_TOLERANCE = 0.12
-"""Share by which the mean specific force may lie off gravity in another unit."""
+UNIT_TOLERANCE = 0.12  # share by which the mean specific force may lie off gravity in another unit
 ORIENTATION_DEGREES = (30.0, 110.0)
 """Gyro over turning of the orientation that a gyro in degrees per second gives [-]."""
-FROZEN_SHARE = 0.3
-"""Share of messages that repeat the one before."""
+FROZEN_SHARE = 0.3  # share of messages that repeat the one before
 MOUNTING = tuple(f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw'))
 """Parameters of the mounting."""
-FROZEN_TIME = 1.0
-"""Time that no number of a running IMU stays the same [s]."""
+FROZEN_TIME = 1.0  # time that no number of a running IMU stays the same [s]
 
 
 @dataclass(frozen=True)
@@ -409,19 +395,17 @@ def _is_mounting(tilt: FloatArray, floor: float, turns: FloatArray, gyro: FloatA
     return probability(math.log(TILT_IS_MOUNTING / (1.0 - TILT_IS_MOUNTING)) + odds)
 
 
-def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
-    """Return the yaw of the IMU in ``base_link`` [rad] and its trial, angles off.
+def yaw_of_imu(evidence: Evidence) -> Estimate | None:
+    """Return the yaw of the IMU in ``base_link`` [rad]; None where starts and stops do not tell it.
 
     Slopes at the places of starts and stops fall off faster than these: a rover that goes to and
     fro feels the same ones each time.
     """
-    by_motion, quick = felt_yaw(evidence), felt_motion(evidence, 0.5 * DRIFT)
-    if by_motion is None or quick is None:
+    seen, quick = felt_yaw(evidence), felt_yaw(evidence, 0.5 * DRIFT)
+    if seen is None or quick is None:
         return None
-    other = float(np.angle(quick[0].sum()))
-    apart = abs(math.remainder(by_motion.value - other, 2.0 * math.pi))
-    seen = Estimate(by_motion.value, math.hypot(by_motion.std, 0.5 * apart, YAW_MODEL_STD))
-    return seen, Trial(abs(math.remainder(other, 2.0 * math.pi)), apart)
+    apart = math.remainder(seen.value - quick.value, 2.0 * math.pi)
+    return Estimate(seen.value, math.hypot(seen.std, 0.5 * apart, YAW_MODEL_STD))
 
 
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -431,19 +415,14 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         signs = np.array([-1.0 if name == axis else 1.0 for name in 'xyz'])
         told_of = evidence.found('force_mirrored', 0.95, value=-1.0, axis=axis)
         return [told_of], replace(evidence, force=evidence.force * signs)
-    told = yaw_of_imu(evidence)
-    if told is None:
+    seen = yaw_of_imu(evidence)
+    if seen is None:
         reason = 'yaw of the IMU: no lively starts and stops in it'
         return [NotChecked('mounting', reason)], evidence
-    seen, trial = told
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
         return [], evidence
-    words: dict[str, Any] = {
-        'angle': math.degrees(seen.value),
-        'off': math.degrees(seen.std),
-        'trial': Trial(*np.degrees(trial[:2]).tolist()).words('off by', 'degrees'),
-    }
+    words: dict[str, Any] = {'angle': math.degrees(seen.value), 'off': math.degrees(seen.std)}
     sure = 0.97
     if not clear and math.cos(seen.value) < -ALONG_AXIS:
         words['rival'] = ', or linear_acceleration.x has the wrong sign: drive circles'

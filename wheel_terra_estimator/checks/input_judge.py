@@ -22,8 +22,7 @@ from wheel_terra_estimator.estimation.estimates import (
 from wheel_terra_estimator.estimation.measurements import StepInputs
 
 _LOGGER = logging.getLogger(__name__)
-SUBJECT = 'check of '
-"""Begins the subject of a finding among the faults of a set."""
+SUBJECT = 'check of '  # begins the subject of a finding among the faults of a set
 _NOT_CHECKED = {SUBJECT + 'the inputs': f'not checked: {INTERNAL_ERROR}'}
 LONGEST_WAIT = 4_000_000_000
 """A stuck warning waits no longer [ns of stamps] for the verdict on its inputs."""
@@ -40,13 +39,7 @@ _NOISE = 'noise_beyond_stated'
 
 
 class InputJudge:
-    """The checks while driving as what runs beside an estimator, kept states included.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        What the inputs are judged against.
-    """
+    """The checks while driving as what runs beside an estimator, kept states included."""
 
     def __init__(self, configuration: Configuration) -> None:
         self._checks = OnlineChecks(configuration)

@@ -40,22 +40,15 @@ from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 Floats = tuple[float, ...]
 
-BIN = 100_000_000
-"""Means are over this [ns of stamps]."""
-KEPT = 300
-"""Bins that are kept: 30 s."""
+BIN = 100_000_000  # means are over this [ns of stamps]
+KEPT = 300  # bins that are kept: 30 s
 OFTEN, SELDOM = 20, 60
 """Bins between two judgements: 2 s in the first half minute of motion, 6 s later."""
-TRIAL = 80
-"""Bins of motion in which wrong signs and units would show on a straight."""
-NEEDED = 2
-"""Judgements that agree before a fault is told."""
-MEMORY = 6
-"""Judgements without a fault that are remembered when one is seen."""
-CAP = 4
-"""Agreeing judgements beyond this many count no more."""
-LEAST_SURE = 0.5
-"""Confidence from which a finding counts."""
+TRIAL = 80  # bins of motion in which wrong signs and units would show on a straight
+NEEDED = 2  # judgements that agree before a fault is told
+MEMORY = 6  # judgements without a fault that are remembered when one is seen
+CAP = 4  # agreeing judgements beyond this many count no more
+LEAST_SURE = 0.5  # confidence from which a finding counts
 
 
 class Row(NamedTuple):
@@ -134,13 +127,7 @@ class _Verdicts:
 
 
 class OnlineChecks:
-    """Judge of a stream of steps; deterministic, driven by stamps alone.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        What the measurements are judged against.
-    """
+    """Judge of a stream of steps; deterministic, driven by stamps alone."""
 
     def __init__(self, configuration: Configuration) -> None:
         self._configuration = configuration

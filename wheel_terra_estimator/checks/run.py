@@ -47,10 +47,8 @@ from wheel_terra_estimator.checks.series import Recording, Series, rows_of
 from wheel_terra_estimator.checks.statistics import moving_mean
 from wheel_terra_estimator.configuration.configuration import Configuration
 
-LEAST_RIM_SPEED = 0.005
-"""Rim speed that no drive stays below [m/s]."""
-ORIENTATION = 'the orientation'
-"""What a gyro is said to turn against."""
+LEAST_RIM_SPEED = 0.005  # rim speed that no drive stays below [m/s]
+ORIENTATION = 'the orientation'  # what a gyro is said to turn against
 _LOGGER = logging.getLogger(__name__)
 Result = TypeVar('Result')
 Given = TypeVar('Given')
@@ -59,16 +57,10 @@ Given = TypeVar('Given')
 def check_recording(
     recording: Recording, configuration: Configuration | None, remapped: Sequence[str] = ()
 ) -> CheckReport:
-    """Run all checks.
+    """Run all checks of a recording.
 
-    Parameters
-    ----------
-    recording : Recording
-        The channels.
-    configuration : Configuration or None
-        The rover file; without one the names of the joints say what there is.
-    remapped : sequence of str
-        Topics of the estimator that the user has named himself.
+    Without a rover file the names of the joints say what there is. Topics that the user has named
+    himself are ``remapped``.
     """
     return examine(recording, configuration, remapped)[0]
 
@@ -166,19 +158,11 @@ def _drives(evidence: Evidence | None) -> bool:
 
 
 class Mended:
-    """Takes what each check finds; gives back what it was given, with that mended.
-
-    Attributes
-    ----------
-    report : CheckReport
-        What was found so far.
-    by_check : dict
-        Name of each check that ran -> its outcomes.
-    """
+    """Takes what each check finds; gives back what it was given, with that mended."""
 
     def __init__(self, report: CheckReport) -> None:
         self.report = report
-        self.by_check: dict[str, list[Outcome]] = {}
+        self.by_check: dict[str, list[Outcome]] = {}  # name of each check that ran
 
     def __call__(
         self,
@@ -215,8 +199,7 @@ def against_each_other(
     return evidence
 
 
-DRIVING = True
-"""Half a minute can tell it."""
+DRIVING = True  # half a minute can tell it
 Check: TypeAlias = 'tuple[str, ModuleType, str] | tuple[str, ModuleType, str, bool]'
 """Kind of what it finds, module and name of a check; whether it also runs while driving."""
 AGAINST_EACH_OTHER: tuple[Check, ...] = (

@@ -21,23 +21,18 @@ from wheel_terra_estimator.checks.torque import thrust
 from wheel_terra_estimator.checks.trial import halves
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorErrors
 
-DEEPEST = 1.2
-"""Sinkage over radius that no wheel gets out of [-]."""
+DEEPEST = 1.2  # sinkage over radius that no wheel gets out of [-]
 LEAST_READINGS = 50
-ANOTHER_UNIT = 30.0
-"""Noise over the stated one from which it may be another unit [-]."""
+ANOTHER_UNIT = 30.0  # noise over the stated one from which it may be another unit [-]
 BELOW_ZERO = 0.006
 """A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
-BURIED = 0.5
-"""Depth over radius that no drive has all the time [-]."""
+BURIED = 0.5  # depth over radius that no drive has all the time [-]
 DRAGS = 0.3
 """Correlation of depth with thrust or slip from which deep wheels are seen to be dragged [-]."""
 ALIKE_SHARE = 0.4
 """Share by which the offset of a wheel may change over a drive to count as its zero [-]."""
-DEEP_STD = 0.02
-"""Deviation of a zero of all wheels: their true sinkage [m]."""
-ODD_ZERO = 0.01
-"""A wheel that reads this much less or more than every other of its side [m] is odd."""
+DEEP_STD = 0.02  # deviation of a zero of all wheels: their true sinkage [m]
+ODD_ZERO = 0.01  # A wheel that reads this much less or more than every other of its side [m] is odd
 
 ORDER = NotChecked(
     'exchanged_wheels',

@@ -12,29 +12,20 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 
-MAD_TO_STD = 1.4826
-"""Standard deviation over median absolute deviation of a normal distribution."""
-HUBER = 2.0
-"""Residuals beyond this many deviations count less in a robust fit."""
-ROUNDS = 8
-"""Reweighted fits."""
+MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation of a normal distribution
+HUBER = 2.0  # residuals beyond this many deviations count less in a robust fit
+ROUNDS = 8  # reweighted fits
 BLOCKS = 12
 """Number of blocks of time that a standard deviation is estimated from: residuals of a drive are
 correlated over seconds, rows are not independent."""
-MOST_TIMES = 2_000_000
-"""Even steps over a drive: 28 hours at 20 Hz."""
-LONGEST_PAUSE = 3600.0
-"""Between stamps of one drive [s]."""
-DRIFT = 6.0
-"""Slopes change more slowly than this [s], speeds faster."""
+MOST_TIMES = 2_000_000  # even steps over a drive: 28 hours at 20 Hz
+LONGEST_PAUSE = 3600.0  # between stamps of one drive [s]
+DRIFT = 6.0  # slopes change more slowly than this [s], speeds faster
 UNIFORM_STD = 1.0 / math.sqrt(12.0)
 """Standard deviation of what lies anywhere in an interval, as a share of its length [-]."""
-MOST_STEPS = 200
-"""Different values of a reading beyond which steps do not matter."""
-SAME_VALUE = 1e-6
-"""Share of the greatest value below which two values are one."""
-OFF_A_STEP = 0.05
-"""Distance from a multiple of a step, as a share of it."""
+MOST_STEPS = 200  # different values of a reading beyond which steps do not matter
+SAME_VALUE = 1e-6  # share of the greatest value below which two values are one
+OFF_A_STEP = 0.05  # distance from a multiple of a step, as a share of it
 
 
 class Estimate(NamedTuple):

@@ -36,30 +36,22 @@ LEAST_ANSWER = 0.3
 """Answer of a torque to slopes and starts over that of the others that tells its sign [-]."""
 MOST_TRACTION = 0.85
 """Sum of T/r over the weight that no soil gives on the level (tangent of 40 degrees)."""
-UNIT_TRACTION = 15.0
-"""The same, above which the torque is in N mm."""
-LEAST_TRACTION = 4e-3
-"""The same, that no ground or drive costs less than."""
-SOFT_TRACTION = 0.25
-"""Level traction above which the soil itself changes what a slope costs."""
-LEAST_SLOPE_STD = 0.25
-"""Scatter of the specific force along the drive that a scale needs [m/s^2]."""
+UNIT_TRACTION = 15.0  # the same, above which the torque is in N mm
+LEAST_TRACTION = 4e-3  # the same, that no ground or drive costs less than
+SOFT_TRACTION = 0.25  # level traction above which the soil itself changes what a slope costs
+LEAST_SLOPE_STD = 0.25  # scatter of the specific force along the drive that a scale needs [m/s^2]
 UP_AND_DOWN = 0.3
 """The same of uphill and of downhill stretches: one way alone the soil may resist more the steeper
 the slope [m/s^2]."""
 GAIN_MODEL_STD = 0.05
 """What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
-SLOPE_TIME = 2.0
-"""Forces are averaged over this for a slope that a sign is told on [s]."""
+SLOPE_TIME = 2.0  # forces are averaged over this for a slope that a sign is told on [s]
 ODD_GAIN, SAME_GAIN = math.log(1.3), 0.25
 """Torque over that of the wheel across that is another scale [ln], and by how much it may differ on
 slopes and on the level: a load, a zero or another radius changes one of them."""
-SMOOTH_ROWS = 20
-"""Rows over which slopes are averaged."""
-LEAST_BACK_ROWS = 10
-"""Rows of wheels turning back in the air that tell zero and friction apart."""
-RUTS = 0.3
-"""Half of the difference of resistance one way and back over its mean, one deviation [-]."""
+SMOOTH_ROWS = 20  # rows over which slopes are averaged
+LEAST_BACK_ROWS = 10  # rows of wheels turning back in the air that tell zero and friction apart
+RUTS = 0.3  # half of the difference of resistance one way and back over its mean, one deviation [-]
 RUT_TILT = 0.5
 """Tilt of a digging body, nose up, over the square of the level traction, one deviation [rad]: ruts
 cost 0.6 sqrt(z/D) of the load (Bekker 1969), depths differ by a third of z over 3.5 radii."""

@@ -18,23 +18,17 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 
 LONGEST_GAP = 0.5
 """A gap of the wheel odometry or the IMU longer than this [s] leaves the estimator blind."""
-GAP_PERIODS = 6.0
-"""A gap also has to be longer than so many periods."""
-GAP_SHARE = 0.05
-"""Share of missing messages of a stuttering channel."""
-SEVERAL = 10
-"""Messages over which a period is taken where stamps jitter."""
+GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
+GAP_SHARE = 0.05  # share of missing messages of a stuttering channel
+SEVERAL = 10  # messages over which a period is taken where stamps jitter
 OFF_PERIOD, REGULAR = 0.2, 0.6
 """Distance of a step from a multiple of the period, as a share of it, and the share of steps nearer
 than that (0.4 by chance) below which stamps jitter [-]."""
 BACKWARD_SHARE = 0.05
 """Share of messages whose stamp lies before that of an earlier arrival by more than a period."""
-FAR_BACK = 1.0
-"""A stamp that goes back by more than this [s] is out of order by itself."""
-FUTURE = -0.1
-"""Arrival less stamp that no message has [s]."""
-MOST_OFFSET = 1e4
-"""Offset that a rover file may state, either way [s]."""
+FAR_BACK = 1.0  # A stamp that goes back by more than this [s] is out of order by itself
+FUTURE = -0.1  # arrival less stamp that no message has [s]
+MOST_OFFSET = 1e4  # offset that a rover file may state, either way [s]
 ARRIVAL_STD = 0.05
 """Time that messages of two sensors take to arrive may differ by this, one deviation [s]."""
 CLOCK_DIFFERENCE = 1.0

@@ -14,12 +14,10 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 
-LEAST_ROWS = 12
-"""Rows of a half that something is found on, at least."""
+LEAST_ROWS = 12  # rows of a half that something is found on, at least
 LEAST_FALL = 0.7
 """Residual with a cure over that without it, on rows that it was not found on, at most [-]."""
-LEAST_MARGIN = 0.8
-"""The same over that with a rival's cure [-]."""
+LEAST_MARGIN = 0.8  # the same over that with a rival's cure [-]
 
 
 class Trial(NamedTuple):
@@ -55,14 +53,7 @@ def halves(energy: FloatArray) -> tuple[slice, slice]:
 def tried(fit: Callable[[slice], float], nothing: float, energy: FloatArray) -> Trial:
     """Fit a number on each half of some rows and return what it leaves on the other, the worse one.
 
-    Parameters
-    ----------
-    fit : callable
-        Number that some rows tell.
-    nothing : float
-        The number that changes nothing.
-    energy : numpy.ndarray
-        (k,) what each row tells of it.
+    ``nothing`` is the number that changes nothing, ``energy`` (k,) what each row tells of it.
     """
     parts = halves(energy)
     if min(part.stop - part.start for part in parts) < LEAST_ROWS:

@@ -40,16 +40,11 @@ from wheel_terra_estimator.estimation.measurements import heading_of
 
 Mask = BoolArray
 
-TRIAL_ROWS = 1000
-"""Rows, spread over the drive, that hypotheses are compared on."""
-MOST_STEERING = 3.3
-"""Steering angle that no wheel has [rad]."""
-MOST_UNLIKE = 0.1
-"""Residual in turns of wheels that roll where they are steered, at most [-]."""
-MOST_WHEELS = 10
-"""Wheels for which all combinations of signs are tried."""
-LEAST_TURNING_ROWS = 40
-"""Rows with a turn by the gyro that the wheels must account for."""
+TRIAL_ROWS = 1000  # rows, spread over the drive, that hypotheses are compared on
+MOST_STEERING = 3.3  # steering angle that no wheel has [rad]
+MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steered, at most [-]
+MOST_WHEELS = 10  # wheels for which all combinations of signs are tried
+LEAST_TURNING_ROWS = 40  # rows with a turn by the gyro that the wheels must account for
 MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2
 """Residual that a cure may leave [-]; of wheels that roll where they are steered."""
 UNTURNED = 0.5
@@ -60,14 +55,10 @@ SAME_SENSE = 0.5
 """Share of the way by the reference that goes where the wheels turn, less the rest, that tells."""
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0
 """Correlation of turns by two sensors that tells a scale, its least error [-] and deviations."""
-HEADING_TIME = 3.0
-"""Turns by orientation and gyro are compared over this [s]."""
-LEAST_CORRELATION = 0.7
-"""Of gyro and wheels, for turns to tell the sides [-]."""
-TIE = 1e-3
-"""Residuals [-] that differ by less are the same."""
-NOISE_FLOOR = 0.02
-"""Residual [-] by which hypotheses must differ at least."""
+HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
+LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
+TIE = 1e-3  # residuals [-] that differ by less are the same
+NOISE_FLOOR = 0.02  # residual [-] by which hypotheses must differ at least
 GYRO_DEGREES = (0.004, 0.07)
 """Effective over stated track that a gyro in degrees per second gives [-]."""
 
@@ -377,14 +368,8 @@ class _Told(NamedTuple):
 def _blame(told: _Told, half_reversed: bool, turn: float) -> str:
     """Return what runs backwards: the wheels beyond the signs that were found, the reference, ''.
 
-    Parameters
-    ----------
-    told : _Told
-        Agreement of the common speed with the others.
-    half_reversed : bool
-        Whether half of the wheels or more have a negative sign.
-    turn : float
-        Track that the turns tell, negative where they run against the gyro, 0 without turns.
+    ``half_reversed``: half of the wheels or more have a negative sign; ``turn``: track by the
+    turns, negative where they run against the gyro, 0 without turns.
     """
     against_force = told.force is not None and told.force < 0.0
     if told.reference is None:

@@ -57,19 +57,16 @@ LEAST_COUNTS = 0.2
 """Speed of a wheel with fewer counts over that of the others; slower ones stand [-]."""
 WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0
 """Change to and fro that no wheel makes over the greatest usual value, and the usual change [-]."""
-LEAST_WILD, MOST_WILD = 3, 0.1
-"""Number and share of single wild values that are told."""
+LEAST_WILD, MOST_WILD = 3, 0.1  # number and share of single wild values that are told
 LONG_FROZEN_TIME = 10.0
 """Time of driving in which an encoder that repeats itself is told from a coarse one [s]."""
 HELD_TORQUE = 1.5
 """Torque of a standing wheel over that of the others meanwhile, above which it is held [-]."""
 NOISE_FACTOR = 5.0
-LEAST_NOISE_SHARE = 0.08
-"""Noise of a rate that matters, as a share of the working rate."""
+LEAST_NOISE_SHARE = 0.08  # noise of a rate that matters, as a share of the working rate
 COUNTING_STD = 1.0 / math.sqrt(6.0)
 """Deviation of a rate from two counts, each off by up to one, as a share of a count [-]."""
-STEP_FACTOR = 1.5
-"""Noise by the steps over the one stated, above which it matters [-]."""
+STEP_FACTOR = 1.5  # noise by the steps over the one stated, above which it matters [-]
 KEPT = 0.9
 """Share of rates that repeat the one before, from which they are rounded, not counted [-]."""
 LEAST_STEP_SHARE = 0.02
@@ -351,13 +348,9 @@ def rounding(evidence: Evidence) -> float:
 
 
 def rate_step(rate: FloatArray, interval: FloatArray) -> float:
-    """Return the step of rates that are multiples of one number [rad/s]; 0 where they are not.
+    """Return the step of rates (k,) that are multiples of one number [rad/s]; 0 for none.
 
-    Parameters
-    ----------
-    rate, interval : numpy.ndarray
-        (k,) rates [rad/s], and the time over which each was counted [s]: counts over unequal
-        times are multiples of an angle, not of a rate.
+    Counts over unequal intervals (k,) [s] are multiples of an angle, not of a rate.
     """
     known = np.isfinite(rate) & (interval > 0.0)
     rate, interval = rate[known], interval[known]
