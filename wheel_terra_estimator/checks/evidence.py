@@ -23,8 +23,6 @@ from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 Mask = BoolArray
 
 REST_RATE = 0.02  # wheel rate below which a wheel stands, as a share of its working rate [-]
-NOISY_REST = 0.15
-"""Noise of a mean rate, as a share of the working rate, in which no standstill is seen [-]."""
 SHORTEST_REST = 1.0  # A standstill counts as rest after this time [s]
 LEAST_REST = 0.4  # rest that tells the bias of a gyro [s]
 SETTLING = 0.5  # A speed counts as steady this long after it changed [s]
@@ -126,8 +124,6 @@ class Evidence:
         mean[width - 1 :] = (total[width:] - total[:-width]) / width
         noise = bend_noise(rate) if rate.shape[0] > 2 else 0.0
         noisy = 4.0 * noise / math.sqrt(width)
-        if noisy > NOISY_REST * self.working_rate:
-            return np.zeros(rate.shape[0], dtype=bool)
         limit = max(REST_RATE * self.working_rate, noisy, 1e-9)
         still = (np.abs(mean) <= limit).all(axis=1)
         still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * noise)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -62,32 +61,16 @@ class Row(NamedTuple):
     reference: Floats  # velocity [m/s], its variance
 
 
-class Mean:
-    """Means of some numbers; exactly the number where all are the same."""
-
-    def __init__(self, count: int) -> None:
-        self.first, self.sums, self.counts = [math.nan] * count, [0.0] * count, [0] * count
-
-    def add(self, values: Sequence[float]) -> None:
-        """Take values; nan is none."""
-        for i, value in enumerate(values):
-            if value == value:
-                if self.counts[i]:
-                    self.sums[i] += value - self.first[i]
-                else:
-                    self.first[i] = value
-                self.counts[i] += 1
-
-    def copy(self) -> Mean:
-        """Return means that later values leave alone."""
-        other = Mean(0)
-        other.first, other.sums, other.counts = self.first[:], self.sums[:], self.counts[:]
-        return other
-
-    def __call__(self) -> Floats:
-        """Return the means so far."""
-        pairs = zip(self.first, self.sums, self.counts, strict=True)
-        return tuple(first + total / max(count, 1) for first, total, count in pairs)
+def _mean(samples: list[Floats], count: int) -> Floats:
+    """Return the means of (k, count) numbers without nan; exactly the number where all are one."""
+    if not samples:
+        return (math.nan,) * count
+    table = np.array(samples)
+    least = np.fmin.reduce(table, axis=0)
+    known = np.isfinite(table)
+    above = np.where(known, table - least, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    mean: list[float] = (least + above).tolist()
+    return tuple(mean)
 
 
 class Tally(NamedTuple):
@@ -170,17 +153,16 @@ class OnlineChecks:
         self._new_bin()
 
     def _new_bin(self) -> None:
-        count = len(self._radius)
-        self._means = [Mean(count), Mean(count), Mean(count), Mean(6), Mean(2)]
+        self._samples: tuple[list[Floats], ...] = ([], [], [], [], [])
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return the state in a form that later steps leave alone."""
-        return self._begin, self._rows, self._verdicts, [mean.copy() for mean in self._means]
+        return self._begin, self._rows, self._verdicts, [one[:] for one in self._samples]
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Return to a kept state."""
-        self._begin, self._rows, self._verdicts, means = snapshot
-        self._means = [mean.copy() for mean in means]
+        self._begin, self._rows, self._verdicts, samples = snapshot
+        self._samples = tuple(one[:] for one in samples)
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Take all inputs of a stamp [ns], later than the one before."""
@@ -189,24 +171,25 @@ class OnlineChecks:
             self._new_bin()
         if stamp - self._begin >= BIN:
             self._close(stamp)
-        rate, torque, depth, inertial, velocity = self._means
+        rate, torque, depth, inertial, velocity = self._samples
         if inputs.wheel_odometry is not None:
-            rate.add(inputs.wheel_odometry.rate.tolist())
-            torque.add(inputs.wheel_odometry.torque.tolist())
-        if inputs.inertial is not None:
-            inertial.add(inputs.inertial.specific_force.tolist())
-            inertial.add((math.nan,) * 3 + tuple(inputs.inertial.angular_rate.tolist()))
+            rate.append(inputs.wheel_odometry.rate.tolist())
+            torque.append(inputs.wheel_odometry.torque.tolist())
+        if (felt := inputs.inertial) is not None:
+            inertial.append((*felt.specific_force.tolist(), *felt.angular_rate.tolist()))
         if inputs.sinkage is not None:
-            depth.add(inputs.sinkage.sinkage.tolist())
+            depth.append(inputs.sinkage.sinkage.tolist())
         if inputs.reference is not None:
-            velocity.add((inputs.reference.forward, inputs.reference.variance))
+            velocity.append((inputs.reference.forward, inputs.reference.variance))
 
     def _close(self, stamp: int) -> None:
         """Close the bin before a stamp, and judge if it is time to."""
         assert self._begin is not None
         bins = (stamp - self._begin) // BIN
         self._begin += bins * BIN
-        row = Row(self._begin - (bins - 1) * BIN, *(mean() for mean in self._means))
+        counts = (len(self._radius),) * 3 + (6, 2)
+        means = [_mean(*of) for of in zip(self._samples, counts, strict=True)]
+        row = Row(self._begin - (bins - 1) * BIN, *means)
         self._new_bin()
         old = next((i for i, r in enumerate(self._rows) if row.stamp - r.stamp < KEPT * BIN), 0)
         self._rows = (*self._rows[old:], row)

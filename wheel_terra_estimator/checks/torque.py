@@ -256,12 +256,14 @@ def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts, fit = evidence.facts, slope_fit(evidence)
     if isinstance(fit, NotChecked) or facts.configuration is None or not facts.has_sides():
         return [], evidence
+    if fit.gain.sigmas_from(0.0) < GAIN_SIGMAS or (fit.shares <= 0.0).any():
+        return [], evidence  # the IMU does not feel these slopes along x
     x = facts.configuration.wheels.x
     across = [
         int(np.argmin(np.where(facts.side == -side, np.abs(x - here), np.inf)))
         for side, here in zip(facts.side, x, strict=True)
     ]
-    size = np.log(np.maximum(fit.shares, 1e-9))
+    size = np.log(fit.shares)
     apart = size - size[across]
     by = np.abs(apart).min(axis=1) * (np.abs(apart[:, 0] - apart[:, 1]) < SAME_GAIN)
     pair = [int(np.argmax(by)), across[int(np.argmax(by))]]
@@ -274,6 +276,10 @@ def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     gain[wheel] = math.exp(float(apart[wheel].mean()))
     rival = facts.names[pair[int(np.argmin(far))]] if 2.0 * far.min() > far.max() else ''
     whole = whole_gain(evidence, 1.0) * gain
+    mended = evidence.with_rate(evidence.rate, evidence.torque / gain)
+    again = slope_fit(mended)
+    if isinstance(again, NotChecked) or again.gain.std > fit.gain.std:
+        return [], evidence  # all torques together fit the slopes no better
     told = evidence.found(
         'wheel_torque',
         0.5 if rival else 0.9,
@@ -284,7 +290,7 @@ def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         rival=f', or that of {rival}' if rival else '',
         gains=listed(whole, '.3f'),
     )
-    return [told], evidence.with_rate(evidence.rate, evidence.torque / gain)
+    return [told], mended
 
 
 def whole_gain(evidence: Evidence, left: float) -> FloatArray:
