@@ -57,6 +57,7 @@ DEEPEST = 0.3  # the same, beyond which a sensor is not believed (another unit) 
 LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
+UNSEEN_SLIP = 0.035  # slip that widens a track where no straight tells it, one deviation [-]
 STEERED_STD = 0.04  # slip of steered wheels in curves, as a share of the track, one deviation [-]
 CLEAR_TURN = 0.95  # correlation of gyro and difference of the sides that a turn has [-]
 
@@ -401,10 +402,9 @@ def rolling_track(evidence: Evidence) -> Told | NotChecked:
         reason = 'wheels slip in turns, whatever the track; drive circles on firm ground'
         return NotChecked('track', reason)
     speeds, ratio = _straight_speeds(evidence), told.ratio
-    if speeds is None:
-        return told._replace(alone=False)
-    std = math.hypot(ratio.std, speeds.ratio.value - 1.0)
-    return told._replace(ratio=Estimate(ratio.value, std))
+    slip = UNSEEN_SLIP if speeds is None else speeds.ratio.value - 1.0
+    seen = Estimate(ratio.value, math.hypot(ratio.std, slip))
+    return Told(seen, told.trial, alone=speeds is not None)
 
 
 def check_track(evidence: Evidence) -> list[Outcome]:

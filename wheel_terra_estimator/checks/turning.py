@@ -466,11 +466,12 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         seen = _turns(evidence, other)
         if correlation(gyro, seen) < SAME_TURNS:
             continue
-        scale = block_fit(np.column_stack([seen, np.ones(seen.size)]), gyro)[0]
-        if abs(scale.value - 1.0) > max(LEAST_SCALE, SCALE_SIGMAS * scale.std):
-            told = {'times': scale.value, 'against': name, 'std': scale.std}
-            finding = evidence.found('gyro_scale', 0.9, value=1.0 / scale.value, **told)
-            return [finding], replace(evidence, gyro=evidence.gyro / scale.value)
+        # The other is the noisier one: its noise would flatten a fit of the gyro to it.
+        cure = block_fit(np.column_stack([gyro, np.ones(seen.size)]), seen)[0]
+        if abs(cure.value - 1.0) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
+            told = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
+            finding = evidence.found('gyro_scale', 0.9, std=cure.std, **told)
+            return [finding], replace(evidence, gyro=evidence.gyro * cure.value)
     return [], evidence
 
 
