@@ -20,13 +20,11 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.ros_yaml import Value, format_value
 from wheel_terra_estimator.errors import UserError
 
-WORTH_CHANGING = 0.2
-"""Relative change of a noise or a rate below which the rover file keeps its number [-]."""
+WORTH_CHANGING = 0.2  # relative change of a noise or rate that is written, at least [-]
 NOISE_STD = 0.1  # relative deviation of a noise that a drive tells [-]
 LEAST_SURE = 0.8  # confidence from which a cure is written [-]
 CLEAR = 2.0  # deviations by which a number is off, from which another is written [-]
-BLUNT_REFERENCE = 0.005
-"""Deviation of the radius by the noise of the reference alone, as a share, that is told [-]."""
+BLUNT_REFERENCE = 0.005  # error of the radius by noise of the reference that is told [-]
 
 NO_CENTRE_OF_GRAVITY = NotChecked(
     'mass',

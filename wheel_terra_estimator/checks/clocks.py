@@ -36,21 +36,14 @@ LONGEST = {'imu': 2.0, 'reference': 3.0}  # greatest lag that is looked for [s]
 IN_A_DRIVE = 15.0  # length of a drive over the greatest lag that it tells [-]
 LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
 LEAST_PERIODS = 0.35  # the same in periods of the reference: between its stamps nothing is known
-LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}
-"""Correlation with the lag taken off, from which it is told [-]."""
-FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}
-"""Unlike part on the other half with the lag taken off over that without, at most [-]: an
-accelerometer is noisy, a slow reference ragged."""
-LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1}
-"""Deviation of a lag, at least [s]: chassis and filters delay what is felt."""
-APART = 0.2
-"""Lags of two halves or of two kinds of motion that differ by less agree [s]; also 3 deviations."""
+LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
+FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part with it, at most
+LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1}  # of chassis and filters [s]
+APART = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS = 4.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]
-SLOWEST = 1.5
-"""Period of the wheels or of a reference [s] above which nothing is said of their stamps."""
-SMOOTHED = 1.0
-"""Speeds and turns are averaged over this where their changes share a drive in halves [s]."""
+SLOWEST = 1.5  # period above which nothing is said of the stamps [s]
+SMOOTHED = 1.0  # speeds and turns are averaged over this to share a drive in halves [s]
 SMOOTHING = 0.4  # speeds and accelerations are averaged over this [s]
 
 

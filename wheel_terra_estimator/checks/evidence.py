@@ -26,17 +26,13 @@ REST_RATE = 0.02  # wheel rate below which a wheel stands, as a share of its wor
 SHORTEST_REST = 1.0  # A standstill counts as rest after this time [s]
 LEAST_REST = 0.4  # rest that tells the bias of a gyro [s]
 SETTLING = 0.5  # A speed counts as steady this long after it changed [s]
-STRAIGHT_SHARE = 0.25
-"""Speed of the sides against the middle, as a share of it, below which a drive is straight [-]."""
-STANDING_SHARE = 0.1
-"""Speed of the reference over rim speed below which the rover stands while its wheels turn [-]."""
-FREE_TRACTION = 0.12
-"""Sum of T/r over the weight that wheels in the air stay below; stuck ones take more [-]."""
+STRAIGHT_SHARE = 0.25  # speed of the sides against the middle of a straight, at most [-]
+STANDING_SHARE = 0.1  # speed over rim speed of a rover that stands, at most [-]
+FREE_TRACTION = 0.12  # sum of T/r over the weight of wheels in the air, at most [-]
 SMOOTH_ROWS = 5  # messages over which speed and torque are averaged for that
 SHORTEST_FREE = 3.0  # wheels that turn so long while the rover stands may be in the air [s]
 LEAST_MOVING_ROWS = 30  # fewer rows of driving than these tell nothing
-EVEN_GROUND_STD = math.radians(0.8)
-"""Deviation of a tilt seen in circles [rad] above which they lay on no plane."""
+EVEN_GROUND_STD = math.radians(0.8)  # deviation of a tilt by circles on a plane, at most [rad]
 LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
 AROUND = 0.25  # half of the time around a velocity that rim speeds are averaged over [s]
 

@@ -21,8 +21,7 @@ from wheel_terra_estimator.checks.statistics import (
 
 Complex: TypeAlias = NDArray[np.complex128]
 
-LEAST_YAW = math.radians(12.0)
-"""Yaw of the mounting below which starts, stops and slopes do not tell it [rad]."""
+LEAST_YAW = math.radians(12.0)  # yaw that starts and stops tell, at least [rad]
 YAW_SIGMAS = 4.0
 LEAST_FELT = 0.4  # what is felt along an axis over what wheels and gyro say, at least [-]
 FELT_BLOCKS = 10  # parts of a drive that a deviation comes from

@@ -31,28 +31,20 @@ from wheel_terra_estimator.checks.wheel_rates import OF_RADII, rounding
 
 LEAST_RADIUS_ERROR = 0.025  # share by which a radius is wrong before it is a finding [-]
 RADIUS_SIGMAS = 4.0
-LEAST_OF_SIDES = 0.05
-"""Share by which the radii of the sides differ, at least [-]; a cross slope makes a side slip."""
+LEAST_OF_SIDES = 0.05  # difference of the sides' radii, at least [-]; a cross slope makes slip
 OUTRUN_STD = 0.01  # slip that is left open where a rover outruns its wheels [-]
-PRIOR_OF_RADIUS = 0.85
-"""Probability that a ratio of speeds is the radius and not the scale of the reference [-]."""
+PRIOR_OF_RADIUS = 0.85  # probability that it is the radius, not the scale of the reference [-]
 SURE = 0.97  # probability beside its rival from which a fault is named alone [-]
 TRACK_STD = 0.02  # deviation that slip leaves in a scale of speed by turns, at least [-]
-RESISTANCE = Estimate(0.08, 0.05)
-"""Rolling resistance of firm ground over the weight: mean, deviation [-]."""
-UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)
-"""The same where no torque tells how firm the ground is [-]."""
+RESISTANCE = Estimate(0.08, 0.05)  # of firm ground over the weight [-]
+UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)  # where no torque tells it [-]
 SOFT_DEPTH = 0.06  # sinkage over radius above which ground is not taken for firm [-]
-MOST_ROUNDING = 0.02
-"""Error of the mean rate by rounding, over the working rate, with which a scale is told [-]."""
+MOST_ROUNDING = 0.02  # error of the mean rate by rounding, over the working rate, at most [-]
 ROUNDED = 'rates are rounded to coarse steps, so their mean is off; publish more digits'
-SLOPE_OF_SLIP = Estimate(0.2, 0.2)
-"""Slip over traction of firm ground where the drive does not tell it: mean, deviation [-]."""
+SLOPE_OF_SLIP = Estimate(0.2, 0.2)  # slip over traction of firm ground [-]
 NOT_SEEN = Estimate(0.0, 1e3)  # the same where there are no slopes
-LEAST_SEEN = 0.5
-"""Weight of the drive beside what firm ground does elsewhere from which it tells its slip [-]."""
-FIRM_DEPTH = Estimate(0.02, 0.015)
-"""Sinkage over radius of firm ground where no sensor tells it: mean, deviation [-]."""
+LEAST_SEEN = 0.5  # weight of the drive from which it tells its slip [-]
+FIRM_DEPTH = Estimate(0.02, 0.015)  # sinkage over radius of firm ground [-]
 DEEPEST = 0.3  # the same, beyond which a sensor is not believed (another unit) [-]
 LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12

@@ -18,12 +18,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, LONGEST_GAP, Evidence
 from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
-from wheel_terra_estimator.checks.felt_motion import (
-    LEAST_YAW,
-    YAW_SIGMAS,
-    felt_yaw,
-    reversed_axis,
-)
+from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS, felt_yaw, reversed_axis
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
@@ -43,50 +38,36 @@ from wheel_terra_estimator.checks.statistics import (
 from wheel_terra_estimator.checks.turning import ordinary_track, track_ratio
 from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
 
-GRAVITY_TOLERANCE = 0.1
-"""Share by which the mean specific force may differ from gravity (slopes, bias, vibration)."""
+GRAVITY_TOLERANCE = 0.1  # of the mean specific force (slopes, bias, vibration) [-]
 GRAVITY_BIAS = 0.3  # the same as an acceleration: biases [m/s^2]
 GRAVITIES = {'the Moon': 1.62, 'Mars': 3.71, 'the Earth': 9.81}  # [m/s^2]
 UPRIGHT_SHARE = 0.5  # share of the mean specific force along z that gravity has on a rover [-]
-UPSIDE_TILT = math.radians(35.0)
-"""Mean tilt that no rover drives at [rad]: the mounting is wrong, whatever the slope."""
-STEEPEST_MEAN = math.radians(20.0)
-"""Mean slope of a drive [rad]: what is within it of an axis is a quarter turn on a slope."""
+UPSIDE_TILT = math.radians(35.0)  # mean tilt that no rover drives at [rad]
+STEEPEST_MEAN = math.radians(20.0)  # mean slope of a drive, at most [rad]
 LEAST_SHOWN = 0.01  # change of an angle [deg] below which a cure leaves it out
 LEAST_MOUNTING = math.radians(1.5)  # mounting errors below this [rad] are left to calibration
 LEAST_TURN = 4.5  # heading that a drive has to cover for the mounting to be told from a slope [rad]
-FLAT_TURN_STD = math.radians(0.1)
-"""Part of the mounting that unevenness of the ground leaves open [rad]."""
-TURNED_ROUND = 0.75
-"""Probability that an IMU that no curve shows is turned round, not its x axis reversed [-]."""
-YAW_MODEL_STD = math.radians(1.0)
-"""Yaw that a body which pitches and rolls as it starts and turns leaves open [rad]."""
+FLAT_TURN_STD = math.radians(0.1)  # unevenness of the ground leaves open [rad]
+TURNED_ROUND = 0.75  # probability that an IMU is turned round, not its x axis reversed [-]
+YAW_MODEL_STD = math.radians(1.0)  # pitch and roll in starts and turns leave open [rad]
 LEAST_QUARTER = math.radians(45.0)  # least yaw of a quarter turn [rad]
-ALONG_AXIS = math.cos(math.radians(25.0))
-"""Cosine of the angle to an axis within which that axis is meant [-]."""
-EVEN = 0.6
-"""Length of the mean direction of the headings in turns, 0 where all occur alike, at most [-]."""
+ALONG_AXIS = math.cos(math.radians(25.0))  # cosine within which an axis is meant [-]
+EVEN = 0.6  # mean direction of the headings in turns, 0 where all occur alike, at most [-]
 NOISE_FACTOR = 4.0  # noise above so many times the stated one is a finding
 BIAS_FACTOR = 6.0  # A bias above so many stated deviations is a finding
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
 LEAST_STANDSTILL = 3.0  # [s]
 BIAS_SIGMAS = 5.0
-TILT_IS_MOUNTING = 0.7
-"""Probability that a tilt seen in circles is the mounting and not the accelerometer's zero [-]."""
-CROSS_AXIS = 0.01
-"""Misalignment of the axes of gyro and accelerometer in one housing [rad]; data sheets of MEMS."""
-LEAST_TURNING = 10.0
-"""Time of turning [s] in which wheels that dig do not agree with a gyro by chance."""
-UNTURNED = 0.85
-"""Probability that an IMU that no turn shows is upside down, not its accelerometer reversed [-]."""
+TILT_IS_MOUNTING = 0.7  # probability that a tilt in circles is the mounting, not a zero [-]
+CROSS_AXIS = 0.01  # gyro against accelerometer in one housing [rad]; data sheets of MEMS
+LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
+UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_WILD = 3
-MOST_WILD = 0.2
-"""Share of wild samples beyond which it is not single ones: vibration, or another unit [-]."""
+MOST_WILD = 0.2  # share of wild samples that are single ones, at most [-]
 LEAST_MESSAGES = 20
 UNIT_TOLERANCE = 0.12  # share by which the mean specific force may lie off gravity in another unit
-ORIENTATION_DEGREES = (30.0, 110.0)
-"""Gyro over turning of the orientation that a gyro in degrees per second gives [-]."""
+ORIENTATION_DEGREES = (30.0, 110.0)  # gyro over orientation if in degrees per second [-]
 FROZEN_SHARE = 0.3  # share of messages that repeat the one before
 MOUNTING = tuple(f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw'))
 """Parameters of the mounting."""

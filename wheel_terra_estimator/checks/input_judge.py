@@ -24,8 +24,7 @@ from wheel_terra_estimator.estimation.measurements import StepInputs
 _LOGGER = logging.getLogger(__name__)
 SUBJECT = 'check of '  # begins the subject of a finding among the faults of a set
 _NOT_CHECKED = {SUBJECT + 'the inputs': f'not checked: {INTERNAL_ERROR}'}
-LONGEST_WAIT = 4_000_000_000
-"""A stuck warning waits no longer [ns of stamps] for the verdict on its inputs."""
+LONGEST_WAIT = 4_000_000_000  # of a stuck warning for the verdict on its inputs [ns of stamps]
 FAR_NIS = 10.0
 """Mean normalised innovation squared of torque or balance that says that they do not fit. Usual
 0.03 to 1; up to 7 for seconds in turns without a reference and on snow; with the wrong sign 13."""

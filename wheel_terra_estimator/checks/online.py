@@ -41,8 +41,7 @@ Floats = tuple[float, ...]
 
 BIN = 100_000_000  # means are over this [ns of stamps]
 KEPT = 300  # bins that are kept: 30 s
-OFTEN, SELDOM = 20, 60
-"""Bins between two judgements: 2 s in the first half minute of motion, 6 s later."""
+OFTEN, SELDOM = 20, 60  # bins between judgements: 2 s in the first half minute of motion, 6 s later
 TRIAL = 80  # bins of motion in which wrong signs and units would show on a straight
 NEEDED = 2  # judgements that agree before a fault is told
 MEMORY = 6  # judgements without a fault that are remembered when one is seen

@@ -23,15 +23,13 @@ from wheel_terra_estimator.checks.statistics import (
 LEAST_REFERENCES = 10
 ALIKE_BOTH_WAYS = 0.5  # slower over faster of the speeds forward and back [-]
 SELDOM_NEGATIVE = 0.1  # share of negative speeds of what has no sign, by noise, at most [-]
-JUMP_FACTOR = 8.0
-"""A velocity that leaves its neighbours by so many times the usual scatter is a jump."""
+JUMP_FACTOR = 8.0  # a jump over the usual change [-]
 JUMP_SHARE = 0.005  # share of jumps that is a fault of the source, not a single wild reading
 LEAST_JUMPS = 3
 LEAST_NEW = 0.5  # share of readings that differ from the one before: fewer are held values
 BEYOND = 2.0  # speed over the fastest of the rims that is a jump whatever the wheels do [-]
 LEAST_JUMP = 0.3  # A jump is also larger than this share of the speed
-COVARIANCE_FACTOR = 6.0
-"""Ratio of stated to seen standard deviation that makes a covariance a placeholder."""
+COVARIANCE_FACTOR = 6.0  # seen over stated deviation of a placeholder [-]
 LEAST_STD = 1e-4  # standard deviation [m/s] that is proposed at least
 AHEAD = 0.3  # mean of the rims over the usual size of one, above which the rover goes ahead [-]
 CLEAR_HEADING = 1.0  # turn in which a frame of the world is told from one of the rover [rad]

@@ -22,15 +22,12 @@ from wheel_terra_estimator.checks.statistics import runs
 
 LEAST_TIME = 5.0  # time of driving in which a reading that stays is frozen [s]
 LEAST_MESSAGES = 10  # messages in which it stays, at least
-LONGER = 10.0
-"""So many times longer than the reading usually stays [-]: rounded ones repeat themselves."""
+LONGER = 10.0  # so many times longer than a reading usually stays [-]
 FINE = 50  # different readings of a sensor whose steps are not what makes it stay
-MOST_REPEATED = 0.5
-"""Share of wheel rates that repeat the one before, above which all is rounded, or free of noise."""
+MOST_REPEATED = 0.5  # share of rates that repeat themselves: more are rounded, or noiseless
 SELDOM = 0.1  # share of readings that repeat the one before of a sensor with noise [-]
 CHANGES = 0.5  # change of the rates over the working rate that all else then changes with [-]
-CLEAR_SINKAGE = 0.005
-"""Median sinkage of the other wheels beside which none reads 0 all the time [m]."""
+CLEAR_SINKAGE = 0.005  # of the other wheels, beside which none reads 0 all the time [m]
 
 
 def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -24,13 +24,10 @@ from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorE
 DEEPEST = 1.2  # sinkage over radius that no wheel gets out of [-]
 LEAST_READINGS = 50
 ANOTHER_UNIT = 30.0  # noise over the stated one from which it may be another unit [-]
-BELOW_ZERO = 0.006
-"""A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
+BELOW_ZERO = 0.006  # median above the ground that no sinkage has [m] (lugs carry less)
 BURIED = 0.5  # depth over radius that no drive has all the time [-]
-DRAGS = 0.3
-"""Correlation of depth with thrust or slip from which deep wheels are seen to be dragged [-]."""
-ALIKE_SHARE = 0.4
-"""Share by which the offset of a wheel may change over a drive to count as its zero [-]."""
+DRAGS = 0.3  # correlation of depth and thrust that tells that deep wheels are dragged [-]
+ALIKE_SHARE = 0.4  # change of an offset over a drive that is still a zero, as a share [-]
 DEEP_STD = 0.02  # deviation of a zero of all wheels: their true sinkage [m]
 ODD_ZERO = 0.01  # A wheel that reads this much less or more than every other of its side [m] is odd
 

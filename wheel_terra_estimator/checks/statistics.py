@@ -21,8 +21,7 @@ correlated over seconds, rows are not independent."""
 MOST_TIMES = 2_000_000  # even steps over a drive: 28 hours at 20 Hz
 LONGEST_PAUSE = 3600.0  # between stamps of one drive [s]
 DRIFT = 6.0  # slopes change more slowly than this [s], speeds faster
-UNIFORM_STD = 1.0 / math.sqrt(12.0)
-"""Standard deviation of what lies anywhere in an interval, as a share of its length [-]."""
+UNIFORM_STD = 1.0 / math.sqrt(12.0)  # of what lies anywhere in an interval, over its length [-]
 MOST_STEPS = 200  # different values of a reading beyond which steps do not matter
 SAME_VALUE = 1e-6  # share of the greatest value below which two values are one
 OFF_A_STEP = 0.05  # distance from a multiple of a step, as a share of it

@@ -29,13 +29,10 @@ from wheel_terra_estimator.checks.statistics import (
 from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
-UPHILL_ENOUGH = -0.02
-"""Specific force along the drive, in g, above which a driven wheel takes power."""
+UPHILL_ENOUGH = -0.02  # specific force along the drive at which a wheel takes power [g]
 SIGN_SIGMAS = 4.0
-LEAST_ANSWER = 0.3
-"""Answer of a torque to slopes and starts over that of the others that tells its sign [-]."""
-MOST_TRACTION = 0.85
-"""Sum of T/r over the weight that no soil gives on the level (tangent of 40 degrees)."""
+LEAST_ANSWER = 0.3  # answer of a torque to slopes over the others' that tells its sign [-]
+MOST_TRACTION = 0.85  # sum of T/r over the weight that no soil gives (tangent of 40 degrees)
 UNIT_TRACTION = 15.0  # the same, above which the torque is in N mm
 LEAST_TRACTION = 4e-3  # the same, that no ground or drive costs less than
 SOFT_TRACTION = 0.25  # level traction above which the soil itself changes what a slope costs
@@ -43,8 +40,7 @@ LEAST_SLOPE_STD = 0.25  # scatter of the specific force along the drive that a s
 UP_AND_DOWN = 0.3
 """The same of uphill and of downhill stretches: one way alone the soil may resist more the steeper
 the slope [m/s^2]."""
-GAIN_MODEL_STD = 0.05
-"""What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
+GAIN_MODEL_STD = 0.05  # by resistance that is larger uphill (firm drives of the simulator)
 SLOPE_TIME = 2.0  # forces are averaged over this for a slope that a sign is told on [s]
 ODD_GAIN, SAME_GAIN = math.log(1.3), 0.25
 """Torque over that of the wheel across that is another scale [ln], and by how much it may differ on
@@ -59,8 +55,7 @@ LEAST_GAIN_ERROR = 0.15
 GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
 ZERO_SIGMAS = 5.0
-ALIKE_ZEROS = 0.6
-"""Scatter of zeros over the radius, as a share of their mean, within which they are one [-]."""
+ALIKE_ZEROS = 0.6  # scatter of zeros over their mean within which they are one [-]
 
 
 def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -16,23 +16,19 @@ from wheel_terra_estimator.checks.series import Channel, JointSeries, Recording,
 from wheel_terra_estimator.checks.statistics import robust_std
 from wheel_terra_estimator.configuration.configuration import Configuration
 
-LONGEST_GAP = 0.5
-"""A gap of the wheel odometry or the IMU longer than this [s] leaves the estimator blind."""
+LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
 GAP_SHARE = 0.05  # share of missing messages of a stuttering channel
 SEVERAL = 10  # messages over which a period is taken where stamps jitter
 OFF_PERIOD, REGULAR = 0.2, 0.6
 """Distance of a step from a multiple of the period, as a share of it, and the share of steps nearer
 than that (0.4 by chance) below which stamps jitter [-]."""
-BACKWARD_SHARE = 0.05
-"""Share of messages whose stamp lies before that of an earlier arrival by more than a period."""
+BACKWARD_SHARE = 0.05  # share of stamps before that of an earlier arrival, at most [-]
 FAR_BACK = 1.0  # A stamp that goes back by more than this [s] is out of order by itself
 FUTURE = -0.1  # arrival less stamp that no message has [s]
 MOST_OFFSET = 1e4  # offset that a rover file may state, either way [s]
-ARRIVAL_STD = 0.05
-"""Time that messages of two sensors take to arrive may differ by this, one deviation [s]."""
-CLOCK_DIFFERENCE = 1.0
-"""Greatest difference between the clocks (log time minus stamp) of two topics [s]."""
+ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
+CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
 
 
 def check_transport(

@@ -15,8 +15,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 
 LEAST_ROWS = 12  # rows of a half that something is found on, at least
-LEAST_FALL = 0.7
-"""Residual with a cure over that without it, on rows that it was not found on, at most [-]."""
+LEAST_FALL = 0.7  # residual with a cure over that without, on the other half, at most [-]
 LEAST_MARGIN = 0.8  # the same over that with a rival's cure [-]
 
 

@@ -45,22 +45,16 @@ MOST_STEERING = 3.3  # steering angle that no wheel has [rad]
 MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steered, at most [-]
 MOST_WHEELS = 10  # wheels for which all combinations of signs are tried
 LEAST_TURNING_ROWS = 40  # rows with a turn by the gyro that the wheels must account for
-MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2
-"""Residual that a cure may leave [-]; of wheels that roll where they are steered."""
-UNTURNED = 0.5
-"""What the residual of turns without an answer of the wheels weighs beside wheels unlike [-]."""
-CLEAR_DIRECTION = 0.8
-"""Cosine of the angle by which starts and curves are felt turned that tells the sense [-]."""
-SAME_SENSE = 0.5
-"""Share of the way by the reference that goes where the wheels turn, less the rest, that tells."""
-SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0
-"""Correlation of turns by two sensors that tells a scale, its least error [-] and deviations."""
+MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2  # residual of a cure; of steered wheels, at most [-]
+UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
+CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
+SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
+SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
 LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
 TIE = 1e-3  # residuals [-] that differ by less are the same
 NOISE_FLOOR = 0.02  # residual [-] by which hypotheses must differ at least
-GYRO_DEGREES = (0.004, 0.07)
-"""Effective over stated track that a gyro in degrees per second gives [-]."""
+GYRO_DEGREES = (0.004, 0.07)  # effective over stated track by a gyro in degrees [-]
 
 
 @dataclass(frozen=True)

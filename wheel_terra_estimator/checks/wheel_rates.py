@@ -17,60 +17,33 @@ from wheel_terra_estimator.checks.faults import RATE_UNITS, listed
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, hardly_moves
 from wheel_terra_estimator.checks.repeats import stays
-from wheel_terra_estimator.checks.statistics import (
-    correlation,
-    lonely,
-    robust_std,
-    runs,
-    step_of,
-)
+from wheel_terra_estimator.checks.statistics import correlation, lonely, robust_std, runs, step_of
 
-MOST_COUNT = 0.07
-"""Speed over rim speed below which wheels that fit no unit are in counts (90 in a turn) [-]."""
-ONLY_BY_SPEED = ('thousandths of rad/s',)
-"""Units that a skidding rover's turns do not tell from counts of an encoder."""
-UNIT_BAND = (0.7, 1.25)
-"""Ratio of speeds over the factor of its unit; slip makes it smaller, nothing larger [-]."""
-LEAST_BAND, OUTRUN = 0.4, 1.05
-"""The same of units that may be counts as well: least, and most without doubt [-]."""
-TELLING = 0.15
-"""Difference of two units' distances from a ratio of speeds [ln] that tells them apart."""
-SAME_SCALE = 0.1
-"""Share by which the scales of rates by speeds and by turns differ of a rover that rolls [-]."""
-OF_RADII = (0.3, 1.4)
-"""Speed over rim speed of a wrong radius; below it a rover is stuck, or its reference dead [-]."""
-LEAST_ROLLING_TRACK = 0.9
-"""Effective over stated track of a rover whose rates are in rad/s; skidding makes it larger [-]."""
-LARGE_WHEEL = 0.6
-"""Radius above which the speed of a rim in m/s is too near to its rate in rad/s [m]."""
-FROZEN_TIME = 5.0
-"""A rate that does not change in the last digit for this long [s] while the others do."""
-LIVELY = 0.3
-"""Rate of the other wheels beside which a wheel does not stand, over the working rate [-]."""
-GOES_ON = 0.75
-"""Speed over that of the rims of the other side of a rover that does not turn about one [-]."""
-SAME_SPEED = 0.05
-"""Speed of a side against the middle, as a share of it, in which all wheels roll alike [-]."""
-LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0
-"""Speed of an odd wheel over that of the others [ln]: least, most of a radius; over scatter [-]."""
-LEAST_COUNTS = 0.2
-"""Speed of a wheel with fewer counts over that of the others; slower ones stand [-]."""
-WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0
-"""Change to and fro that no wheel makes over the greatest usual value, and the usual change [-]."""
+MOST_COUNT = 0.07  # speed over rim speed of counts (90 in a turn), at most [-]
+ONLY_BY_SPEED = ('thousandths of rad/s',)  # turns of a skidding rover do not tell it
+UNIT_BAND = (0.7, 1.25)  # ratio of speeds over its unit's factor; slip makes it smaller [-]
+LEAST_BAND, OUTRUN = 0.4, 1.05  # the same of units that may be counts [-]
+TELLING = 0.15  # difference of two units' distances from a ratio that tells them apart [ln]
+SAME_SCALE = 0.1  # of rates by speeds and by turns of a rover that rolls [-]
+OF_RADII = (0.3, 1.4)  # speed over rim speed of a wrong radius [-]
+LEAST_ROLLING_TRACK = 0.9  # effective over stated track of rates in rad/s, at least [-]
+LARGE_WHEEL = 0.6  # radius of a wheel whose rim speed is too near to its rate [m]
+FROZEN_TIME = 5.0  # a dead rate does not change for so long while others do [s]
+LIVELY = 0.3  # rate of the others beside which none stands, over the working rate [-]
+GOES_ON = 0.75  # speed over that of the other side's rims of a rover that goes on [-]
+SAME_SPEED = 0.05  # speed of a side against the middle in which all roll alike, at most [-]
+LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0  # speed over the others' of a radius; over scatter [ln]
+LEAST_COUNTS = 0.2  # speed of a wheel with fewer counts over the others', at least [-]
+WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0  # wild change over the greatest and usual value [-]
 LEAST_WILD, MOST_WILD = 3, 0.1  # number and share of single wild values that are told
-LONG_FROZEN_TIME = 10.0
-"""Time of driving in which an encoder that repeats itself is told from a coarse one [s]."""
-HELD_TORQUE = 1.5
-"""Torque of a standing wheel over that of the others meanwhile, above which it is held [-]."""
+LONG_FROZEN_TIME = 10.0  # time that a coarse encoder does not repeat itself [s]
+HELD_TORQUE = 1.5  # torque of a held wheel over that of the others, at least [-]
 NOISE_FACTOR = 5.0
 LEAST_NOISE_SHARE = 0.08  # noise of a rate that matters, as a share of the working rate
-COUNTING_STD = 1.0 / math.sqrt(6.0)
-"""Deviation of a rate from two counts, each off by up to one, as a share of a count [-]."""
+COUNTING_STD = 1.0 / math.sqrt(6.0)  # of a rate from two counts, in counts
 STEP_FACTOR = 1.5  # noise by the steps over the one stated, above which it matters [-]
-KEPT = 0.9
-"""Share of rates that repeat the one before, from which they are rounded, not counted [-]."""
-LEAST_STEP_SHARE = 0.02
-"""Noise by the steps of an encoder that matters, as a share of the working rate."""
+KEPT = 0.9  # share of repeated rates from which they are rounded, not counted [-]
+LEAST_STEP_SHARE = 0.02  # noise by steps that matters, over the working rate [-]
 
 
 # Dead channels -----------------------------------------------------------------------------------
