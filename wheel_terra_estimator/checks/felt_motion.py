@@ -45,23 +45,19 @@ def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None
     return motion, seen
 
 
-def reversed_axis(evidence: Evidence) -> tuple[str, bool]:
-    """Return the horizontal axis whose sign is wrong, '' for none, and whether curves tell it.
+def felt_senses(evidence: Evidence) -> list[int]:
+    """Return how starts and curves are felt along x and y: 1 as wheels and gyro say, -1 against.
 
-    An IMU that is turned feels starts and curves turned alike; no rotation reverses one of them.
+    0 is not clear. An IMU that is turned feels both alike; no rotation reverses one of them.
     """
     both = _motions(evidence, DRIFT)
     if both is None:
-        return '', False
-    fits = [
-        block_fit(wheels[:, None], felt)[0]
-        for wheels, felt in ((both[0].real, both[1].real), (both[0].imag, both[1].imag))
-    ]
+        return [0, 0]
+    motion, seen = both
+    pairs = (motion.real, seen.real), (motion.imag, seen.imag)
+    fits = [block_fit(wheels[:, None], felt)[0] for wheels, felt in pairs]
     clear = [abs(f.value) > LEAST_FELT and f.sigmas_from(0.0) > YAW_SIGMAS for f in fits]
-    starts, curves = (fit.value for fit in fits)
-    if not all(clear) or starts * curves > 0.0:
-        return '', clear[1]
-    return 'x' if starts < 0.0 else 'y', True
+    return [int(np.sign(f.value)) * there for f, there in zip(fits, clear, strict=True)]
 
 
 def felt_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:

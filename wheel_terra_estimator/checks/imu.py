@@ -18,7 +18,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, LONGEST_GAP, Evidence
 from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
-from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS, felt_yaw, reversed_axis
+from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS, felt_senses, felt_yaw
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
@@ -391,8 +391,10 @@ def yaw_of_imu(evidence: Evidence) -> Estimate | None:
 
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return an IMU whose x axis does not point forward, and the evidence with that mended."""
-    axis, clear = reversed_axis(evidence)
-    if axis and evidence.force is not None and _turns_upright(evidence) > CLEAR_AGREEMENT:
+    starts, curves = felt_senses(evidence)
+    axis, clear = 'x' if starts < 0 else 'y', curves != 0
+    mirrored = starts * curves < 0 and _turns_upright(evidence) > CLEAR_AGREEMENT
+    if mirrored and evidence.force is not None:
         signs = np.array([-1.0 if name == axis else 1.0 for name in 'xyz'])
         told_of = evidence.found('force_mirrored', 0.95, value=-1.0, axis=axis)
         return [told_of], replace(evidence, force=evidence.force * signs)

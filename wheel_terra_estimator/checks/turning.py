@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
 from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS, listed
-from wheel_terra_estimator.checks.felt_motion import felt_yaw
+from wheel_terra_estimator.checks.felt_motion import felt_senses, felt_yaw
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries
@@ -413,7 +413,12 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
     assert imu is not None
     heading = _heading(evidence, imu)
     gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
-    alone = heading is not None and correlation(_turns(evidence, heading), gyro) > LEAST_CORRELATION
+    # Curves are felt as the gyro says where it is right, and orientations turn as it does.
+    starts, curves = felt_senses(evidence)
+    curves = max(curves, 0) if starts < 1 else curves  # else the IMU may be turned round
+    if not curves and heading is not None:
+        curves = int(correlation(_turns(evidence, heading), gyro) > LEAST_CORRELATION)
+    alone = curves > 0
     mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
     sides = evidence.found(
         'swapped_sides',
@@ -424,8 +429,10 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
     )
     if alone:
         return [sides]
-    against = 'the wheels, or left and right wheels are swapped'
-    return [sides, evidence.found('gyro_reversed', 0.5, value=-1.0, axis='z', against=against)]
+    against = 'wheels and curves' if curves else 'the wheels, or left and right wheels are swapped'
+    sure = 0.9 if curves else 0.5
+    gyro_off = evidence.found('gyro_reversed', sure, value=-1.0, axis='z', against=against)
+    return [gyro_off] if curves else [sides, gyro_off]
 
 
 def _turns(evidence: Evidence, heading: FloatArray) -> FloatArray:
