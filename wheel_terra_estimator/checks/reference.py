@@ -38,7 +38,6 @@ MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
 """Speed over that without slip of a rover that slips much, and error of the ratio without slip."""
 LEAST_UNIT_RATIO = 1.3  # speed over rim speed below which it may be the radius, not the unit [-]
 NO_SCALE = 30.0  # speed over rim speed that is a unit, however much the rover slips [-]
-SLIPPING = 0.7  # speed over that of the rims in firm ground, at least [-]
 MOSTLY = 0.4  # mean over median rim speed of wheels most of which turn one way [-]
 CLEAR_SPEED = 5.0  # speed over the noise of the reference that a ratio of speeds needs [-]
 LEAST_ROWS = 5  # velocities beside rims that a ratio needs

@@ -21,6 +21,7 @@ from wheel_terra_estimator.checks.series import SinkageSeries, rows_of
 from wheel_terra_estimator.checks.statistics import runs
 
 LEAST_TIME = 5.0  # time of driving in which a reading that stays is frozen [s]
+ZERO_TIME = 20.0  # the same of a vector of zeros [s]
 LEAST_MESSAGES = 10  # messages in which it stays, at least
 LONGER = 10.0  # so many times longer than a reading usually stays [-]
 FINE = 50  # different readings of a sensor whose steps are not what makes it stay
@@ -106,7 +107,8 @@ class Stays(NamedTuple):
 def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | None:
     """Return where readings (k, p) at times (k,) [s] stay, all p of a row; None: nowhere.
 
-    A zero counts only where nothing else is ever read: a sensor may well read 0 for a while.
+    A sensor may well read 0 for a while: a zero counts where nothing else is ever read, or for long
+    of a vector that never repeats itself otherwise.
     """
     known = np.isfinite(values).all(axis=1)
     if known.sum() < LEAST_MESSAGES:
@@ -122,13 +124,12 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
     for first, last in runs(same):
         share = float(driving[first:last].mean())
         lasts = share * (last - first) * period  # a gap is none
-        live = not readings[first].any() and readings.any()
-        if live or lasts < LEAST_TIME:
-            continue
         beside = np.delete(same, np.s_[first:last])
         steady = np.ptp(speed[first:last]) < CHANGES * evidence.working_rate
         noisy = 2 * beside.size > last - first and np.mean(beside) < SELDOM
-        if rounded and steady and not noisy:
+        live = not readings[first].any() and bool(readings.any())
+        live = live and not (noisy and values.shape[1] > 1 and lasts > ZERO_TIME)
+        if live or lasts < LEAST_TIME or (rounded and steady and not noisy):
             continue
         usual = _usual(beside)
         others = np.delete(readings, np.s_[first : last + 1], axis=0)

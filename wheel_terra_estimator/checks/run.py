@@ -95,7 +95,8 @@ def _one_cause(findings: list[Finding]) -> list[Finding]:
     reversed_ = [f for f in findings if f.fault == 'gyro_reversed' and ORIENTATION in f.words]
     if reversed_:  # steered wheels then seem to turn against the gyro as well
         findings = [f for f in findings if f.fault != 'steering_sign']
-    swapped = [f for f in findings if f.fault == 'swapped_sides']
+    by_wheels = [f for f in findings if f.fault in ('swapped_sides', 'gyro_reversed')]
+    swapped = [f for f in by_wheels if f not in reversed_]
     if not swapped or not reversed_:
         return findings
     told = found('orientation_frame', reversed_[0].topic, swapped[0].confidence)
