@@ -68,6 +68,8 @@ MOST_WILD = 0.2  # share of wild samples that are single ones, at most [-]
 LEAST_MESSAGES = 20
 UNIT_TOLERANCE = 0.12  # share by which the mean specific force may lie off gravity in another unit
 ORIENTATION_DEGREES = (30.0, 110.0)  # gyro over orientation if in degrees per second [-]
+UP_APART = math.radians(25.0)  # that no acceleration makes [rad]
+MOST_COMPARED = 5000  # messages
 FROZEN_SHARE = 0.3  # share of messages that repeat the one before
 MOUNTING = tuple(f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw'))
 """Parameters of the mounting."""
@@ -119,12 +121,33 @@ def check_imu(state: ImuState) -> Judged:
         (_frozen, force, gyro),
         (_gravity, force),
         (_wild, force, gyro),
+        (_up_by_orientation, force),
         (_against_orientation, gyro),
     ):
         if all(getattr(state, name) for name in needed):
             told, state = check(state)
             outcomes += told
     return outcomes, state
+
+
+def _up_by_orientation(state: ImuState) -> Judged:
+    """Return an orientation that has up elsewhere than the specific force, both in its frame."""
+    from scipy.spatial.transform import Rotation  # heavy
+
+    imu = state.imu
+    norm = np.linalg.norm(imu.orientation, axis=1)
+    known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
+    if known.size < LEAST_MESSAGES:
+        return [], state
+    some = known[:: max(known.size // MOST_COMPARED, 1)]
+    up = Rotation.from_quat(imu.orientation[some]).apply(imu.force[some])[:, 2]
+    usual = np.median(imu.force, axis=0)  # without noise and vibration
+    cosine = float(np.clip(np.median(up) / np.linalg.norm(usual), -1.0, 1.0))
+    apart, upright = math.acos(cosine), float((state.rotation @ usual)[2]) > 0.0
+    if apart < UP_APART or (apart > math.pi - UP_APART and not upright):  # see `check_upside`
+        return [], state
+    told = state.found('orientation_tilt', 0.97, apart=math.degrees(apart))
+    return [told], state.with_values(orientation=np.full_like(imu.orientation, np.nan))
 
 
 def _placeholders(state: ImuState) -> Judged:
