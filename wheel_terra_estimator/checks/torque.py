@@ -269,7 +269,10 @@ def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     far = np.abs(size[pair, 1] - np.median(others))  # the one of both that is unlike all others
     wheel, gain = pair[int(np.argmax(far))], np.ones(size.shape[0])
     gain[wheel] = math.exp(float(apart[wheel].mean()))
-    rival = facts.names[pair[int(np.argmin(far))]] if 2.0 * far.min() > far.max() else ''
+    if 2.0 * far.min() > far.max():
+        both = ' and '.join(facts.names[i] for i in pair)
+        reason = f'torque of {both}: another scale of one, or another load; lift and turn them'
+        return [NotChecked('gain', reason)], evidence
     whole = whole_gain(evidence, 1.0) * gain
     mended = evidence.with_rate(evidence.rate, evidence.torque / gain)
     again = slope_fit(mended)
@@ -277,12 +280,11 @@ def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence  # all torques together fit the slopes no better
     told = evidence.found(
         'wheel_torque',
-        0.5 if rival else 0.9,
+        0.9,
         wheel=facts.names[wheel],
         value=round(float(whole[wheel]), 3),
         std=round(float(whole[wheel] * max(0.5 * np.ptp(apart[wheel]), GAIN_MODEL_STD)), 3),
         times=float(gain[wheel]),
-        rival=f', or that of {rival}' if rival else '',
         gains=listed(whole, '.3f'),
     )
     return [told], mended
