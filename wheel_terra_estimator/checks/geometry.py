@@ -49,6 +49,7 @@ DEEPEST = 0.3  # the same, beyond which a sensor is not believed (another unit) 
 LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
+MOST_HIDDEN = 0.7  # speed over rim speed of slip that torques off zero may hide, at least [-]
 UNSEEN_SLIP = 0.035  # slip that widens a track where no straight tells it, one deviation [-]
 STEERED_STD = 0.04  # slip of steered wheels in curves, as a share of the track, one deviation [-]
 CLEAR_TURN = 0.95  # correlation of gyro and difference of the sides that a turn has [-]
@@ -270,7 +271,9 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     scale, wheels = ratio.value * (1.0 + 0.5 * apart), facts.configuration.wheels
     rims = facts.radius * scale - (wheels.slip_radius - wheels.radius)  # lugs stay
     share = 1.0 if lopsided else _share_of_radius(evidence, ratio)
-    slips = ratio.value < 1.0 and (evidence.force is None or both_ways(evidence) is None)
+    slips = MOST_HIDDEN < ratio.value < 1.0 and (
+        evidence.force is None or both_ways(evidence) is None
+    )
     sure = confidence(sigmas) * (SURE if lopsided else 0.5 if slips else 1.0)
     evidence.figures['rover.radius_ratio'] = round(ratio.value, 4)
     words: dict[str, Any] = {'ratio': ratio.value, 'off': ratio.std}
