@@ -467,9 +467,12 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         seen = _turns(evidence, other)
         if correlation(gyro, seen) < SAME_TURNS:
             continue
-        # The other is the noisier one: its noise would flatten a fit of the gyro to it.
-        cure = block_fit(np.column_stack([gyro, np.ones(seen.size)]), seen)[0]
-        if abs(cure.value - 1.0) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
+        # Noise of either flattens the fit to it: the scale lies between both.
+        one = np.ones(seen.size)
+        cure = block_fit(np.column_stack([gyro, one]), seen)[0]
+        other_way = 1.0 / block_fit(np.column_stack([seen, one]), gyro)[0].value
+        off = min((cure.value - 1.0, other_way - 1.0), key=abs)
+        if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
             told = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
             finding = evidence.found('gyro_scale', 0.9, std=cure.std, **told)
             return [finding], replace(evidence, gyro=evidence.gyro * cure.value)
