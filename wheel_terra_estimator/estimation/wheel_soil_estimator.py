@@ -472,8 +472,7 @@ class WheelSoilEstimator:
         )
         if not cycle.still and not cycle.reference_known:
             direction = self._contact_age.state.direction
-            digging = self._resistance.digging.slip
-            step = self._speed.towards_equilibrium_slip(step, cycle, direction, digging)
+            step = self._speed.towards_equilibrium_slip(step, cycle, direction)
         self._speed.predict(prediction, step, cycle)
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:

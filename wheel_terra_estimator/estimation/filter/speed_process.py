@@ -369,11 +369,10 @@ class SpeedProcess(Component[SpeedState]):
         return max(spread(changes) - self._rim_noise, 0.0)
 
     def towards_equilibrium_slip(
-        self, step: SpeedStep, cycle: Cycle, direction: float, digging: float
+        self, step: SpeedStep, cycle: Cycle, direction: float
     ) -> SpeedStep:
         """Without a reference velocity, let v / rim speed return to what such a slope takes.
 
-        `digging` is the slip beside it of wheels that dig, 0 = they do not [-].
         On deep or saturated contacts torque and pull hardly change with slip. There the posterior
         is the prior, and a random walk is no prior: it ends anywhere.
         """
@@ -382,7 +381,7 @@ class SpeedProcess(Component[SpeedState]):
             return step
         most = _MOST_EQUILIBRIUM_SLIP
         slip = self._equilibrium_slip.at(demand, beyond=most)
-        usual = (1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)) * (1.0 - digging)
+        usual = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
         keep = math.exp(-abs(rim) * cycle.dt / USUAL_LENGTH)
         return SpeedStep(
             keep * step.speed_gain,
