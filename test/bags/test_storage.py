@@ -107,7 +107,7 @@ def test_truncated_mcap_gives_the_messages_before_the_cut(make_bag, whole, tmp_p
         ('notes.txt', b'hello', 'not a bag'),
         ('empty.mcap', b'', 'not one message can be read'),
         ('rubbish.mcap', b'rubbish' * 100, 'does not begin as an MCAP file'),
-        ('rubbish.db3', b'rubbish' * 100, 'cannot be read'),
+        ('rubbish.db3', b'rubbish' * 100, 'finds no recording in it'),
     ],
 )
 def test_what_is_no_recording_is_refused_by_name(tmp_path, name, content, words):
