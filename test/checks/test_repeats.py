@@ -111,3 +111,13 @@ def test_speed_and_torque_without_a_sign():
     assert finding.fault == 'reference_unsigned'
     (finding,) = found(joints=replace(WHOLE.joints, torque=np.abs(WHOLE.joints.torque)))
     assert finding.fault == 'torque_unsigned' and finding.kind == 'sign'
+
+
+def test_torques_that_brake_down_a_slope_have_a_sign():
+    """Driven forth and back always downhill: what is positive on the way back holds the rover."""
+    seconds, rate = WHOLE.joints.seconds, WHOLE.joints.rate.mean(axis=1)
+    force = WHOLE.imu.force.copy()
+    force[:, 0] -= np.sign(np.interp(WHOLE.imu.seconds, seconds, rate))
+    joints = replace(WHOLE.joints, torque=np.abs(WHOLE.joints.torque))
+    downhill = replace(WHOLE.imu, force=force)
+    assert 'torque_unsigned' not in {f.fault for f in found(joints=joints, imu=downhill)}

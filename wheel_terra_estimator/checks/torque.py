@@ -404,9 +404,16 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
 
 
 def _unsigned(evidence: Evidence) -> list[Outcome]:
-    """Return torques that are never negative although all wheels drive both ways."""
+    """Return torques that are never negative although all wheels drive both ways.
+
+    Where a rover backs down a slope they are positive: it brakes.
+    """
     lowest = np.nanquantile(evidence.torque[evidence.moving], 0.02, axis=0)
     if both_ways(evidence) is None or not (lowest >= 0.0).all():
+        return []
+    assert evidence.force is not None
+    uphill = evidence.force[:, 0] * np.sign(evidence.rim) > UPHILL_ENOUGH * evidence.facts.gravity
+    if (evidence.moving & uphill & (evidence.rim < 0.0)).sum() < LEAST_MOVING_ROWS:
         return []
     return [evidence.found('torque_unsigned', 0.9)]
 
