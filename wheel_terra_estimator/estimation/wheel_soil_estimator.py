@@ -35,7 +35,6 @@ from wheel_terra_estimator.estimation.contacts.measured_wheels import (
     slip_of_torque,
 )
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
-from wheel_terra_estimator.estimation.contacts.resistance import Resistance
 from wheel_terra_estimator.estimation.contacts.ruts import Ruts, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
 from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestClimb
@@ -187,7 +186,6 @@ class WheelSoilEstimator:
         self._demand = Demand()
         self._torque_coefficient = Demand()
         self._climb = SteepestClimb()
-        self._resistance = Resistance()
         angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
         self._linearisation = Linearisation(rover, layout, models, angle_std)
         self._stationary = StationaryWheels(rover, sensors, layout, models)
@@ -314,7 +312,6 @@ class WheelSoilEstimator:
         self._torque_coefficient.update(
             self._torque_over_load(cycle), cycle.dt, settled=self._contact_age.settled
         )
-        self._note_resistance(cycle)
         self._predict(cycle)
         if not cycle.reference_known and not self._contact_age.settled:
             self._speed.remove_start_transient(ekf, cycle)
@@ -440,18 +437,6 @@ class WheelSoilEstimator:
         if most <= 0.0:
             return NAN
         return self._contact_age.state.direction * sum(torque for torque, _ in told) / most
-
-    def _note_resistance(self, cycle: Cycle) -> None:
-        """Note what the ground resists, where no sinkage tells how deep the wheels are.
-
-        Anew after a stop, which leaves ruts, and where a wheel is dragged, which resists too.
-        """
-        read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
-        if read or not all(cycle.turns):
-            self._resistance.reset()
-        elif self._contact_age.settled and cycle.lateral_motion <= _SHARP_TURN:
-            resistance = self._torque_coefficient.state - self._demand.state
-            self._resistance.update(resistance, cycle.dt * abs(cycle.yaw_compensated.typical))
 
     def _note_climb(self, demand: float, rim: float, dt: float, *, told: bool) -> None:
         """Note what is asked and the slip, where a reference tells it and the rover rolls on."""
@@ -688,9 +673,9 @@ class WheelSoilEstimator:
         filtered = self._filtered_speed(rolling)
         if self._reference.known(self._clock.time):
             return filtered
-        usual, variance = self._usual_speed(rolling), filtered.variance * excess(self._torque.state)
-        doubted = SpeedAndVariance(filtered.speed, variance)
-        return doubted if usual is None else intersected(doubted, usual)
+        usual = self._usual_speed(rolling)
+        speed, variance = filtered if usual is None else intersected(filtered, usual)
+        return SpeedAndVariance(speed, variance * excess(self._torque.state))
 
     def _yaw_compensated(self, rims: Floats) -> RimSpeeds:
         return RimSpeeds.of(rims, self._turning.state.yaw_rate, self._steering.state.headings)
@@ -711,7 +696,7 @@ class WheelSoilEstimator:
         straight = self._contact_age.settled and not turns
         if self._reference.known(time) or not (straight and self._wheels.torque_known(time)):
             return None
-        usual = slip_of_torque(self._torque_coefficient.state, self._resistance.digging)
+        usual = slip_of_torque(self._torque_coefficient.state)
         if isnan(usual.slip) or not abs(rims.typical) >= self._rover.low_rim:
             return None
         speed = (1.0 - usual.slip) * rims.typical

@@ -27,7 +27,6 @@ class MeasuredWheelsTuning:
     slip_scale_std: float = 0.6  # [ln]
     least_std: float = 0.04  # of the slip [-]: the torque of rolling without pull
     most_mobilised: float = 0.9  # of the greatest torque: beyond, it tells nothing of the slip
-    least_digging: float = 0.5  # slip of digging wheels, to be believed there [-]
 
 
 class SlipOfTorque(NamedTuple):
@@ -37,29 +36,20 @@ class SlipOfTorque(NamedTuple):
     std: float
 
 
-_ROLLING = SlipOfTorque(0.0, 0.0)  # wheels that do not dig
-
-
 def slip_of_torque(
-    coefficient: float,
-    digging: SlipOfTorque = _ROLLING,
-    tuning: MeasuredWheelsTuning = MeasuredWheelsTuning(),
+    coefficient: float, tuning: MeasuredWheelsTuning = MeasuredWheelsTuning()
 ) -> SlipOfTorque:
     """Return the slip of measured wheels at a torque over load times radius [-], nan = unknown.
 
-    Negative where the wheels brake. Valid on loose soil, for wheels that go straight; near the
-    greatest torque, and beyond, nothing is returned unless they rather dig than roll.
+    Negative where the wheels brake. Valid on loose soil, for wheels that roll straight; near the
+    greatest torque, and beyond, nothing is returned.
     """
     share = abs(coefficient) / tuning.greatest_torque
-    beyond = share > tuning.most_mobilised
-    if isnan(coefficient) or (beyond and digging.slip < tuning.least_digging):
+    if isnan(coefficient) or share > tuning.most_mobilised:
         return SlipOfTorque(NAN, NAN)
-    share = min(share, tuning.most_mobilised)
     slip = -tuning.slip_scale * math.log(1.0 - share)
     by_greatest = tuning.slip_scale * share / (1.0 - share) * tuning.greatest_torque_std
     std = math.hypot(tuning.slip_scale_std * slip, by_greatest, tuning.least_std)
-    std = math.hypot((1.0 - digging.slip) * std, (1.0 - slip) * digging.std)
-    slip = 1.0 - (1.0 - slip) * (1.0 - digging.slip)
     return SlipOfTorque(math.copysign(slip, coefficient), std)
 
 
