@@ -153,6 +153,8 @@ def _held(table: Path, layout: ColumnMap) -> dict[str, int]:
     """
     held = {}
     for topic, columns in (('/sinkage', layout.sinkage), ('/reference_odom', layout.reference)):
+        if not columns:
+            continue
         with open_csv(table) as file:
             cells = (_cells(row, columns) for _, row in file.rows)
             runs = [len(list(same)) for _, same in groupby(cells)]
