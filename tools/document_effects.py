@@ -7,12 +7,13 @@ python tools/document_effects.py
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from wheel_terra_estimator.cli.effects import left_aside, prior_in_words, touched
+from wheel_terra_estimator.cli.effects import left_aside, touched
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 from wheel_terra_estimator.terramechanics.effects import Effect, EffectParameter, catalogue
 from wheel_terra_estimator.terramechanics.effects import learned_closure as law
@@ -77,12 +78,13 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         '',
         '<!-- Written by `python tools/document_effects.py`; do not edit. -->',
         '',
-        'Every physical or instrument effect that the models know. Each is off unless a model file '
-        'has `effects.<name>.enabled: true`; `effects.<name>.form` chooses one of its forms. What '
-        'a further form shares with the first is not repeated. Numbers of a parameter: default '
-        '(range), prior. *Needs*: columns that must vary in a table. *Confounded with*: in '
-        'brackets what separates the two. Figures: first parameter, wheel of 157 mm radius with '
-        '10 mm lugs, 80 N, HIT-LSS1 sand.',
+        'Every physical or instrument effect that the models know. Each is off unless a file has '
+        '`effects.<name>.enabled: true`; `effects.<name>.form` chooses one of its forms. What a '
+        'further form shares with the first is not repeated. Numbers of a parameter: default '
+        '(range), prior: mean ± deviation of a normal one, or scale of a half-normal one. '
+        '*Needs*: columns that must vary in a table. *Confounded with*: in brackets what tells '
+        'the two apart. Figures: first parameter, wheel of 157 mm radius with 10 mm lugs, 80 N, '
+        'HIT-LSS1 sand.',
         '',
         'By the outputs that they change:',
         '',
@@ -100,30 +102,41 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
                 lines += [f'**`form: {form.form}`**{first}', '']
             lines += [f'{form.claim[0].upper()}{form.claim[1:]}.', '', f'    {form.symbol}', '']
             lines += _law_table() if form.sparse else []
-            facts = [fact for fact in _facts(effect, form) if fact not in said]
-            said.update(facts)
-            lines += [*facts, '']
+            for facts in (_parameters(form), _facts(effect, form)):
+                new = [fact for fact in facts if fact not in said]
+                said.update(new)
+                listed = '\n' if facts and facts[0].startswith('- ') else ' '
+                lines += [listed.join(new), ''] if new else []
         others = ', '.join(f'`{other}` ({by})' for other, by in effect.confounded_with.items())
         if others:
-            lines.append(f'- Confounded with: {others}.')
+            lines += [f'*Confounded with*: {others}.', '']
         if effect.incompatible_with:
-            lines.append(f'- Not together with: {", ".join(sorted(effect.incompatible_with))}.')
-        lines += [f'- {text[0].upper()}{text[1:]}.' for text in left_aside(effect)]
-        if lines[-1]:
-            lines.append('')
+            lines += [f'*Not together with*: {", ".join(sorted(effect.incompatible_with))}.', '']
+        for text in left_aside(effect):
+            lines += [f'{text[0].upper()}{text[1:]}.', '']
         if not effect.sparse:
             lines.append(f'![{effect.name}](models/effects/{effect.name}.svg)')
     return '\n'.join(lines) + '\n'
 
 
+def _parameters(form: Effect) -> list[str]:
+    return [] if form.sparse else [_parameter(p) for p in form.parameters]
+
+
 def _facts(effect: Effect, form: Effect) -> list[str]:
-    """Return what a form's numbers are, what it needs, where it holds and where it comes from."""
-    facts = [] if form.sparse else [_parameter(p) for p in form.parameters]
+    """Return what a form needs, where it holds and where it comes from."""
+    facts = []
     if form.touches != effect.touches:
-        facts.append(f'- Touches: {touched(form)}.')
+        facts.append(f'*Touches*: {touched(form)}.')
     if form.needs:
-        facts.append(f'- Needs: {", ".join(form.needs)}.')
-    return [*facts, f'- Valid: {form.validity}.', f'- Source: {form.source}.']
+        facts.append(f'*Needs*: {", ".join(form.needs)}.')
+    return [*facts, f'*Valid*: {form.validity}.', f'*Source*: {_linked(form.source)}.']
+
+
+def _linked(source: str) -> str:
+    """Return a source with its DOIs as links; that a book has none needs no word."""
+    source = re.sub(r',? no DOI\b', '', source)
+    return re.sub(r'\bdoi (10\.[^\s,;]+[^\s,;).])', r'[doi](https://doi.org/\1)', source)
 
 
 def _law_table() -> list[str]:
@@ -138,21 +151,15 @@ def _law_table() -> list[str]:
         unit = '' if target.unit == '-' else f', in {target.unit}'
         how = 'factor exp(x)' if target.factor else f'added{unit}'
         lines.append(f'| `{name}` | {target.meaning} | {how} | {target.bound:g} |')
-    lines += ['', '| feature | value |', '|---|---|']
-    products = {name: f for name, f in law.FEATURES.items() if '_times_' in name}
+    of_targets: dict[tuple[str, ...], list[str]] = {}
     for name, feature in law.FEATURES.items():
-        if name in products:
-            continue
-        targets = ', '.join(f'`{t}`' for t in feature.targets)
-        only = f' ({targets} only)' if targets else ''
-        lines.append(f'| `{name}` | {_in_a_cell(feature.meaning)}{only} |')
-    (targets_of_all,) = {f.targets for f in products.values()}  # all the same
-    names, targets = (', '.join(f'`{n}`' for n in some) for some in (products, targets_of_all))
-    return [*lines, '', f'Products of two features, for {targets} only: {names}.', '']
-
-
-def _in_a_cell(text: str) -> str:
-    return text.replace('|', '&#124;')
+        value = '' if '_times_' in name else f' ({feature.meaning})'
+        of_targets.setdefault(tuple(feature.targets), []).append(f'`{name}`{value}')
+    lines += ['', 'Features:', '']
+    for targets, features in of_targets.items():
+        only = f'for {", ".join(f"`{t}`" for t in targets)} only: ' if targets else ''
+        lines.append(f'- {only}{", ".join(features)}')
+    return [*lines, '']
 
 
 def _parameter(p: EffectParameter) -> str:
@@ -160,8 +167,14 @@ def _parameter(p: EffectParameter) -> str:
     note = '' if p.free else ', not fitted'
     return (
         f'- `{p.name}`{unit}: {p.meaning}; {p.default:g} ({p.lower:g} to {p.upper:g}), '
-        f'{prior_in_words(p)}{note}'
+        f'{_prior(p)}{note}'
     )
+
+
+def _prior(p: EffectParameter) -> str:
+    if p.prior == 'half_normal':
+        return f'half-normal {p.prior_scale:g}'
+    return f'{p.prior_mean:g} ± {p.prior_scale:g}'
 
 
 def main() -> None:
