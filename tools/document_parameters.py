@@ -7,6 +7,8 @@ python tools/document_parameters.py
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from pathlib import Path
 
 from wheel_terra_estimator.configuration.parameters import Parameter, declared
@@ -18,9 +20,9 @@ _INTRODUCTION = """# Parameters
 Written by `python tools/document_parameters.py` from the declared table; do not edit.
 
 Keys of [configuration files](configuration.md); in brackets default, unit and what is allowed. A
-list per wheel has one entry for each of `wheels.names`, in that order. An integer will do where a
-number is wanted, though not inside a list (`[0.0, 0.5]`, not `[0, 0.5]`: ROS refuses mixed lists).
-Every `_std` is one standard deviation.
+list per wheel has one entry for each of `wheels.names`, in that order. An integer will do for a
+number, though not inside a list (`[0.0, 0.5]`, not `[0, 0.5]`: ROS refuses mixed lists).
+Every `_std` is one standard deviation, in the unit of what it belongs to.
 """
 
 _SECTIONS = {
@@ -48,10 +50,9 @@ _SIGNS = {
 }
 _EFFECTS = """## Effects
 
-`effects.NAME.enabled: true` switches an effect on, `effects.NAME.form` chooses one of its forms and
-`effects.NAME.PARAMETER` sets a parameter, whose default is its value where none is given;
-`effects.NAME.PARAMETER_std` is the standard deviation that a fit found (0 = not stated). Names,
-forms, parameters, units and ranges: [effects](effects.md).
+`effects.NAME.enabled: true` switches an effect on, `effects.NAME.form` chooses one of its forms,
+`effects.NAME.PARAMETER` sets a parameter, `effects.NAME.PARAMETER_std` is the standard deviation
+that a fit found (0 = not stated). Names, forms, units and ranges: [effects](effects.md).
 """
 
 
@@ -61,24 +62,30 @@ def page() -> str:
     table = list(declared().values())
     for section, title in _SECTIONS.items():
         lines += [f'## {title}', '']
-        for parameter in table:
-            head = parameter.key.split('.')[0] if '.' in parameter.key else ''
-            if head == section:
-                lines.append(_row(parameter))
+        of_section = [p for p in table if p.key.rpartition('.')[0] == section]
+        lines += [_row([*alike]) for _, alike in itertools.groupby(of_section, key=_said)]
         lines.append('')
     return '\n'.join(lines) + f'\n{_EFFECTS}'
 
 
-def _row(parameter: Parameter) -> str:
+def _said(parameter: Parameter) -> tuple[object, ...]:
+    """Return what one row says for all parameters that have it in common."""
+    return parameter.meaning, parameter.allowed, str(parameter.default), parameter.required
+
+
+def _row(alike: Sequence[Parameter]) -> str:
+    parameter = alike[0]
     default = '*required*' if parameter.required else f'`{format_value(parameter.default)}`'
-    unit = parameter.unit if parameter.unit not in ('', '-') else ''
+    units = {p.unit for p in alike}
+    unit = parameter.unit if len(units) == 1 and parameter.unit not in ('', '-') else ''
     allowed = _in_short(parameter.allowed)
     quantity = f'{default}, {unit}' if parameter.required and unit else f'{default} {unit}'.strip()
     facts = quantity if allowed in ('number', 'text', 'true/false') else f'{quantity}, {allowed}'
     meaning = parameter.meaning.replace('<', '&lt;')
     if parameter.aliases:
         meaning += ' (also ' + ', '.join(f'`{alias}`' for alias in parameter.aliases) + ')'
-    return f'- `{parameter.key}` ({facts}): {meaning}'
+    keys = ', '.join(f'`{p.key}`' for p in alike)
+    return f'- {keys} ({facts}): {meaning}'
 
 
 def _in_short(allowed: str) -> str:
