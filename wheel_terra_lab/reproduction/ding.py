@@ -36,7 +36,7 @@ SMALL = 0.1  # of the sinkage: "relatively small"
 SPEED = 0.01  # [m/s] of the wheel's centre
 RIPPLE = 20.0  # [N]
 RIPPLE_LUGS = (30, 24, 15)
-NOT_FIXED = 'no moduli are printed: stiffness and angles are fitted to these two'
+NOT_FIXED = 'stiffness and angles are fitted to these two, since no moduli are printed'
 
 
 def statements(count: int = integration.POINTS) -> list[Statement]:
@@ -67,11 +67,10 @@ def _ratio(place: str, what: str, curve: FloatArray, why: str = '') -> Statement
 
 def _sinkages(model: Model) -> list[Statement]:
     curves = {height: sinkage(model, 'Wh3', height) for height in SUPPORT}
-    found = []
-    for (slip, said), ours in zip(STATED, curves[0.010][[0, -1]], strict=True):
-        why = f'{within(said, ours, 0.1)[1]}; {NOT_FIXED}'
-        what = f'Wh3: z({slip:g}) [mm]'
-        found.append(Statement('figure 3', what, f'{said:g}', f'{ours:.1f}', None, why))
+    what = f'Wh3: {", ".join(f"z({slip:g})" for slip, _ in STATED)} [mm]'
+    said = ', '.join(f'{value:g}' for _, value in STATED)
+    told = ', '.join(f'{value:.1f}' for value in curves[0.010][[0, -1]])
+    found = [Statement('figure 3', what, said, told, None, NOT_FIXED)]
     spread = np.abs(sinkage(model, 'Wh3', 0.01, 8) - sinkage(model, 'Wh3', 0.01, 30)).max()
     why = 'no term of the model has the number of lugs'
     what = 'lugs 8 to 30 change the sinkage by [mm]'
@@ -98,8 +97,8 @@ def _lugs(model: Model) -> list[Statement]:
         if not holds:
             why += (
                 f'; the printed h s - dz4 cross at {more:g}/{deeper:g} = {more / deeper:.2f} on '
-                f'any soil; {ding_curves.CROSSING:g} asks for supports dz4 '
-                f'{ding_curves.CROSSING * deeper:g} mm apart, printed are {more:g}'
+                f'any soil; {ding_curves.CROSSING:g} takes supports '
+                f'{ding_curves.CROSSING * deeper:g} mm apart, not {more:g}'
             )
         what = f'slip above which {1e3 * high:.0f} mm lugs sink more than {1e3 * low:.0f} mm'
         found.append(Statement('figure 4', what, 'about 0.4', f'{ours:.2f}', holds, why))
@@ -176,6 +175,6 @@ def _ripple(model: Model) -> list[Statement]:
     ripple = [0.5 * value * 2.0 * step / float(high - low) for value in rise]
     what = 'ripple of the load with 30, 24, 15 lugs [N]'
     told = ', '.join(f'+-{value:.0f}' for value in ripple)
-    why = 'the model is a mean over a lug; ours: at rest on one lug, then on two, the axle held'
+    why = 'the model is a mean over a lug; ours: axle held, on one lug, then on two'
     found.append(Statement('text', what, f'about +-{RIPPLE:g}', told, None, why))
     return found

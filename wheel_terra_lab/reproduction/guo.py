@@ -49,17 +49,17 @@ ANGLES = {
 }
 REFUSED = 10.0  # relative error of angles that no contact has
 WHY_UNFITTED = {
-    'HIT_Wh34_smooth': 'above slip 0.3 the stress moves forward more than the fixed angles',
-    'KLS1_lug10': 'the torque of this rig holds 1 N m and more that no contact stress gives',
+    'HIT_Wh34_smooth': 'above slip 0.3 the stress moves further forward than the fixed angles',
+    'KLS1_lug10': '1 N m and more of its torque comes from no contact stress',
 }
 WHY_FITTED = {
-    'HIT_Wh34_smooth': 'the rows ask for a peak that moves forward up to slip 0.3 and back at 0.6; '
+    'HIT_Wh34_smooth': 'its peak moves forward up to slip 0.3 and back at 0.6; '
     'digitised to 1 N, 7 to 9 %',
     'KLS1_lug10': 'the measured pull falls from 12.7 to 6.4 N between slip 0.4 and 0.5',
 }
 WHY_PRINTED = (
-    'with them any lug lets the soil shear within itself at every slip; the measured gain over the '
-    'smooth rim grows with slip'
+    'they let the soil shear within itself at every slip; the measured gain over the smooth rim '
+    'grows with slip'
 )
 SIGMA = (0.0015, 0.5, 0.3)  # weights of sinkage [m], pull [N], torque [N m]: the pull first
 PRIOR = 0.1  # weight of expected values

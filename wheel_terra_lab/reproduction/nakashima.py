@@ -40,12 +40,12 @@ RELATIVE_DENSITY = 17.4  # [%]
 LIGHT = {9.8: (1.46, 1.18, 0.572), 14.7: (2.18, 1.59, 0.574)}
 """Of wheel 2 on 25 degrees by load [N]: R_r [N], z_a [cm], H/W (section 5.3)."""
 WHY_Z_A = (
-    'seven wheels lie within 0.2 cm, our beds scatter by 0.05 to 0.15 cm: that alone leaves 0.70 '
+    'seven wheels lie within 0.2 cm, and beds that scatter by 0.05 to 0.15 cm alone leave 0.70 '
     '(0.37 to 0.92)'
 )
 TWO_STARTS = (
-    'with grains x2 a wheel that stands first has 82 % and 2.4 cm, one held along the slope 98 % '
-    'and 6.0 cm: the paper, which states no start, lies between'
+    'the start decides: grains x2, standing 82 % and 2.4 cm, held along the slope 98 % and 6.0 cm; '
+    'the paper states none'
 )
 """Wheel 5 on 21 degrees in 1/6 g, one bed, `free_sinkage` standing and held."""
 AS_ON = 20.0  # [deg]: what the path on 25 degrees is equal to (section 4.2)
@@ -64,7 +64,7 @@ def kept() -> Runs:
     """Return the shipped runs."""
     with (metrics.DATA / reproduction.TABLE).open(newline='', encoding='utf-8') as stream:
         rows = list(csv.DictReader(stream))
-    return Runs(rows, metrics.DATA, 'kept results of the shipped runs; --run computes them anew')
+    return Runs(rows, metrics.DATA, 'kept results; --run computes them anew')
 
 
 def statements(runs: Runs) -> list[Statement]:
@@ -127,15 +127,12 @@ def _table7(rows: Sequence[Row]) -> list[Statement]:
             )
             if not good and key == 'sinkage_average' and BASE_WHEEL in before:
                 why += (
-                    f'; it sank {before[wheel]:.1f} cm before it turned '
+                    f'; sank {before[wheel]:.1f} cm before it turned '
                     f'(wheel {BASE_WHEEL}: {before[BASE_WHEEL]:.1f})'
                 )
             elif not good and key == 'motion_resistance':
                 force = 100.0 * off / paper[wheel]['gross_traction']
-                why += (
-                    f'; {off:.2f} N, {force:.0f} % of H, which lacks them too: '
-                    'H - R_r = W sin 25 deg'
-                )
+                why += f'; {off:.2f} N are {force:.0f} % of H, and H - R_r = W sin 25 deg'
             paper_s, ours_s, what = f'{said:.3g}', f'{have:.3g}', f'{name}, 25 degrees'
             found.append(Statement('table 7', what, paper_s, ours_s, good, why, wheel))
     if len(ours) == len(paper) == len(before):
@@ -152,8 +149,8 @@ def _table7(rows: Sequence[Row]) -> list[Statement]:
         together = float(np.corrcoef(misses, [before[w] for w in ours])[0, 1])
         what = 'misses of z_a against what each wheel sank before: correlation'
         why = (
-            'who sinks deep while standing for 1 s has less left to sink; how the load is put on '
-            'is not stated'
+            'a wheel that sinks deep while it stands for 1 s has less left to sink; the paper does '
+            'not state how the load is applied'
         )
         found.append(Statement('table 7', what, '-', f'{together:.2f}', None, why))
     return found
@@ -250,16 +247,16 @@ def _table6(rows: Sequence[Row]) -> list[Statement]:
 def _why_table6(rows: Sequence[Row], wheel: int, key: str, said: float) -> str:
     """Return why a number of table 6 is missed."""
     if key.startswith('slope'):
-        return '; the calibration is of lugs of 10 mm, this wheel alone has 5 mm' * (wheel == 6)
+        return '; calibrated on lugs of 10 mm, this wheel alone has 5 mm' * (wheel == 6)
     if key == 'power_number_20_percent':
-        return '; it climbs a steeper slope at that slip, and H grows with the slope'
+        return '; its slope at that slip is steeper, and H grows with the slope'
     if key != 'power_number_15_deg':
         return ''
     there = [r for r in reproduction.table6_rows(rows, wheel) if float(r['slope_deg']) == 15.0]
     slip = float(np.mean([metrics.number(row, 'slip') for row in there]))
     torque = float(np.mean([metrics.number(row, 'torque_coefficient') for row in there]))
     return (
-        f'; slips {100 * slip:.0f} % there, PN = (H/W)/(1 - s) asks for '
+        f'; slip {100 * slip:.0f} %, where PN = (H/W)/(1 - s) asks for '
         f'{100 * (1 - torque / said):.0f} % with our H/W of {torque:.2f}'
     )
 
@@ -329,7 +326,7 @@ def _lighter(rows: Sequence[Row]) -> list[Statement]:
             have = unit * float(np.mean([metrics.number(row, key) for row in mine]))
             good, why = within(said, have, share)
             if not good:
-                why += f'; {len(mine)} bed, and beds differ by 0.2 cm (wheels of table 7)'
+                why += f'; {len(mine)} bed, beds differ by 0.2 cm'
             found.append(Statement('figure 12(a)', what, f'{said:g}', f'{have:.3g}', good, why))
     return found
 
@@ -349,14 +346,13 @@ def _moon(rows: Sequence[Row]) -> list[Statement]:
             sunk = 100.0 * np.mean(_moon_values(rows, slope, moon=True, name='sinkage_static'))
             slid = 100.0 * np.mean(_moon_values(rows, slope, moon=True, name='slid_before'))
             why += (
-                f'; it slid {slid:.0f} cm down and sank {sunk:.1f} cm while it stood for 1 s; '
-                f'{TWO_STARTS}'
+                f'; slid {slid:.0f} cm and sank {sunk:.1f} cm while standing for 1 s; {TWO_STARTS}'
             )
         elif not good:
             told = ' and '.join(f'{100 * value:.0f}' for value in beds)
             why += (
-                f'; {len(beds)} beds ({told} %) differ as much; only the resistance to rolling, '
-                'fitted in 1 g, moves it'
+                f'; {len(beds)} beds ({told} %) differ as much; only the rolling resistance, '
+                'fitted in 1 g, changes it'
             )
         what = f'wheel 5, 1/6 g, {slope:g} degrees: {name}'
         found.append(Statement('section 6', what, f'{said:g}', f'{have:.3g}', good, why))
@@ -367,10 +363,7 @@ def _moon(rows: Sequence[Row]) -> list[Statement]:
         slid = _moon_values(rows, reproduction.TABLE7_SLOPE, moon=True, name='slid_before')
         stuck = slip > 95.0
         ours = 'does not climb' if stuck else f'slip {slip:.0f} %'
-        why = (
-            f'slides {100 * np.mean(slid):.0f} cm down while it stands, then makes {up:.0f} cm in '
-            '40 s; one held along the slope has 98 % on 21 degrees'
-        )
+        why = f'slides {100 * np.mean(slid):.0f} cm while standing, then makes {up:.0f} cm in 40 s'
         what = 'wheel 5, 1/6 g, 25 degrees'
         why = '' if stuck else why
         found.append(Statement('section 6', what, 'cannot climb', ours, stuck, why))
