@@ -11,12 +11,12 @@ from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.discrepancy.numbers import percent
 from wheel_terra_estimator.reporting.html import render
 
-PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'glossary.md'
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'nomenclature.md'
 
 
-def test_the_page_of_the_site_is_the_glossary():
-    table = glossary.as_markdown(glossary.terms())
-    assert table in PAGE.read_text(encoding='utf-8'), table
+def test_the_page_of_the_site_has_the_glossary():
+    words = glossary.as_markdown(glossary.terms())
+    assert words in PAGE.read_text(encoding='utf-8'), words
     assert all(term.meaning.endswith('.') for term in glossary.terms())
 
 

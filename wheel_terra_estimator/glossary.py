@@ -41,12 +41,10 @@ def used_in(text: str) -> list[Term]:
 
 
 def as_markdown(chosen: Iterable[Term]) -> str:
-    """Return words as a table of the site."""
-    rows = [
-        f'| {t.term}{f" ({t.also})" if t.also else ""} | {t.meaning.replace("|", "&#124;")} |'
-        for t in chosen
-    ]
-    return '\n'.join(['| word | meaning |', '|---|---|', *rows])
+    """Return words as a list of the site."""
+    return '\n'.join(
+        f'- **{t.term}**{f" ({t.also})" if t.also else ""}: {t.meaning}' for t in chosen
+    )
 
 
 def as_text(word: str = '') -> str:
