@@ -51,16 +51,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--soil',
         choices=('shared', 'own'),
         default='shared',
-        help='of several tables: diagnosed as one with one soil (default), or each with its own in '
-        'a folder of its name, with a summary of which effect they favour together',
+        help='several tables: as one with one soil (default), or each with its own in a folder of '
+        'its name, with a summary of which effect they favour together',
     )
     add_jobs_argument(parser, words='tables with their own soil side by side (default 1)')
     parser.add_argument(
         '--reference',
         type=Path,
         metavar='A.csv',
-        help='table in which the effect in question is absent; fitted first, so that structural '
-        'error common to both cancels',
+        help='table in which the effect in question is absent: structural error common to both '
+        'cancels',
     )
     parser.add_argument(
         '--columns',
@@ -76,8 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='append',
         default=[],
         metavar='COLUMN',
-        help='column of numbers that is left out (several with commas between; all: what is not '
-        'understood); without it a column that is not used is an error',
+        help='column of numbers to leave out (several with commas between; all: what is not '
+        'understood); else a column that is not used is an error',
     )
     parser.add_argument(
         '--effects',
@@ -85,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='append',
         default=[],
         metavar='FILE.py',
-        help='Python file with effects of your own, which then compete like the others',
+        help='Python file with effects of your own, which compete like the others',
     )
     parser.add_argument(
         '--only',
@@ -106,15 +106,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.02,
         metavar='SHARE',
-        help="model error that is no reason for doubt, share of each quantity's range (default "
-        '0.02): a channel off by more than twice its sum with the noise does not agree',
+        help="model error that is allowed, share of each quantity's range (default 0.02): a "
+        'quantity off by more than twice its sum with the noise does not agree',
     )
     parser.add_argument(
         '--soil-known-to',
         type=float,
         metavar='SHARE',
-        help='share of its value to which every soil number is known (default: as the '
-        'configuration states, else by the class of its source)',
+        help='share of its value to which every soil number is known (default: as configured, else '
+        'by the class of its source)',
     )
     bag_arguments.add_arguments(parser, 'for a bag: ')
     parser.add_argument(

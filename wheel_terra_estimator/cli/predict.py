@@ -95,7 +95,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--points',
         type=Path,
         metavar='F.csv',
-        help='operating points from a table of steady measurements instead of --slip and --load',
+        help='operating points from a table of steady rows instead of --slip and --load',
     )
     parser.add_argument(
         '--method', choices=METHODS, default='quadrature', help='how the contact is integrated'
@@ -103,8 +103,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--law',
         choices=LAWS,
-        help='law of the contact (see models/laws) in place of rover.contact_law; pressures are '
-        'the same at the width of the wheel',
+        help='law of the contact (see models/laws) in place of rover.contact_law',
     )
     parser.add_argument(
         '--table',
@@ -115,9 +114,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--noise',
         metavar='Z,F,T[,L]',
-        help='make virtual measurements: standard deviations of sinkage [m], drawbar pull [N] and '
-        'torque [N m], with slip angles lateral force [N], added as normal noise and stated in '
-        'columns of their own',
+        help='make virtual measurements: add normal noise of these standard deviations to sinkage '
+        '[m], drawbar pull [N], torque [N m] and lateral force [N], and state them in columns',
     )
     parser.add_argument(
         '--seed', type=int, default=1, metavar='N', help='draws the noise (default 1)'

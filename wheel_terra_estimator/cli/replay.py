@@ -44,8 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_output(
         parser,
-        'rosbag2 folder (MCAP) for the estimates, under the names that the node has; of '
-        'several recordings a folder of such folders, with summary.csv and summary.html',
+        'rosbag2 folder (MCAP) for the estimates, under the names of the node; of several '
+        'recordings a folder of such folders, with summary.csv and summary.html',
     )
     parser.add_argument(
         '--table',
@@ -57,22 +57,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--track',
         action=Output,
         metavar='F.csv',
-        help='map of the drive: position, slip, class, sinkage, pull margin and learned soil along '
-        'the way, units in the header',
+        help='map of the drive: position, slip, class, sinkage, pull margin and learned soil, units '
+        'in the header',
     )
     parser.add_argument(
         '--track-odometry',
         default='',
         metavar='TOPIC',
-        help='odometry in the recording whose positions the map has (default: reckoned from the '
-        'estimated velocity and the attitude)',
+        help='odometry in the recording that gives the positions of the map (default: dead '
+        'reckoning)',
     )
     parser.add_argument(
         '--save-soil',
         action=Output,
         metavar='F.yaml',
-        help='parameter file with the soil and the sensor biases that were learned, a further '
-        '--config for the next drive; of one recording',
+        help='parameter file with the learned soil and sensor biases of one recording, a further '
+        '--config for the next drive',
     )
     parser.add_argument(
         '--smooth',
@@ -94,8 +94,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--arrival',
         type=Path,
         metavar='F',
-        help='hear the messages in the order that a live node logged (its parameter '
-        'record_arrival), not in the order of the bag',
+        help='take the messages in the order that a live node logged (its parameter '
+        'record_arrival), not in that of the bag',
     )
     parser.add_argument(
         '--overwrite', action='store_true', help='replace an earlier output of the same name'
