@@ -57,8 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--track',
         action=Output,
         metavar='F.csv',
-        help='map of the drive: position, slip, class, sinkage, pull margin and learned soil, units '
-        'in the header',
+        help='map of the drive: position, slip, class, sinkage, pull margin and learned soil, '
+        'units in the header',
     )
     parser.add_argument(
         '--track-odometry',
