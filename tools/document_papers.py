@@ -15,32 +15,38 @@ from wheel_terra_estimator.cli.main import main
 
 FOLDER = Path(__file__).resolve().parents[1] / 'docs' / 'laboratory' / 'papers'
 PAGE = 'reproduction.md'
-_HEAD = '| where | what | paper | ours |'
+_HELD = '| where | what | paper | ours |'
 _TEXT = {
     '# Three papers, statement by statement': '# Three papers beside ours',
     '`wheel-terra reproduce all -o DIR` writes this page from installed code and shipped data.': (
         '`wheel-terra reproduce all -o DIR` lists every statement, from installed code and shipped '
-        'data. Below: what is not reproduced, what is no test, and the tables of nine wheels.'
+        'data. Below: what is not reproduced, and the tables of nine wheels.'
     ),
+    (
+        '*no test*: an input, a definition, a picture, or an accuracy that the paper does not '
+        'state.\n'
+    ): '',
 }
+_NOT = ' | **not**'
 
 
 def shortened(page: str) -> str:
-    """Return the page of the command without what is reproduced, but for rows of several wheels."""
+    """Return the page of the command with what is not reproduced, and rows of several wheels."""
     for words, others in _TEXT.items():
         page = page.replace(words, others)
     blocks: list[str] = []
     for block in page.split('\n\n'):
         head, *rows = block.splitlines()
-        if head != _HEAD:
+        if not head.startswith('| where'):
             blocks.append(block)
             continue
-        several = [row for row in rows if ' | wheels ' in row]
-        ending = ', among them:' if several else '. The rest:'
-        blocks[-1] = blocks[-1].replace(' reproduced:', f' reproduced{ending}')
-        if several:
-            blocks.append('\n'.join([head, rows[0], *several]))
-    return '\n\n'.join(blocks)
+        kept = [row for row in rows[1:] if _NOT in row or ' | wheels ' in row]
+        if head == _HELD:
+            ending = ', among them:' if kept else '. Not:'
+            blocks[-1] = blocks[-1].replace(' reproduced:', f' reproduced{ending}')
+        if kept:
+            blocks.append('\n'.join([head, rows[0], *kept]))
+    return '\n\n'.join(blocks).rstrip() + '\n'
 
 
 if __name__ == '__main__':
