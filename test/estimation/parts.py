@@ -1,9 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Constants of a rover for tests of single parts of the estimator."""
+"""Constants of a rover for tests of single parts of the estimator, and steady inputs of all."""
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
@@ -12,9 +14,25 @@ from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.filter.initial_state import initial_filter, layout_of
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    ReferenceVelocity,
+    StepInputs,
+    WheelOdometry,
+)
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 SAND = ['generic_six_wheel', 'dry_sand_ding2015']
+
+
+def step_inputs(time, rate, torque, force=(0.1, 0.0, 9.8), speed=None):
+    """Return stamp and inputs of a step; a speed is that of an exact reference."""
+    stamp = 10**12 + round(time * 1e9)
+    return stamp, StepInputs(
+        wheel_odometry=WheelOdometry(stamp, np.asarray(rate), np.asarray(torque)),
+        inertial=InertialReading(stamp, np.array(force), np.zeros(3), None),
+        reference=None if speed is None else ReferenceVelocity(stamp, speed, 1e-6),
+    )
 
 
 @dataclass

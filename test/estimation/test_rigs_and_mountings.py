@@ -2,38 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rigs and mountings at the edge: one wheel, one axle, an IMU upside down, exact sensors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from parts import SAND, Parts
+from parts import SAND, Parts, step_inputs
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
-from wheel_terra_estimator.estimation.measurements import (
-    InertialReading,
-    LeavingAngleReading,
-    ReferenceVelocity,
-    StepInputs,
-    WheelOdometry,
-)
+from wheel_terra_estimator.estimation.measurements import LeavingAngleReading
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 
 ONE_WHEEL = ['hit_wh3', 'hit_lss1']
-START = 10**12
-SECOND = 10**9
 
 
 def run(estimator, seconds, wheels, up=9.8, gap=0.1, rate=0.4):
     sets = []
     for i in range(round(seconds / gap)):
-        stamp = START + round(i * gap * SECOND)
-        given = StepInputs(
-            wheel_odometry=WheelOdometry(stamp, np.full(wheels, rate), np.full(wheels, 2.0)),
-            inertial=InertialReading(stamp, np.array([0.1, 0.0, up]), np.zeros(3), None),
-            reference=ReferenceVelocity(stamp, 0.04, 1e-6) if gap > 1.0 or i % 10 == 5 else None,
-        )
-        estimator.step(stamp, given)
+        speed = 0.04 if gap > 1.0 or i % 10 == 5 else None
+        rates, torques = np.full(wheels, rate), np.full(wheels, 2.0)
+        estimator.step(*step_inputs(i * gap, rates, torques, (0.1, 0.0, up), speed))
         sets.append(estimator.estimates())
     return sets
 
@@ -89,17 +79,11 @@ def test_the_error_of_the_rear_camera_counts_where_it_measures(measured):
         configuration = reader.load(SAND, [f'sensors.leaving_angle_std_deg:={degrees}'])
         estimator = WheelSoilEstimator(configuration)
         for i in range(40):
-            stamp = START + i * SECOND // 10
-            angle = LeavingAngleReading(stamp, np.full(6, -0.2)) if measured else None
-            estimator.step(
-                stamp,
-                StepInputs(
-                    wheel_odometry=WheelOdometry(stamp, np.full(6, 0.4), np.full(6, 12.0)),
-                    inertial=InertialReading(stamp, np.array([0.1, 0, 9.8]), np.zeros(3), None),
-                    leaving_angle=angle,
-                    reference=ReferenceVelocity(stamp, 0.045, 1e-6) if i % 10 == 5 else None,
-                ),
-            )
+            speed = 0.045 if i % 10 == 5 else None
+            stamp, given = step_inputs(0.1 * i, np.full(6, 0.4), np.full(6, 12.0), speed=speed)
+            if measured:
+                given = replace(given, leaving_angle=LeavingAngleReading(stamp, np.full(6, -0.2)))
+            estimator.step(stamp, given)
         deviations.append(estimator.estimates().drawbar_pull_std.mean())
     if measured:
         assert deviations[1] > 1.1 * deviations[0]
