@@ -14,9 +14,7 @@ from wheel_terra_estimator.estimation.filter.correlation import correlated_cycle
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
-from wheel_terra_estimator.estimation.filter.reference import (
-    ReferenceUpdate,
-)
+from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import FLOOR_VARIANCE, SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
@@ -58,27 +56,29 @@ def window(force_x, force_z, readings=5, noise=0.0):
 # -- Reference velocity -----------------------------------------------------------------------
 
 
+def reference_update(parts):
+    return ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
+
+
+def hear(parts, update, ekf, time, speed, still=False, fastest_rim=0.05):
+    """Fuse a reference of the stated deviation; return whether the speed was opened to it."""
+    reading, variance = ReferenceVelocity(0, speed, 0.0), parts.sensors.reference_std**2
+    return update.update(
+        ekf, time, reading, still=still, fastest_rim=fastest_rim, variance=variance
+    )
+
+
 def references(parts, ekf, speeds, held=None):
     """Fuse one reference per second; return for each whether the speed was opened to it.
 
     Something else may hold the speed at a value.
     """
-    update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
-    opened = []
+    update, opened = reference_update(parts), []
     for i, speed in enumerate(speeds):
         ekf.inflate(SPEED, 1e-8)
         if held is not None:
             ekf.set(SPEED, held, 1e-8)
-        opened.append(
-            update.update(
-                ekf,
-                float(i),
-                ReferenceVelocity(0, speed, 0.0),
-                still=False,
-                fastest_rim=0.05,
-                variance=parts.sensors.reference_std**2,
-            )
-        )
+        opened.append(hear(parts, update, ekf, float(i), speed))
     return update, opened
 
 
@@ -135,18 +135,11 @@ def test_models_are_doubted_where_a_small_lean_lasts(parts):
 
 def test_two_references_on_standing_wheels_say_that_the_rover_slides(parts, ekf):
     """A single one may be wild: neither is it believed, nor does it open the speed."""
-    update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    update = reference_update(parts)
     ekf.set(SPEED, 0.0, 0.0005**2)
     readings = [(0.0, 0.0), (1.0, 0.5), (2.0, 0.0), (3.0, 0.03), (4.0, 0.03), (5.0, 0.03)]
     for time, speed in readings:
-        update.update(
-            ekf,
-            time,
-            ReferenceVelocity(0, speed, 0.0),
-            still=True,
-            fastest_rim=0.0,
-            variance=parts.sensors.reference_std**2,
-        )
+        hear(parts, update, ekf, time, speed, still=True, fastest_rim=0.0)
         sliding = time > 3.0
         assert (update.state.sliding_until > time) is sliding
         assert ekf.mean[SPEED] == pytest.approx(0.03 if sliding else 0.0, abs=0.003)
@@ -163,26 +156,18 @@ def wandering(rng, count, dt, std, time):
 @pytest.mark.parametrize(('stated', 'least', 'most'), [(0.03, 0.85, 1.0), (0.0, 0.0, 0.4)])
 def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, most):
     """A satellite receiver at 5 Hz, off by 3 cm/s for 15 s at a time: its errors are covered."""
-    parts = Parts(
-        reader.load(SAND, [f'sensors.reference_wander_std:={stated}', 'filter.gate:=1e6'])
-    )
+    keys = [f'sensors.reference_wander_std:={stated}', 'sensors.reference_std:=0.01']
+    parts = Parts(reader.load(SAND, [*keys, 'filter.gate:=1e6']))
     rng, dt, count, inside = np.random.default_rng(4), 0.2, 100, []
     for _ in range(20):
-        ekf = parts.filter()
+        ekf, update = parts.filter(), reference_update(parts)
         ekf.set(SPEED, 0.5 + 0.1 * rng.standard_normal(), 0.1**2)
-        update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
         for i, error in enumerate(wandering(rng, count, dt, 0.03, 15.0)):
             prediction = Prediction.unchanged(ekf.mean)
             update.predict(prediction, dt if i else 0.0)
             ekf.predict(*prediction)
-            update.update(
-                ekf,
-                dt * i,
-                ReferenceVelocity(0, 0.5 + error + 0.01 * rng.standard_normal(), 1e-4),
-                still=False,
-                fastest_rim=0.6,
-                variance=1e-4,
-            )
+            speed = 0.5 + error + 0.01 * rng.standard_normal()
+            hear(parts, update, ekf, dt * i, speed, fastest_rim=0.6)
         inside.append(abs(ekf.mean[SPEED] - 0.5) < 1.96 * np.sqrt(ekf.covariance[SPEED, SPEED]))
     assert least <= np.mean(inside) <= most
 
@@ -221,51 +206,59 @@ def test_a_fast_rover_is_not_stopped_at_once(parts):
 # -- Sinkage ----------------------------------------------------------------------------------
 
 
-def test_a_spike_of_the_sinkage_is_dropped_and_three_in_a_row_are_believed(parts, ekf):
-    noise = parts.sensors.sinkage_std**2
-    update = SinkageUpdate(parts.configuration, parts.layout)
-    zi = parts.layout.sinkage.start
+def read_sinkage(parts, update, ekf, time, depth, count=1):
+    """Fuse the sum of some readings of the first wheel; return its mean, None where it stays."""
+    sums = SinkageSums((depth,) + (0.0,) * 5, (count,) + (0,) * 5)
+    rows = update.update(ekf, time, sums, parts.sensors.sinkage_std**2)
+    ekf.fuse(rows)
+    return float(ekf.mean[parts.layout.sinkage.start]) if rows else None
 
-    def read(time, depth):
-        rows = update.update(ekf, time, SinkageSums((depth,) + (0.0,) * 5, (1,) + (0,) * 5), noise)
-        ekf.fuse(rows)
-        return len(rows)
 
+@pytest.fixture
+def sinkage_update(parts):
+    return SinkageUpdate(parts.configuration, parts.layout)
+
+
+def test_a_spike_of_the_sinkage_is_dropped_and_three_in_a_row_are_believed(
+    parts, ekf, sinkage_update
+):
+    update = sinkage_update
     for i in range(20):
-        assert read(0.1 * i, 0.03) == 1
-    assert [read(2.0 + 0.1 * i, 0.1) for i in range(3)] == [0, 0, 1]
+        assert read_sinkage(parts, update, ekf, 0.1 * i, 0.03) is not None
+    believed = [read_sinkage(parts, update, ekf, 2.0 + 0.1 * i, 0.1) for i in range(3)]
+    assert believed == [None, None, pytest.approx(0.1, abs=0.002)]
     assert update.state.rejected == 3
-    assert ekf.mean[zi] == pytest.approx(0.1, abs=0.002)
     assert update.unread(3.0) == [1, 2, 3, 4, 5]
     assert update.unread(9.0) == list(range(6))
 
 
-@pytest.mark.parametrize('spike', [0.1, 0.2])  # within the deviations at the start, and beyond
-def test_a_first_reading_that_is_a_spike_is_outvoted_by_the_next_two(parts, ekf, spike):
-    zi = parts.layout.sinkage.start
-    update = SinkageUpdate(parts.configuration, parts.layout)
-    ekf.set(zi, 0.04, 0.025**2)  # as at rest in this soil
+@pytest.mark.parametrize(
+    ('rest', 'std', 'read'),
+    [
+        (0.04, 0.025, [0.1, 0.03, 0.03]),  # a spike within the deviations at the start
+        (0.04, 0.025, [0.2, 0.03, 0.03]),  # and one beyond
+        (0.01, 0.005, [0.1, 0.1]),  # far from the configured soil
+    ],
+)
+def test_a_first_reading_is_believed_where_the_next_ones_agree(
+    parts, ekf, sinkage_update, rest, std, read
+):
+    ekf.set(parts.layout.sinkage.start, rest, std**2)
+    found = [
+        read_sinkage(parts, sinkage_update, ekf, 0.1 * i, depth) for i, depth in enumerate(read)
+    ]
+    assert found[-1] == pytest.approx(read[-1], abs=0.002)
+    assert len(read) > 2 or found[0] is None
 
-    def read(time, depth):
-        sums = SinkageSums((depth,) + (0.0,) * 5, (1,) + (0,) * 5)
-        ekf.fuse(update.update(ekf, time, sums, parts.sensors.sinkage_std**2))
-        return float(ekf.mean[zi])
 
-    read(0.0, spike)
-    read(0.1, 0.03)
-    assert read(0.2, 0.03) == pytest.approx(0.03, abs=0.002)
-
-
-def test_a_wheel_far_from_the_configured_soil_is_believed_by_its_second_reading(parts, ekf):
-    zi = parts.layout.sinkage.start
-    update = SinkageUpdate(parts.configuration, parts.layout)
-    ekf.set(zi, 0.01, 0.005**2)
-    found = []
-    for time in (0.0, 0.1):
-        sums = SinkageSums((0.1,) + (0.0,) * 5, (1,) + (0,) * 5)
-        ekf.fuse(update.update(ekf, time, sums, parts.sensors.sinkage_std**2))
-        found.append(float(ekf.mean[zi]))
-    assert found == [0.01, pytest.approx(0.1, abs=0.002)]
+def test_two_readings_of_the_sinkage_are_the_textbook_update(parts, ekf, sinkage_update):
+    """Information adds up: that of the state, and that of their mean with its floor."""
+    zi, noise = parts.layout.sinkage.start, parts.sensors.sinkage_std**2 / 2.0 + FLOOR_VARIANCE
+    ekf.set(zi, 0.03, 0.002**2)
+    information = 1.0 / 0.002**2 + 1.0 / noise
+    mean = (0.03 / 0.002**2 + 0.031 / noise) / information
+    assert read_sinkage(parts, sinkage_update, ekf, 0.0, 0.062, 2) == pytest.approx(mean)
+    assert float(ekf.covariance[zi, zi]) == pytest.approx(1.0 / information)
 
 
 def sinkage_predicted(
@@ -392,6 +385,17 @@ def forces(parts, ekf):
     return linearised(parts, ekf.mean, loads), loads
 
 
+def torque_update(parts, ekf, found, cycle, doubt=0.0, repeats=1.0):
+    return TorqueUpdate(parts.configuration, parts.rover, parts.layout).update(
+        ekf,
+        found,
+        cycle,
+        variance=parts.sensors.torque_std**2,
+        model_variance=doubt,
+        repeats=repeats,
+    )
+
+
 def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0, reference_known=True):
     found, _ = forces(parts, ekf)
     cycle = parts.cycle(
@@ -400,32 +404,20 @@ def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0, reference_known=True
         turns=(True,) * 4 + (False,) * 2,
         reference_known=reference_known,
     )
-    return TorqueUpdate(parts.configuration, parts.rover, parts.layout).update(
-        ekf,
-        found,
-        cycle,
-        variance=parts.sensors.torque_std**2,
-        model_variance=doubt,
-        repeats=repeats,
-    ), found
+    return torque_update(parts, ekf, found, cycle, doubt, repeats), found
 
 
 def test_without_a_reference_torques_tell_little_by_what_they_differ(parts, ekf):
     """The mean of all is known as well as by single rows, what they differ by a fifth as well."""
     alone, _ = torque_rows(parts, ekf, 0.3, repeats=10.0)
     rows, found = torque_rows(parts, ekf, 0.3, repeats=10.0, reference_known=False)
-    same = np.array([1.0, 1.0, 1.0, 1.0])
+    same, coordinates = np.ones(4), np.linalg.pinv(np.array([row.jacobian for row in alone]))
 
     def information(rows):
         """Fisher information of the jacobians' own coordinates: H' R^-1 H with H = rows of I."""
         J = np.array([row.jacobian for row in rows])
-        W = J / np.sqrt([[row.variance] for row in rows])
-        return (
-            np.linalg.pinv(np.array([row.jacobian for row in alone]).T)
-            @ W.T
-            @ W
-            @ np.linalg.pinv(np.array([row.jacobian for row in alone]))
-        )
+        W = J / np.sqrt([[row.variance] for row in rows]) @ coordinates
+        return W.T @ W
 
     inverse = np.linalg.inv(information(rows))
     single = np.diag([row.variance for row in alone])
@@ -448,7 +440,6 @@ def test_torques_are_rows_of_turning_wheels_that_were_read(parts, ekf):
 def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ekf):
     """A wheel's share of the load changes along the way: the soil's torque does, the zero not."""
     zero, rng = 2.0 * parts.sensors.torque_zero_std, np.random.default_rng(2)
-    update = TorqueUpdate(parts.configuration, parts.rover, parts.layout)
     level = np.array(WheelLoads(parts.rover).state.load)
     entries = range(parts.layout.size)
     learned = {SHEAR_STRENGTH, *entries[parts.layout.torque_zero]}
@@ -460,40 +451,33 @@ def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ek
         loads = tuple((level * (0.3 + 1.4 * rng.random(6))).tolist())
         found, true = (linearised(parts, x, loads) for x in (ekf.mean, strong))
         torque = true.torque + np.array([zero, -zero, 0.0, 0.0, 0.0, 0.0])
-        rows = update.update(
-            ekf,
-            found,
-            parts.cycle(FORWARD, torque=tuple(torque.tolist())),
-            variance=parts.sensors.torque_std**2,
-            model_variance=0.0,
-            repeats=1.0,
-        )
-        ekf.fuse(rows)
+        cycle = parts.cycle(FORWARD, torque=tuple(torque.tolist()))
+        ekf.fuse(torque_update(parts, ekf, found, cycle))
+    update = TorqueUpdate(parts.configuration, parts.rover, parts.layout)
     assert update.zeros(ekf.mean) == pytest.approx((zero, -zero, 0, 0, 0, 0), abs=0.15 * zero)
     assert ekf.mean[SHEAR_STRENGTH] == pytest.approx(0.1, abs=0.01)
+
+
+SURE = {'model_variance': 0.0, 'repeats': 1.0}
+
+
+def force_balance(parts):
+    return ForceBalance(parts.configuration, parts.rover, parts.sensors, parts.layout)
 
 
 def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts, ekf):
     """With 0.05 rad a row is as uncertain as half of what 0.1 rad change the force."""
     loads = WheelLoads(parts.rover).state.load
-    balance = ForceBalance(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    balance = force_balance(parts)
     variances, torques, pulls = [], [], []
     for std, angle in ((1e-9, -0.2), (0.05, -0.2), (1e-9, -0.25), (0.05, NAN), (1e-9, NAN)):
         found = linearised(parts, ekf.mean, loads, angle, std)
-        given = {'model_variance': 0.0, 'repeats': 1.0}
         torque = tuple(found.torque.tolist())
         cycle = parts.cycle(FORWARD, loads, torque=torque, window=window(0.0, 9.8))
-        noise = parts.sensors.torque_std**2
-        rows = TorqueUpdate(parts.configuration, parts.rover, parts.layout).update(
-            ekf,
-            found,
-            cycle,
-            variance=noise,
-            **given,
-        )
+        rows = torque_update(parts, ekf, found, cycle)
         total = balance.sum_of_pulls(cycle, 0.0)
         along = total._replace(along=float(found.pull.sum()))
-        row = balance.update(ekf, found, along, cycle, stationary=[None] * 6, **given)
+        row = balance.update(ekf, found, along, cycle, stationary=[None] * 6, **SURE)
         variances.append((rows[0].variance, row.variance))
         torques.append(float(found.torque[0]))
         pulls.append(found.pull)
@@ -517,23 +501,22 @@ def test_a_torque_beyond_the_gate_is_weakened_to_it(parts, ekf):
 
 
 def test_the_balance_of_forces_on_a_slope(parts, ekf):
-    balance = ForceBalance(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    balance = force_balance(parts)
     found, loads = forces(parts, ekf)
     ekf.mean[parts.layout.sinkage] = 0.03  # even ruts: the body lies along the ground
     along = float(found.pull.sum()) + 12.0
     cycle = parts.cycle(FORWARD, loads, window=window(along / parts.rover.mass, 9.6))
     total = balance.sum_of_pulls(cycle, 0.0)
-    given = {'model_variance': 0.0, 'repeats': 1.0}
-    row = balance.update(ekf, found, total, cycle, stationary=[None] * 6, **given)
+    row = balance.update(ekf, found, total, cycle, stationary=[None] * 6, **SURE)
     assert row.residual == pytest.approx(12.0, abs=1e-6)
     rear = int(np.argmin(parts.rover.longitudinal))
     ekf.mean[parts.layout.sinkage.start + rear] += 0.01  # the nose points up by it
-    tilted = balance.update(ekf, found, total, cycle, stationary=[None] * 6, **given)
+    tilted = balance.update(ekf, found, total, cycle, stationary=[None] * 6, **SURE)
     tilt = 0.01 * parts.rover.rut_tilt[rear]
     assert tilt > 0.0
     assert tilted.residual == pytest.approx(12.0 - parts.rover.mass * 9.6 * tilt)
     standing = [StationaryPull(NAN, 5.0, 20.0), *[None] * 5]
-    held = balance.update(ekf, found, total, cycle, stationary=standing, **given)
+    held = balance.update(ekf, found, total, cycle, stationary=standing, **SURE)
     assert held.residual - tilted.residual == pytest.approx(float(found.pull[0]) - 5.0)
 
 
@@ -559,7 +542,7 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
 
 def test_a_vibrating_accelerometer_weakens_the_balance(parts):
     """Noise of 1 m/s^2 at 100 Hz is a density of 0.01: over 0.1 s a variance of 0.1."""
-    balance = ForceBalance(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    balance = force_balance(parts)
     loads = (parts.rover.mass * 9.8 / 6,) * 6
     calm, shaken = (
         balance.sum_of_pulls(parts.cycle(FORWARD, loads, window=told), 0.0)
@@ -567,20 +550,6 @@ def test_a_vibrating_accelerometer_weakens_the_balance(parts):
     )
     added = parts.rover.mass**2 * (0.1 - parts.sensors.specific_force_std**2 / 5)
     assert shaken.variance - calm.variance == pytest.approx(added)
-
-
-def test_two_readings_of_the_sinkage_are_the_textbook_update(parts, ekf):
-    """Information adds up: that of the state, and that of their mean with its floor."""
-    update = SinkageUpdate(parts.configuration, parts.layout)
-    zi, floor = parts.layout.sinkage.start, FLOOR_VARIANCE
-    ekf.set(zi, 0.03, 0.002**2)
-    sums = SinkageSums((0.062,) + (0.0,) * 5, (2,) + (0,) * 5)
-    ekf.fuse(update.update(ekf, 0.0, sums, parts.sensors.sinkage_std**2))
-    noise = parts.sensors.sinkage_std**2 / 2.0 + floor
-    information = 1.0 / 0.002**2 + 1.0 / noise
-    assert float(ekf.covariance[zi, zi]) == pytest.approx(1.0 / information)
-    mean = (0.03 / 0.002**2 + 0.031 / noise) / information
-    assert float(ekf.mean[zi]) == pytest.approx(mean)
 
 
 @pytest.mark.parametrize('entry', ['sinkage', 'stiffness', 'slip_sinkage', 'speed'])
