@@ -123,6 +123,24 @@ def play(core, measurements, flush=True):
     return sets + core.flush() if flush else sets
 
 
+def arriving(stream, delays):
+    """The stream in its order of arrival, each message late by its delay [s]."""
+    pairs = zip(delays, stream, strict=True)
+    return [m for _, m in sorted(pairs, key=lambda pair: pair[1].stamp + pair[0] * SECOND)]
+
+
+def with_runs_in_order(stream, delays, **changes):
+    """Yield each set, and the last of a run in order through the inputs up to it that had come."""
+    core, _ = make_core(**changes)
+    arrived = []
+    for measurement in arriving(stream, delays):
+        arrived.append(measurement)
+        for estimates in core.add(measurement):
+            used = [m for m in arrived if m.stamp <= estimates.stamp]
+            plain, _ = make_core(**{**changes, 'max_lag': 30.0})
+            yield estimates, play(plain, sorted(used, key=lambda m: m.stamp))[-1]
+
+
 def essence(sets):
     """What must be equal to the bit."""
     return [(s.stamp, s.forward_velocity, s.yaw_rate, s.slip_class.tolist()) for s in sets]

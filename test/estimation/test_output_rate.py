@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from fake_estimator import (
     FakeEstimator,
+    arriving,
     configuration,
     essence,
     imu,
@@ -18,6 +19,7 @@ from fake_estimator import (
     reference,
     sinkage,
     stamp_at,
+    with_runs_in_order,
 )
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -61,11 +63,6 @@ def recording_core(**changes):
 
 def play_on(core, stream):
     return [estimates for measurement in stream for estimates in core.add(measurement)]
-
-
-def arriving(stream, delays):
-    pairs = zip(delays, stream, strict=True)
-    return [m for _, m in sorted(pairs, key=lambda pair: pair[1].stamp + pair[0] * 1e9)]
 
 
 @settings(max_examples=25, deadline=None)
@@ -166,18 +163,10 @@ def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(seed, s
             if not isinstance(m, WheelOdometry) or not stamp_at(silent) < m.stamp < end
         ]
     delays = np.random.default_rng(seed).choice([0.0, 0.0, 0.004, 0.03, 0.25], len(stream))
-    core, _ = make_core(**unbounded)
-    arrived = []
-    for measurement in arriving(stream, delays):
-        arrived.append(measurement)
-        for estimates in core.add(measurement):
-            used = [m for m in arrived if m.stamp <= estimates.stamp]
-            fake = FakeEstimator(configuration(**unbounded))
-            plain = EstimatorCore(configuration(**{**unbounded, 'max_lag': 30.0}), fake)
-            expected = play(plain, sorted(used, key=lambda m: m.stamp))
-            # A late odometry may have taken the place of this one: then it ends no step there.
-            if expected[-1].stamp == estimates.stamp:
-                assert essence([estimates]) == essence(expected[-1:])
+    for estimates, expected in with_runs_in_order(stream, delays, **unbounded):
+        # A late odometry may have taken the place of this one: then it ends no step there.
+        if expected.stamp == estimates.stamp:
+            assert essence([estimates]) == essence([expected])
 
 
 @pytest.mark.parametrize('seed', range(2))

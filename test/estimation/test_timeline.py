@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from fake_estimator import (
     SECOND,
+    arriving,
     essence,
     imu,
     make_core,
@@ -17,6 +18,7 @@ from fake_estimator import (
     reference,
     sinkage,
     stamp_at,
+    with_runs_in_order,
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -49,12 +51,6 @@ def drive(duration=2.0):
     stream += [sinkage(0.2 * i + 0.013, depth=0.001 * i) for i in range(round(5 * duration))]
     stream += [reference(0.5 * i + 0.007, forward=0.01 * i) for i in range(round(2 * duration))]
     return sorted(stream, key=lambda m: m.stamp)
-
-
-def arriving(stream, delays):
-    """The stream in its order of arrival, each message late by its delay [s]."""
-    pairs = zip(delays, stream, strict=True)
-    return [m for _, m in sorted(pairs, key=lambda pair: pair[1].stamp + pair[0] * SECOND)]
 
 
 # -- Sets ---------------------------------------------------------------------------------------
@@ -162,15 +158,8 @@ def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(data):
     """The definition itself: laziness, kept states and forgetting must not show."""
     stream = drive(1.5)
     delays = [data.draw(st.sampled_from([0.0, 0.0, 0.004, 0.03, 0.25, 0.7])) for _ in stream]
-    core, _ = make_core()
-    arrived = []
-    for measurement in arriving(stream, delays):
-        arrived.append(measurement)
-        for estimates in core.add(measurement):
-            used = [m for m in arrived if m.stamp <= estimates.stamp]
-            plain, _ = make_core(max_lag=30.0)
-            expected = play(plain, sorted(used, key=lambda m: m.stamp))[-1]
-            assert estimates.forward_velocity == expected.forward_velocity
+    for estimates, expected in with_runs_in_order(stream, delays):
+        assert estimates.forward_velocity == expected.forward_velocity
 
 
 @settings(max_examples=20, deadline=None)

@@ -66,6 +66,10 @@ class NodeProcess:
         for number in numbers:
             self._process.send_signal(number)
 
+    def said(self):
+        """Return what it has said so far."""
+        return self._process.said()
+
     def stop(self, number):
         """Send a signal; return exit status and what the process said."""
         self.signal(number)
