@@ -55,7 +55,7 @@ def test_odometry_that_might_be_the_reference_is_named(tmp_path):
     from wheel_terra_estimator.cli.demo import DRIVES
 
     drive = next(drive for drive in DRIVES if drive.name == 'pathfinder')
-    recording = beginning(shipped.demo_recording(drive.name), tmp_path / 'drive', 12.0)
+    recording = beginning(shipped.demo_recording(drive.name), tmp_path / 'drive', 6.0)
     with open_bag(recording) as bag:
         result = replay(bag, reader.load(['pathfinder']), {})
         (said,) = [note for note in result.notes if 'reference_odom:=' in note]

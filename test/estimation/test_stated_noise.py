@@ -41,11 +41,11 @@ def drive(variances, backwards=False):
     """A start, an arc and a stop; `variances` go to the messages of the IMU in turn."""
     rng = np.random.default_rng(4)
     stream = []
-    for i in range(600):
-        stamp, moving = 100 * SECOND + i * SECOND // 100, 100 < i < 500
-        if backwards and i >= 300:
+    for i in range(400):
+        stamp, moving = 100 * SECOND + i * SECOND // 100, 60 < i < 340
+        if backwards and i >= 200:
             stamp -= 30 * SECOND
-        turn = 0.1 * (250 < i < 400)
+        turn = 0.1 * (160 < i < 280)
         variance = variances[min(i // 2, len(variances) - 1)]
         force = np.array([0.3, 0.0, 9.8]) + 0.3 * rng.normal(size=3)
         rate = np.array([0.0, 0.0, turn]) + 0.02 * rng.normal(size=3)
