@@ -1,12 +1,213 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Slip of single wheels and its deviation."""
+"""Slip of a wheel that begins to turn; classes: borders, hysteresis, dwell, unknown."""
 
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_estimator import SECOND, configuration
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.steering import straight_headings
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.judgement.classes import (
+    ClassState,
+    PublishedClasses,
+    SlipClassifier,
+    instantaneous_class,
+)
 from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge
+from wheel_terra_estimator.estimation.output_guard import blank_estimates
+from wheel_terra_estimator.simulation.drive import simulate
+from wheel_terra_estimator.simulation.scenario import load
+
+BORDERS = (0.3, 0.6, 0.9)
+HYSTERESIS, DWELL, CLASS_STD = 0.02, 0.3, 0.25
+UNKNOWN = SlipClass.UNKNOWN
+
+
+def sets_of(slips, stds=0.01, dt=0.1, judged=True, config=None):
+    """Sets as the estimator gives them, before they get classes."""
+    blank = blank_estimates(config or configuration())
+    slips = np.asarray(slips, dtype=float)
+    stds, judged = np.broadcast_to(stds, slips.shape), np.broadcast_to(judged, slips.shape)
+    return [
+        replace(
+            blank,
+            stamp=round((1.0 + i * dt) * SECOND),
+            slip=np.full(2, slip),
+            slip_std=np.full(2, std),
+            slip_class=np.full(2, 0 if told else UNKNOWN, dtype=np.uint8),
+        )
+        for i, (slip, std, told) in enumerate(zip(slips, stds, judged, strict=True))
+    ]
+
+
+def run(slips, stds=0.01, dt=0.1, judged=True, **changes):
+    config = configuration(**changes)
+    classes = PublishedClasses(config)
+    given_sets = sets_of(slips, stds, dt, judged, config)
+    return [int(classes.follow(given_set).slip_class[1]) for given_set in given_sets]
+
+
+def contradictions(sets, judged=None):
+    """What of published sets breaks the contract's rule, from their slips and stamps alone.
+
+    Unknown where the deviation says so or the wheel is not judged, and before a first class 3 for
+    the dwell. A class may stand as long as |s| has been within half the hysteresis of it at some
+    time within the dwell.
+    """
+    found = []
+    half = 0.5 * HYSTERESIS + 1e-12
+    lower, upper = (0.0, *BORDERS), (*BORDERS, 1.0)
+    for wheel in range(len(sets[0].slip)):
+        within = None  # stamp at which the present class last agreed with |s|
+        waits = None  # stamp since which a first class 3 waits for the dwell
+        for i, e in enumerate(sets):
+            kind, slip = int(e.slip_class[wheel]), abs(float(e.slip[wheel]))
+            if e.slip_std[wheel] > CLASS_STD or (judged is not None and not judged[i]):
+                if kind != UNKNOWN:
+                    found.append((i, wheel, 'told of what is not known'))
+                within = waits = None
+                continue
+            if kind == UNKNOWN:
+                waits = e.stamp if waits is None else waits
+                top = slip > BORDERS[-1] and (e.stamp - waits) * 1e-9 < DWELL
+                if judged is not None and not top:
+                    found.append((i, wheel, 'unknown though known'))
+                within = None
+                continue
+            waits = None
+            before = int(sets[i - 1].slip_class[wheel]) if i else int(UNKNOWN)
+            if lower[kind] - half <= slip <= upper[kind] + half:
+                within = e.stamp
+            elif kind != before or within is None:
+                found.append((i, wheel, 'not the class of the slip'))
+            elif (e.stamp - within) * 1e-9 > DWELL + (e.stamp - sets[i - 1].stamp) * 1e-9 + 1e-6:
+                found.append((i, wheel, 'held beyond the dwell'))
+    return found
+
+
+@pytest.mark.parametrize(
+    ('slip', 'expected'),
+    [(0.0, 0), (0.3, 0), (0.301, 1), (-0.6, 1), (0.9, 2), (0.901, 3), (-1.0, 3)],
+)
+def test_upper_bound_belongs_to_the_class_below(slip, expected):
+    assert instantaneous_class(slip, BORDERS) == expected
+
+
+def test_change_comes_after_the_dwell_and_not_before():
+    classes = run([0.1] * 5 + [0.5] * 10)
+    assert classes[:8] == [0] * 8
+    assert classes[8:] == [1] * 7
+
+
+def test_short_excursion_changes_nothing():
+    assert set(run([0.1] * 5 + [0.5] * 2 + [0.1] * 5)) == {0}
+
+
+def test_run_through_several_classes_is_one_run():
+    classes = run([0.1] * 5 + [0.4, 0.7, 0.95, 0.95, 0.95])
+    assert classes[-1] == 3
+    assert 1 not in classes  # it never stayed there
+
+
+@pytest.mark.parametrize('std', [0.001, 0.1, 0.25])
+def test_the_deviation_changes_nothing_up_to_its_limit(std):
+    assert run([0.1] * 5 + [0.34] * 10, std)[-1] == 1
+    assert run([0.1] * 5 + [1.0] * 10, std)[-1] == 3
+
+
+def test_beyond_its_limit_the_class_is_unknown_and_what_it_was_is_forgotten():
+    classes = run([0.1, 0.1, 0.1, 0.85, 0.85], [0.1, 0.26, 1.0, 0.25, 0.25])
+    assert classes == [0, 255, 255, 2, 2]
+    assert run([0.1] * 2, 0.3, filter__class_std=0.31) == [0, 0]
+
+
+def test_the_hysteresis_is_what_keeps_a_flicker_out():
+    flicker = [0.29] * 5 + [0.309, 0.309, 0.309, 0.309, 0.291, 0.291, 0.291, 0.291] * 5
+    assert set(run(flicker)) == {0}
+    assert set(run(flicker, filter__class_hysteresis=0.0)) == {0, 1}
+    # Half of it on each side of a border.
+    assert run([0.25] * 5 + [0.308] * 10)[-1] == 0 and run([0.25] * 5 + [0.312] * 10)[-1] == 1
+    assert run([0.35] * 5 + [0.292] * 10)[-1] == 1 and run([0.35] * 5 + [0.288] * 10)[-1] == 0
+
+
+def test_braking_and_sliding_back_are_class_3():
+    assert run([-0.95] * 5)[-1] == 3
+    assert run([1.0] * 5)[-1] == 3
+
+
+@pytest.mark.parametrize('start', [0.0, 0.1, 0.4, 0.7])
+def test_a_first_class_3_comes_at_the_dwell_whatever_the_stamps_round_to(start):
+    """0.7 - 0.4 is a little less than 0.3 in floating point, 0.4 - 0.1 a little more."""
+    classifier, state, found = SlipClassifier(BORDERS, 0.02, 0.3), ClassState(), []
+    for i in range(5):
+        state = classifier.update(state, start + 0.1 * i, 0.95)
+        found.append(state.current)
+    assert found == [UNKNOWN] * 3 + [3] * 2
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(-1.0, 1.0) | st.sampled_from((0.295, 0.305, 0.312, 0.589, 0.905, -0.915)),
+            st.floats(0.0, 1.0) | st.just(0.05),
+            st.integers(1, 8),
+            st.integers(0, 9),
+        ),
+        min_size=1,
+        max_size=30,
+    ),
+    st.sampled_from((0.02, 0.05, 0.1, 0.2, 0.5)),
+)
+@settings(max_examples=30, deadline=None)
+def test_the_class_is_that_of_the_published_slip(stretches, dt):
+    """Any slips, deviations and rests, in stretches of some sets."""
+    rows = [(slip, std, rest > 0) for slip, std, count, rest in stretches for _ in range(count)]
+    slips, stds, judged = zip(*rows, strict=True)
+    given_sets = sets_of(slips, stds, dt, judged)
+    classes = PublishedClasses(configuration())
+    assert contradictions([classes.follow(e) for e in given_sets], judged) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(('kind', 'duration'), [('near_stuck', 18.0), ('turns', 25.0)])
+def test_the_class_is_that_of_the_published_slip_in_drives(kind, duration):
+    """References come late, so that the past is estimated anew while the present is published."""
+    from wheel_terra_lab.evaluation.kinds import KINDS
+
+    drive = simulate(load(dict(KINDS[kind])), 1000, duration)
+    core = EstimatorCore(drive.configuration)
+    sets = [e for a in drive.arrivals for e in core.add(a.measurement)] + core.flush()
+    assert core.health()['steps_repeated'] > 0
+    assert {0, 1} <= {int(c) for e in sets for c in e.slip_class}
+    assert contradictions(sets) == []
+
+
+@pytest.mark.parametrize(('slip', 'left'), [(0.95, 0.0), (0.85, 3.0), (-0.95, 3.0)])
+def test_a_driving_wheel_that_is_stuck_has_no_travel_left(slip, left):
+    classes = PublishedClasses(configuration())
+    for estimates in sets_of([slip] * 10):
+        ahead = replace(estimates, rim_travel_left=np.full(2, 3.0), time_to_stuck=np.full(2, 3.0))
+        published = classes.follow(ahead)
+    assert published.rim_travel_left == pytest.approx([left] * 2)
+    assert published.time_to_stuck == pytest.approx([left] * 2)
+
+
+def test_a_new_run_begins_without_a_class():
+    config = configuration()
+    core = EstimatorCore(config)
+    classes = core._classes
+    first = sets_of([0.1] * 3, config=config)
+    assert [int(classes.follow(e).slip_class[0]) for e in first] == [0, 0, 0]
+    core.reset()
+    assert int(classes.follow(sets_of([0.5], config=config)[0]).slip_class[0]) == 1
 
 
 def test_a_wheel_that_begins_to_turn_is_not_sure_to_spin():

@@ -1,0 +1,155 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What curves of traction tell: slip on a slope and slip of a torque, pull that is left over."""
+
+import math
+
+import numpy as np
+import pytest
+from parts import SAND, Parts
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.contacts.measured_wheels import (
+    SpeedAndVariance,
+    intersected,
+    slip_of_torque,
+)
+from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
+from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+
+
+@pytest.fixture(scope='module')
+def parts():
+    return Parts(reader.load(SAND))
+
+
+@pytest.fixture(scope='module')
+def usual(parts):
+    return UsualSlip(parts.configuration, parts.rover)
+
+
+def pull_share(parts, slip):
+    """Return pull over load of the whole rover in steady driving at a slip.
+
+    Its soil shears half way up the lugs.
+    """
+    configuration = parts.configuration
+    wheels, n = configuration.wheels, configuration.wheels.count
+    loads = np.asarray(parts.rover.load.loads((0.0, 0.0, parts.rover.gravity)))
+    points = OperatingPoints(
+        slip=np.full(n, slip),
+        normal_load=loads,
+        wheel=wheels.wheel,
+        slip_radius=configuration.slip_radius,
+        gravity=float(configuration.rover.gravity),
+        pass_number=np.asarray(wheels.passes, dtype=float),
+    )
+    effects = configuration.effects | {'lug_shear_radius': {'lam': 0.5}}
+    steady = WheelSoilModel(configuration.soil, effects).steady_state(points)
+    return float(steady.drawbar_pull.sum() / loads.sum())
+
+
+@pytest.mark.parametrize('slip', [0.08, 0.17, 0.35])
+def test_a_slope_that_a_slip_climbs_takes_that_slip(parts, usual, slip):
+    demand = pull_share(parts, slip)
+    assert usual.at(demand, beyond=0.8) == pytest.approx(slip, abs=0.03)
+
+
+def test_steeper_takes_more_and_no_soil_gives_all(usual):
+    slips = [usual.at(demand, beyond=0.8) for demand in np.linspace(-0.3, 0.6, 40)]
+    assert slips == sorted(slips)
+    assert slips[0] < 0.0
+    assert usual.at(2.0, beyond=0.8) == 0.8
+    assert usual.at(-2.0, beyond=0.8) == -0.5
+
+
+@pytest.mark.parametrize('slip', [0.05, 0.15, 0.3])
+@pytest.mark.parametrize('stated', [False, True])
+def test_lugs_of_which_no_file_says_it_shear_half_way_up(slip, stated):
+    """Lugs of a tenth of the radius: sheared at the rim they would take 0.05 to 0.2 more."""
+    keys = ['wheels.lug_height:=[0.015, 0.015, 0.015, 0.015, 0.015, 0.015]']
+    keys += ['effects.lug_shear_radius.enabled:=true'] * stated
+    lugged = Parts(reader.load(SAND, keys))
+    demand = pull_share(lugged, slip)
+    found = UsualSlip(lugged.configuration, lugged.rover).at(demand, beyond=0.8)
+    assert found == pytest.approx(slip, abs=0.02)
+
+
+# -- Slip of a torque, beside wheels that were measured -------------------------------------------
+
+
+HIT_SMOOTH = ((0.1, 0.238), (0.2, 0.334), (0.3, 0.381))  # Ding et al. 2011, figure 9
+HIT_LUGS = ((0.1, 0.278), (0.2, 0.397), (0.3, 0.461))
+KLS1_SMOOTH = ((0.1, 0.26), (0.2, 0.31), (0.3, 0.38))  # Wang and Han 2016
+"""Slip and torque over load times radius, as digitised in shared/measured."""
+
+
+@pytest.mark.parametrize('wheel', [HIT_SMOOTH, HIT_LUGS, KLS1_SMOOTH])
+def test_measured_wheels_lie_within_the_stated_interval(wheel):
+    for slip, coefficient in wheel:
+        usual = slip_of_torque(coefficient)
+        assert abs(usual.slip - slip) < 1.96 * usual.std
+
+
+def test_half_of_the_greatest_torque_takes_the_scale_times_ln_2():
+    usual = slip_of_torque(0.275)
+    assert usual.slip == pytest.approx(0.17 * math.log(2.0))
+
+
+def test_braking_wheels_skid_as_driving_ones_slip():
+    driving, braking = slip_of_torque(0.3), slip_of_torque(-0.3)
+    assert braking.slip == -driving.slip
+    assert braking.std == driving.std
+
+
+def test_torque_tells_nothing_on_the_plateau_or_where_there_is_none():
+    """HIT's lugged wheel has the torque of 0.5 at a slip of 0.4 and of 0.57 at 0.6."""
+    assert math.isnan(slip_of_torque(0.5).slip)
+    assert math.isnan(slip_of_torque(math.nan).slip)
+
+
+@pytest.mark.parametrize('correlation', [-0.9, 0.0, 0.9, 1.0])
+def test_intersected_variance_covers_any_correlation(correlation):
+    """By Monte Carlo: the stated variance is never below that of the error."""
+    rng = np.random.default_rng(5)
+    first, second = rng.standard_normal((2, 20_000))
+    one = 0.1 * first
+    other = 0.3 * (correlation * first + math.sqrt(1.0 - correlation**2) * second)
+    # The mean is linear in both: its weights from two calls.
+    weight = intersected(SpeedAndVariance(1.0, 0.01), SpeedAndVariance(0.0, 0.09)).speed
+    error = weight * one + (1.0 - weight) * other
+    stated = intersected(SpeedAndVariance(0.0, 0.01), SpeedAndVariance(0.0, 0.09)).variance
+    assert np.mean(error**2) <= 1.02 * stated
+    # The mean is that of inverse variances, as if the errors were apart.
+    both = intersected(SpeedAndVariance(0.2, 0.01), SpeedAndVariance(0.6, 0.09))
+    assert both.speed == pytest.approx((0.2 / 0.01 + 0.6 / 0.09) / (1 / 0.01 + 1 / 0.09))
+
+
+# -- Pull left over: the top of the curve less what the ground asks --------------------------------
+
+
+LOADS = (250.0,) * 5 + (0.0,)
+
+
+def margin(parts, slope, direction=1.0):
+    found = PullMargin(len(LOADS), parts.models)
+    sinkages = parts.filter().mean[parts.layout.sinkage]
+    wheels = WheelStates(1.0, sinkages, np.array(LOADS), mound=0.05)
+    found.update(0.0, wheels, direction * math.tan(slope))
+    return found.state.margin
+
+
+def test_the_margin_is_the_greatest_pull_less_what_the_slope_asks(parts):
+    sinkage = parts.filter().mean[parts.layout.sinkage]
+    ratio = 1.0 - np.linspace(0.2, 0.95, 40)[:, None]
+    _, pulls = parts.models.torque_and_pull(WheelStates(ratio, sinkage, 250.0, mound=0.05))
+    level = margin(parts, 0.0)
+    assert level[0] == pytest.approx(pulls[:, 0].max(), abs=0.02 * 250.0)
+    assert level[5] == 0.0  # in the air
+    uphill = margin(parts, 0.2)
+    assert level[0] - uphill[0] == pytest.approx(250.0 * math.tan(0.2))
+    # Backwards up the same ground is downhill.
+    assert margin(parts, 0.2, direction=-1.0)[0] > level[0]
