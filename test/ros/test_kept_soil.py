@@ -183,12 +183,14 @@ def test_a_place_that_takes_no_file_is_told_at_the_start(start, parameters, list
 
 
 @pytest.mark.parametrize('name', ['soil_file', 'record_arrival'])
-def test_a_node_writes_to_no_file_that_it_reads(start, parameters, name):
+def test_a_node_writes_to_no_file_that_it_reads(listener, parameters, name):
+    """With an error of which `run_node` makes one line and an exit status."""
+    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
+
     before = Path(parameters).read_text()
-    status, words = start('estimator_node', *ROVER, parameters, '-p', f'{name}:={parameters}').end()
-    assert status == 2
-    assert f'{name}: {parameters}: is, or lies in' in words
-    assert 'Traceback' not in words
+    arguments = [*ROVER, parameters, '-p', f'{name}:={parameters}']
+    with pytest.raises(UserError, match=f'{name}: {parameters}: is, or lies in'):
+        EstimatorNode(context=listener[0].context, cli_args=arguments)
     assert Path(parameters).read_text() == before
 
 

@@ -205,6 +205,7 @@ def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
         ('critical_slip:=0.1', 'must be below'),
         ('creep_scale:=.nan', 'out of range'),
         ('stamped:=7', 'stamped'),
+        ('creep:=0.5', "'creep_scale'"),
     ],
 )
 def test_what_cannot_be_used_is_refused_at_the_start(listener, parameters, parameter, said):
@@ -218,11 +219,6 @@ def test_what_cannot_be_used_is_refused_at_the_start(listener, parameters, param
     with pytest.raises((UserError, ParameterException), match=re.escape(said)):
         TractionLimiter(context=listener[0].context, cli_args=arguments)
     assert Path(parameters).read_text() == before
-
-
-def test_what_is_refused_ends_the_process_with_one_line(start):
-    status, words = start('traction_limiter_node', '--ros-args', '-p', 'creep:=0.5').end()
-    assert status == 2 and "'creep_scale'" in words and 'Traceback' not in words, words
 
 
 def test_one_limiter_keeps_its_stop_and_the_other_says_so_until_the_first_has_ended(

@@ -67,12 +67,19 @@ def test_two_nodes_of_one_name_are_told(start, heard, rover):
     until(lambda: 'another node' not in statuses[-1].message)
 
 
-def test_sim_time_without_a_clock_is_told_until_it_comes(start, heard, rover):
+def test_sim_time_without_a_clock_is_told_until_it_comes_and_estimates_go_on(start, heard, rover):
     from rosgraph_msgs.msg import Clock
+    from sensor_msgs.msg import JointState
 
     node, until, statuses = heard
+    sets = []
+    node.create_subscription(JointState, f'{NODE}/slip', sets.append, 10)
+    publisher, send = joint_states(node, [100_000_000_000])
     start('estimator_node', *rover, '-p', 'use_sim_time:=true')
-    until(lambda: statuses and 'nothing comes on /clock' in statuses[-1].message)
+    until(lambda: publisher.get_subscription_count() and node.count_publishers(f'{NODE}/slip'))
+    until(lambda: (send(), len(sets) > 3)[1])
+    words = 'nothing comes on /clock'
+    until(lambda: (send(), any(s.level[0] == 1 and words in s.message for s in statuses))[1])
     clock = node.create_publisher(Clock, '/clock', 10)
     tick = Clock()
     tick.clock.sec = 100
@@ -83,25 +90,6 @@ def test_sim_time_without_a_clock_is_told_until_it_comes(start, heard, rover):
         return '/clock' not in statuses[-1].message
 
     until(gone)
-
-
-def test_estimates_go_on_without_a_clock(start, heard, rover):
-    from sensor_msgs.msg import JointState
-
-    node, until, statuses = heard
-    sets = []
-    node.create_subscription(JointState, f'{NODE}/slip', sets.append, 10)
-    publisher, send = joint_states(node, [100_000_000_000])
-    start('estimator_node', *rover, '-p', 'use_sim_time:=true')
-    until(publisher.get_subscription_count)
-    until(lambda: node.count_publishers(f'{NODE}/slip'))
-
-    def some():
-        send()
-        return len(sets) > 3
-
-    until(some)
-    until(lambda: (send(), any(s.level[0] == 1 and '/clock' in s.message for s in statuses))[1])
 
 
 @pytest.mark.parametrize(('topic', 'kept'), [('joint_states', BURST), ('reference_odom', 10)])
