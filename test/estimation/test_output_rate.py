@@ -169,19 +169,6 @@ def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(seed, s
             assert essence([estimates]) == essence([expected])
 
 
-@pytest.mark.parametrize('seed', range(2))
-def test_late_inputs_within_the_history_end_in_the_same_state(seed):
-    stream, last = drive(1.0), odometry(3.2)
-    core, _ = make_core(**DEFAULT)
-    expected = essence(play(core, [*stream, imu(3.19), last]))[-1]
-    rng = np.random.default_rng(seed)
-    delays = rng.uniform(0.0, 0.99, len(stream)) * (rng.random(len(stream)) < 0.5)
-    core, _ = make_core(**DEFAULT)
-    sets = play(core, [*arriving(stream, delays), imu(3.19), last])
-    assert essence(sets)[-1] == expected
-    assert all(a.stamp < b.stamp for a, b in pairwise(sets))
-
-
 # -- Lag ----------------------------------------------------------------------------------------
 
 

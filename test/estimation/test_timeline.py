@@ -74,14 +74,6 @@ def test_a_reading_with_other_numbers_is_another_one():
     assert not same(felt, replace(felt, orientation=np.zeros(4)))
 
 
-def test_equal_stamps_are_merged_whatever_came_first():
-    first, _ = make_core(max_lag=0.5)
-    second, _ = make_core(max_lag=0.5)
-    one = play(first, [odometry(0.0), imu(0.0, 5.0), sinkage(0.0), odometry(0.1)])
-    other = play(second, [sinkage(0.0), imu(0.0, 5.0), odometry(0.0), odometry(0.1)])
-    assert essence(one) == essence(other)
-
-
 def test_a_stamp_that_comes_again_with_other_numbers_is_said():
     core, _ = make_core(max_lag=0.0)
     play(core, [odometry(0.0), odometry(0.1), odometry(0.1), odometry(0.1, 2.0)])
@@ -93,16 +85,6 @@ def test_a_stamp_that_comes_again_with_other_numbers_is_said():
 def test_no_lag_is_no_wait_of_any_length():
     assert LagLearner(0).longest == 0
     assert LagLearner(-1).longest == LONGEST_HOLD
-
-
-def test_an_input_of_the_stamp_of_the_last_set_makes_no_second_set_but_counts_from_then_on():
-    core, _ = make_core()
-    assert len(core.add(odometry(0.0))) == 1
-    assert core.add(imu(0.0, 5.0)) == []
-    (estimates,) = core.add(odometry(0.1))
-    merged, _ = make_core()
-    expected = play(merged, [imu(0.0, 5.0), odometry(0.0), odometry(0.1)])
-    assert essence([estimates]) == essence(expected)[1:]
 
 
 def test_odometry_a_little_later_than_the_imu_still_gets_its_set():
@@ -357,15 +339,6 @@ def test_wheel_odometry_keeps_the_time_where_clocks_differ_for_good():
             sets += core.add(odometry(0.02 * i))
     assert times(sets)[-10:] == [round(0.1 * i, 6) for i in range(30, 40)]
     assert core.health()['imu/data_rejected: stamp far ahead of all others'] > 100
-
-
-def test_reset_begins_a_new_run_and_forgets_the_soil():
-    core, fake = make_core()
-    play(core, drive(2.0), flush=False)
-    core.reset()
-    again = play(core, drive(2.0))
-    assert essence(again) == essence(play(make_core()[0], drive(2.0)))
-    assert fake.begun[-1][1] is False
 
 
 # -- Reference ------------------------------------------------------------------------------------
