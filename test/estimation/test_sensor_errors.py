@@ -107,13 +107,6 @@ def test_what_the_checks_are_to_refuse_is_left_to_them(rover):
     assert health['imu/data_rejected: specific force exactly zero (sensor not running)'] == 1
 
 
-def test_nothing_stated_changes_nothing(rover):
-    errors = SensorErrors(rover)
-    for measurement in drive(2, duration=1.0):
-        assert errors.corrected(measurement) is measurement
-        assert errors.as_read(measurement) is measurement
-
-
 def test_simulated_sensors_have_the_stated_errors():
     level = {'configuration': ['generic_six_wheel', 'test_sand'], 'duration': 3.0}
     stated = {

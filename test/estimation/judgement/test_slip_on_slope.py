@@ -9,13 +9,12 @@ import pytest
 from fake_estimator import make_core, odometry, play
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.estimates import SLOPE_NAMES, SLOPES, SlipOnSlope
+from wheel_terra_estimator.estimation.estimates import SLOPES, SlipOnSlope
 from wheel_terra_estimator.estimation.judgement import slip_on_slope
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import (
     CurveState,
     Instant,
-    OncePerSecond,
     SlopeCurve,
     slips_at,
 )
@@ -47,11 +46,6 @@ def learned(slopes_deg, seconds=200.0, std=0.03, noise=0.02, seed=1):
 def at(found: SlipOnSlope, slope):
     place = SLOPES.tolist().index(slope)
     return tuple(float(column[place]) for column in found)
-
-
-def test_the_names_are_those_of_the_contract():
-    assert SLOPE_NAMES[0] == 'slope_-20deg' and SLOPE_NAMES[4] == 'slope_0deg'
-    assert SLOPE_NAMES[-1] == 'slope_30deg' and len(SLOPE_NAMES) == 11
 
 
 @pytest.mark.parametrize('seed', range(2))
@@ -166,13 +160,6 @@ def test_what_is_not_known_teaches_nothing():
     np.testing.assert_array_equal(curve.state.mean, before.mean)
     np.testing.assert_array_equal(curve.state.covariance, before.covariance)
     assert np.isfinite(curve.state.told).all()
-
-
-def test_it_is_due_once_a_second_of_stamps():
-    once = OncePerSecond()
-    stamps = [7_300_000_000 + i * 50_000_000 for i in range(100)]
-    due = [stamp for stamp in stamps if once.due(stamp)]
-    assert due == [7_300_000_000 + i * 1_000_000_000 for i in range(5)]
 
 
 def test_sets_of_the_core_have_it_once_a_second():
