@@ -172,6 +172,15 @@ def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, m
     assert least <= np.mean(inside) <= most
 
 
+def test_the_error_that_lasts_keeps_its_deviation_over_any_step():
+    parts = Parts(reader.load(SAND, ['sensors.reference_wander_std:=0.03']))
+    prediction, e = Prediction.unchanged(parts.filter().mean), parts.layout.reference_error
+    reference_update(parts).predict(prediction, 0.5 * parts.sensors.reference_wander_time)
+    hold = prediction.F[e, e]
+    assert hold == pytest.approx(np.exp(-0.5))
+    assert hold**2 * 0.03**2 + prediction.Q[e, e] == pytest.approx(0.03**2)
+
+
 # -- Zero velocity ----------------------------------------------------------------------------
 
 
@@ -359,6 +368,7 @@ def test_what_all_wheels_share_of_the_shear_error_lasts_longer_than_what_one_has
     gain = parts.configuration.sensors.torque_gain_std
     stationary = (0.05**2 + gain**2) * np.eye(6) + 0.12**2
     assert F @ stationary @ F.T + Q == pytest.approx(stationary)
+    assert parts.filter().covariance[e, e] == pytest.approx(stationary)
 
 
 def test_softer_ground_is_weaker_ground_where_no_torque_says_how_weak(parts):
@@ -554,11 +564,11 @@ def test_a_vibrating_accelerometer_weakens_the_balance(parts):
 
 @pytest.mark.parametrize('entry', ['sinkage', 'stiffness', 'slip_sinkage', 'speed'])
 def test_the_jacobian_of_a_settled_sinkage_is_its_derivative(parts, ekf, entry):
-    part = parts.layout.sinkage
+    part, wheel = parts.layout.sinkage, parts.layout.sinkage.start + 2
     settled, _, _ = relaxed(parts, ekf, 60.0, speed=0.04)
     column = {
-        'sinkage': part.start,
-        'stiffness': parts.layout.stiffness.start,
+        'sinkage': wheel,
+        'stiffness': parts.layout.stiffness.start + 2,
         'slip_sinkage': SLIP_SINKAGE,
         'speed': SPEED,
     }[entry]
@@ -570,8 +580,8 @@ def test_the_jacobian_of_a_settled_sinkage_is_its_derivative(parts, ekf, entry):
         return sinkage_predicted(parts, x)[0]
 
     step = {'sinkage': 1e-4, 'speed': 1e-4}.get(entry, 1e-3)
-    difference = (predicted(step).mean - predicted(-step).mean)[part.start] / (2.0 * step)
-    stated = predicted(0.0).F[part.start, column]
+    difference = (predicted(step).mean - predicted(-step).mean)[wheel] / (2.0 * step)
+    stated = predicted(0.0).F[wheel, column]
     if entry == 'sinkage':  # what is forgotten; the law's slope is a number of the tuning
         assert 1.0 - stated == pytest.approx(1.0 - difference, rel=0.25)
     else:

@@ -168,9 +168,8 @@ def test_pulses_from_rest_pass_whole_only_once_until_a_class_is_known():
 
 def test_doubt_lets_the_last_known_class_count_on_then_the_cautious_one():
     rover = Rover()
-    rover.drive(1.0, 0.1, slip=0.45, slip_class=1)
-    before = rover.scale(0.1)
-    assert before == pytest.approx(0.65)
+    before, state, _ = rover.drive(1.0, 0.1, slip=0.45, slip_class=1)
+    assert (before, state) == (pytest.approx(0.65), 'slowed')
     found = [rover.drive(STEP, 0.1, slip=0.0, slip_class=UNKNOWN).scale for _ in range(40)]
     assert found[:19] == [before] * 19 and found[-19:] == [0.3] * 19
 
@@ -339,10 +338,13 @@ def scale(slip, travel, **limits):
         ([0.1] * 5 + [0.99], [10.0] * 5 + [0.0], 1.0),  # one spinning wheel stops no rover
         ([-0.1] * 5 + [0.99], FREE, 1.0),  # nor where the others brake
         ([-0.5] * 6, FREE, 1.0),  # braking downhill
+        ([0.1] * 6, [1.0] * 2 + [10.0] * 4, 0.5),  # half way from 1.4 to 0.6 m of rim travel
+        ([0.55] * 6, [1.0] * 6, 0.3 + 0.7 / 6.0),  # the lower of both
+        ([0.1] * 6, [0.61] * 6, 0.3),
     ],
 )
 def test_what_passes_of_a_command(slip, travel, passes):
-    assert scale(slip, travel) == passes
+    assert scale(slip, travel) == pytest.approx(passes)
 
 
 @given(SLIPS, SLIPS, TRAVELS, TRAVELS)

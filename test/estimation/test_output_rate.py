@@ -86,14 +86,16 @@ def test_rates_are_averaged_over_the_interval_that_each_stands_for():
     stamps = (0.0, 0.01, 0.04, 0.05)
     rates = ([1.0, 1.0], [4.0, nan], [2.0, 8.0], [nan, 6.0])
     torques = ([1.0, 1.0], [2.0, nan], [4.0, nan], [6.0, nan])
-    for t, rate, torque in zip(stamps, rates, torques, strict=True):
-        core.add(WheelOdometry(stamp_at(t), np.array(rate), np.array(torque)))
+    angles = ([0.0, 0.0], [0.2, nan], [nan, 0.3], [nan, nan])  # the newest of each wheel counts
+    for t, *columns in zip(stamps, rates, torques, angles, strict=True):
+        core.add(WheelOdometry(stamp_at(t), *map(np.array, columns)))
     _, (stamp, inputs) = fake.inputs
     assert stamp == stamp_at(0.05) == inputs.wheel_odometry.stamp
     left = (4.0 * 0.01 + 2.0 * 0.03) / 0.04
     right = (8.0 * 0.04 + 6.0 * 0.01) / 0.05
     np.testing.assert_allclose(inputs.wheel_odometry.rate, [left, right])
     np.testing.assert_allclose(inputs.wheel_odometry.torque, [4.0, nan])
+    np.testing.assert_allclose(inputs.wheel_odometry.steering, [0.2, 0.3])
 
 
 def test_imu_and_sinkage_are_averaged_and_references_stay_at_their_stamps():

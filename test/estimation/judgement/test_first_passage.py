@@ -168,6 +168,10 @@ def test_a_longer_look_ahead_sees_more_of_wheels_that_sink():
     assert near < 0.2 < 0.4 < far
     by_travel = likely(there, DEFAULTS._replace(horizon=2.0, travel=15.0 * RIM))
     assert by_travel == pytest.approx(far)
+    course = passage_probability([0.4], [0.03], there.digging)[0]
+    for horizon in (7.3, 1e3):  # between two travels, and beyond the last
+        expected = np.interp(horizon * RIM, TRAVELS, course)
+        assert likely(there, DEFAULTS._replace(horizon=horizon)) == pytest.approx(expected)
 
 
 def test_wheels_that_dig_in_a_spin_on_the_spot_are_no_entrapment():

@@ -21,7 +21,11 @@ from wheel_terra_estimator.estimation.judgement.classes import (
     SlipClassifier,
     instantaneous_class,
 )
-from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge
+from wheel_terra_estimator.estimation.judgement.slip import (
+    BodyMotion,
+    SlipJudge,
+    slip_and_deviation,
+)
 from wheel_terra_estimator.estimation.output_guard import blank_estimates
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
@@ -221,3 +225,17 @@ def test_a_wheel_that_begins_to_turn_is_not_sure_to_spin():
     assert turning.std > 0.25
     assert abs(turning.slip - (1.0 - 0.7 / 1.05)) < 2.0 * turning.std
     assert not any(wheel.judged for wheel in standing)
+    lost = SlipJudge(parts.rover, parts.sensors).update(0.0, rims, body._replace(speed_std=9.0))[0]
+    assert lost.std == 1.0, 'no slip is further off'
+
+
+@pytest.mark.parametrize(('rim', 'v'), [(0.05, 0.03), (0.05, 0.08), (-0.05, -0.03), (-0.05, -0.08)])
+def test_the_deviation_of_a_slip_is_that_of_its_two_speeds(rim, v):
+    def slip(rim, v):
+        return slip_and_deviation(rim, v, 0.004, 0.003, 0.002)[0]
+
+    step = 1e-6
+    by_rim = (slip(rim + step, v) - slip(rim - step, v)) / (2.0 * step)
+    by_v = (slip(rim, v + step) - slip(rim, v - step)) / (2.0 * step)
+    expected = np.hypot(by_v * 0.004, by_rim * 0.003)
+    assert slip_and_deviation(rim, v, 0.004, 0.003, 0.002)[1] == pytest.approx(expected)

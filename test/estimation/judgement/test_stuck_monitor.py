@@ -95,7 +95,8 @@ def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
     found = held(monitor, stalled, 1.5, start=3.0)
     assert 0.1 <= first(found) <= 0.3
     assert found[-1].stalled == (True, True, False, False)
-    assert 'stalled' in found[-1].reason
+    assert found[-1].wheels[0] == (1.0, 0.0, 0.0), 'it is there: no time and no travel left'
+    assert '2 wheels stalled' in found[-1].reason
 
 
 @pytest.mark.parametrize('spinning', [True, False])
