@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray, IndexArray
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.assessment.gaps import (
     channels_off,
     gaps,
@@ -73,8 +73,6 @@ class Decision:
     floor_index: int  # of ``findings.selection.floors``: the model-error floor in use
     after: Fit  # the chosen explanation, refitted under that floor
     variance: FloatArray
-    # (N,) groups of slip that were left out in turn; -1 for rows of a reference
-    groups: IndexArray
     curves: Curves
     gap: Mapping[str, QuantityGap]  # quantity -> QuantityGap
     names: tuple[Naming, ...] = ()  # strongest first; empty unless ``named``
@@ -220,9 +218,8 @@ def _predicted(
         'findings': findings,
         'after': fits[-1],
         'variance': beside,
-        'groups': groups,
         'curves': curves,
-        'gap': gaps(table, findings, curves, floor, allowed_error),
+        'gap': gaps(table, findings, curves, allowed_error),
     }
 
 

@@ -14,7 +14,6 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
-from wheel_terra_estimator.discrepancy.assessment.held_out import log_scores
 from wheel_terra_estimator.discrepancy.assessment.order import changes_along_rows
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import Decision, known_alike
@@ -194,37 +193,25 @@ def _nearest(decision: Decision) -> tuple[str, ...]:
 def _candidates(decision: Decision) -> tuple[Candidate, ...]:
     """Return the best explanations, nothing among them, each with why it was not the one."""
     findings, verdict = decision.findings, decision.verdict
-    selection, setting = findings.selection, findings.setting
+    selection = findings.selection
     nothing = selection.nothing
     shown = [h for h, e in enumerate(selection.explanations) if e.names][:_CANDIDATES_SHOWN]
     if verdict.index not in (nothing, *shown):
         shown.append(verdict.index)
     totals = np.logaddexp.reduce(selection.log_joint, axis=1)
-    kept = [decision.findings.nothing, *(selection.explanations[h].fitted for h in shown)]
-    scores = log_scores(setting, kept, decision.variance, decision.groups)
-    gains = dict(zip((nothing, *shown), (s - scores[0] for s in scores), strict=True))
-    evidence = {h: selection.explanations[h].log_evidence for h in gains}
+    at_nothing = selection.explanations[nothing].log_evidence
     chosen = set(selection.explanations[verdict.index].names)
-    found = []
-    for h in sorted(gains, key=lambda h: -totals[h]):
-        explanation = selection.explanations[h]
-        fitted = explanation.fitted
-        change = setting.problem.flat(fitted.outputs - findings.nothing.outputs)
-        distance = np.sqrt((setting.problem.rotate(change) ** 2 / fitted.variance).sum())
-        found.append(
-            Candidate(
-                explanation.names,
-                evidence[h] - evidence[nothing],
-                float(selection.probability[h].sum()),
-                gains[h],
-                float((fitted.residual**2).sum()),
-                float(setting.problem.size - len(fitted.u)),
-                _parameters(fitted, explanation.posterior.covariance[decision.floor_index]),
-                float(distance) if explanation.names else 0.0,
-                '' if h == verdict.index else words.why_not(findings, verdict, h, totals, chosen),
-            )
+    return tuple(
+        Candidate(
+            explanation.names,
+            explanation.log_evidence - at_nothing,
+            float(selection.probability[h].sum()),
+            _parameters(explanation.fitted, explanation.posterior.covariance[decision.floor_index]),
+            '' if h == verdict.index else words.why_not(findings, verdict, h, totals, chosen),
         )
-    return tuple(found)
+        for h in sorted((nothing, *shown), key=lambda h: -totals[h])
+        for explanation in (selection.explanations[h],)
+    )
 
 
 def _smallest_visible(

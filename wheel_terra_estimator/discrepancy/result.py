@@ -69,13 +69,7 @@ class Candidate:
     # Log marginal likelihood relative to ``nothing``: above 0 the data speak for it
     log_evidence: float
     probability: float  # posterior probability among all fitted sets
-    # Log predictive score on groups of rows that the fit did not see, relative to the soil refit
-    held_out_gain: float
-    chi2: float  # of the residual after the fit, whitened by the noise
-    degrees_of_freedom: float = field(metadata=_ASIDE)
     parameters: Mapping[str, FittedParameter]  # ``effect.parameter`` -> fitted parameter
-    # Distance d' to the best soil refit, in noise standard deviations, at the fitted values
-    size: float = field(metadata=_ASIDE)
     why_not: str = ''  # why it was not added; empty for the chosen one
 
     @property
@@ -100,23 +94,16 @@ class QuantityGap:
     """Root-mean-square error of one quantity on rows that the fit did not see [its unit].
 
     ``noise`` is the stated or estimated standard deviation (an uncertain slip included), ``fitted``
-    the error of the written model on all rows, ``floor`` the model-error floor that the data ask
-    for; ``shrink`` = 1 - excess(after)/excess(refit), where the excess is what is left when the
-    noise alone is subtracted in squares, with a bootstrap interval over the rows. ``limit`` is what
-    noise and the allowed model error permit: an ``after`` beyond it wants an explanation.
+    the error of the written model on all rows. ``limit`` is what noise and the allowed model error
+    permit: an ``after`` beyond it wants an explanation.
     """
 
     before: float
     refit: float
     after: float
     noise: float | None
-    floor: float = 0.0
-    rows: int = 0
     fitted: float = 0.0
     limit: float = math.inf
-    shrink: float | None = None
-    shrink_low: float | None = None
-    shrink_high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -168,8 +155,6 @@ class InputRange:
 class Where:
     """Where model (soil refitted) and measurement disagree most."""
 
-    json_also: ClassVar[Mapping[str, str]] = {'unit': 'unit'}
-
     sentence: str  # for people
     quantity: str  # the quantity with the largest share of the misfit
     # Quantity -> share of the squared misfit in excess of the noise, 0..1
@@ -177,17 +162,8 @@ class Where:
     # Region with the largest gap; empty = everywhere (a constant shift)
     box: tuple[InputRange, ...]
     rows: IndexArray  # indices of the table rows inside the box
-    # Shares of the misfit and of the rows inside
-    share_of_gap: float
-    share_of_rows: float
-    mean: float  # mean of measured minus model inside, in the unit of ``quantity``
-    mean_in_noise_std: float  # the same in noise standard deviations
+    share_of_gap: float  # share of the misfit inside
     p_value: float  # of the box, calibrated by the parametric bootstrap of the soil refit
-
-    @property
-    def unit(self) -> str:
-        """Unit of ``quantity``."""
-        return UNITS[self.quantity]
 
 
 @dataclass(frozen=True)
@@ -201,8 +177,6 @@ class NextMeasurement:
     distance_then: float
     # Column -> values of the proposed rows (SI); None for a zero check of an instrument
     rows: Mapping[str, FloatArray] | None = None
-    # Competing explanation -> (n, 4) predicted sinkage, drawbar pull, torque of these rows
-    predictions: Mapping[str, FloatArray] = field(default_factory=dict, metadata=_ASIDE)
 
 
 @dataclass(frozen=True)

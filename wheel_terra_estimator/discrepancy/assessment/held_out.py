@@ -33,36 +33,6 @@ def slip_groups(table: SteadyTable) -> IndexArray:
     return np.minimum(rank * GROUPS // max(len(levels), 1), GROUPS - 1).astype(np.intp)
 
 
-def log_scores(
-    setting: Setting, fits: Sequence[Fit], variance: FloatArray, groups: IndexArray
-) -> list[float]:
-    """Return the sum of the log predictive densities of the groups, each given all the rest.
-
-    Around the fit everything is Gaussian, so that blocks of the inverse covariance suffice.
-    """
-    problem = setting.problem
-    cell_group = groups[problem.row]
-    parts = [np.flatnonzero(cell_group == label) for label in np.unique(groups[groups >= 0])]
-    parts = [out for out in parts if out.size]
-    plain = _inverse(problem, variance)
-    blocks = [plain[np.ix_(out, out)] for out in parts]
-    scores = []
-    for fitted in fits:
-        weighted = plain @ fitted.sensitivity
-        precision = fitted.sensitivity.T @ weighted + np.diag(fitted.prior)
-        low_rank = np.linalg.solve(precision, weighted.T)
-        target = setting.observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
-        pull = plain @ target - weighted @ (low_rank @ target)
-        score = 0.0
-        for out, noise in zip(parts, blocks, strict=True):
-            block = noise - weighted[out] @ low_rank[:, out]
-            square = float(pull[out] @ np.linalg.solve(block, pull[out]))
-            log_det = float(np.linalg.slogdet(block)[1])
-            score += 0.5 * (log_det - square - out.size * np.log(2.0 * np.pi))
-        scores.append(score)
-    return scores
-
-
 def hold_out(
     setting: Setting, fits: Sequence[Fit], variance: FloatArray, groups: IndexArray
 ) -> list[FloatArray]:

@@ -62,16 +62,7 @@ def propose(
             depth = outputs[..., 0].max()
             worth = np.isfinite(then) and then > max(_WORTH, _MORE * now)
             if worth and depth < _DEEPEST * np.min(points.wheel.radius):
-                blocks.append(
-                    NextMeasurement(
-                        what,
-                        names,
-                        now,
-                        then,
-                        _columns(points),
-                        dict(zip(names, outputs, strict=True)),
-                    )
-                )
+                blocks.append(NextMeasurement(what, names, now, then, _columns(points)))
         blocks.sort(key=lambda block: -block.distance_then)
         found.extend(blocks[:_KEPT])
     return tuple(found)

@@ -83,9 +83,6 @@ def locate(
         box,
         np.flatnonzero(inside),
         share_inside,
-        float(inside.sum() / mine.sum()),
-        mean,
-        mean / noise,
         p_value,
     )
 

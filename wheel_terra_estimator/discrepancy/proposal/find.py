@@ -358,10 +358,8 @@ def _proposal(
         old = gap[quantity]
         mine = np.isfinite(measured[:, q])
         fitted = np.sqrt(np.mean((law.outputs[:rows] - measured)[mine, q] ** 2))
-        gaps[quantity] = QuantityGap(
-            old.before, by_slip[quantity].refit, by_slip[quantity].law, old.noise,
-            old.floor, old.rows, float(fitted), old.limit,
-        )  # fmt: skip
+        found = by_slip[quantity]
+        gaps[quantity] = replace(old, refit=found.refit, after=found.law, fitted=float(fitted))
     return Proposal(
         law_in_words(names, values, table, setting.forward.points),
         tuple(pair_of(name)[0] for name in names),

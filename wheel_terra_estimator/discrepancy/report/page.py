@@ -54,7 +54,6 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         tone=_TONES[diagnosis.verdict],
         said=in_words(diagnosis),
         title=Path(diagnosis.table.name).name,
-        cards=_cards(diagnosis),
         figures=_figures(folder, diagnosis),
         best=max([10.0, *(c.log_evidence for c in diagnosis.candidates)]),
         noise=diagnosis.to_dict()['noise'],
@@ -78,7 +77,6 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         unit_of=lambda quantity: SHOWN[quantity][1],
         with_unit=with_unit,
         parameter=_parameter,
-        share=_share,
         proposed=_proposed,
     )
     path = folder / 'report.html'
@@ -113,56 +111,6 @@ def _where(diagnosis: Diagnosis) -> str:
     return text[:1].upper() + text[1:].rstrip('.') + '.'
 
 
-def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    cards = []
-    if diagnosis.effects:
-        first = diagnosis.effects[0]
-        shares = ', '.join(percent(effect.confidence) for effect in diagnosis.effects)
-        names = 'names, in their order' if len(diagnosis.effects) > 1 else 'name'
-        cards.append({'value': shares, 'label': f'confidence of the {names}'})
-        if first.confounded_with:
-            cards.append(
-                {
-                    'value': percent(first.confidence_of_set),
-                    'label': 'that it is the name or one it is confounded with',
-                }
-            )
-    worst = max(
-        diagnosis.gap.items(),
-        # The greatest gap that the soil leaves open; where it closes all, the greatest of all.
-        key=lambda item: (
-            (item[1].before if diagnosis.verdict == 'agrees' else item[1].refit)
-            / (item[1].noise or 1e9)
-        ),
-        default=None,
-    )
-    if worst is not None:
-        name, item = worst
-        scale, unit = SHOWN[name]
-        stages = {'as configured': item.before, 'soil refitted': item.refit}
-        if diagnosis.effects:
-            stages['effect added'] = item.after
-        values = ' → '.join(number(scale * value, 2) for value in stages.values())
-        cards.append(
-            {
-                'value': f'{values} {unit}',
-                'label': f'rms error of {plain(name)} on unseen rows: ' + ', '.join(stages),
-            }
-        )
-    closed = {name: g.shrink for name, g in diagnosis.gap.items() if g.shrink is not None}
-    if diagnosis.effects and closed:
-        ends = sorted({f'{100 * share:.0f}' for share in closed.values()}, key=float)
-        cards.append(
-            {
-                'value': ' to '.join(dict.fromkeys((ends[0], ends[-1]))) + ' %',
-                'label': f'of the gap above the noise closed ({", ".join(map(plain, closed))})',
-            }
-        )
-    cards.append({'value': str(len(diagnosis.table)), 'label': 'rows'})
-    cards.append({'value': f'{diagnosis.seconds:.2f} s', 'label': 'time of the diagnosis'})
-    return cards
-
-
 def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
     """Draw every picture that this diagnosis has; each is written as PNG and embedded."""
 
@@ -173,24 +121,12 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
         figure.set_layout_engine('none')  # laid out once, for both formats
         return picture(figure)
 
-    proposed = next((m for m in diagnosis.next_measurement if m.rows is not None), None)
     residuals = [
-        (
-            plain(name),
-            keep(f'residuals_by_{name}', pictures.residuals(diagnosis, name)),
-        )
+        (plain(name), keep(f'residuals_by_{name}', pictures.residuals(diagnosis, name)))
         for name in pictures.colour_inputs(diagnosis)
     ]
-    return {
-        'curves': keep('curves_over_slip', pictures.curves_over_slip(diagnosis)),
-        'parity': keep('measured_against_model', pictures.measured_against_model(diagnosis)),
-        'residuals': residuals,
-        'where': keep('where', pictures.where_map(diagnosis)),
-        'competitors': keep('next_measurement', pictures.competitors(proposed))
-        if proposed
-        else None,
-        'competitors_title': proposed.what if proposed else '',
-    }
+    curves = keep('curves_over_slip', pictures.curves_over_slip(diagnosis))
+    return {'curves': curves, 'residuals': residuals}
 
 
 def _parameter(name: str, item: FittedParameter) -> str:
@@ -198,12 +134,6 @@ def _parameter(name: str, item: FittedParameter) -> str:
     reach = item.upper - item.lower
     end = np.isfinite(reach) and min(item.value - item.lower, item.upper - item.value)
     return f'{name} = {value}{" (at its bound)" if end is not False and end < 1e-3 * reach else ""}'
-
-
-def _share(value: float) -> str:
-    if value < 0.001:
-        return '< 0.1 %'
-    return '> 99.9 %' if value > 0.999 else f'{100 * value:.1f} %'
 
 
 def _proposed(item: NextMeasurement) -> str:

@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label, plain, with_unit
-from wheel_terra_estimator.discrepancy.result import Diagnosis, NextMeasurement
+from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, QUANTITIES
 from wheel_terra_estimator.reporting.style import INK, LINE_COLOURS, NOISE_COLOUR, picture_style
 
@@ -27,8 +27,7 @@ SHOWN_INPUT = {
     'lug_height': (1e3, 'mm'),
     'leaving_angle': (180.0 / np.pi, 'deg'),
 }
-BLUE, RED, GREEN, PURPLE = (LINE_COLOURS[i] for i in (0, 1, 2, 6))
-GREY = '#9aa5b1'
+RED = LINE_COLOURS[1]
 COLOUR_MAP = 'viridis'
 # Levels differ in brightness and in shape as well, for the colour-blind and for grey prints.
 _DISCRETE = ('#E69F00', '#009E73', '#0072B2', '#7B4FA3', '#111111', '#D55E00')
@@ -47,33 +46,6 @@ def label(name: str, unit: str) -> str:
     return plain(name) if unit == '-' else f'{plain(name)} [{unit}]'
 
 
-def measured_against_model(diagnosis: Diagnosis) -> Figure:
-    """Draw measured over modelled values, before and after, one panel per quantity."""
-    curves, table = diagnosis.curves, diagnosis.table
-    with picture_style():
-        figure, axes = _panels(1, table.quantities, height=2.7)
-        for axis, q, scale in _each(axes, table.quantities, 'model [{}]', 'measured [{}]'):
-            measured = scale * table.measured[:, q]
-            good = np.isfinite(measured) & ~_rejected_cells(diagnosis, q)
-            after = scale * curves.after[:, q]
-            axis.plot(
-                scale * curves.before[good, q],
-                measured[good],
-                'o',
-                ms=4.5,
-                mfc='none',
-                mec=GREY,
-                label='as configured',
-            )
-            axis.plot(after[good], measured[good], 'o', ms=4, color=BLUE, label=_last(diagnosis))
-            values = np.concatenate([measured[good], after[good], scale * curves.before[good, q]])
-            ends = np.array([values.min(), values.max()])
-            axis.plot(ends, ends, color=INK, lw=0.8)
-        handles, labels = axes[0][0].get_legend_handles_labels()
-        _legend(figure, handles, labels)
-    return figure
-
-
 def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
     """Draw measurement and model over slip, one curve for each setting of the other inputs.
 
@@ -89,7 +61,9 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
     models = ['model as configured', f'model {_last(diagnosis)}']
     with picture_style():
         figure, axes = _panels(1, table.quantities, height=3.0)
-        for axis, q, scale in _each(axes, table.quantities):
+        for axis, name in zip(axes[0], table.quantities, strict=True):
+            q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
+            axis.set(xlabel='slip', title=plain(name), ylabel=f'[{unit}]')
             kept = np.isfinite(table.measured[:, q]) & ~_rejected_cells(diagnosis, q)
             for (_, rows), colour, shape in zip(groups, _DISCRETE, _SHAPES, strict=False):
                 for values, style in ((curves.before, ':'), (curves.after, '-')):
@@ -208,87 +182,12 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     return figure
 
 
-def where_map(diagnosis: Diagnosis) -> Figure:
-    """Draw where the soil-refitted model and the measurement disagree, for every quantity."""
-    table, curves, where = diagnosis.table, diagnosis.curves, diagnosis.where
-    second = next(iter(colour_inputs(diagnosis)), 'normal_load')
-    factor, unit = shown_input(second)
-    x, y = table.columns['slip'], factor * table.columns[second]
-    with picture_style():
-        figure, axes = _panels(1, table.quantities, height=2.7)
-        drawn = None
-        for axis, name in zip(axes[0], table.quantities, strict=True):
-            q = QUANTITIES.index(name)
-            sigma = (table.measured[:, q] - curves.refit[:, q]) / curves.band[:, q]
-            good = np.isfinite(sigma)
-            drawn = axis.scatter(
-                x[good],
-                y[good],
-                c=np.clip(sigma[good], -6, 6),
-                s=20 + 14 * np.minimum(np.abs(sigma[good]), 8),
-                cmap='RdBu_r',
-                vmin=-6,
-                vmax=6,
-                edgecolors='#5b6875',
-                linewidths=0.4,
-            )
-            share = where.shares.get(name)
-            share_text = '' if share is None else f', {100 * share:.0f} % of the misfit'
-            axis.set(title=plain(name) + share_text, xlabel='slip')
-            if name == where.quantity:
-                _box(axis, diagnosis, second)
-        axes[0][0].set_ylabel(label(second, unit))
-        _colour_bar(figure, axes, drawn, 'measured minus model [s.d.]')
-    return figure
-
-
-def competitors(item: NextMeasurement) -> Figure | None:
-    """Draw what the competitors predict on proposed rows, for the quantities in which they part."""
-    if item.rows is None or len(item.predictions) < 2:
-        return None
-    x_name = 'slip' if np.ptp(item.rows.get('slip', np.zeros(1))) > 0 else _widest(item.rows)
-    factor, unit = shown_input(x_name)
-    x = factor * np.asarray(item.rows[x_name], dtype=float)
-    order = np.argsort(x, kind='stable')
-    with picture_style():
-        aside = any(np.asarray(values)[:, -1].any() for values in item.predictions.values())
-        shown = QUANTITIES if aside else QUANTITIES[:-1]
-        figure, axes = _panels(1, shown, height=2.2)
-        for axis, q, scale in _each(axes, shown, label(x_name, unit), 'predicted [{}]'):
-            for (competitor, values), colour, marker in zip(
-                item.predictions.items(), (BLUE, RED, GREEN, PURPLE), 'oDs^', strict=False
-            ):
-                axis.plot(
-                    x[order],
-                    scale * np.asarray(values)[order, q],
-                    marker,
-                    ms=4.5,
-                    color=colour,
-                    mfc='none' if marker != 'o' else colour,
-                    label=plain(competitor),
-                )
-        handles, labels = axes[0][0].get_legend_handles_labels()
-        _legend(figure, handles, labels)
-    return figure
-
-
 def colour_inputs(diagnosis: Diagnosis) -> list[str]:
     """Return the inputs by which residuals are coloured: where the gap is, load, slope, any."""
     varying = diagnosis.table.varying()
     box = [side.input for side in diagnosis.where.box]
     wanted = dict.fromkeys((*box, 'normal_load', 'slope', *varying))
     return [name for name in wanted if name in varying and name != 'slip'][:2] or ['normal_load']
-
-
-def _each(
-    axes: Any, quantities: Sequence[str], x: str = 'slip', y: str = '[{}]'
-) -> Iterator[tuple[Axes, int, float]]:
-    """Yield panel, column and scale of each quantity; then title and labels with its unit."""
-    for axis, name in zip(axes[0], quantities, strict=True):
-        scale, unit = SHOWN[name]
-        yield axis, QUANTITIES.index(name), scale
-        axis.set(xlabel=x.format(unit), title=plain(name))
-        axis.set_ylabel(y.format(unit))
 
 
 def _panels(
@@ -344,36 +243,3 @@ def _rejected_cells(diagnosis: Diagnosis, q: int) -> BoolArray:
     for row, quantity, _ in diagnosis.outliers:
         mask[row] |= QUANTITIES.index(quantity) == q
     return mask
-
-
-def _box(axis: Axes, diagnosis: Diagnosis, second: str) -> None:
-    """Frame the region in which the gap is largest."""
-    from matplotlib.patches import Rectangle
-
-    sides = {side.input: side for side in diagnosis.where.box}
-    if not sides.keys() & {'slip', second}:
-        return
-    table = diagnosis.table
-    ends = []
-    for name in ('slip', second):
-        factor = 1.0 if name == 'slip' else shown_input(name)[0]
-        values = factor * table.columns[name]
-        margin = 0.04 * float(np.ptp(values))
-        side = sides.get(name)
-        low = float(values.min()) if side is None else max(factor * side.low, values.min())
-        high = float(values.max()) if side is None else min(factor * side.high, values.max())
-        ends.append((low - margin, high + margin))
-    (x0, x1), (y0, y1) = ends
-    axis.add_patch(
-        Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, ec=RED, lw=1.4, ls='--', zorder=3)
-    )
-
-
-def _widest(rows: Any) -> str:
-    """Return the input that varies most over proposed rows."""
-
-    def spread(name: str) -> float:
-        values = np.asarray(rows[name], dtype=float)
-        return float(np.ptp(values) / max(np.abs(values).max(), 1e-12))
-
-    return max((name for name in rows if name in INPUT_UNITS), key=spread)

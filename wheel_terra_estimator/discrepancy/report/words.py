@@ -50,17 +50,8 @@ _COARSE = 0.05  # model-error floor above which agreement says little
 
 
 def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
-    """Return what shrank, what stays open and what to do next, without any statistics."""
-    shrank, still_off = [], channels_off(diagnosis.gap)
-    for name, item in diagnosis.gap.items():
-        stages = {'as configured': item.before, 'refitted': item.refit}
-        if diagnosis.effects:
-            stages['with the effect'] = item.after
-        if diagnosis.proposal and name in diagnosis.proposal.gap:
-            stages['with the proposed law'] = diagnosis.proposal.gap[name].after
-        said = ', '.join(f'{amount(name, value)} {stage}' for stage, value in stages.items())
-        noise = f'; its noise is {amount(name, item.noise)}' if item.noise else ''
-        shrank.append(f'{plain(name)} [{SHOWN[name][1]}]: off by {said}{noise}.')
+    """Return what stays open and what to do next, without any statistics."""
+    still_off = channels_off(diagnosis.gap)
     left = [
         f'{plain(name)} is still off by more than noise and the allowed model error.'
         for name in still_off
@@ -97,7 +88,7 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
             'model.yaml is the best model so far; which measurement would settle what stays open '
             'these rows do not say.'
         )
-    return {'shrank': shrank, 'open': left, 'next': following}
+    return {'open': left, 'next': following}
 
 
 def _to_settle(diagnosis: Diagnosis) -> list[str]:
