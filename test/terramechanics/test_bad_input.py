@@ -31,7 +31,6 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
         (lambda: replace(SAND, leaving_angle_ratio=0.3), r'leaving angle ratio is 0\.3'),
         (lambda: replace(SAND, pressure_law='clay'), r"pressure law is 'clay'"),
         (lambda: WheelSoilModel(SAND, method='guess'), r"method is 'guess'"),
-        (lambda: WheelSoilModel(SAND, nodes=0), r'nodes is 0; allowed is 2 or more'),
         (lambda: Wheel('wide', 0.1), r"wheel radius is 'wide'; allowed is a number"),
         (lambda: points(1.0000001), r'slip is 1\.0000001; allowed is \[-1, 1\]'),
         (lambda: points([0.1, 0.2], [1.0, 2.0, 3.0]), r'normal load has 3 entries, slip has 2'),

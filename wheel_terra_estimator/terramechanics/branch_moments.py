@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.quantity import Quantity
@@ -132,19 +131,6 @@ class BranchForces:
         """Exponent N of the normal stress [-]; the load grows with about 2 N + 1."""
         return self._exponent
 
-    def take(self, rows: NDArray[np.bool_]) -> BranchForces:
-        """Return the form of some of the points."""
-
-        def chosen(value: Any) -> Any:
-            if isinstance(value, np.ndarray) and value.size > 1:
-                return np.broadcast_to(value, rows.shape)[rows]
-            return value
-
-        part = object.__new__(BranchForces)
-        for name in self.__slots__:
-            setattr(part, name, chosen(getattr(self, name)))
-        return part
-
     def forces(self, angle: Quantity) -> tuple[Any, Any, Any]:
         """Load [N], pull [N] and torque [N m] at an entrance angle."""
         stressed, sticking = self._parts(angle)
@@ -205,9 +191,13 @@ class BranchForces:
             edge_front * sqrt(1.0 - middle * middle) + edge_rear * sqrt(1.0 - mean * mean),
             self._shear_radius * (stick_front + stick_rear),
         )
-        if self._skidding:
-            return self._with_skid(angle, stressed, sticking)
-        return stressed, sticking
+        if not self._skidding:
+            return stressed, sticking
+        by_nodes = self._node_parts(angle)  # their share grows with the skid
+        return (
+            [s + self._skid * (n - s) for s, n in zip(stressed, by_nodes[0], strict=False)],
+            [c + self._skid * (n - c) for c, n in zip(sticking, by_nodes[1], strict=False)],
+        )
 
     def _mobilised(
         self, angle: Quantity, top: Quantity, front: Quantity, rear: Quantity, cos_rear: Quantity
@@ -250,25 +240,6 @@ class BranchForces:
             share_front, even_front = share_front * sign_front, even_front * sign_front
             share_rear, even_rear = share_rear * sign_rear, even_rear * sign_rear
         return share_front, share_rear, even_front, even_rear
-
-    def _with_skid(
-        self, angle: Any, *rolling: Sequence[Any]
-    ) -> tuple[Sequence[Any], Sequence[Any]]:
-        """`_parts` with the nodes' share where the rim skids."""
-        skid = self._skid
-        if np.ndim(skid) == 0 or np.shape(skid) != np.shape(angle):
-            nodes = self._node_parts(angle)
-            stressed, sticking = (
-                [part + skid * (there - part) for part, there in zip(parts, found, strict=False)]
-                for parts, found in zip(rolling, nodes, strict=True)
-            )
-            return stressed, sticking
-        rows = skid > 0.0
-        skid, nodes = skid[rows], self.take(rows)._node_parts(angle[rows])
-        for parts, found in zip(rolling, nodes, strict=True):
-            for part, there in zip(parts, found, strict=False):  # without the lateral force
-                part[rows] += skid * (there - part[rows])
-        return rolling[0], rolling[1]
 
     def _node_parts(self, angle: Quantity) -> tuple[Sequence[Any], Sequence[Any]]:
         """`_parts`, and the lateral force [N], from nodes on either side of the peak."""

@@ -70,14 +70,12 @@ def balance(
         settled = (np.abs(y0 * y1 * y2) < _REST) & (angle < LARGEST_ANGLE)
     if settled.all():
         return angle, pull, torque, settled
-    rest = ~settled
-    part = form.take(rest)
-    start = np.where(np.isfinite(angle), angle, 0.3)[rest]
-    angle[rest], settled[rest] = solve_entrance_angle(
-        lambda angles: part.forces(angles)[0], load[rest], np.clip(start, 1e-3, 1.4)
-    )
-    _, pull[rest], torque[rest] = part.forces(angle[rest])
-    return angle, pull, torque, settled
+    start = np.clip(np.where(np.isfinite(angle), angle, 0.3), 1e-3, 1.4)
+    found, carries = solve_entrance_angle(lambda angles: form.forces(angles)[0], load, start)
+    angle = np.where(settled, angle, found)
+    _, by_pull, by_torque = form.forces(angle)
+    pull, torque = np.where(settled, pull, by_pull), np.where(settled, torque, by_torque)
+    return angle, pull, torque, settled | carries
 
 
 def _inverse(step: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,7 +31,8 @@ from wheel_terra_estimator.terramechanics.terms import (
     set_angles,
 )
 
-METHODS = ('quadrature', 'closed_form')
+_FORCES: Mapping[str, Any] = {'quadrature': quadrature, 'closed_form': closed_form}
+METHODS = tuple(_FORCES)
 
 OVERLOADED = 1  # the soil cannot carry the load: values belong to a sinkage of one radius
 # |slip| above 0.95, where no steady state is known; or effects made the strength negative.
@@ -75,17 +76,14 @@ class WheelSoilModel:
         # True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
         # at a sinkage of one radius and flagged
         strict: bool = True,
-        nodes: int = quadrature.NODES,  # quadrature nodes on each side of the peak stress
     ) -> None:
         if method not in METHODS:
             raise ValueError(f'method is {method!r}; allowed is one of {METHODS}')
-        if nodes < 2:
-            raise ValueError(f'nodes is {nodes}; allowed is 2 or more')
         self.soil = soil
         self.effects = check_settings(effects or {})
         self.method = method
         self.strict = strict
-        self.nodes = nodes
+        self._law = _FORCES[method]
         self._soil = {name: getattr(soil, name) for name in SOIL_NUMBERS}
 
     def steady_state(self, points: OperatingPoints) -> SteadyState:
@@ -115,17 +113,20 @@ class WheelSoilModel:
         if self.strict and not carries.all():
             worst = int(np.flatnonzero(~carries)[0])
             set_angles(contact, np.full_like(angle, np.pi / 2), points.leaving_angle, terms)
-            limit = np.broadcast_to(self._forces(contact, terms)[0], angle.shape)[worst]
+            limit = np.broadcast_to(self._law.forces(contact, terms)[0], angle.shape)[worst]
             raise ValueError(
                 f'normal load is {load[worst]:g} N (entry {worst}); this soil carries at most '
                 f'about {limit:.3g} N at a sinkage of one radius'
             )
         set_angles(contact, angle, None if explicit else points.leaving_angle, terms)
-        contact.lateral_force = self._lateral_force(contact, terms)
+        contact.lateral_force = self._law.lateral_force(contact, terms)
         if not explicit:
-            _, pull, torque = self._forces(contact, terms)
-        outputs = self._outputs(contact, angle, pull, torque, terms)
-        return self._pack(contact, points, angle, carries, outputs)
+            _, pull, torque = self._law.forces(contact, terms)
+        contact.sinkage = contact.radius * (1.0 - np.cos(angle))
+        contact.drawbar_pull = contact.direction * pull
+        contact.torque = contact.direction * torque
+        terms.apply('on_outputs', contact)  # as the instruments read them
+        return _answer(contact, points, angle, carries)
 
     def _check(self, contact: Contact[Quantity]) -> None:
         """Complain of what effects, or the width, made of the soil."""
@@ -150,51 +151,30 @@ class WheelSoilModel:
 
         def carried(angle: FloatArray) -> FloatArray:
             set_angles(contact, angle, points.leaving_angle, terms)
-            return self._forces(contact, terms)[0]
+            load: FloatArray = self._law.forces(contact, terms)[0]
+            return load
 
         return solve_entrance_angle(carried, load, start)
 
-    def _forces(self, contact: Contact[Quantity], terms: Terms) -> tuple[Any, Any, Any]:
-        if self.method == 'quadrature':
-            return quadrature.forces(contact, terms, self.nodes)
-        return closed_form.forces(contact, terms)
 
-    def _lateral_force(self, contact: Contact[Quantity], terms: Terms) -> Quantity:
-        if self.method == 'quadrature':
-            return quadrature.lateral_force(contact, terms, self.nodes)
-        return closed_form.lateral_force(contact, terms)
+def _answer(
+    contact: Contact[Quantity], points: OperatingPoints, angle: FloatArray, carries: BoolArray
+) -> SteadyState:
+    flags = np.where(carries, 0, OVERLOADED)
+    weakened = (np.asarray(contact.cohesion) < 0.0) | (np.asarray(contact.tan_friction) < 0.0)
+    weakened |= np.asarray(contact.sinkage_exponent) <= 0.0
+    flags = flags + np.where((np.abs(points.slip) > 0.95) | weakened, OUTSIDE_VALIDITY, 0)
 
-    @staticmethod
-    def _outputs(
-        contact: Contact[Quantity],
-        angle: FloatArray,
-        pull: Quantity,
-        torque: Quantity,
-        terms: Terms,
-    ) -> tuple[Quantity, Quantity, Quantity]:
-        """Sinkage, pull and torque as the instruments read them."""
-        contact.sinkage = contact.radius * (1.0 - np.cos(angle))
-        contact.drawbar_pull = contact.direction * pull
-        contact.torque = contact.direction * torque
-        terms.apply('on_outputs', contact)
-        return contact.sinkage, contact.drawbar_pull, contact.torque
+    def whole(value: Quantity) -> FloatArray:
+        return np.array(np.broadcast_to(value, angle.shape))
 
-    @staticmethod
-    def _pack(
-        contact: Contact[Quantity],
-        points: OperatingPoints,
-        angle: FloatArray,
-        carries: BoolArray,
-        outputs: Sequence[Quantity],
-    ) -> SteadyState:
-        flags = np.where(carries, 0, OVERLOADED)
-        weakened = (np.asarray(contact.cohesion) < 0.0) | (np.asarray(contact.tan_friction) < 0.0)
-        weakened |= np.asarray(contact.sinkage_exponent) <= 0.0
-        flags = flags + np.where((np.abs(points.slip) > 0.95) | weakened, OUTSIDE_VALIDITY, 0)
-        shape = angle.shape
-        angles = angle, contact.peak_angle, contact.leaving_angle
-        columns = (*outputs, *angles, contact.lateral_force)
-        sinkage, pull, torque, entrance, peak, leaving, lateral = (
-            np.array(np.broadcast_to(column, shape)) for column in columns
-        )
-        return SteadyState(sinkage, pull, torque, entrance, peak, leaving, lateral, flags)
+    return SteadyState(
+        sinkage=whole(contact.sinkage),
+        drawbar_pull=whole(contact.drawbar_pull),
+        torque=whole(contact.torque),
+        entrance_angle=whole(angle),
+        peak_stress_angle=whole(contact.peak_angle),
+        leaving_angle=whole(contact.leaving_angle),
+        lateral_force=whole(contact.lateral_force),
+        flags=flags,
+    )

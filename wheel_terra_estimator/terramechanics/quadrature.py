@@ -29,14 +29,14 @@ def _rule(nodes: int, dimensions: int) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def forces(
-    contact: Contact[Quantity], terms: Terms, nodes: int = NODES
+    contact: Contact[Quantity], terms: Terms, nodes: int | None = None
 ) -> tuple[Quantity, Quantity, Quantity]:
     """Vertical force, longitudinal force and torque on the wheel, angles given.
 
     Ding et al. 2010 eq. 19 (doi 10.1007/s11771-010-0021-7) for the load, the same integrals for
     pull and torque: W = b Int (r sigma cos + R tau sin), F = b Int (R tau cos - r sigma sin), T = b
     R^2 Int tau. Returns W [N], F [N] in the direction of motion, T [N m], in the common shape of
-    the contact.
+    the contact; ``nodes``: other than `NODES`.
     """
     weight, cosine, sine = _stressed(contact, terms, nodes)
     angle, normal = contact.angle, contact.normal_stress
@@ -49,25 +49,26 @@ def forces(
     return load, pull, width * contact.shear_radius * np.add.reduce(shear)
 
 
-def lateral_force(contact: Contact[Quantity], terms: Terms, nodes: int = NODES) -> Quantity:
+def lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
     """Force of the soil under the rim on the wheel, positive left [N], angles given.
 
     Ishigami et al. 2007 (doi 10.1002/rob.20187), without the flank: F_y = b R Int tau_y.
     """
     if contact.straight:
         return 0.0 * contact.entrance_angle
-    weight, _, sine = _stressed(contact, terms, nodes)
+    weight, _, sine = _stressed(contact, terms)
     strength = contact.cohesion + contact.normal_stress * contact.tan_friction
     across = strength * stresses.mobilised_shares(contact, contact.angle, sine=sine)[1]
     return contact.width * contact.shear_radius * np.add.reduce(across * weight)
 
 
 def _stressed(
-    contact: Contact[Quantity], terms: Terms, nodes: int
+    contact: Contact[Quantity], terms: Terms, nodes: int | None = None
 ) -> tuple[Quantity, Quantity, Quantity]:
     """Set angle and normal stress of the nodes; return their weights [rad], cosines and sines."""
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     front, rear = t1 - tm, tm - t2
+    nodes = nodes or NODES
     x, w = _rule(nodes, max(np.ndim(front), np.ndim(rear), np.ndim(contact.slip)))
     entry_side = t1 - front * x
     angle = np.concatenate([entry_side, np.broadcast_to(t2 + rear * x, entry_side.shape)])

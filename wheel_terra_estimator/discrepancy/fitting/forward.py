@@ -34,7 +34,6 @@ from wheel_terra_estimator.terramechanics.terms import (
 )
 
 STEP = 1e-5  # of u, for one-sided differences
-NODES = 8  # quadrature nodes on each side of the peak stress
 _LEAST_ANGLE, _GREATEST_ANGLE = 1e-3, 1.55  # [rad]
 _TOLERANCE, _ITERATIONS = 1e-6, 60  # relative to the load
 
@@ -62,7 +61,6 @@ class Forward:
     soil: Soil
     base_effects: Mapping[str, Mapping[str, float]]
     catalogue: Mapping[str, Effect]
-    nodes: int = NODES
     active: BoolArray | None = None
     readings: Readings | None = None
 
@@ -130,11 +128,11 @@ class Forward:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the load balance (C, N) [N] and the outputs (C, N, 4) at given angles."""
         set_angles(contact, angle, self._leaving_angle, terms)
-        load, pull, torque = quadrature.forces(contact, terms, self.nodes)
+        load, pull, torque = quadrature.forces(contact, terms)
         contact.sinkage = contact.radius * (1.0 - np.cos(angle))
         contact.drawbar_pull = contact.direction * pull
         contact.torque = contact.direction * torque
-        contact.lateral_force = quadrature.lateral_force(contact, terms, self.nodes)
+        contact.lateral_force = quadrature.lateral_force(contact, terms)
         terms.apply('on_outputs', contact)
         outputs = np.empty((*angle.shape, len(QUANTITIES)))
         outputs[..., 0] = contact.sinkage
