@@ -9,9 +9,14 @@ import pytest
 from terra_tools import SAND, WHEEL, state
 
 from wheel_terra_estimator.terramechanics import effects
-from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
+from wheel_terra_estimator.terramechanics.conditioned import (
+    ConditionedForces,
+    ConditionedInputs,
+    contacts_as_built,
+)
 from wheel_terra_estimator.terramechanics.effects import Effect, EffectParameter, catalogue
 from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.terms import Terms
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 TAN = math.tan(SAND.friction_angle)
@@ -166,6 +171,26 @@ def test_the_filter_s_forces_from_the_sinkage_agree_with_the_model(name, slip):
     )
     assert torque[0] == pytest.approx(steady.torque[0], rel=2e-3, abs=0.01)
     assert pull[0] == pytest.approx(steady.drawbar_pull[0], rel=2e-3, abs=0.1)
+
+
+@pytest.mark.parametrize('name', ['bulldozing', 'bulldozing:terzaghi', 'grouser_thrust'])
+def test_soil_is_pushed_with_its_own_friction_whatever_that_of_the_rim(name):
+    """What the soil gives to a wall of soil, at one contact, does not know the rim."""
+
+    def pushed(*others: str) -> float:
+        settings = {key: {} for key in (name, *others)}
+        contact = contacts_as_built(Wheel(0.15, 0.15, 0.002, 24), SAND, G)
+        contact.slip = contact.velocity_ratio = 0.3
+        contact.cohesion, contact.tan_friction, contact.shear_modulus = 500.0, TAN, 0.01
+        contact.normal_load, contact.direction = LOAD, 1.0
+        terms = Terms(effects.check_settings(settings))
+        terms.apply('on_inputs', contact)
+        contact.entrance_angle, contact.leaving_angle = 0.6, -0.1
+        terms.apply('on_outputs', contact)
+        return float(contact.drawbar_pull[0])
+
+    assert abs(pushed()) > 1.0
+    assert pushed('rim_friction') == pytest.approx(pushed(), rel=1e-12)
 
 
 LASTING = (

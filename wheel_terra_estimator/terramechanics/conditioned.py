@@ -169,7 +169,7 @@ def contacts_as_built(wheel: Wheel, soil: Soil, gravity: float) -> Contact[Any]:
         column.flags.writeable = False  # a term changes its own contact, never these
     contact: Contact[Any] = Contact(**dict.fromkeys(Contact.__dataclass_fields__, 0.0))
     contact.radius = contact.shear_radius = contact.rim_radius = radius
-    contact.width = width
+    contact.width, contact.rim_share = width, 1.0
     contact.lug_height, contact.lug_count, contact.lug_thickness = height, count, thickness
     contact.gravity, contact.density = gravity, float(soil.density)
     contact.bearing_modulus, contact.reference_depth = soil.bearing(width, gravity)

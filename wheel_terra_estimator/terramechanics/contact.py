@@ -66,12 +66,19 @@ class Contact(Generic[Q]):
     torque: Q | float = 0.0  # [N m]
     # Wheel as built, whatever the effects make of `radius`: resets and arms refer to it.
     rim_radius: Q | float = 0.0  # [m]
+    rim_share: Q | float = 1.0  # friction of soil on the rim over that of soil on soil [-]
     # Sideways motion; the float 0.0 where no wheel slides sideways.
     lateral_ratio: Q | float = 0.0  # v_y/w [m], positive left
 
     def __copy__(self) -> Contact[Q]:
         """Return a contact with the same quantities: terms change the copy alone."""
         return Contact(*map(self.__getattribute__, Contact.__slots__))
+
+    @property
+    def soil_friction(self) -> Quantity:
+        """Friction of soil on soil, tan(phi) [-]: where `tan_friction` is that of the rim."""
+        on_rim: Any = self.tan_friction
+        return on_rim / self.rim_share
 
     @property
     def straight(self) -> bool:

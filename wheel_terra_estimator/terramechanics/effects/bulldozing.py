@@ -20,11 +20,11 @@ def wedge_resistance(contact: Contact[Quantity], depth: Quantity) -> Quantity:
 
     D1 (c h + D2 rho g h^2/2) at the depth h [m] of its foot.
     """
-    friction = np.arctan(contact.tan_friction)
+    friction = np.arctan(contact.soil_friction)
     wedge = 0.25 * np.pi - 0.5 * friction  # angle of the failure plane, Xc
     cot = 1.0 / np.tan(wedge)
     d1 = cot + np.tan(wedge + friction)
-    d2 = cot + cot * cot * contact.tan_friction
+    d2 = cot + cot * cot * contact.soil_friction
     weight = contact.density * contact.gravity
     return d1 * (contact.cohesion * depth + 0.5 * d2 * weight * depth**2)
 
@@ -45,7 +45,7 @@ def _push(contact: Contact[Quantity], p: SimpleNamespace) -> None:
 
 
 def _earth_pressure(contact: Contact[Quantity], p: SimpleNamespace) -> None:
-    friction = np.arctan(np.maximum(contact.tan_friction, _LEAST_FRICTION))
+    friction = np.arctan(np.maximum(contact.soil_friction, _LEAST_FRICTION))
     tan, cos = np.tan(friction), np.cos(friction)
     half = 0.25 * np.pi + 0.5 * friction
     turn = np.exp(2.0 * (0.75 * np.pi - 0.5 * friction) * tan)

@@ -26,7 +26,7 @@ def _textbook(contact: Contact[Quantity], p: SimpleNamespace) -> None:
 
 def _passive_coefficient(contact: Contact[Quantity]) -> Quantity:
     """Rankine's Np = tan^2(pi/4 + phi/2) [-]."""
-    friction = np.arctan(contact.tan_friction)
+    friction = np.arctan(contact.soil_friction)
     return np.tan(0.25 * np.pi + 0.5 * friction) ** 2
 
 

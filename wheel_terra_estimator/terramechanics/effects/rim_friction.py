@@ -15,7 +15,8 @@ from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 def _slide(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     bare = np.exp(-contact.lug_height / p.ring_height)
-    contact.tan_friction = contact.tan_friction * (1.0 - p.loss * bare)
+    contact.rim_share = 1.0 - p.loss * bare
+    contact.tan_friction = contact.tan_friction * contact.rim_share
 
 
 EFFECT = Effect(

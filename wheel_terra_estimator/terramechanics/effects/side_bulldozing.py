@@ -58,7 +58,7 @@ def _plate(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.lateral_force = contact.lateral_force - push
     # The flank slides past the wedge: backwards as the wheel turns, down as the wedge rises.
     back = _CENTRE * r - contact.velocity_ratio
-    wedge = 0.25 * np.pi - 0.5 * np.arctan(contact.tan_friction)
+    wedge = 0.25 * np.pi - 0.5 * np.arctan(contact.soil_friction)
     rise = np.tan(wedge) * contact.lateral_ratio
     slide = np.maximum(np.sqrt(back * back + rise * rise), 1e-12)
     rub = contact.tan_friction * np.abs(push) * back / slide
