@@ -168,66 +168,20 @@ class Forward:
         jacobian: bool = True,
         # Coordinates of each hypothesis by which to differentiate (default: all)
         by: Sequence[Sequence[int]] | None = None,
-        # (N, 4) outputs of all hypotheses where ``start`` is the solution: nothing is solved, and
-        # the derivatives by the angle are those of one of them
-        known: FloatArray | None = None,
     ) -> State:
         """Solve the load balance of every hypothesis; with Jacobians by u unless told otherwise."""
         if by is None:
             by = [range(len(h)) for h in hypotheses]
         if start is not None:
             start = np.broadcast_to(start, (len(u), len(self.points)))
-        groups: dict[frozenset[str], list[int]] = {}
-        for b, hypothesis in enumerate(hypotheses):
-            groups.setdefault(self._acting_on_stress(hypothesis), []).append(b)
-        if len(groups) > 1:
-            return self._apart(hypotheses, u, start, jacobian, by, known, list(groups.values()))
         columns = [
             {c.key: float(c.value(x)) for c, x in zip(h, values, strict=True)}
             for h, values in zip(hypotheses, u, strict=True)
         ]
-        if known is None or start is None:
-            angle, outputs = self._balance(hypotheses, columns, start)
-        else:
-            angle, outputs = start, np.broadcast_to(known, (*start.shape, len(QUANTITIES)))
+        angle, outputs = self._balance(hypotheses, columns, start)
         if not jacobian:
             return State([np.asarray(x) for x in u], angle, outputs, [], [])
-        alike = known is not None
-        return self._differences(hypotheses, u, by, columns, angle, outputs, alike)
-
-    def _acting_on_stress(self, hypothesis: Sequence[Coordinate]) -> frozenset[str]:
-        """Terms of the hypothesis that work at every node of the quadrature, at a price."""
-        owners = {c.owner for c in hypothesis} - {'soil'} - self.base_effects.keys()
-        return frozenset(n for n in owners if self.catalogue[n].on_normal_stress is not None)
-
-    def _apart(
-        self,
-        hypotheses: Sequence[Sequence[Coordinate]],
-        u: Sequence[FloatArray],
-        start: FloatArray | None,
-        jacobian: bool,
-        by: Sequence[Sequence[int]],
-        known: FloatArray | None,
-        groups: Sequence[Sequence[int]],
-    ) -> State:
-        """Solve groups of hypotheses apart, so that none pays for the expensive terms of others."""
-        angle = np.empty((len(u), len(self.points)))
-        outputs = np.empty((*angle.shape, len(QUANTITIES)))
-        jacobians: list[FloatArray] = [np.empty(0)] * (len(u) if jacobian else 0)
-        slopes = list(jacobians)
-        for group in groups:
-            part = self.solve(
-                [hypotheses[b] for b in group],
-                [u[b] for b in group],
-                None if start is None else start[group],
-                jacobian,
-                [by[b] for b in group],
-                known,
-            )
-            angle[group], outputs[group] = part.angle, part.outputs
-            for k, b in enumerate(group if jacobian else ()):
-                jacobians[b], slopes[b] = part.jacobian[k], part.angle_slope[k]
-        return State([np.asarray(x) for x in u], angle, outputs, jacobians, slopes)
+        return self._differences(hypotheses, u, by, columns, angle, outputs)
 
     def _differences(
         self,
@@ -237,34 +191,28 @@ class Forward:
         columns: Sequence[dict[str, float]],
         angle: FloatArray,
         outputs: FloatArray,
-        alike: bool,
     ) -> State:
-        """Jacobians (implicit functions): dy/du at fixed angle, then along the balance.
-
-        Hypotheses that are all ``alike`` at ``u`` share one plain copy.
-        """
-        plain = columns[:1] if alike else columns
-        copies = list(plain)
-        owner = list(range(len(plain)))
+        """Jacobians (implicit functions): dy/du at fixed angle, then along the balance."""
+        copies = list(columns)
+        owner = list(range(len(columns)))
         for b, (hypothesis, values) in enumerate(zip(hypotheses, u, strict=True)):
             for c, x in ((hypothesis[k], values[k]) for k in by[b]):
                 copies.append({**columns[b], c.key: float(c.value(x + self._step(c, x)))})
                 owner.append(b)
         # Once more the plain copies, for the derivative along the angle.
         step = 1e-6
-        contact, terms = self._contact(hypotheses, [*copies, *plain])
+        contact, terms = self._contact(hypotheses, [*copies, *columns])
         residual, shifted = self._response(
-            contact, terms, np.concatenate([angle[owner], angle[: len(plain)] + step])
+            contact, terms, np.concatenate([angle[owner], angle + step])
         )
         beyond, moved = residual[len(copies) :], shifted[len(copies) :]
-        jacobians, slopes, at = [], [], len(plain)
+        jacobians, slopes, at = [], [], len(columns)
         for b, hypothesis in enumerate(hypotheses):
             count = len(by[b])
             steps = np.array([self._step(hypothesis[k], u[b][k]) for k in by[b]])
-            own = 0 if alike else b
-            base_r, base_y = residual[own], shifted[own]
-            by_angle = (beyond[own] - base_r) / step
-            y_by_angle = (moved[own] - base_y) / step
+            base_r, base_y = residual[b], shifted[b]
+            by_angle = (beyond[b] - base_r) / step
+            y_by_angle = (moved[b] - base_y) / step
             direct_r = (residual[at : at + count] - base_r) / steps[:, None]
             direct_y = (shifted[at : at + count] - base_y) / steps[:, None, None]
             angle_by_u = -direct_r / by_angle

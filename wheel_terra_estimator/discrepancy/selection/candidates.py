@@ -171,8 +171,8 @@ def _strength_responses(
 ) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
     """Return outputs (N, 4), entrance angle (N,) and derivative (N, 4, 1) by strength of each.
 
-    At neutral strength everything but the strength has the derivatives of the base. Terms of a
-    sparse law have nothing but a strength, so that all of them stand in one model side by side.
+    Terms of a sparse law have nothing but a strength, so that all of them stand in one model side
+    by side.
     """
     fixed = len(base.u)
     if all(setting.effects[name].sparse for name, _, _ in trials):
@@ -184,20 +184,10 @@ def _strength_responses(
             (state.outputs[0], state.angle[0], state.jacobian[0][..., k : k + 1])
             for k in range(len(trials))
         ]
-    # At rest everything but the strength stands where the base does.
-    at_rest = [shape[0] == own[0].coordinate(own[0].neutral) for _, own, shape in trials]
-    found: dict[int, tuple[FloatArray, FloatArray, FloatArray]] = {}
-    for known in (base.outputs, None):
-        places = [k for k, rests in enumerate(at_rest) if rests == (known is not None)]
-        if not places:
-            continue
-        state = setting.forward.solve(
-            [(*base.coordinates, *trials[k][1]) for k in places],
-            [np.concatenate([base.u, trials[k][2]]) for k in places],
-            base.angle,
-            by=[[fixed]] * len(places),
-            known=known,
-        )
-        answers = zip(state.outputs, state.angle, state.jacobian, strict=True)
-        found.update(zip(places, answers, strict=True))
-    return [found[k] for k in range(len(trials))]
+    state = setting.forward.solve(
+        [(*base.coordinates, *own) for _, own, _ in trials],
+        [np.concatenate([base.u, shape]) for _, _, shape in trials],
+        base.angle,
+        by=[[fixed]] * len(trials),
+    )
+    return list(zip(state.outputs, state.angle, state.jacobian, strict=True))
