@@ -4,14 +4,12 @@
 
     python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations \
         [--only hit kls1 ...]
-    python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations --no-pictures \
-        --page cases.md
+    python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations --no-pictures
 
 Measured data are looked for in ``../shared`` (``--shared`` says where else); a case whose data are
 not there is skipped, visibly. Each case writes ``report.json``, ``report.html``, ``model.yaml``
 and pictures into a folder of its name; the verdicts are listed on the terminal and in
-``summary.md``; ``--page`` writes the table of all cases, each with its gap and whether it was
-halved or why not. What they mean is discussed in ``docs/discrepancy/demonstrations.md``.
+``summary.md``. What they mean is discussed in ``docs/discrepancy/demonstrations.md``.
 """
 
 from __future__ import annotations
@@ -25,7 +23,6 @@ from pathlib import Path
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.discrepancy.numbers import SHOWN
 from wheel_terra_estimator.discrepancy.report.model_file import write_files
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
@@ -300,69 +297,6 @@ def summary(name: str, case: Case, diagnosis: Diagnosis) -> str:
     return '\n'.join(lines) + '\n'
 
 
-_PAGE_HEAD = """# Every real case: was the gap halved?
-
-Written by `python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations
---no-pictures --page cases.md`; do not edit.
-What the cases mean: [demonstrations](demonstrations.md).
-
-Root-mean-square error on rows that the fit did not see. *In the end* is the named effect, or the
-proposed law where nothing is named. The gap is the error beyond the noise, sqrt(error² - noise²);
-the last column but one is what is left of the gap of the model as configured, and of the refitted
-soil. A case is halved where the gaps of its quantities, each over its noise, together (root of the
-sum of squares) are at most half of those as configured.
-
-| case | verdict | quantity | configured | refitted | end | noise | left of | halved |
-|---|---|---|---|---|---|---|---|---|
-"""
-_HALF = 0.5
-# Why a case keeps more than half of its gap, in one sentence each.
-REASONS: dict[str, str] = {
-    'hit': 'six rows of one load and lug height hold what lugs add at one to two noise deviations, '
-    'and seven soil numbers fit it nearly as well as any effect',
-    'hit_paired': 'twelve rows of one load; a structural error of 25 % of the range, as both '
-    'tables show it, lies over the six that have the effect',
-    'cmu_fitted': 'the model as configured is the fit itself, and agrees; its 1.4 mm and '
-    '0.8 N are what that law leaves of rows whose repeats lie within 1 mm and 0.3 N, and slips '
-    'left out are not predicted better by another soil',
-    'grc3': 'pull alone; the mound that is nearest is too doubtful to be named',
-    'soilbin_slope': 'on slips left out the law leaves 10.8 mm, where a soil refit alone goes to '
-    '50 mm',
-    'frostyboy_4': 'no window of 4 s at a constant wheel rate without a turn; the rover digs in at '
-    'once',
-}
-
-
-def case_rows(name: str, diagnosis: Diagnosis) -> str:
-    """Return the rows of a case: each quantity with its gaps, and whether they were halved."""
-    proposal = diagnosis.proposal
-    said = ' + '.join(effect.name for effect in diagnosis.effects) or diagnosis.verdict
-    gaps = diagnosis.gap if proposal is None else proposal.gap
-    rows, before_all, after_all = [], 0.0, 0.0
-    for quantity, gap in gaps.items():
-        scale, unit = SHOWN[quantity]
-        noise = gap.noise or 1e-12
-        before, refit, after = (
-            math.sqrt(max((value / noise) ** 2 - 1.0, 0.0))
-            for value in (gap.before, gap.refit, gap.after)
-        )
-        before_all, after_all = before_all + before**2, after_all + after**2
-        # A gap below half of the noise is none.
-        left = ', '.join(
-            '-' if of <= _HALF else f'{100 * after / of:.0f} %' for of in (before, refit)
-        )
-        values = [f'{scale * v:.3g}' for v in (gap.before, gap.refit, gap.after, noise)]
-        rows.append([f'{quantity.replace("_", " ")} [{unit}]', *values, left])
-    halved = after_all <= max(_HALF**2 * before_all, _HALF**2)
-    said = f'{said}, law proposed' if proposal else said
-    verdict = 'yes' if halved else f'no: {REASONS.get(name, "no reason stated")}'
-    lines = []
-    for k, row in enumerate(rows):
-        head = [name, said] if k == 0 else ['', '']
-        lines.append(f'| {" | ".join([*head, *row, verdict if k == 0 else ""])} |')
-    return '\n'.join(lines)
-
-
 def main() -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(
@@ -373,10 +307,8 @@ def main() -> None:
     parser.add_argument('--shared', type=Path, default=default, help='folder of measured data')
     parser.add_argument('--only', nargs='*', default=list(CASES), choices=list(CASES))
     parser.add_argument('--no-pictures', action='store_true', help='no report.html')
-    parser.add_argument('--page', type=Path, help='Markdown page of all cases, to be written')
     arguments = parser.parse_args()
     parts: list[str] = []
-    judged: list[str] = []
     for name in arguments.only:
         try:
             case = CASES[name](arguments.shared)
@@ -384,20 +316,15 @@ def main() -> None:
             parts.append(f'## {name}\n\nskipped: {missing.filename} is not here\n')
         except UserError as error:
             parts.append(f'## {name}\n\nno verdict: {error}\n')
-            why = REASONS.get(name, 'no reason stated')
-            judged.append(f'| {name} | no verdict | | | | | | | no: {why} |')
         else:
             diagnosis = diagnose(case.table, case.configuration, case.reference)
             folder = arguments.output / name
             folder.mkdir(parents=True, exist_ok=True)
             write_files(diagnosis, folder, pictures=not arguments.no_pictures)
-            judged.append(case_rows(name, diagnosis))
             parts.append(summary(name, case, diagnosis))
         print(parts[-1], flush=True)
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / 'summary.md').write_text('\n'.join(parts), encoding='utf-8')
-    if arguments.page:
-        arguments.page.write_text(_PAGE_HEAD + '\n'.join(judged) + '\n', encoding='utf-8')
 
 
 if __name__ == '__main__':
