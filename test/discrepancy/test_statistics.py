@@ -330,6 +330,19 @@ def test_noise_is_estimated_beside_an_effect(forward, setting):
     assert np.all(np.exp(np.mean(np.log(ratios), axis=0)) == pytest.approx(1.0, rel=0.3))
 
 
+def test_smooth_rows_are_not_taken_for_free_of_noise(forward, setting):
+    """Sixteen rows without scatter, read off a curve: half a per cent of the range at least."""
+    soil, truth, _, inputs, scale = setting
+    guess = np.broadcast_to(0.01 * scale, truth.shape)
+    problem = build_problem(truth, guess, inputs, scale)
+    start, variance = [np.zeros(len(soil))], problem.variance(0.1)
+    nothing = fit(forward, problem, problem.observed, [((), soil)], start, variance)[0]
+    origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
+    before = Noise(guess, origin, dict.fromkeys(origin, 0.0))
+    after = noise.estimate_noise(before, nothing, problem, problem.observed)
+    assert (after.std[0, :3] > 0.005 * scale[:3]).all()
+
+
 def test_repeats_give_the_noise():
     rng = np.random.default_rng(2)
     slip = np.repeat(np.linspace(0.1, 0.8, 8), 5)

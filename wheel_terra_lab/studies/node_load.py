@@ -5,21 +5,15 @@
 ::
 
     python -m wheel_terra_lab.studies.node_load --odometry 100 --imu 100 --pairs 5 --seconds 20
-    python -m wheel_terra_lab.studies.node_load --late imu/data --delay 0.5 --jitter 0.2
-
-The second kind compares the node with late messages with itself with punctual ones.
 """
 
 from __future__ import annotations
 
 import argparse
-import heapq
-import random
 import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -28,42 +22,9 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_lab.studies.live_rover import Process, Rover, quantile
+from wheel_terra_lab.studies.live_rover import Process, Rover, quantile, serve
 
 OUTPUTS = ('slip', 'sinkage', 'slip_stddev', 'sinkage_stddev', 'mobility', 'soil')
-
-
-class LateLink:
-    """Sends the messages of one topic late.
-
-    Parameters
-    ----------
-    topic : str
-        Which; empty text: none.
-    delay, jitter : float
-        How late [s], and by what share of it more or less at random.
-    """
-
-    def __init__(self, topic: str, delay: float, jitter: float) -> None:
-        self._topic, self._delay, self._jitter = topic, delay, jitter
-        self._held: list[tuple[float, int, Callable[[Any], None], Any]] = []
-        self._count = 0
-
-    def send(self, topic: str, message: Any, publish: Callable[[Any], None]) -> None:
-        """Send a message at once or hold it back."""
-        if topic != self._topic:
-            publish(message)
-            return
-        delay = self._delay * (1.0 + self._jitter * random.uniform(-1.0, 1.0))
-        self._count += 1
-        heapq.heappush(self._held, (time.monotonic() + delay, self._count, publish, message))
-
-    def release(self) -> float:
-        """Send what is due; return when the next message is."""
-        while self._held and self._held[0][0] <= time.monotonic():
-            _, _, publish, message = heapq.heappop(self._held)
-            publish(message)
-        return self._held[0][0] if self._held else float('inf')
 
 
 def floor_node(executor: str) -> None:
@@ -101,32 +62,25 @@ def floor_node(executor: str) -> None:
 
 
 def run(
-    arguments: argparse.Namespace, command: list[str], names: tuple[str, ...], late: str = ''
+    arguments: argparse.Namespace, command: list[str], names: tuple[str, ...]
 ) -> dict[str, float]:
-    """Run one node for a while, one topic late; return what it cost."""
+    """Run one node for a while; return what it cost."""
     rclpy.init(args=[])
     rates = {'joint_states': arguments.odometry, 'imu/data': arguments.imu}
-    link = LateLink(late, arguments.delay, arguments.jitter)
-    rover = Rover(names, rates | {'sinkage': 20.0, 'reference_odom': 1.0}, link.send)
+    rover = Rover(names, rates | {'sinkage': 20.0, 'reference_odom': 1.0})
     executor = SingleThreadedExecutor()
     executor.add_node(rover)
     begin = time.monotonic()
     process = Process(command)
 
-    def serve(seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            due = min(rover.publish_due(), link.release())
-            executor.spin_once(timeout_sec=max(min(due, end) - time.monotonic(), 0.0))
-
     while not rover.sets and time.monotonic() - begin < 30.0:
-        serve(0.05)
+        serve(rover, executor, 0.05)
     first, cpu_first = time.monotonic() - begin, process.seconds()
-    serve(6.0)
+    serve(rover, executor, 6.0)
     rover.latencies.clear()
     before, wall, sent = process.seconds(), time.monotonic(), rover.count['joint_states']
     sets = rover.sets
-    serve(arguments.seconds)
+    serve(rover, executor, arguments.seconds)
     result = {
         'cpu': 100.0 * (process.seconds() - before) / (time.monotonic() - wall),
         'cpu_first': cpu_first,
@@ -159,9 +113,6 @@ def main() -> int:
     parser.add_argument('--executor', default='events', choices=('events', 'single_threaded'))
     parser.add_argument('--pairs', type=int, default=5)
     parser.add_argument('--seconds', type=float, default=20.0)
-    parser.add_argument('--late', default='', help='topic whose messages come late')
-    parser.add_argument('--delay', type=float, default=0.5, help='how late [s]')
-    parser.add_argument('--jitter', type=float, default=0.0, help='share of it, more or less')
     parser.add_argument('--floor', action='store_true', help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.floor:
@@ -176,14 +127,10 @@ def main() -> int:
         floor = [__file__, '--floor', '--executor', arguments.executor]
         names = configuration.wheels.names
         pairs = [
-            (
-                run(arguments, node if arguments.late else floor, names),
-                run(arguments, node, names, arguments.late),
-            )
+            (run(arguments, floor, names), run(arguments, node, names))
             for _ in range(arguments.pairs)
         ]
-    first, second = ('punctual', 'late') if arguments.late else ('floor', 'node')
-    print(f'            {first:9} {second:9} ratio   (cpu: % of a core; p50, p99: ms; rss: MB)')
+    print('            floor     node      ratio   (cpu: % of a core; p50, p99: ms; rss: MB)')
     keys = ('cpu', 'p50', 'p99', 'rss', 'first', 'cpu_first', 'sets', 'rate', 'lost', 'lost_share')
     for key in keys:
         floor_values, node_values = ([pair[i].get(key) for pair in pairs] for i in (0, 1))

@@ -25,6 +25,9 @@ _SMOOTH = (0.01, 0.03, 0.1, 0.3, 1.0)
 _FIRST_GUESS = 0.01  # of the range
 _USUAL, _SPREAD = 1.5, 1.2  # weak prior of the factor on the guess: centre, width of its log
 _LEAST = 1e-4  # of the range: noise below it is a matter of rounding
+# A few smooth rows, read off a figure or averaged, hide by how much they are off: an estimate is at
+# least what it would be if so many cells more were off by this share of the range.
+_UNSEEN, _UNSEEN_NOISE = 4.0, 0.02
 
 
 def stated_noise(table: SteadyTable, scale: FloatArray) -> Noise:
@@ -99,6 +102,9 @@ def estimate_noise(noise: Noise, fitted: Fit, problem: Problem, observed: FloatA
             target[mine], here.jacobian[mine], problem.roughness[mine], _LEAST / _FIRST_GUESS
         )
         std[:, q] *= value
+        unseen = _UNSEEN * (_UNSEEN_NOISE * problem.scale[q]) ** 2
+        weighed = (count * std[:, q] ** 2 + unseen) / (count + _UNSEEN)
+        std[:, q] = np.maximum(std[:, q], np.sqrt(weighed))
         freedom[QUANTITIES[q]] = count
     return replace(noise, std=std, degrees_of_freedom=freedom)
 

@@ -38,9 +38,6 @@ TEMPERATURE = 1.3
 
 # A named set that leaves something must at least have removed this share of the excess misfit.
 MOST = 0.9
-# Odds, against all hypotheses with an unexplained misfit, from which named sets without one are
-# looked at alone.
-CLEAN_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -83,11 +80,7 @@ def choose(
     named = [h for h in named if h not in excluded]
     if not named or rest - effects > np.log(ODDS_AGAINST_NAMES):
         return Verdict('unexplained', nothing, (), left)
-    # An effect beside a mere floor goes before one beside a misfit that asks for another name.
-    quiet = np.array([log_sum(row[~unexplained]) for row in joint])
-    misfit = log_sum(joint[:, unexplained].ravel())
-    clean = log_sum(quiet[named]) > misfit + np.log(CLEAN_SHARE)
-    best = _best_set(selection, quiet if clean else total, named)
+    best = _best_set(selection, total, named)
     behind = total[nothing] - total[best]
     if excluded and behind > -np.log(ODDS_TO_SPEAK):
         return Verdict('unexplained', nothing, (), left)  # what is left to name is no better
