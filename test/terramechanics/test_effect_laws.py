@@ -147,7 +147,7 @@ def test_the_soil_behind_the_wheel_stands_as_high_as_the_formula_says(name):
     assert 1.0 - math.cos(found.leaving_angle[0]) == pytest.approx(height, rel=1e-9)
 
 
-ON_STRESS = {'hard_layer', 'hard_layer:bearing', 'multipass:rut', 'soil_adhesion:tension'}
+ON_STRESS = {'hard_layer', 'hard_layer:bearing', 'multipass:rut'}
 VARIANTS = [form.name for effect in catalogue().values() for form in effect.forms]
 
 

@@ -6,10 +6,8 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import numpy as np
-
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
@@ -22,18 +20,9 @@ def _below_the_rim(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.sinkage = contact.sinkage - p.thickness
 
 
-def _tension(contact: Contact[Quantity], p: SimpleNamespace) -> None:
-    rear = np.minimum(contact.leaving_angle, -_LEAST_ANGLE)
-    share = np.maximum(contact.angle / rear, 0.0)
-    contact.normal_stress = contact.normal_stress - p.tension * share
-
-
-_LEAST_ANGLE = 1e-6  # [rad]; no tension where nothing of the contact lies behind the hub
-
 EFFECT = Effect(
     name='soil_adhesion',
     claim='soil sticks to the rim: a layer of it rolls with the wheel',
-    form='layer',
     symbol='r, R += thickness for the soil; z, at the rim, -= thickness',
     parameters=(
         EffectParameter(
@@ -50,30 +39,4 @@ EFFECT = Effect(
     source='geometry of a coated wheel; sticking soil: Bekker 1969 (book, no DOI)',
     on_inputs=_layer,
     on_outputs=_below_the_rim,
-    other_forms=(
-        Form(
-            name='tension',
-            claim='soil sticks to the rim: behind the hub it holds the rim back as it lifts off',
-            symbol='sigma -= tension t/t_2 behind the hub',
-            parameters=(
-                EffectParameter(
-                    'tension',
-                    'Pa',
-                    500.0,
-                    0.0,
-                    2e4,
-                    500.0,
-                    'half_normal',
-                    'greatest tension',
-                ),
-            ),
-            validity='moist or fine soil; needs a leaving angle behind the hub; tension below the '
-            'normal stress',
-            source='adhesion of soil to metal (Bekker 1969, book, no DOI); growth to the leaving '
-            'edge assumed',
-            candidate=False,
-            why_aside='an uncertain leaving angle looks like it',
-            on_normal_stress=_tension,
-        ),
-    ),
 )
