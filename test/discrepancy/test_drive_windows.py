@@ -127,7 +127,7 @@ def test_rows_are_what_was_driven():
             else:
                 assert values == pytest.approx(truth, abs=tolerance), name
     assert set(columns['pass_number'][~whole]) == {1.0, 2.0}
-    assert rows.stretches[GOOD] == len(rows.windows)
+    assert rows.seconds[GOOD] == pytest.approx(sum(w.end - w.start for w in rows.windows))
     table = rows.table()
     assert len(table) == len(columns['slip'])
     assert any('steady windows' in note for note in table.notes)

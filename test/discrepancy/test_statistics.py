@@ -53,7 +53,6 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 SOIL = Soil(15600.0, 2.4e6, 1.1, 250.0, np.radians(31.9), 0.011, 0.4, -0.2)
 WHEEL = Wheel(0.157, 0.165, 0.01, 30.0, 0.002)
-KNOWN = np.full(3, np.inf)
 
 
 @pytest.fixture(scope='module')
@@ -151,7 +150,7 @@ def test_evidence_is_the_integral_over_parameters(setting):
     model = linear_fit(rng, problem, 2, coordinates)
     amplitude = 0.02
     floor = Floor((amplitude,) * 4, 0.0, False)
-    got = evidence(problem, model, (floor,), KNOWN).log_joint[0]
+    got = evidence(problem, model, (floor,)).log_joint[0]
 
     row, quantity = problem.row, problem.quantity
     smooth = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
@@ -324,7 +323,7 @@ def test_noise_is_estimated_beside_an_effect(forward, setting):
             [np.zeros(len(soil))],
             problem.variance(0.1),
         )[0]
-        before = Noise(guess, origin, dict.fromkeys(origin, 0.0))
+        before = Noise(guess, origin)
         after = noise.estimate_noise(before, nothing, problem, problem.observed)
         ratios.append((after.std[0] / std[0])[:3])
     assert np.all(np.exp(np.mean(np.log(ratios), axis=0)) == pytest.approx(1.0, rel=0.3))
@@ -338,7 +337,7 @@ def test_smooth_rows_are_not_taken_for_free_of_noise(forward, setting):
     start, variance = [np.zeros(len(soil))], problem.variance(0.1)
     nothing = fit(forward, problem, problem.observed, [((), soil)], start, variance)[0]
     origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
-    before = Noise(guess, origin, dict.fromkeys(origin, 0.0))
+    before = Noise(guess, origin)
     after = noise.estimate_noise(before, nothing, problem, problem.observed)
     assert (after.std[0, :3] > 0.005 * scale[:3]).all()
 

@@ -94,11 +94,11 @@ def decide(
     """
     off, tried, doubtful = False, list[int](), tuple[Naming, ...]()
     everything = frozenset(range(len(findings.selection.explanations)))
-    variance_of = findings.setting.problem.variance
+    problem = findings.setting.problem
     laws = _Laws(table)
     while True:
         barred = everything if len(tried) >= _MOST_TRIED else frozenset(tried)
-        verdict = choose(findings.selection, variance_of, off=off, excluded=barred)
+        verdict = choose(findings.selection, problem, off=off, excluded=barred)
         decision = _judged(table, both, findings, verdict, allowed_error)
         if verdict.status == 'agrees' and not off and channels_off(decision.gap):
             off = True
@@ -191,7 +191,7 @@ def _judged(
     quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
     place = quiet[int(np.argmax(selection.log_joint[verdict.index][quiet]))]
     floor, chosen = selection.floors[place], selection.explanations[verdict.index]
-    own = setting.problem.variance(floor.amplitude, chosen.posterior.noise_factor[place])
+    own = setting.problem.variance(floor.amplitude)
     fits = [findings.nothing, chosen.fitted] if chosen.names else [findings.nothing]
     found = _predicted(table, both, findings, fits, own, floor.largest, allowed_error)
     return Decision(verdict=verdict, floor_index=place, **found)

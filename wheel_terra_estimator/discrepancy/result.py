@@ -229,13 +229,11 @@ class Curves:
 class Noise:
     """Standard deviation of each cell and how it was found.
 
-    ``std`` (N, 4) [m, N, N m]; ``origin`` quantity -> ``given``, ``repeats`` or ``estimated``;
-    ``degrees_of_freedom`` quantity -> how well it is known (infinite where given).
+    ``std`` (N, 4) [m, N, N m]; ``origin`` quantity -> ``given``, ``repeats`` or ``estimated``.
     """
 
     std: FloatArray
     origin: Mapping[str, str]
-    degrees_of_freedom: Mapping[str, float]
     # Quantity -> pooled deviation of rows that repeat one another, its degrees of freedom
     repeatability: Mapping[str, tuple[float, int]] = field(default_factory=dict)
 

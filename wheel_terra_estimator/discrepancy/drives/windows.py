@@ -117,9 +117,7 @@ class DriveRows:
     name: str  # where the drive came from
     columns: Mapping[str, FloatArray]  # column -> (N,) values [SI], nan = not measured
     windows: tuple[Window, ...]  # the steady ones
-    # Quality -> number of stretches and how long they were; ``steady`` are the windows
-    stretches: Mapping[str, int]
-    seconds: Mapping[str, float]
+    seconds: Mapping[str, float]  # quality -> how long; ``steady`` are the windows
     notes: tuple[str, ...]  # for people
 
     def table(self) -> SteadyTable:
@@ -182,7 +180,6 @@ def rows_from_measurements(
         name,
         columns,
         tuple(windows),
-        dict(finder.stretches),
         dict(finder.seconds),
         _notes(finder, windows, left_out),
     )
@@ -195,9 +192,7 @@ class _WindowFinder:
         self.series = series
         self.configuration = configuration
         self.settings = Rover.from_configuration(configuration)
-        self.stretches: Counter[str] = Counter()
         self.seconds: dict[str, float] = {}
-        self._last = ''
 
     def search(self) -> list[Window]:
         """Return the windows in order of time."""
@@ -227,18 +222,15 @@ class _WindowFinder:
             quality, window = self._judge(now, now + duration, passages)
             if window is not None:
                 windows.append(window)
-                now = self._pass(now, duration, GOOD, one=True)
+                now = self._pass(now, duration, GOOD)
             else:
                 now = self._pass(now, max(0.25 * duration, 0.5), quality)
                 if quality == 'slope changes':  # until the last wheel has followed
                     unsettled = float(np.ptp(wheels.x))
         return windows
 
-    def _pass(self, now: float, step: float, quality: str, one: bool = False) -> float:
+    def _pass(self, now: float, step: float, quality: str) -> float:
         """Book a stretch and return its end."""
-        if one or quality != self._last:
-            self.stretches[quality] += 1
-        self._last = quality
         self.seconds[quality] = self.seconds.get(quality, 0.0) + step
         return now + step
 

@@ -3,7 +3,7 @@
 """Evidence of a fitted hypothesis: Laplace's method with truncated priors.
 
 Around the fit the model is linear in u ~ N(0, I), so that the marginal likelihood of the cells is
-Gaussian for every amplitude of the structural error and every factor on the noise. Bounds enter as
+Gaussian for every amplitude of the structural error. Bounds enter as
 the share of the posterior inside them over the share of the prior.
 """
 
@@ -49,7 +49,6 @@ class Posterior:
     log_joint: FloatArray  # (F,) of evidence and prior of the floor
     mean: FloatArray  # (F, P) of u
     covariance: FloatArray  # (F, P, P)
-    noise_factor: FloatArray  # (F, 4) most probable factor on the noise
 
 
 def log_sum(values: FloatArray, axis: int | None = None) -> FloatArray:
@@ -64,7 +63,6 @@ def evidence(
     problem: Problem,
     fitted: Fit,
     floors: tuple[Floor, ...],
-    noise_freedom: FloatArray,
     believed_widths: Sequence[tuple[float, float]] = BELIEVED_WIDTHS,
 ) -> Posterior:
     """Return the evidence of a fit for every floor.
@@ -72,19 +70,13 @@ def evidence(
     Soil as good as stated or worse, and effects small or large, are weighed alike: each floor's
     evidence is the mean over these scales of the priors.
 
-    ``noise_freedom``: (4,) degrees of freedom with which the noise of each quantity is known (inf =
-    given). ``believed_widths``: widths of the priors of configured numbers in units of their
-    coordinates, with their probabilities.
+    ``believed_widths``: widths of the priors of configured numbers in units of their coordinates,
+    with their probabilities.
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u
     amplitude = np.array([floor.amplitude for floor in floors])
-    factor = np.ones((len(floors), len(noise_freedom)))
-    unknown = np.isfinite(noise_freedom)
-    for _ in range(3 if unknown.any() else 0):
-        variance = problem.variance(amplitude, factor)
-        factor = _noise_factor(problem, fitted, target, variance, factor, noise_freedom)
-    variance = problem.variance(amplitude, factor)
+    variance = problem.variance(amplitude)
     weighted = jacobian[None] / variance[:, :, None]
     information = np.swapaxes(weighted, 1, 2) @ jacobian  # (F, P, P)
     right = (target / variance) @ jacobian
@@ -103,10 +95,6 @@ def evidence(
         + problem.size * np.log(2.0 * np.pi)
     )
     value -= problem.log_std
-    if unknown.any():
-        # log density of a scaled inverse chi-square in ln(factor^2), relative to its mode.
-        square = factor[:, unknown] ** 2
-        value += (0.5 * noise_freedom[unknown] * (1.0 - np.log(square) - 1.0 / square)).sum(axis=1)
     value += _truncation(fitted, mean, covariance, priors)
     best = np.argmax(value, axis=0)
     rows = np.arange(len(floors))
@@ -114,7 +102,6 @@ def evidence(
         log_sum(value + np.log(weights)[:, None], axis=0) + [f.log_prior for f in floors],
         mean[best, rows],
         covariance[best, rows],
-        factor,
     )
 
 
@@ -132,36 +119,6 @@ def _prior_precisions(
             combinations.append(scale**-2)
             weights.append(share * part)
     return np.array(combinations), np.array(weights)
-
-
-def _noise_factor(
-    problem: Problem,
-    fitted: Fit,
-    target: FloatArray,
-    variance: FloatArray,
-    factor: FloatArray,
-    noise_freedom: FloatArray,
-) -> FloatArray:
-    """One step of expectation maximisation for the factor on the noise of each quantity."""
-    jacobian = fitted.jacobian
-    weighted = jacobian[None] / variance[:, :, None]
-    precision = np.swapaxes(weighted, 1, 2) @ jacobian + np.diag(fitted.prior)
-    covariance = np.linalg.inv(precision)
-    mean = np.einsum('fpq,fq->fp', covariance, (target / variance) @ jacobian)
-    left = target[None] - mean @ jacobian.T
-    spread = ((jacobian[None] @ covariance) * jacobian[None]).sum(axis=2)
-    new = factor.copy()
-    for q in range(len(noise_freedom)):
-        mine = problem.block == q
-        if not np.isfinite(noise_freedom[q]) or not mine.any():
-            continue
-        k2 = factor[:, q][:, None] ** 2
-        share = k2 / variance[:, mine]
-        # Expected square of the noise part of each axis: the rest of the variance is the floor's.
-        noise = share**2 * (left[:, mine] ** 2 + spread[:, mine]) + k2 * (1.0 - share)
-        freedom = noise_freedom[q]
-        new[:, q] = np.sqrt((freedom + noise.sum(axis=1)) / (freedom + mine.sum()))
-    return np.clip(new, 0.3, 4.0)
 
 
 def _truncation(

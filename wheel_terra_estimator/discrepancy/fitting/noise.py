@@ -34,7 +34,6 @@ def stated_noise(table: SteadyTable, scale: FloatArray) -> Noise:
     """Return the stated deviations, those from repeats, and a first guess for the rest."""
     std = table.stated_std.copy()
     origin: dict[str, str] = {}
-    freedom: dict[str, float] = {}
     repeatability: dict[str, tuple[float, int]] = {}
     for q, quantity in enumerate(QUANTITIES):
         here = np.isfinite(table.measured[:, q])
@@ -47,15 +46,15 @@ def stated_noise(table: SteadyTable, scale: FloatArray) -> Noise:
         if stated.any():
             # Cells without a stated deviation take the median of the stated ones.
             std[here & ~stated, q] = np.median(std[stated, q])
-            origin[quantity], freedom[quantity] = 'given', np.inf
+            origin[quantity] = 'given'
             continue
         if count >= ENOUGH_REPEATS:
             std[here, q] = max(pooled, _LEAST * scale[q])
-            origin[quantity], freedom[quantity] = 'repeats', float(count)
+            origin[quantity] = 'repeats'
         else:
             std[here, q] = _FIRST_GUESS * scale[q]
-            origin[quantity], freedom[quantity] = 'estimated', 0.0
-    return Noise(std, origin, freedom, repeatability)
+            origin[quantity] = 'estimated'
+    return Noise(std, origin, repeatability)
 
 
 def repeats(table: SteadyTable, quantity: int) -> tuple[float, int]:
@@ -93,7 +92,7 @@ def estimate_noise(noise: Noise, fitted: Fit, problem: Problem, observed: FloatA
         return noise
     here = fitted.within(problem, observed)
     target = here.residual + here.jacobian @ here.u
-    std, freedom = noise.std.copy(), dict(noise.degrees_of_freedom)
+    std = noise.std.copy()
     for q in unknown:
         mine = problem.block == q
         if not mine.any():
@@ -105,8 +104,7 @@ def estimate_noise(noise: Noise, fitted: Fit, problem: Problem, observed: FloatA
         unseen = _UNSEEN * (_UNSEEN_NOISE * problem.scale[q]) ** 2
         weighed = (count * std[:, q] ** 2 + unseen) / (count + _UNSEEN)
         std[:, q] = np.maximum(std[:, q], np.sqrt(weighed))
-        freedom[QUANTITIES[q]] = count
-    return replace(noise, std=std, degrees_of_freedom=freedom)
+    return replace(noise, std=std)
 
 
 def _white_part(

@@ -57,19 +57,17 @@ class Problem:
         """Whiten and rotate (m,) or (m, P) cells."""
         return self.rotation @ cells
 
-    def variance(self, amplitude: ArrayLike, noise: ArrayLike = 1.0) -> FloatArray:
+    def variance(self, amplitude: ArrayLike) -> FloatArray:
         """Return (m,) variances of the rotated axes.
 
         ``amplitude``: share of the range; (4,) per quantity, or (F, 4) for (F, m) variances.
-        ``noise``: factor on the noise standard deviation; (4,) or (F, 4) per quantity.
         """
-        a, k = (np.atleast_1d(np.asarray(x, dtype=float)) for x in (amplitude, noise))
+        a = np.atleast_1d(np.asarray(amplitude, dtype=float))
         if (self.block < 0).any():
-            measured = np.unique(self.quantity) if k.shape[-1] > 1 else [0]
-            k, a = k[..., measured].mean(axis=-1, keepdims=True), a.max(axis=-1, keepdims=True)
-        else:
-            k, a = (x[..., self.block] if x.shape[-1] > 1 else x for x in (k, a))
-        return np.asarray(k**2 + a**2 * self.roughness)
+            a = a.max(axis=-1, keepdims=True)
+        elif a.shape[-1] > 1:
+            a = a[..., self.block]
+        return np.asarray(1.0 + a**2 * self.roughness)
 
 
 @dataclass(frozen=True)

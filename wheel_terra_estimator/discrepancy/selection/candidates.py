@@ -60,7 +60,6 @@ class Setting:
     nuisance: tuple[Coordinate, ...]  # soil and stated base effects
     effects: Mapping[str, Effect]  # the visible effects
     floors: tuple[Floor, ...]
-    noise_freedom: FloatArray
     deepest: float  # greatest rim sinkage of the baseline [m]
     # Of the priors of configured numbers, as in ``evidence``
     believed_widths: Sequence[tuple[float, float]] = BELIEVED_WIDTHS
@@ -96,9 +95,7 @@ class Setting:
 
     def explain(self, fitted: Fit) -> Explanation:
         """Weigh a fit."""
-        posterior = evidence(
-            self.problem, fitted, self.floors, self.noise_freedom, self.believed_widths
-        )
+        posterior = evidence(self.problem, fitted, self.floors, self.believed_widths)
         return Explanation(fitted, posterior, float(log_sum(posterior.log_joint)))
 
 

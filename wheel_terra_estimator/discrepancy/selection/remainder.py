@@ -4,20 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.special import chdtrc  # scipy.stats takes longer to load than a diagnosis
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
-
-Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], FloatArray]
 
 # Misfit that even the best floor leaves improbable.
 IMPROBABLE = 1e-3
@@ -58,11 +54,8 @@ class Remainder:
         return self.significant or self.probability_of_any > 0.8
 
 
-def remainder(selection: Selection, index: int, variance_of: Variance) -> Remainder:
-    """Test what explanation number ``index`` leaves.
-
-    ``variance_of``: (amplitude, noise factor) -> (m,) variances of the rotated axes.
-    """
+def remainder(selection: Selection, index: int, problem: Problem) -> Remainder:
+    """Test what explanation number ``index`` leaves of the cells."""
     explanation = selection.explanations[index]
     joint = selection.log_joint[index]
     share = float(np.exp(log_sum(joint[selection.unexplained]) - log_sum(joint)))
@@ -72,7 +65,7 @@ def remainder(selection: Selection, index: int, variance_of: Variance) -> Remain
     quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
     best = quiet[int(np.argmax(joint[quiet]))]
     floor = selection.floors[best]
-    variance = variance_of(floor.amplitude, explanation.posterior.noise_factor[best])
+    variance = problem.variance(floor.amplitude)
     # A reference has no misfit that asks for a name: its structural error moves the soil as well.
     z_score = largest_z_score(explanation.fitted) if selection.unexplained.any() else 0.0
     return Remainder(

@@ -109,7 +109,6 @@ def search(
         deepest = float(np.max(rim))
         found = signatures(builder.forward, problem, nothing, possible, deepest)
         visible = {name: possible[name] for name, s in found.items() if s.greatest >= SEEN}
-        freedom = np.array([noise.degrees_of_freedom.get(q, np.inf) for q in QUANTITIES])
         setting = Setting(
             builder.forward,
             problem,
@@ -117,7 +116,6 @@ def search(
             nuisance,
             visible,
             floors,
-            freedom,
             deepest,
         )
         selection = _select(setting, nothing)

@@ -14,9 +14,9 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.selection.remainder import (
     Remainder,
-    Variance,
     remainder,
 )
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
@@ -53,7 +53,7 @@ class Verdict:
 
 def choose(
     selection: Selection,
-    variance_of: Variance,  # (amplitude, noise factor) -> (m,) variances of the rotated axes
+    problem: Problem,
     *,
     # Unseen rows are off by more than noise and the allowed model error: then a floor is no reason
     # to ask a name for higher odds, and nothing "agrees"
@@ -64,7 +64,7 @@ def choose(
     joint, unexplained = selection.log_joint, selection.unexplained
     total = np.asarray(log_sum(joint, axis=1))
     nothing = selection.nothing
-    left = remainder(selection, nothing, variance_of)
+    left = remainder(selection, nothing, problem)
     agrees = float(log_sum(joint[nothing][~unexplained]))
     rest = float(log_sum(joint[nothing][unexplained]))
     named = [h for h, e in enumerate(selection.explanations) if e.names]
@@ -84,7 +84,7 @@ def choose(
     behind = total[nothing] - total[best]
     if excluded and behind > -np.log(ODDS_TO_SPEAK):
         return Verdict('unexplained', nothing, (), left)  # what is left to name is no better
-    after = remainder(selection, best, variance_of)
+    after = remainder(selection, best, problem)
     if after.significant and _explained(selection, nothing, best) < MOST:
         return Verdict('unexplained', nothing, (), left)
     names = selection.explanations[best].names
