@@ -68,18 +68,18 @@ def run(file: Path, per_group: int, jobs: int) -> None:
     run_jobs(names_of, tasks, ResultFile(file), lambda row: row['key'], jobs=jobs)
 
 
-def logistic(features: np.ndarray, right: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Return logistic coefficients with a ridge around ``centre`` (Newton, steps halved)."""
+def logistic(features: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return logistic coefficients with a ridge around zero (Newton, steps halved)."""
 
     def loss(weights: np.ndarray) -> float:
         margin = features @ weights
         misfit = np.logaddexp(0.0, margin) - right * margin
-        return float(misfit.sum() + 0.5 * RIDGE * ((weights - centre) ** 2).sum())
+        return float(misfit.sum() + 0.5 * RIDGE * (weights**2).sum())
 
-    weights = centre.copy()
+    weights = np.zeros(features.shape[1])
     for _ in range(60):
         p = expit(features @ weights)
-        gradient = features.T @ (right - p) - RIDGE * (weights - centre)
+        gradient = features.T @ (right - p) - RIDGE * weights
         hessian = (features * (p * (1.0 - p))[:, None]).T @ features
         step = np.linalg.solve(hessian + RIDGE * np.eye(len(weights)), gradient)
         while loss(weights + step) > loss(weights) and np.abs(step).max() > 1e-9:
@@ -90,16 +90,8 @@ def logistic(features: np.ndarray, right: np.ndarray, centre: np.ndarray) -> np.
     return weights
 
 
-def fit(file: Path, around: Path | None) -> None:
-    """Fit the map, print its errors on designs left out, write it.
-
-    Parameters
-    ----------
-    around : Path or None
-        Map from more campaigns of an earlier state, in whose neighbourhood the new one is sought;
-        None: around zero.
-    """
-    known = json.loads(around.read_text()) if around else {'features': []}
+def fit(file: Path) -> None:
+    """Fit the map, print its errors on designs left out, write it."""
     records = ResultFile(file).rows
     # Where an effect that looks like the name was left out, its share is taken off by rule.
     records = [r for r in records if 'features' in r and not r['features'].get('alike', 0.0)]
@@ -108,14 +100,10 @@ def fit(file: Path, around: Path | None) -> None:
     result: dict[str, object] = {'features': list(confidence.FEATURES), 'names': len(records)}
     for key, target in (('name', 'right'), ('set', 'in_set')):
         right = np.array([float(record[target]) for record in records])
-        before = dict(zip(known['features'], known.get(key, []), strict=True))
-        centre = np.array([before.get(name, 0.0) for name in confidence.FEATURES])
         left_out = np.empty(len(right))
         for one in np.unique(design):
             mine = design == one
-            left_out[mine] = 1.0 / (
-                1.0 + np.exp(-x[mine] @ logistic(x[~mine], right[~mine], centre))
-            )
+            left_out[mine] = 1.0 / (1.0 + np.exp(-x[mine] @ logistic(x[~mine], right[~mine])))
         sure = left_out > 0.9
         print(
             f'{key}: {len(right)} names, {right.mean():.3f} right; calibration error '
@@ -128,7 +116,7 @@ def fit(file: Path, around: Path | None) -> None:
                 f'  kind left out: {out.sum()} names, {np.mean(left_out[out] > 0.8):.3f} said '
                 f'above 0.8, {np.mean(left_out[out] > 0.9):.3f} above 0.9'
             )
-        result[key] = [round(float(w), 4) for w in logistic(x, right, centre)]
+        result[key] = [round(float(w), 4) for w in logistic(x, right)]
     MAP.write_text(json.dumps(result, indent=1) + '\n')
 
 
@@ -144,12 +132,11 @@ def main() -> None:
     add_jobs_argument(runner, '--processes', words='campaigns at a time')
     fitter = commands.add_parser('fit')
     fitter.add_argument('file', type=Path)
-    fitter.add_argument('--around', type=Path, help='map of an earlier state to start from')
     arguments = parser.parse_args()
     if arguments.command == 'run':
         run(arguments.file, arguments.per_group, arguments.jobs)
     else:
-        fit(arguments.file, arguments.around)
+        fit(arguments.file)
 
 
 if __name__ == '__main__':
