@@ -21,8 +21,8 @@ from wheel_terra_estimator.discrepancy.assessment.gaps import _cell_noise
 from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
-from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, write_report
-from wheel_terra_estimator.discrepancy.report.words import in_words
+from wheel_terra_estimator.discrepancy.report.page import write_report
+from wheel_terra_estimator.discrepancy.report.words import FACTORS, in_words
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_lab.studies.campaigns import Plan, make_campaign, scoring
@@ -158,7 +158,7 @@ def test_numbers_are_those_of_the_diagnosis(page, named):
         assert cells[1] == f'{candidate.log_evidence:.1f}'
         assert cells[-1] == candidate.why_not
     for shift in named.soil:
-        cells = parsed.row(SOIL_WORDS.get(shift.name, shift.name.replace('_', ' ')), 'parameter')
+        cells = parsed.row(FACTORS.get(shift.name, shift.name.replace('_', ' ')), 'parameter')
         assert cells[5] == f'{shift.z_score:+.1f}'
     for item in named.next_measurement:
         assert item.what in parsed.text

@@ -86,55 +86,41 @@ def collect(measurements: Iterable[Measurement], wheels: int, name: str) -> Driv
     They come in any order; ``name`` says where from, for messages. Raises UserError if a sensor is
     missing without which no steady row can be had.
     """
-    rate: dict[int, FloatArray] = {}
-    torque: dict[int, FloatArray] = {}
-    force: dict[int, FloatArray] = {}
-    yaw: dict[int, FloatArray] = {}
-    sinkage: dict[int, FloatArray] = {}
-    reference: dict[int, FloatArray] = {}
+    widths = {
+        'rate': wheels, 'torque': wheels, 'specific_force': 3, 'yaw_rate': 1, 'sinkage': wheels,
+        'reference': 2,
+    }  # fmt: skip
+    found: dict[str, dict[int, FloatArray]] = {key: {} for key in widths}
     for item in measurements:
+        stamp = item.stamp
         if isinstance(item, WheelOdometry):
             # A message may hold some of the wheels only: equal stamps complete one another.
-            for series, values in ((rate, item.rate), (torque, item.torque)):
-                before = series.get(item.stamp)
-                series[item.stamp] = (
-                    values if before is None else np.where(np.isnan(values), before, values)
-                )
+            for key, values in (('rate', item.rate), ('torque', item.torque)):
+                before = found[key].get(stamp, values)
+                found[key][stamp] = np.where(np.isnan(values), before, values)
         elif isinstance(item, InertialReading):
             # A message may hold some of the fields only.
             if not np.isnan(item.specific_force).any():
-                force[item.stamp] = item.specific_force
+                found['specific_force'][stamp] = item.specific_force
             if not np.isnan(item.angular_rate[2]):
-                yaw[item.stamp] = item.angular_rate[2:]
+                found['yaw_rate'][stamp] = item.angular_rate[2:]
         elif isinstance(item, SinkageReading):
-            sinkage[item.stamp] = item.sinkage
+            found['sinkage'][stamp] = item.sinkage
         elif isinstance(item, ReferenceVelocity):
-            reference[item.stamp] = np.array([item.forward, item.variance])
-    for series, topic, why in (
-        (rate, 'wheel odometry', 'wheel rates'),
-        (force, 'imu/data', 'loads and pull come from the specific force'),
-        (yaw, 'imu/data', 'turns are left out by the angular rate'),
-        (reference, 'reference_odom', 'the slip of a drive comes from it'),
+            found['reference'][stamp] = np.array([item.forward, item.variance])
+    for key, topic, why in (
+        ('rate', 'wheel odometry', 'wheel rates'),
+        ('specific_force', 'imu/data', 'loads and pull come from the specific force'),
+        ('yaw_rate', 'imu/data', 'turns are left out by the angular rate'),
+        ('reference', 'reference_odom', 'the slip of a drive comes from it'),
     ):
-        if len(series) < 2:
+        if len(found[key]) < 2:
             raise UserError(
                 f'{name}: no {topic} ({why}); if it has another name in the bag, give '
-                f'--remap {"joint_states" if series is rate else topic}:=/ITS/NAME'
+                f'--remap {"joint_states" if key == "rate" else topic}:=/ITS/NAME'
             )
-    origin = min(rate)
-    return DriveSeries(
-        *(
-            _channel(series, origin, width)
-            for series, width in (
-                (rate, wheels),
-                (torque, wheels),
-                (force, 3),
-                (yaw, 1),
-                (sinkage, wheels),
-                (reference, 2),
-            )
-        )
-    )
+    origin = min(found['rate'])
+    return DriveSeries(**{key: _channel(found[key], origin, widths[key]) for key in widths})
 
 
 def _channel(series: dict[int, FloatArray], origin: int, width: int) -> Channel:

@@ -414,12 +414,9 @@ def _with_deviations(windows: list[Window], configuration: Configuration) -> lis
         for name in names
     }
     # What white noise of the sensors leaves at best: the scatter must not promise more.
+    load = settings.mass * settings.gravity / settings.wheel_count
     least = {
-        'torque': 1e-3
-        * settings.mass
-        * settings.gravity
-        / settings.wheel_count
-        * np.mean(settings.rim_radius),
+        'torque': 1e-3 * load * np.mean(settings.rim_radius),
         'sinkage': 5e-5,
         'pull': settings.mass / settings.wheel_count * float(sensors.specific_force_std),
     }
@@ -469,20 +466,12 @@ def _columns(
         for i in range(wheels.count):
             if np.isnan([window.torque[i], window.sinkage[i]]).all() or window.normal_load[i] <= 0:
                 continue
-            rows.append(
-                {
-                    **constant,
-                    **_wheel(wheels, i),
-                    'slip': window.slip[i],
-                    'slip_std': window.std['slip'][i],
-                    'normal_load': window.normal_load[i],
-                    'angular_velocity': window.rate[i],
-                    'torque': window.torque[i],
-                    'torque_std': window.std['torque'][i],
-                    'sinkage': window.sinkage[i],
-                    'sinkage_std': window.std['sinkage'][i],
-                }
-            )
+            row = {**constant, **_wheel(wheels, i), 'normal_load': window.normal_load[i]}
+            row['angular_velocity'] = window.rate[i]
+            for name in ('slip', 'torque', 'sinkage'):
+                row[name] = getattr(window, name)[i]
+                row[f'{name}_std'] = window.std[name][i]
+            rows.append(row)
         if not alike or np.ptp(window.slip) > SLIP_SPREAD:
             left_out += 1
             continue

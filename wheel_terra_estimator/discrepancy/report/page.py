@@ -19,7 +19,7 @@ from wheel_terra_estimator.discrepancy.numbers import (
 )
 from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
-from wheel_terra_estimator.discrepancy.report.words import in_words, law_line, soil_line
+from wheel_terra_estimator.discrepancy.report.words import FACTORS, in_words, law_line, soil_line
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
 from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE
 from wheel_terra_estimator.reporting.html import picture, render
@@ -30,10 +30,6 @@ if TYPE_CHECKING:
 
 TEMPLATES = Path(__file__).parent / 'templates'
 _RESOLUTION = 110  # [dots per inch]
-SOIL_WORDS = {
-    'stiffness': 'bearing stiffness (factor on both moduli)',
-    'tan_friction': 'tangent of the friction angle',
-}
 _TONES = {'agrees': 'good', 'named': 'warn', 'unexplained': 'bad', 'undecided': 'warn'}
 
 
@@ -67,7 +63,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         soil_line=soil_line(diagnosis),
         law_line=law_line(diagnosis),
         where=_where(diagnosis),
-        soil_words=SOIL_WORDS,
+        soil_words=FACTORS,
         far=LARGEST_Z_SCORE,
         # How things are written
         words=plain,

@@ -39,7 +39,7 @@ from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
 
-_KEYS = {
+FACTORS = {
     'stiffness': 'the factor on soil.frictional_modulus and soil.cohesive_modulus',
     'tan_friction': 'the tangent of soil.friction_angle_deg',
 }
@@ -126,7 +126,7 @@ def moved(shift: SoilShift) -> str:
     """Return how far the fit moved a configured number, and how well it was known."""
     key = shift.name if shift.name.startswith('effects.') else f'soil.{shift.name}'
     return (
-        f'{_KEYS.get(shift.name, key)} from {number(shift.before)} to {number(shift.after)}, '
+        f'{FACTORS.get(shift.name, key)} from {number(shift.before)} to {number(shift.after)}, '
         f'{shift.z_score:+.1f} of its standard deviations ({shift.source})'
     )
 
