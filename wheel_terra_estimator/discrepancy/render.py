@@ -61,16 +61,7 @@ def render(
     moved = (*soil, *_shifts(findings, after, variance, *setting.forward.base_effects))
     return Diagnosis(
         verdict=decision.verdict.status,
-        sentence=words.sentence(
-            decision.verdict,
-            effects,
-            gap_p_value,
-            left,
-            decision.floor,
-            stretch,
-            decision.gap,
-            nearest,
-        ),
+        sentence=words.sentence(decision, effects, gap_p_value, stretch, nearest),
         table=table,
         configuration=configuration,
         effects=effects,

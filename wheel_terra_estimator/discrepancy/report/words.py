@@ -12,6 +12,7 @@ from scipy.special import chdtrc
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
+from wheel_terra_estimator.discrepancy.decision import Decision
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.numbers import (
     SHOWN,
@@ -31,7 +32,7 @@ from wheel_terra_estimator.discrepancy.result import (
     QuantityGap,
     SoilShift,
 )
-from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE, Remainder
+from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -251,18 +252,16 @@ def untried(alike: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
 
 
 def sentence(
-    verdict: Verdict,
+    decision: Decision,
     effects: tuple[NamedEffect, ...],
     gap_p_value: float,
-    left: Remainder,
-    floor: float,
-    stretch: Stretch | None = None,
-    gap: Mapping[str, QuantityGap] | None = None,
-    nearest: tuple[str, ...] = (),
+    stretch: Stretch | None,
+    nearest: tuple[str, ...],
 ) -> str:
     """Return the verdict in words."""
+    verdict, left, floor = decision.verdict, decision.verdict.left, decision.floor
     if verdict.status == 'undecided':
-        return _undecided(gap or {}, nearest)
+        return _undecided(decision.gap, nearest)
     within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'
     if not floor:
         within = ' (model-error floor needed: none)'
