@@ -17,7 +17,6 @@ from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.order import changes_along_rows
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import Decision, known_alike
-from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import (
@@ -99,16 +98,11 @@ def render(
 
 def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffect, ...]:
     """Return the named effects as they are reported."""
-    fitted, selection = decision.after, decision.findings.selection
+    fitted = decision.after
     parameters = _parameters(fitted)
     found = []
     for naming in decision.names:
         key, name = naming.key, effect_of(naming.key)
-        forms = {
-            e.names[0]: float(log_sum(selection.log_joint[h]))
-            for h, e in enumerate(selection.explanations)
-            if len(e.names) == 1 and e.effects == {name}
-        }
         competitors = tuple(map(effect_of, naming.competitors))
         found.append(
             NamedEffect(
@@ -131,11 +125,6 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
                 },
                 naming.features,
                 known[key].form if len(known[name].forms) > 1 else '',
-                {
-                    known[form].form: forms[key] - weight
-                    for form, weight in forms.items()
-                    if form != key
-                },
             )
         )
     return tuple(found)
@@ -176,8 +165,9 @@ def _proposal(decision: Decision) -> Proposal | None:
 
 def _nearest(decision: Decision) -> tuple[str, ...]:
     """Return up to three effects: those that were too doubtful to be named, then single ones."""
-    weights = decision.findings.selection.single_weights()
-    keys = [*(name.key for name in decision.doubtful), *sorted(weights, key=lambda k: -weights[k])]
+    best_first = decision.findings.selection.explanations
+    singles = (e.names[0] for e in best_first if len(e.names) == 1)
+    keys = [*(name.key for name in decision.doubtful), *singles]
     return tuple(dict.fromkeys(map(effect_of, keys)))[:_NEAREST]
 
 

@@ -55,8 +55,6 @@ class NamedEffect:
     # What the confidence was computed from (``confidence.FEATURES``)
     features: Mapping[str, float] = field(default_factory=dict, metadata=_ASIDE)
     form: str = ''  # which form of the effect; empty where it has one only
-    # Other form that was tried -> how far it is behind [nats]
-    other_forms: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

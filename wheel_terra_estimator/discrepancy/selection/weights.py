@@ -123,19 +123,6 @@ class Selection:
                 return h
         raise KeyError(names)
 
-    def single_weights(self) -> dict[str, float]:
-        """Return effect -> share of the probability among the single effects."""
-        singles = [
-            (e.names[0], float(log_sum(self.log_joint[h])))
-            for h, e in enumerate(self.explanations)
-            if len(e.names) == 1
-        ]
-        if not singles:
-            return {}
-        logs = np.array([value for _, value in singles])
-        shares = np.exp(logs - log_sum(logs))
-        return {name: float(s) for (name, _), s in zip(singles, shares, strict=True)}
-
 
 def log_prior(names: Sequence[str], visible: Iterable[str]) -> float:
     """Return the log prior of a set of effects among all ``visible`` effects and forms.
