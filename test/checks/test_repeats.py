@@ -85,6 +85,24 @@ def test_a_coarse_gyro_on_a_straight_and_a_simulation_without_noise():
     assert 'frozen' not in {f.kind for f in found(reference=exact, joints=joints)}
 
 
+@pytest.mark.parametrize('dead', [None, 2])
+def test_rates_without_noise_that_stay_together_are_alive_and_one_alone_is_not(dead):
+    """A simulator without noise: a curve that changes all along, then a steady straight."""
+    time = np.arange(0.0, 44.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [0, 5, 30], [0.1, 0.3, 0.3]) + np.where(
+        time < 30, 0.02 * np.sin(time) * np.sin(np.pi * time / 30), 0.0
+    )
+    yaw = np.where(time < 30, 0.1 * np.sin(np.pi * time / 30), 0.0)
+    rate = (speed[:, None] - yaw[:, None] * rover_y()) / rolling.RADIUS
+    whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    if dead is not None:
+        rate[50:300, dead] = rate[50, dead]
+    joints = replace(whole.joints, rate=rate)
+    told = check_recording(replace(whole, joints=joints), rolling.rover()).findings
+    frozen = [f.wheel for f in told if f.kind == 'frozen']
+    assert frozen == ([] if dead is None else [rolling.NAMES[dead]])
+
+
 def rover_y():
     """Places of the wheels beside the middle [m]."""
     return np.array(rolling.rover().wheels.y)
