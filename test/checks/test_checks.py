@@ -357,7 +357,21 @@ def test_transport():
         only(checked(joints=zero), 'order')
     back = joints.stamp - 10**10 * (np.arange(joints.stamp.size) == 500)
     told = only(checked(joints=replace(joints, stamp=back)), 'order')
-    assert 'go back, by up to 9.9 s' in told.words
+    assert 'step by +10.1 s against their arrival' in told.words
+
+
+@pytest.mark.parametrize('by', [-3.0, 30.0])
+def test_a_clock_that_was_set_is_one_finding_whatever_it_stamps(by):
+    changes = {}
+    for name in ('joints', 'imu', 'sinkage', 'reference'):
+        channel = getattr(WHOLE, name)
+        later = channel.stamp > WHOLE.joints.stamp[1200]
+        stamp = channel.stamp + round(by * 1e9) * later
+        changes[name] = replace(channel, stamp=stamp)
+    told = [f for f in checked(**changes).findings if f.kind in ('order', 'drop_outs', 'delay')]
+    assert [f.kind for f in told] == ['order']
+    assert 'a clock was set' in told[0].words
+    assert all(topic in told[0].words for topic in ('/imu/data', '/sinkage', '/reference_odom'))
 
 
 def test_drives_that_send_a_message_each_repeat_no_stamp():
@@ -382,7 +396,7 @@ def test_without_a_rover_file_signs_are_found_all_the_same():
     assert kinds(report) == {('sign', 'rear_right')}
 
 
-def test_values_that_are_no_numbers_are_passed_over():
+def test_values_that_are_no_numbers_are_passed_over_and_many_of_the_imu_are_told():
     imu, joints, reference = WHOLE.imu, WHOLE.joints, WHOLE.reference
     force, rate, velocity = imu.force.copy(), joints.rate.copy(), reference.velocity.copy()
     force[::9], rate[::5, 1], velocity[::7] = np.nan, np.nan, np.nan
@@ -391,7 +405,9 @@ def test_values_that_are_no_numbers_are_passed_over():
         joints=replace(joints, rate=rate),
         reference=replace(reference, velocity=velocity),
     )
-    assert not report.findings, [str(f) for f in report.findings]
+    (finding,) = report.findings
+    assert (finding.kind, finding.topic) == ('placeholder', '/imu/data')
+    assert finding.words.startswith('11 % ') and 'linear_acceleration' in finding.words
 
 
 def test_degrees_per_second_behind_a_side_that_counts_backwards():

@@ -217,14 +217,15 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     stated = reference.variance[np.isfinite(reference.variance)]
     usual = math.sqrt(max(float(np.median(stated)), 0.0)) if stated.size else 0.0
     evidence.figures['reference.stated_std_m_s'] = float(f'{usual:.3g}')
-    configuration, constant = evidence.facts.configuration, not stated.size or not np.ptp(stated)
+    if stated.size and np.ptp(stated):
+        return []  # what changes is no placeholder
+    configuration = evidence.facts.configuration
     own = configuration.sensors.reference_std if configuration is not None else 0.0
     expected = usual or float(own or 0.0)  # what the estimator goes by
-    beyond = noise > COVARIANCE_FACTOR * expected
     # Errors wander: what is stated may well be more than the scatter, but not more than the speed.
-    if expected and not beyond and not (constant and expected > np.quantile(np.abs(forward), 0.9)):
+    usual_speed = float(np.quantile(np.abs(forward), 0.9))
+    if expected and noise / COVARIANCE_FACTOR <= expected <= usual_speed:
         return []
     noise = max(noise, LEAST_STD)
     told = {'noise': noise, 'variance': noise**2, 'stated': usual}
-    key = 'covariance' if constant else 'reference_noise'
-    return [evidence.found(key, 0.9, value=float(f'{noise:.2g}'), **told)]
+    return [evidence.found('covariance', 0.9, value=float(f'{noise:.2g}'), **told)]

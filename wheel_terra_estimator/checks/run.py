@@ -47,6 +47,7 @@ from wheel_terra_estimator.checks.series import Recording, Series, rows_of
 from wheel_terra_estimator.checks.statistics import moving_mean
 from wheel_terra_estimator.configuration.configuration import Configuration
 
+LEAST_LOST = 0.01  # share of messages with nan that is told [-]
 LEAST_RIM_SPEED = 0.005  # rim speed that no drive stays below [m/s]
 ORIENTATION = 'the orientation'  # what a gyro is said to turn against
 _LOGGER = logging.getLogger(__name__)
@@ -139,7 +140,8 @@ def _examined(
     for name, offset in late.items():
         on_time = clocks.shifted(getattr(recording, name), round(offset * 1e9))
         recording = replace(recording, **{name: on_time})
-    recording = _whole_rows(recording)
+    stamped = recording
+    recording = mended('placeholder', stamped, lambda: _whole_rows(stamped))
     evidence = against_each_other(recording, facts, AGAINST_EACH_OTHER, mended)
     if evidence is None:
         report.not_checked.append(NotChecked('sign', 'no wheel rates to compare with'))
@@ -233,16 +235,22 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
 WHILE_DRIVING = tuple(check for check in AGAINST_EACH_OTHER if check[3:])
 
 
-def _whole_rows(recording: Recording) -> Recording:
+def _whole_rows(recording: Recording) -> tuple[list[Outcome], Recording]:
     """Leave out IMU and reference messages with values that are no numbers."""
-    imu, velocity = recording.imu, recording.reference
+    imu, velocity, outcomes = recording.imu, recording.reference, list[Outcome]()
     if imu is not None:
         both = np.hstack([imu.force, imu.rate])
         there = np.isfinite(both).any(axis=0)  # a field may say that it is not there
-        imu = _known(imu, np.isfinite(both[:, there]))
+        known = np.isfinite(both)
+        lost = np.where(there, 1.0 - known.mean(axis=0), 0.0)
+        if lost.max() > LEAST_LOST:
+            field = 'linear_acceleration' if lost[:3].max() > lost[3:].max() else 'angular_velocity'
+            told = {'share': 100.0 * float(lost.max()), 'field': field}
+            outcomes.append(found('imu_nan', imu.topic, 0.99, **told))
+        imu = _known(imu, known[:, there])
     if velocity is not None:
         velocity = _known(velocity, np.isfinite(velocity.velocity))
-    return replace(recording, imu=imu, reference=velocity)
+    return outcomes, replace(recording, imu=imu, reference=velocity)
 
 
 def _known(series: Series, known: NDArray[np.bool_]) -> Series | None:

@@ -36,17 +36,27 @@ def check_transport(
 ) -> tuple[list[Outcome], dict[str, float]]:
     """Return what is wrong with the stamps, and how late those of a channel are by log time [s]."""
     outcomes: list[Outcome] = []
-    late, shifts = dict[str, float](), dict[str, float]()
+    late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
     for name in ('joints', 'imu', 'sinkage', 'reference'):
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
             continue
         most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
-        outcomes += _order(channel, most_back) or _drop_outs(name, channel, figures)
-        if channel.late.size:
+        order, step = _order(channel, most_back), _step(channel)
+        outcomes += order
+        if step and not order:
+            steps[channel.topic] = step
+        elif not order:
+            outcomes += _drop_outs(name, channel, figures)
+        if channel.late.size and not step:
             ends = np.array_split(channel.late, 4)[:: 3 if channel.late.size > 3 else 1]
             late[name] = float(np.median(channel.late))
             shifts[name] = float(np.median(ends[0]) - np.median(ends[-1]))
+    if steps:  # of one clock, whatever it stamps
+        topic, *rest = steps
+        how = f'they step by {steps[topic]:+.3g} s against their arrival'
+        how += f', as those of {", ".join(rest)} do: a clock was set' if rest else ''
+        outcomes.append(found('order', topic, 0.99, how=how))
     if 'joints' not in late:
         return outcomes, {}
     assert recording.joints is not None
@@ -78,6 +88,14 @@ def check_transport(
     return outcomes, told
 
 
+def _step(channel: Channel) -> float:
+    """Return the greatest step of the stamps that messages do not arrive by [s]; 0 for none."""
+    stamped = channel.stamp > 0
+    step, arrival = (np.diff(at[stamped]) * 1e-9 for at in (channel.stamp, channel.log_time))
+    far = (step < -FAR_BACK) | ((step > FAR_BACK) & (arrival < 0.5 * step))
+    return float(step[far][np.argmax(np.abs(step[far]))]) if far.any() else 0.0
+
+
 def _order(channel: Channel, most_back: float) -> list[Outcome]:
     stamped = channel.stamp > 0
     zero = float(np.mean(~stamped))
@@ -87,20 +105,15 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     back = float(np.mean(step < -period)) if step.size else 0.0
     again = (step == 0.0) & _of_one_joint(channel)[stamped][1:]
     repeated = float(np.mean(again)) if step.size else 0.0
-    far = int(np.sum(step < -FAR_BACK))
-    arrival = np.diff(channel.log_time[stamped]) * 1e-9
-    leap = float(np.max(step * ((step > FAR_BACK) & (arrival < 0.5 * step)), initial=0.0))
     words = []
     if zero > 0.01:
         words.append(f'{100 * zero:.0f} % of the stamps are 0')
-    if far or back > most_back:
+    if back > most_back:
         words.append(
             f'{100 * back:.1f} % of the stamps go back, by up to {-min(step.min(), 0.0):.2g} s'
         )
     if repeated > BACKWARD_SHARE:
         words.append(f'{100 * repeated:.0f} % of the stamps repeat the one before')
-    if leap:
-        words.append(f'they leap by up to {leap:.3g} s between messages that arrive together')
     if not words:
         return []
     return [found('order', channel.topic, 0.99, how='; '.join(words))]
