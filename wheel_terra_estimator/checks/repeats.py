@@ -151,7 +151,7 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
 
 
 def _still(evidence: Evidence, at: FloatArray) -> FloatArray:
-    """Return where (k,) no rate changes although rates have no noise: all else may stay then too."""
+    """Return where (k,) no rate changes, of rates without noise: all else may stay then too."""
     rate = np.nan_to_num(evidence.rate)
     noise = robust_std(np.diff(rate[evidence.moving], 4, axis=0).ravel()) / FOURTH_OF_NOISE
     if not noise < EXACT * evidence.working_rate:

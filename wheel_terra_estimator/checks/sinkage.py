@@ -162,7 +162,7 @@ def _sign_and_zero(
         spread = max(float(np.nanmax(others) - np.nanmin(others)), 0.1 * abs(far))
         how = f'reads {1000 * far:+.0f} mm off the other wheels all the time'
         odd = max(ODD_ZERO, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
-        if abs(far) > odd and _lasting(table, index, far):
+        if (abs(far) > odd or own < -limit) and _lasting(table, index, far):
             outcomes.append(_zero(evidence, [name], far, spread, how))
     return outcomes
 

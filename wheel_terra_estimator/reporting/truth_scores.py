@@ -169,8 +169,12 @@ def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[tuple[float, 
 
 
 def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
-    """Return for each warning whether the slip estimated after it bears it out, in a sentence."""
-    slip = known(history, 'slip', border)
+    """Return for each warning whether the slip estimated after it bears it out, in a sentence.
+
+    Slip without a class says nothing: inputs that are wrong, or a wide deviation.
+    """
+    judged = history.slip_class != SlipClass.UNKNOWN
+    slip = np.where(judged, known(history, 'slip', border), np.nan)
     there = np.isfinite(slip).any(axis=1)
     if not history.warnings:
         return ()
