@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from wheel_terra_estimator.checks.calibration import as_file, calibrate
 from wheel_terra_estimator.checks.imu import gross_tilt
 from wheel_terra_estimator.checks.run import check_recording, examine
+from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.configuration import reader
 
 WRONG = {
@@ -176,6 +177,19 @@ def test_a_dead_reference_lifts_no_rover():
     joints = replace(whole.joints, torque=0.0 * whole.joints.torque)
     _, evidence = examine(replace(whole, reference=dead, joints=joints), rolling.rover())
     assert not evidence.in_air.any() and evidence.moving.any()
+
+
+def test_a_reference_every_three_seconds_does_not_stand_where_the_rover_turns_back():
+    """Ahead, then to and fro in 15 s with light wheels: means of its velocity are nothing."""
+    time = np.arange(0.0, 200.0, 1.0 / rolling.RATE)
+    to_and_fro = np.interp(time % 15.0, [0, 1, 6.5, 7.5, 8.5, 14, 15], [0, 1, 1, 0, -1, -1, 0])
+    speed = 0.3 * np.where(time < 120.0, 1.0, to_and_fro)
+    motion = rolling.Motion(time, speed, 0.0 * time, 0.0 * time)
+    whole = rolling.recording(motion)
+    rare = rows_of(whole.reference, np.arange(whole.reference.stamp.size) % 6 == 0)
+    joints = replace(whole.joints, torque=0.5 * whole.joints.torque)
+    _, evidence = examine(replace(whole, reference=rare, joints=joints), rolling.rover())
+    assert evidence.moving.any() and not evidence.in_air.any()
 
 
 def test_what_the_recording_cannot_tell_stays():

@@ -29,7 +29,8 @@ SETTLING = 0.5  # A speed counts as steady this long after it changed [s]
 STRAIGHT_SHARE = 0.25  # speed of the sides against the middle of a straight, at most [-]
 STANDING_SHARE = 0.1  # speed over rim speed of a rover that stands, at most [-]
 FREE_TRACTION = 0.12  # sum of T/r over the weight of wheels in the air, at most [-]
-SMOOTH_ROWS = 5  # messages over which speed and torque are averaged for that
+SMOOTH_ROWS, SMOOTH_TIME = 5, 1.0
+"""Messages over which speed and torque are averaged for that, those of the reference in 1 s."""
 SHORTEST_FREE = 3.0  # wheels that turn so long while the rover stands may be in the air [s]
 LEAST_MOVING_ROWS = 30  # fewer rows of driving than these tell nothing
 EVEN_GROUND_STD = math.radians(0.8)  # deviation of a tilt by circles on a plane, at most [rad]
@@ -248,8 +249,10 @@ class Evidence:
         reference = self.recording.reference
         if reference is None:
             return None
-        smooth = moving_mean(np.nan_to_num(reference.velocity[:, 0]), SMOOTH_ROWS)
-        return _shared(np.abs(np.interp(self.time, self.seconds(reference), smooth)))
+        # Over messages that are far apart a mean would stand where the rover turns back.
+        rows = int(np.nan_to_num(np.clip(SMOOTH_TIME / reference.period, 1, SMOOTH_ROWS), nan=1))
+        smooth = moving_mean(np.nan_to_num(reference.velocity[:, 0]), rows)
+        return _shared(np.interp(self.time, self.seconds(reference), np.abs(smooth)))
 
     def rim_at(self, stamp: IntArray, values: FloatArray, half: float = AROUND) -> FloatArray:
         """Return means of (k,) values within ``half`` [s] around stamps [ns]; nan for none."""
