@@ -97,11 +97,6 @@ class _Changes:
         """Note a change."""
         self.made.append(Change(key, self.before.get(key), after, std, source))
 
-    def add_with_deviation(self, key: str, after: Value, std: float, source: str) -> None:
-        """Note a change and that of its deviation, which the estimator goes by."""
-        self.add(key, after, std, source)
-        self.add(f'{key}_std', float(f'{std:.3g}'), None, f'deviation of {key}')
-
 
 def _sure(report: CheckReport) -> list[Finding]:
     """Return the findings whose cure stood its trial and has no rival."""
@@ -210,7 +205,9 @@ def _torques(changes: _Changes, evidence: Evidence) -> None:
         zeros = torque.whole_zeros(evidence, zeros)
         after, std = [round(zero.value, 3) for zero in zeros], max(zero.std for zero in zeros)
         source = 'straight stretches driven both ways'
-        changes.add_with_deviation('sensors.torque_zero', after, std, source)
+        key = 'sensors.torque_zero'
+        changes.add(key, after, std, source)
+        changes.add(f'{key}_std', float(f'{std:.3g}'), None, f'deviation of {key}')
 
 
 def _friction(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:

@@ -64,12 +64,10 @@ class CheckReport:
     not_checked: list[NotChecked] = field(default_factory=list)
     figures: dict[str, Any] = field(default_factory=dict)
 
-    def take(self, outcomes: list[Outcome]) -> list[Finding]:
-        """Sort outcomes in; return the findings among them."""
-        found = [o for o in outcomes if isinstance(o, Finding)]
-        self.findings += found
+    def take(self, outcomes: list[Outcome]) -> None:
+        """Sort outcomes in."""
+        self.findings += [o for o in outcomes if isinstance(o, Finding)]
         self.not_checked += [o for o in outcomes if isinstance(o, NotChecked)]
-        return found
 
     def as_dict(self) -> dict[str, Any]:
         """Return what ``check --json`` prints."""

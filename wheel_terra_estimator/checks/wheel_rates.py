@@ -101,12 +101,6 @@ def _stays(evidence: Evidence, index: int) -> float:
     return dead.longest if dead is not None and dead.longest > LONG_FROZEN_TIME else 0.0
 
 
-def _repeats(rate: FloatArray) -> float:
-    """Return the share of rates (k,) or (k, n) that repeat the one before."""
-    change = np.diff(rate, axis=0)
-    return float(np.mean(change[np.isfinite(change)] == 0.0)) if np.isfinite(change).any() else 0.0
-
-
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:
     """Return whether the torque says that a standing wheel is stalled, not its encoder dead."""
     size = np.abs(evidence.torque[rows])
@@ -302,22 +296,19 @@ def _intervals(time: FloatArray) -> FloatArray:
     return np.diff(time, prepend=2.0 * time[0] - time[1]) if time.size > 1 else np.ones(time.size)
 
 
-def common_step(rate: FloatArray, time: FloatArray) -> float:
-    """Return the usual step of the rates (k, n) of all wheels [rad/s]; 0 for none."""
-    interval = _intervals(time)
-    return float(np.median([rate_step(column, interval) for column in rate.T]))
-
-
 def rounding(evidence: Evidence) -> float:
     """Return by how much the mean of the rates may be off, over the working rate [-].
 
     Counts of an encoder come and go, so that their mean is right; a rate that a driver rounds is
     the same all along.
     """
-    rate = evidence.rate[evidence.moving]
-    if evidence.working_rate <= 0.0 or _repeats(rate) < KEPT:
+    rate, time = evidence.rate[evidence.moving], evidence.time[evidence.moving]
+    change = np.diff(rate, axis=0)
+    change = change[np.isfinite(change)]
+    if evidence.working_rate <= 0.0 or not change.size or np.mean(change == 0.0) < KEPT:
         return 0.0
-    return 0.5 * common_step(rate, evidence.time[evidence.moving]) / evidence.working_rate
+    step = np.median([rate_step(column, _intervals(time)) for column in rate.T])
+    return 0.5 * float(step) / evidence.working_rate
 
 
 def rate_step(rate: FloatArray, interval: FloatArray) -> float:
