@@ -10,10 +10,12 @@ import pytest
 from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, StuckWarning
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.judgement.entrapment import Outcome
 from wheel_terra_estimator.reporting.comparison import as_text, compare
+from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.estimates_table import write_table
-from wheel_terra_estimator.reporting.truth_scores import as_lines, truth_errors
+from wheel_terra_estimator.reporting.truth_scores import as_lines, seen_later, truth_errors
 
 STAMP = 10**12 + np.arange(100, dtype=np.int64) * 100_000_000
 THRESHOLDS = np.array([0.3, 0.6, 0.9])
@@ -69,6 +71,17 @@ def test_lead_of_a_warning_and_one_that_was_wrong():
     assert as_lines(unseen)[-1].endswith('no warning, though the rover was entrapped at 7.0 s')
     nothing = truth_errors(history(0.0 * true), truth(0.0 * true), THRESHOLDS)
     assert not any('warning' in line for line in as_lines(nothing))
+
+
+@pytest.mark.parametrize(
+    ('unknown_from', 'said'), [(99, 'false, the median slip'), (45, 'is not known')]
+)
+def test_a_warning_before_slip_without_a_class_is_not_judged(unknown_from, said):
+    """Inputs that are found wrong after it: what the filter makes of them says nothing."""
+    classes = np.where(np.arange(100) >= unknown_from, SlipClass.UNKNOWN, SlipClass.LOW)
+    drive = history(np.zeros((100, 2)), classes[:, None], (StuckWarning(int(STAMP[40]), None, ''),))
+    (verdict,) = seen_later(drive, Border())
+    assert said in verdict
 
 
 def test_a_set_is_stuck_while_a_warning_stands():

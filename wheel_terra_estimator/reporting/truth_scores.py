@@ -32,6 +32,7 @@ LONGEST_BRIDGE = 0.5
 """Truth further away than this [s] is not compared."""
 TRUE_CLASSES = (SlipClass.LOW, SlipClass.MODERATE, SlipClass.HIGH, SlipClass.STUCK)
 CLASSES = (*TRUE_CLASSES, SlipClass.UNKNOWN)
+LEAST_KNOWN = 0.5  # share of the time after a warning in which slip tells whether it was right [-]
 COMPARED = (
     ('slip', 'slip', '-'),
     ('sinkage', 'sinkage', 'm'),
@@ -169,19 +170,15 @@ def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[tuple[float, 
 
 
 def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
-    """Return for each warning whether the slip estimated after it bears it out, in a sentence.
-
-    Slip without a class says nothing: inputs that are wrong, or a wide deviation.
-    """
-    judged = history.slip_class != SlipClass.UNKNOWN
-    slip = np.where(judged, known(history, 'slip', border), np.nan)
+    """Return for each warning whether the slip estimated after it bears it out, in a sentence."""
+    slip = known(history, 'slip', border)
     there = np.isfinite(slip).any(axis=1)
     if not history.warnings:
         return ()
     found = []
     for start, verdict in _warnings(history, slip):
         after = (history.seconds >= start) & (history.seconds <= start + FORESIGHT)
-        if not (after & there).any():
+        if not after.any() or np.mean(there[after]) < LEAST_KNOWN:
             found.append('Whether it was right is not known: the slip after it is not.')
         else:
             found.append(f'By the estimates: {_in_words(verdict)}.')
