@@ -260,6 +260,18 @@ def test_a_frozen_rate_is_told_and_noisy_ones_are_not():
     assert (finding.kind, finding.wheel) == ('frozen', wheels.configuration.wheels.names[2])
 
 
+def test_a_dead_imu_whose_means_are_rounded_is_told():
+    """Means of one number over another count of messages each differ in the last digit."""
+    wheels, reading = Wheels(), np.array([0.1, 0.1, 9.8, 0.01, 0.01, 0.01])
+    checks, random = OnlineChecks(wheels.configuration), np.random.default_rng(1)
+    for k in range(20 * 14):
+        stamp, inputs = wheels.inputs(k)
+        mean = reading + random.integers(-2, 3, 6) * np.spacing(reading)
+        dead = InertialReading(stamp, mean[:3], mean[3:], None)
+        checks.step(stamp, replace(inputs, inertial=dead))
+    assert 'sensor_frozen' in {finding.fault for finding in checks.remarks}
+
+
 def raised(wheels, begin, end=np.inf, seconds=20, flip_from=None):
     """Return when a warning between two stamps is published [s since the first]."""
     judge, found = InputJudge(wheels.configuration), []

@@ -47,6 +47,7 @@ NEEDED = 2  # judgements that agree before a fault is told
 MEMORY = 6  # judgements without a fault that are remembered when one is seen
 CAP = 4  # agreeing judgements beyond this many count no more
 LEAST_SURE = 0.5  # confidence from which a finding counts
+DIGITS = 12  # decimals of means: those of one number, summed up elsewhere, differ behind them
 
 
 class Row(NamedTuple):
@@ -61,14 +62,13 @@ class Row(NamedTuple):
 
 
 def _mean(samples: list[Floats], count: int) -> Floats:
-    """Return the means of (k, count) numbers without nan; exactly the number where all are one."""
+    """Return the means of (k, count) numbers without nan; the same where all are one number."""
     if not samples:
         return (math.nan,) * count
     table = np.array(samples)
-    least = np.fmin.reduce(table, axis=0)
     known = np.isfinite(table)
-    above = np.where(known, table - least, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    mean: list[float] = (least + above).tolist()
+    number = np.where(known.any(axis=0), known.sum(axis=0), math.nan)
+    mean: list[float] = (np.where(known, table, 0.0).sum(axis=0) / number).round(DIGITS).tolist()
     return tuple(mean)
 
 
