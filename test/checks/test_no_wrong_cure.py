@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 
+from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.calibration import calibrate
+from wheel_terra_estimator.checks.evidence import gather
+from wheel_terra_estimator.checks.rover_facts import from_configuration
 from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import block_fit
@@ -316,3 +319,16 @@ def test_turns_on_the_spot_are_a_drive():
     spot = rolling.Motion(time, 0.0 * time, 0.3 * (time % 20.0 > 6.0), 0.0 * time)
     whole = rolling.recording(spot)
     assert faults(checked(whole=whole)) == []
+
+
+@pytest.mark.parametrize('degrees', [True, False])
+def test_exchanged_wheels_are_no_gyro_in_degrees(degrees):
+    """The sides turn next to alike where two wheels across are exchanged; rear ones are larger."""
+    rate = WHOLE.joints.rate * [1.0, 1.0, 0.95, 0.95]
+    joints = replace(WHOLE.joints, rate=rate if degrees else rate[:, [1, 0, 2, 3]])
+    imu = replace(WHOLE.imu, rate=WHOLE.imu.rate * (180.0 / np.pi if degrees else 1.0))
+    whole, facts = replace(WHOLE, joints=joints, imu=imu), from_configuration(rolling.rover())
+    evidence = gather(whole, facts, np.eye(3), {})
+    assert 0.004 < abs(turning.track_ratio(evidence)) < 0.07
+    told, _ = turning.check_gyro_unit(evidence)
+    assert [finding.fault for finding in told] == ['gyro_degrees'] * degrees

@@ -55,6 +55,7 @@ LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
 TIE = 1e-3  # residuals [-] that differ by less are the same
 NOISE_FLOOR = 0.02  # residual [-] by which hypotheses must differ at least
 GYRO_DEGREES = (0.004, 0.07)  # effective over stated track by a gyro in degrees [-]
+MOST_SCALED = 0.2  # residual in turns beside such a gyro, at most [-]
 
 
 @dataclass(frozen=True)
@@ -510,7 +511,9 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     ratio = track_ratio(evidence)
     if ratio is None:
         return [NotChecked('unit', 'gyro: no clear turn in it; drive a circle')], evidence
-    if not GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]:
+    # Of exchanged wheels the sides turn alike, but not the wheels of a side.
+    scaled = GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]
+    if not scaled or _left_in_turns(evidence) > MOST_SCALED:
         return [], evidence
     told = {'times': 1.0 / abs(ratio), 'how': 'turning of the wheels'}
     finding = evidence.found('gyro_degrees', 0.95, value=math.radians(1.0), **told)
