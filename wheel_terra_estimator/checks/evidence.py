@@ -17,7 +17,7 @@ from wheel_terra_estimator.checks.faults import FAULTS, found
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Channel, JointSeries, Recording
-from wheel_terra_estimator.checks.statistics import averaged, bend_noise, moving_mean
+from wheel_terra_estimator.checks.statistics import averaged, bend_noise, moving_mean, robust_std
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 Mask = BoolArray
@@ -35,6 +35,8 @@ SHORTEST_FREE = 3.0  # wheels that turn so long while the rover stands may be in
 LEAST_MOVING_ROWS = 30  # fewer rows of driving than these tell nothing
 EVEN_GROUND_STD = math.radians(0.8)  # deviation of a tilt by circles on a plane, at most [rad]
 LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
+NO_NOISE = 5e-4  # noise of rates that have none, over the working rate, at most [-]
+BEND_OF_NOISE = math.sqrt(70.0)  # deviation of fourth differences, in which no motion is left [-]
 AROUND = 0.25  # half of the time around a velocity that rim speeds are averaged over [s]
 
 
@@ -229,6 +231,15 @@ class Evidence:
             yaw = np.abs(self.gyro[:, 2] - np.median(self.gyro[:, 2]))
             rows &= yaw * float(np.abs(self.facts.lateral).max()) < STRAIGHT_SHARE * rim
         return _shared(rows)
+
+    @cached_property
+    def exactly_even(self) -> Mask:
+        """Rows in which no rate changes, of rates without noise (a simulator's); else none."""
+        rate = np.nan_to_num(self.rate)
+        bend = np.diff(rate[self.moving], 4, axis=0)
+        exact = robust_std(bend.ravel()) < NO_NOISE * BEND_OF_NOISE * self.working_rate
+        same = np.append(True, (np.diff(rate, axis=0) == 0.0).all(axis=1))
+        return _shared(same & exact)
 
     @cached_property
     def straight(self) -> Mask:

@@ -18,7 +18,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.series import SinkageSeries, rows_of
-from wheel_terra_estimator.checks.statistics import robust_std, runs
+from wheel_terra_estimator.checks.statistics import runs
 
 LEAST_TIME = 5.0  # time of driving in which a reading that stays is frozen [s]
 ZERO_TIME = 20.0  # the same of a vector of zeros [s]
@@ -28,9 +28,7 @@ FINE = 50  # different readings of a sensor whose steps are not what makes it st
 MOST_REPEATED = 0.5  # share of rates that repeat themselves: more are rounded, or noiseless
 SELDOM = 0.1  # share of readings that repeat the one before of a sensor with noise [-]
 CHANGES = 0.5  # change of the rates over the working rate that all else then changes with [-]
-EXACT = 5e-4  # noise of the rates over the working rate of a simulator without any, at most [-]
-FOURTH_OF_NOISE = math.sqrt(70.0)  # deviation of fourth differences, which no motion has [-]
-AT_ONCE = 0.9  # share of a stretch in which no rate of such a simulator changes, at least [-]
+AT_ONCE = 0.9  # share of a stretch in which no rate without noise changes, at least [-]
 CLEAR_SINKAGE = 0.005  # of the other wheels, beside which none reads 0 all the time [m]
 
 
@@ -121,7 +119,6 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
     change = np.diff(evidence.rate[evidence.moving], axis=0)
     rounded = change.size > 0 and np.mean(change == 0.0) > MOST_REPEATED
     speed = np.interp(at, evidence.time, np.abs(evidence.common_rate))
-    still = _still(evidence, at)
     same = (np.diff(readings, axis=0) == 0.0).all(axis=1)
     rows, longest, value = np.zeros(time.size, dtype=bool), 0.0, 0.0
     period = float(np.median(np.abs(np.diff(at))))
@@ -135,7 +132,7 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         live = live and not (noisy and values.shape[1] > 1 and lasts > ZERO_TIME)
         if live or lasts < LEAST_TIME or (rounded and steady and not noisy):
             continue
-        if float(still[first:last].mean()) > AT_ONCE:
+        if np.interp(at[first:last], evidence.time, evidence.exactly_even).mean() > AT_ONCE:
             continue
         usual = _usual(beside)
         others = np.delete(readings, np.s_[first : last + 1], axis=0)
@@ -148,16 +145,6 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         if lasts > longest:
             longest, value = lasts, float(readings[first, 0]) if values.shape[1] == 1 else math.nan
     return Stays(rows, longest, value) if longest else None
-
-
-def _still(evidence: Evidence, at: FloatArray) -> FloatArray:
-    """Return where (k,) no rate changes, of rates without noise: all else may stay then too."""
-    rate = np.nan_to_num(evidence.rate)
-    noise = robust_std(np.diff(rate[evidence.moving], 4, axis=0).ravel()) / FOURTH_OF_NOISE
-    if not noise < EXACT * evidence.working_rate:
-        return np.zeros(at.size)
-    same = np.append(True, (np.diff(rate, axis=0) == 0.0).all(axis=1))
-    return np.interp(at, evidence.time, same)
 
 
 def _usual(same: Mask) -> float:

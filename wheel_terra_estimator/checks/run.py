@@ -245,8 +245,8 @@ def _whole_rows(recording: Recording) -> tuple[list[Outcome], Recording]:
         lost = np.where(there, 1.0 - known.mean(axis=0), 0.0)
         if lost.max() > LEAST_LOST:
             field = 'linear_acceleration' if lost[:3].max() > lost[3:].max() else 'angular_velocity'
-            told = {'share': 100.0 * float(lost.max()), 'field': field}
-            outcomes.append(found('imu_nan', imu.topic, 0.99, **told))
+            share = 100.0 * float(lost.max())
+            outcomes.append(found('imu_nan', imu.topic, 0.99, share=share, field=field))
         imu = _known(imu, known[:, there])
     if velocity is not None:
         velocity = _known(velocity, np.isfinite(velocity.velocity))

@@ -172,7 +172,7 @@ def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[tuple[float, 
 def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
     """Return for each warning whether the slip estimated after it bears it out, in a sentence."""
     slip = known(history, 'slip', border)
-    there = np.isfinite(slip).any(axis=1)
+    there = np.asarray(np.isfinite(slip).any(axis=1))
     if not history.warnings:
         return ()
     found = []
