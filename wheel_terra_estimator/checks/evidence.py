@@ -261,7 +261,8 @@ class Evidence:
         if reference is None:
             return None
         # Over messages that are far apart a mean would stand where the rover turns back.
-        rows = int(np.nan_to_num(np.clip(SMOOTH_TIME / reference.period, 1, SMOOTH_ROWS), nan=1))
+        period = reference.period if reference.stamp.size > 1 else math.inf
+        rows = int(np.clip(SMOOTH_TIME / max(period, 1e-3), 1, SMOOTH_ROWS))
         smooth = moving_mean(np.nan_to_num(reference.velocity[:, 0]), rows)
         return _shared(np.interp(self.time, self.seconds(reference), np.abs(smooth)))
 
