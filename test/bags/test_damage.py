@@ -9,11 +9,10 @@ import sqlite3
 import struct
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from wheel_terra_estimator.bags.salvage.limits import Limits
+from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
@@ -34,8 +33,8 @@ def samples(count: int = 90) -> list[Sample]:
     ]
 
 
-def read(path: Path, **options: Any) -> tuple[list[RawMessage], list[str]]:
-    with open_bag(path, **options) as bag:
+def read(path: Path) -> tuple[list[RawMessage], list[str]]:
+    with open_bag(path) as bag:
         return list(bag.messages(tuple(bag.topics))), bag.notes
 
 
@@ -354,20 +353,22 @@ def test_the_write_ahead_log_of_a_recorder_that_died_is_read(tmp_path):
     assert sorted(p.name for p in other.iterdir()) == before
 
 
-def test_a_chunk_above_the_limit_is_left_out_and_said(tmp_path):
+def test_a_chunk_above_the_limit_is_left_out_and_said(tmp_path, monkeypatch):
     few = samples()
     few.insert(45, Sample(few[44].log_time + 1, '/imu/data', bytes(50_000)))
     (tmp_path / 'a.mcap').write_bytes(make(few, TYPES, Layout(900, 'zstd')).content)
-    found, notes = read(tmp_path / 'a.mcap', limits=Limits(chunk=20_000))
+    monkeypatch.setattr(limits, 'CHUNK', 20_000)
+    found, notes = read(tmp_path / 'a.mcap')
     assert 80 <= len(found) < 90
     assert 'was left out' in notes[0]
 
 
-def test_more_than_can_be_held_is_refused_not_swapped(tmp_path):
+def test_more_than_can_be_held_is_refused_not_swapped(tmp_path, monkeypatch):
     layout = Layout(900, by_topic=True)
     (tmp_path / 'a.mcap').write_bytes(make(samples(900), TYPES, layout).content)
+    monkeypatch.setattr(limits, 'HELD', 5_000)
     with pytest.raises(UserError, match='sort it first'):
-        read(tmp_path / 'a.mcap', limits=Limits(held=5_000))
+        read(tmp_path / 'a.mcap')
 
 
 def test_garbage_in_a_damaged_recording_is_not_put_down_to_the_driver(make_bag, tmp_path, capsys):

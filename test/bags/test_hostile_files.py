@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
+from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.errors import UserError
 
@@ -131,11 +131,11 @@ MCAPS = (zeros, lying_zeros, packed_messages, packed_gaps, headless, headless_bo
          many_topics)  # fmt: skip
 
 
-def read(path: Path, limits: Limits, sender: Any) -> None:
+def read(path: Path, sender: Any) -> None:
     """Read a file, and tell the processor time [s], the memory [MB] that it took and the words."""
     before, began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
     try:
-        with open_bag(path, limits) as bag:
+        with open_bag(path) as bag:
             count = sum(1 for _ in bag.messages(tuple(bag.topics)))
             words = '; '.join([f'{count} messages', *bag.notes])
     except UserError as error:
@@ -144,7 +144,7 @@ def read(path: Path, limits: Limits, sender: Any) -> None:
     sender.send((time.process_time() - began, peak / 1024, words))
 
 
-EIGHTH = Limits(held=LIMITS.held // 8)
+EIGHTH = limits.HELD // 8
 """For small files: a bomb costs what is allowed, whatever its size."""
 LARGE = [pytest.mark.slow, pytest.mark.timeout(900)]
 ELSEWHERE = (zeros, lying_zeros)  # quick in test_input_file.py: a file costs the limit at any size
@@ -157,12 +157,13 @@ CASES = [
 
 
 @pytest.mark.parametrize(('make', 'size'), CASES)
-def test_no_file_costs_much(tmp_path, make, size):
+def test_no_file_costs_much(tmp_path, monkeypatch, make, size):
     path = tmp_path / 'a.mcap'
     path.write_bytes(make(size))
-    limits, longest = (EIGHTH, 4.0) if size <= 10**5 else (LIMITS, 10.0)
+    held, longest = (EIGHTH, 4.0) if size <= 10**5 else (limits.HELD, 10.0)
+    monkeypatch.setattr(limits, 'HELD', held)
     receiver, sender = get_context('fork').Pipe(False)
-    process = get_context('fork').Process(target=read, args=(path, limits, sender))
+    process = get_context('fork').Process(target=read, args=(path, sender))
     process.start()
     used, memory, words = receiver.recv()
     process.join()

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.bags.message_types import topic_messages
-from wheel_terra_estimator.bags.salvage.limits import in_words
+from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
@@ -111,8 +111,8 @@ class MeasurementReader:
 
     def unpack(self, data: bytes, name: str) -> Any | None:
         """Return the message in CDR bytes of an input topic; None, counted, if it is damaged."""
-        if len(data) > (largest := self.bag.limits.message):
-            self.rejected[name, f'above {in_words(largest)}'] += 1
+        if len(data) > limits.MESSAGE:
+            self.rejected[name, f'above {limits.in_words(limits.MESSAGE)}'] += 1
             return None
         try:
             return self._unpack[name](data)

@@ -13,6 +13,7 @@ import numpy as np
 
 from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.reader import NO_INPUTS
+from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.checks.series import (
     ImuSeries,
@@ -94,7 +95,7 @@ def read_series(
         collector = collectors[by_topic[topic]]
         if len(collector.arrivals) >= most:
             shortened = True
-        elif len(data) <= bag.limits.message:
+        elif len(data) <= limits.MESSAGE:
             collector.add(log_time, data)
     for collector in collectors.values():
         collector.unpack()

@@ -19,7 +19,6 @@ from typing import Protocol
 
 from wheel_terra_estimator.bags import bag_metadata
 from wheel_terra_estimator.bags.salvage.compression import ZSTD_MAGIC, unpack_file, unpack_message
-from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
 from wheel_terra_estimator.bags.salvage.losses import Losses
 from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
 from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
@@ -47,11 +46,8 @@ class _Source(Protocol):
 class Bag:
     """An open recording."""
 
-    def __init__(
-        self, path: Path, sources: list[_Source], notes: list[str], limits: Limits = LIMITS
-    ) -> None:
+    def __init__(self, path: Path, sources: list[_Source], notes: list[str]) -> None:
         self.path = path
-        self.limits = limits
         self._notes = notes
         self._sources = sources
         counts: Counter[str] = Counter()
@@ -84,12 +80,12 @@ class Bag:
         merged = sources[0] if len(sources) == 1 else heapq.merge(*sources, key=lambda m: m[0])
         for message in merged:
             if message.data[:4] == ZSTD_MAGIC:  # compressed message by message
-                message = message._replace(data=unpack_message(message.data, self.limits))
+                message = message._replace(data=unpack_message(message.data))
             yield message
 
 
 @contextmanager
-def open_bag(path: str | Path, limits: Limits = LIMITS) -> Iterator[Bag]:
+def open_bag(path: str | Path) -> Iterator[Bag]:
     """Open a recording.
 
     A `UserError` that is raised while it is open is completed by what is wrong with the recording.
@@ -100,7 +96,7 @@ def open_bag(path: str | Path, limits: Limits = LIMITS) -> Iterator[Bag]:
     path = Path(path)
     notes: list[str] = []
     with ExitStack() as stack:
-        bag = Bag(path, _open_sources(path, notes, stack, limits), notes, limits)
+        bag = Bag(path, _open_sources(path, notes, stack), notes)
         try:
             if not bag.message_count and bag.notes:
                 raise UserError(
@@ -119,7 +115,7 @@ def open_bag(path: str | Path, limits: Limits = LIMITS) -> Iterator[Bag]:
             raise UserError(f'{error} ({"; ".join(bag.notes)})') from None
 
 
-def _open_sources(path: Path, notes: list[str], stack: ExitStack, limits: Limits) -> list[_Source]:
+def _open_sources(path: Path, notes: list[str], stack: ExitStack) -> list[_Source]:
     try:
         folder = path.is_dir()
         there = folder or path.exists()
@@ -135,7 +131,7 @@ def _open_sources(path: Path, notes: list[str], stack: ExitStack, limits: Limits
             )
         if not path.name.endswith(STORAGE_SUFFIXES):
             raise UserError(f'{path}: not a bag; give a rosbag2 folder, a .mcap or a .db3 file')
-        return [_open_file(path, notes, stack, limits)]
+        return [_open_file(path, notes, stack)]
     metadata = bag_metadata.read(path)
     files = _storage_files(path, metadata, notes)
     if not files:
@@ -143,7 +139,7 @@ def _open_sources(path: Path, notes: list[str], stack: ExitStack, limits: Limits
             f'{path}: not a bag (no .mcap, no .db3 in it); give a rosbag2 folder or a storage file'
             + ''.join(f' ({note})' for note in notes)
         )
-    sources = [_open_file(file, notes, stack, limits) for file in files]
+    sources = [_open_file(file, notes, stack) for file in files]
     _compare(metadata, sources, notes)
     return sources
 
@@ -201,23 +197,19 @@ def _compare(metadata: bag_metadata.Metadata, sources: list[_Source], notes: lis
             return
 
 
-def _open_file(path: Path, notes: list[str], stack: ExitStack, limits: Limits) -> _Source:
+def _open_file(path: Path, notes: list[str], stack: ExitStack) -> _Source:
     check_regular(path)
     if path.suffix == '.zstd':
         unpacked = Path(stack.enter_context(TemporaryDirectory())) / path.stem
-        if damage := unpack_file(path, unpacked, limits):
+        if damage := unpack_file(path, unpacked):
             notes.append(damage)
         try:
-            return _open_file(unpacked, notes, stack, limits)
+            return _open_file(unpacked, notes, stack)
         except UserError as error:
             words = f' ({damage})' if damage else ''
             raise UserError(f'{error}{words}'.replace(str(unpacked), str(path))) from None
     try:
-        return (
-            McapFile(path, stack, limits)
-            if path.suffix == '.mcap'
-            else SqliteFile(path, stack, limits)
-        )
+        return (McapFile if path.suffix == '.mcap' else SqliteFile)(path, stack)
     except OSError as error:
         raise UserError(f'{path}: cannot be read ({error.strerror})') from None
 

@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     configuration = configuration_reader.from_arguments(arguments)
     check_file(arguments.output, arguments.overwrite)
-    with open_bag(arguments.bag, bag_arguments.limits_of(arguments)) as bag:
+    with open_bag(arguments.bag) as bag:
         name = arguments.bag.resolve().name
         remaps = parse_remaps(arguments.remap)
         recording = read_series(bag, remaps, name)

@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     given = bool(arguments.config or arguments.parameters)
     configuration = configuration_reader.from_arguments(arguments) if given else None
     remaps = parse_remaps(arguments.remap)
-    with open_bag(arguments.bag, bag_arguments.limits_of(arguments)) as bag:
+    with open_bag(arguments.bag) as bag:
         recording = read_series(bag, remaps, arguments.bag.resolve().name)
         if recording.joints is None and recording.wheel_odometry is None:
             there = in_one_line((name, kind) for name, kind, _ in recording.topics)

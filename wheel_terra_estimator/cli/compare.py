@@ -8,8 +8,6 @@ import argparse
 import json
 from pathlib import Path
 
-from wheel_terra_estimator.cli import bag_arguments
-
 EXAMPLES = (
     'wheel-terra compare estimates_a estimates_b',
     'wheel-terra compare estimates_a estimates_b --truth my_drive',
@@ -22,7 +20,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('second', type=Path, metavar='B', help='bag of estimates of the same drive')
     parser.add_argument('--truth', type=Path, metavar='BAG', help='recording with ground truth')
     parser.add_argument('--json', action='store_true', help='print the differences as JSON')
-    bag_arguments.add_limits(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -39,16 +36,15 @@ def run(arguments: argparse.Namespace) -> int:
     )
 
     inputs = [arguments.first, arguments.second]
-    limits = bag_arguments.limits_of(arguments)
     histories = []
     notes: list[str] = []
     for path in inputs:
-        with open_bag(path, limits) as bag:
+        with open_bag(path) as bag:
             histories.append(read_estimates(bag))
             notes += bag.notes
     truth = None
     if arguments.truth:
-        with open_bag(arguments.truth, limits) as bag:
+        with open_bag(arguments.truth) as bag:
             truth = read_simulated_truth(bag, histories[0].names)
             notes += bag.notes
         if truth is None:

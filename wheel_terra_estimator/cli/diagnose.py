@@ -297,10 +297,8 @@ def _read(path: Path, arguments: argparse.Namespace, configuration: Configuratio
         from wheel_terra_estimator.bags.reader import parse_remaps
         from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
-        remaps, limits = parse_remaps(arguments.remap), bag_arguments.limits_of(arguments)
-        return rows_from_bag(
-            path, configuration, remaps, limits=limits, smooth=arguments.smooth
-        ).table()
+        remaps = parse_remaps(arguments.remap)
+        return rows_from_bag(path, configuration, remaps, smooth=arguments.smooth).table()
     from wheel_terra_estimator.discrepancy.tables.header import Choice
     from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 

@@ -9,12 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
-    from wheel_terra_estimator.bags.salvage.limits import Limits
     from wheel_terra_estimator.configuration.rover_template import RoverSketch
 
 EXAMPLES = (
@@ -46,7 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, unit, meaning in _MEASURES:
         parser.add_argument(f'--{name}', type=_positive, metavar=unit, help=meaning)
     parser.add_argument('--name', default='', metavar='TEXT', help='name of the rover, for reports')
-    bag_arguments.add_limits(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 
 
@@ -110,7 +107,7 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
     if described is not None:
         return replace(described, name=arguments.name or described.name)
     if arguments.bag:
-        wheels = wheels or _wheels_of(arguments.bag, bag_arguments.limits_of(arguments))
+        wheels = wheels or _wheels_of(arguments.bag)
     elif not wheels:
         raise UserError('give --urdf, --bag or --wheels')
     return _from_measures(arguments, wheels)
@@ -125,7 +122,7 @@ def _description_of(arguments: argparse.Namespace) -> RoverSketch | None:
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.configuration.urdf import read_urdf
 
-    with open_bag(arguments.bag, bag_arguments.limits_of(arguments)) as bag:
+    with open_bag(arguments.bag) as bag:
         if DESCRIPTION not in bag.topics:
             return None
         messages = bag.messages([DESCRIPTION])
@@ -134,12 +131,12 @@ def _description_of(arguments: argparse.Namespace) -> RoverSketch | None:
     return read_urdf(Path(f'{arguments.bag}:{DESCRIPTION}'), _names(arguments.wheels), text)
 
 
-def _wheels_of(path: Path, limits: Limits) -> list[str]:
+def _wheels_of(path: Path) -> list[str]:
     from wheel_terra_estimator.bags.series_reader import read_series
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.checks.rover_facts import wheel_names
 
-    with open_bag(path, limits) as bag:
+    with open_bag(path) as bag:
         recording = read_series(bag, {}, path.name)
         if recording.joints is None:
             raise UserError(f'{path}: no joint states in it; name the wheels with --wheels')

@@ -127,7 +127,6 @@ def _run_one(arguments: argparse.Namespace) -> int:
         remaps,
         arguments.output,
         _options(arguments),
-        bag_arguments.limits_of(arguments),
         print_findings,
     )
     if arguments.json:
@@ -249,7 +248,6 @@ def _run_several(arguments: argparse.Namespace) -> int:
         arguments.output,
         _plain_name('--report', arguments.report),
         _plain_name('--table', arguments.table),
-        bag_arguments.limits_of(arguments),
         _options(arguments),
         track=_plain_name('--track', arguments.track),
     )

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from wheel_terra_estimator.bags.check_before import check_before
 from wheel_terra_estimator.bags.replay import DEFAULT, Options, Replay, replay
-from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import Truth, read_truth
 from wheel_terra_estimator.checks.finding import CheckReport
@@ -73,7 +72,6 @@ def replay_drive(
     remaps: Mapping[str, str],
     output: Path | None,
     options: Options = DEFAULT,
-    limits: Limits = LIMITS,
     on_checked: Callable[[CheckReport], None] = lambda checked: None,
 ) -> Drive:
     """Check a recording, run the estimator over it and sum it up.
@@ -81,7 +79,7 @@ def replay_drive(
     ``on_checked``: called with what the checks found, before the replay begins. Raises UserError as
     `bags.replay.replay`.
     """
-    with open_bag(path, limits) as bag:
+    with open_bag(path) as bag:
         checked = check_before(bag, configuration, remaps)
         on_checked(checked)
         result = replay(bag, configuration, remaps, output, options)

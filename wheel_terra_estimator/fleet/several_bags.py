@@ -21,7 +21,6 @@ from typing import Any
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.bags.replay import DEFAULT, Options
-from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.fleet.drive import replay_drive
@@ -67,7 +66,6 @@ class Settings:
     output: Path
     report: str = ''
     table: str = ''
-    limits: Limits = LIMITS
     options: Options = DEFAULT
     track: str = ''
 
@@ -197,7 +195,6 @@ def _digest(settings: Settings, path: Path) -> str:
         'stated': sorted(configuration.stated),
         'remaps': dict(settings.remaps),
         'files': [settings.report, settings.table],
-        'limits': asdict(settings.limits),
         'smooth': settings.options.smooth,
         'track': [settings.track, settings.options.odometry],
     }
@@ -232,9 +229,7 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
         load_file(str(effect_file))  # its reader has allowed it; this may be another machine
     output = settings.output / task.folder
     options = replace(settings.options, overwrite=True, progress=False)
-    drive = replay_drive(
-        task.path, configuration, settings.remaps, output, options, settings.limits
-    )
+    drive = replay_drive(task.path, configuration, settings.remaps, output, options)
     if settings.table:
         drive.write_table(output / settings.table, overwrite=True)
     if settings.track:

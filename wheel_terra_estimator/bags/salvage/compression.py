@@ -9,7 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wheel_terra_estimator.bags.salvage.limits import LIMITS, MEGABYTE, Limits, in_words
+from wheel_terra_estimator.bags.salvage import limits
+from wheel_terra_estimator.bags.salvage.limits import MEGABYTE, in_words
 from wheel_terra_estimator.errors import UserError
 
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
@@ -27,7 +28,7 @@ class Unpacked(NamedTuple):
     damage: str
 
 
-def unpack(codec: str, packed: bytes | memoryview, size: int, limits: Limits = LIMITS) -> Unpacked:
+def unpack(codec: str, packed: bytes | memoryview, size: int) -> Unpacked:
     """Unpack a chunk.
 
     Parameters
@@ -38,11 +39,9 @@ def unpack(codec: str, packed: bytes | memoryview, size: int, limits: Limits = L
         Packed data, maybe cut or damaged.
     size : int
         Unpacked size that the file states [byte]; 0: none. It may be damaged: how much there is
-        decides, not what is stated.
-    limits : Limits
-        Nothing above `Limits.unpacked` is unpacked.
+        decides, not what is stated. Nothing above `limits.unpacked` is unpacked.
     """
-    most = limits.unpacked(len(packed)) if codec else limits.chunk
+    most = limits.unpacked(len(packed)) if codec else limits.CHUNK
     too_large = f'a chunk is above {in_words(most)}'
     if codec not in CODECS:
         return Unpacked(b'', f'the compression {codec!r} is not known')
@@ -64,13 +63,13 @@ def unpack(codec: str, packed: bytes | memoryview, size: int, limits: Limits = L
     return Unpacked(content, f'a chunk of {size} B unpacks to {len(content)} B')
 
 
-def unpack_message(packed: bytes, limits: Limits = LIMITS) -> bytes:
+def unpack_message(packed: bytes) -> bytes:
     """Unpack a message that was packed alone; nothing comes of a damaged or too large one."""
-    found = _all_at_once('zstd', packed, limits.message)
-    return b'' if found is None or len(found) > limits.message else found
+    found = _all_at_once('zstd', packed, limits.MESSAGE)
+    return b'' if found is None or len(found) > limits.MESSAGE else found
 
 
-def unpack_file(path: Path, target: Path, limits: Limits = LIMITS) -> str:
+def unpack_file(path: Path, target: Path) -> str:
     """Unpack a ``.zstd`` file into another one, as far as it reaches.
 
     Raises UserError where it cannot be read or written, or unpacks to far more than recordings do.
@@ -89,7 +88,7 @@ def unpack_file(path: Path, target: Path, limits: Limits = LIMITS) -> str:
                     content = decompressor.decompress(piece, MEGABYTE)
                     written += len(content)
                     if written > allowed:
-                        raise bomb(path, limits)
+                        raise bomb(path)
                     out.write(content)
             except (OSError, UserError):
                 raise
@@ -100,10 +99,10 @@ def unpack_file(path: Path, target: Path, limits: Limits = LIMITS) -> str:
     return ''
 
 
-def bomb(path: Path, limits: Limits) -> UserError:
+def bomb(path: Path) -> UserError:
     """Return the error of a file that unpacks to far more than recordings do."""
     return UserError(
-        f'{path}: unpacks to more than {limits.packed_share} times its size; no recording does, '
+        f'{path}: unpacks to more than {limits.PACKED_SHARE} times its size; no recording does, '
         'so it is not read'
     )
 

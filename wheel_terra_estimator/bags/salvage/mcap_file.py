@@ -24,9 +24,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
 
+from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.salvage import mcap_records as mcap
 from wheel_terra_estimator.bags.salvage.compression import MAGICS, bomb, unpack
-from wheel_terra_estimator.bags.salvage.limits import LIMITS, MEGABYTE, Limits, in_words
+from wheel_terra_estimator.bags.salvage.limits import MEGABYTE, in_words
 from wheel_terra_estimator.bags.salvage.losses import Losses
 from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.errors import UserError
@@ -95,10 +96,9 @@ _ROW_SIZE = 250
 class McapFile:
     """One ``.mcap`` file."""
 
-    def __init__(self, path: Path, stack: ExitStack, limits: Limits = LIMITS) -> None:
+    def __init__(self, path: Path, stack: ExitStack) -> None:
         self.path = path
         self.losses = Losses()
-        self._limits = limits
         self._pieces: list[Piece] = []
         self._definitions = _Definitions()
         self._counts: Counter[int] = Counter()
@@ -227,7 +227,7 @@ class McapFile:
     def _take_records(self, begin: int, end: int, gaps: list[mcap.Gap]) -> None:
         """Note what stands between two places, and the gaps."""
         content = self._map
-        possible = mcap.Possible(longest=self._limits.chunk)
+        possible = mcap.Possible(longest=limits.CHUNK)
         for item in mcap.records(content, begin, end, possible):
             self._forget(item.end - item.begin)
             if isinstance(item, mcap.Gap):
@@ -382,7 +382,7 @@ class McapFile:
 
     def _rows(self, piece: Piece, wanted: frozenset[int], held: int) -> list[Row]:
         content = self._content(piece)
-        reading = self._read(piece, content, wanted, self._limits.held - held)
+        reading = self._read(piece, content, wanted, limits.HELD - held)
         self._note_damage(piece, content, reading)
         return sorted(reading.rows, key=lambda row: row[:2])
 
@@ -393,7 +393,7 @@ class McapFile:
         if head is None:
             return Content(self._map[piece.begin : piece.end], '', False, False)
         packed = self._map[head.begin : min(head.begin + head.packed, piece.end)]
-        data, damage = unpack(head.codec, packed, head.size, self._limits)
+        data, damage = unpack(head.codec, packed, head.size)
         self._add_work(len(packed) + len(data))
         right = bool(head.checksum) and not damage and crc32(data) == head.checksum
         return Content(data, damage, right, bool(head.checksum) and not damage and not right)
@@ -481,9 +481,8 @@ class McapFile:
 
     def _too_much(self) -> UserError:
         return UserError(
-            f'{self.path}: more than {in_words(self._limits.held)} of messages would be held to '
-            'bring them into order; sort it first (ros2 bag convert), or allow more with '
-            '--most-held'
+            f'{self.path}: more than {in_words(limits.HELD)} of messages would be held to '
+            'bring them into order; sort it first (ros2 bag convert)'
         )
 
     def _pass(
@@ -536,8 +535,8 @@ class McapFile:
 
     def _add_work(self, count: int) -> None:
         self._work += count
-        if self._work > self._limits.work(self._size):
-            raise bomb(self.path, self._limits)
+        if self._work > limits.work(self._size):
+            raise bomb(self.path)
 
     def _forget(self, count: int) -> None:
         """Let go of the pages of the file that were looked at: they count as memory of ours."""

@@ -20,7 +20,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
+from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.salvage.losses import Losses
 from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.errors import UserError
@@ -39,7 +39,7 @@ class SqliteFile:
     Raises UserError where it is no rosbag2 file, or nothing of one is left.
     """
 
-    def __init__(self, path: Path, stack: ExitStack, limits: Limits = LIMITS) -> None:
+    def __init__(self, path: Path, stack: ExitStack) -> None:
         self.path = path
         self.losses = Losses()
         self._number = array('q')  # of the row, and its log time: only where the order differs
@@ -49,7 +49,7 @@ class SqliteFile:
         self._whole = (
             "typeof(topic_id) = 'integer' AND typeof(data) = 'blob' "
             "AND typeof(timestamp) = 'integer' AND timestamp >= 0 "
-            f'AND length(data) <= {limits.chunk}'
+            f'AND length(data) <= {limits.CHUNK}'
         )
         try:
             fault = self._open(path, stack)

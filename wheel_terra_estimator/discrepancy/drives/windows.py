@@ -31,7 +31,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
@@ -51,10 +50,6 @@ from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
-
-if TYPE_CHECKING:
-    from wheel_terra_estimator.bags.salvage.limits import Limits
-
 
 _GREATEST_CORRELATION = 0.95  # of neighbouring segments
 
@@ -130,7 +125,6 @@ def rows_from_bag(
     path: str | Path,  # folder, or a single ``.mcap`` or ``.db3``
     configuration: Configuration,  # wheels, mass and load model
     remaps: Mapping[str, str] | None = None,  # estimator's topic -> the bag's
-    limits: Limits | None = None,  # what of the recording is unpacked and held
     *,
     # Whether the slip comes from the fixed-interval smoother in place of the references alone; it
     # takes about 1.7 times as long as a replay
@@ -141,10 +135,9 @@ def rows_from_bag(
     Raises UserError if the bag cannot be read, lacks a sensor, or holds no steady window.
     """
     from wheel_terra_estimator.bags.reader import MeasurementReader
-    from wheel_terra_estimator.bags.salvage.limits import LIMITS
     from wheel_terra_estimator.bags.storage import open_bag
 
-    with open_bag(path, limits or LIMITS) as bag:
+    with open_bag(path) as bag:
         read = MeasurementReader(bag, remaps or {}, configuration).measurements()
         heard = (item for _, item in read)
         rows = rows_from_measurements(heard, configuration, str(path), smooth=smooth)
