@@ -26,7 +26,6 @@ as it was. A file::
 from __future__ import annotations
 
 import errno
-import glob
 import json
 import os
 import shutil
@@ -43,11 +42,11 @@ from wheel_terra_estimator.errors import UserError
 MARKER = '.wheel-terra.json'
 """File in an output folder that lists what the program wrote there; folders end in ``/``."""
 
-EARLIER = 'put aside'
-"""Fact in the marker of a folder that stands aside while another is written: its name."""
-
 LEAST_ROOM = 2**16
 """Room on the disk [byte] without which nothing is begun."""
+
+BESIDE = '.wheel-terra-'
+"""In the name of a hidden folder in which an output is written, beside its place."""
 
 LARGEST_MARKER = 16 * 2**20
 """A marker is a short list: a longer file [byte] is none of ours."""
@@ -124,38 +123,22 @@ def try_to_write(path: Path) -> None:
 
 
 @contextmanager
-def new_folder(
-    path: Path, overwrite: bool = False, inputs: Iterable[Path] = (), keep_partial: bool = False
-) -> Iterator[Path]:
+def new_folder(path: Path, overwrite: bool = False, inputs: Iterable[Path] = ()) -> Iterator[Path]:
     """Yield an empty folder to be filled; at the end of the block it is at ``path``.
 
-    ``keep_partial``: whether what was written before an error (none of the user's) is put in its
-    place as well, unless an earlier output stands there. Raises UserError as `check_target`, and
-    where the disk is full or fails.
+    Raises UserError as `check_target`, and where the disk is full or fails.
     """
     check_target(path, overwrite, inputs, folder=True)
     path = _absolute(path)
-    kept = False
     try:
         with _beside(path) as beside:
             fresh = beside / path.name
-            try:
-                fresh.mkdir()
-                yield fresh
-            except BaseException as error:
-                keep_partial = keep_partial and not isinstance(error, UserError)
-                if keep_partial and not path.exists() and fresh.is_dir() and any(fresh.iterdir()):
-                    with suppress(OSError):
-                        mark(fresh)
-                    with suppress(OSError):
-                        fresh.rename(path)
-                        kept = True
-                raise
+            fresh.mkdir()
+            yield fresh
             mark(fresh)
             _put_in_place(fresh, path, beside)
     except OSError as error:
-        words = '; what was written before is kept there' if kept else ''
-        raise CannotWriteError(f'{cannot_write(path, error)}{words}') from None
+        raise cannot_write(path, error) from None
 
 
 @contextmanager
@@ -186,17 +169,13 @@ def new_file(
 
 @contextmanager
 def _beside(path: Path) -> Iterator[Path]:
-    """Yield a hidden folder beside ``path`` that no other run removes and that goes at the end."""
+    """Yield a hidden folder beside ``path`` that goes at the end."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    _remove_left_behind(path)
-    beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
-    held = _hold(beside)
-    try:
-        yield beside
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-        if held is not None:
-            os.close(held)
+    prefix = f'.{path.name}{BESIDE}'
+    with tempfile.TemporaryDirectory(
+        dir=path.parent, prefix=prefix, ignore_cleanup_errors=True
+    ) as beside:
+        yield Path(beside)
 
 
 @contextmanager
@@ -209,8 +188,7 @@ def working_folder(
 ) -> Iterator[None]:
     """Make a folder that a command fills in place in the block, so that it can go on after an end.
 
-    Until the block has ended well, an earlier output stands whole beside it as ``NAME.earlier``;
-    where the block ends with no result, the place is again as it was found.
+    Where the block ends with no result the folder goes, and the place is free for the next try.
 
     ``resume``: whether to go on with a folder as it is, where it is one of ours. ``entries``: all
     names that the command may write there, as in `mark`. Raises UserError as `check_folder`.
@@ -226,47 +204,19 @@ def working_folder(
     else:
         check_folder(path, overwrite, inputs)
     path = _absolute(path)
-    aside = path.with_name(f'{path.name}.earlier')
-    refuse_inputs(aside, inputs)
-    empty = path.is_dir() and not any(path.iterdir())  # then it is the user's, and stays
     try:
-        if path.exists() and not resume and not empty:
-            _put_aside(path, aside)
+        if path.exists() and not resume:
+            _remove_own_files(path)
         path.mkdir(parents=True, exist_ok=True)
         mark(path, entries)
     except OSError as error:
         raise cannot_write(path, error) from None
-    whole = False
     try:
         yield
-        whole = True
     finally:
         with suppress(OSError, UserError):
             if path.is_dir() and not any(_holds(path / name) for name in _own_files(path)):
                 _remove_own_files(path)
-                if _is_earlier(aside):
-                    aside.rename(path)
-                    mark(path, [], {EARLIER: ''})
-                elif empty:
-                    path.mkdir()
-            elif whole and _is_earlier(aside):
-                _remove_own_files(aside)
-
-
-def _put_aside(path: Path, aside: Path) -> None:
-    """Rename an output that is to be replaced; one that stands aside already is the whole one."""
-    if _is_earlier(aside):
-        _remove_own_files(path)
-    elif aside.exists() or aside.is_symlink():
-        raise UserError(f'{aside}: the earlier output is to stand here meanwhile; move it')
-    else:
-        mark(path, [], {EARLIER: path.name})  # first: a full disk then leaves it in its place
-        path.rename(aside)
-
-
-def _is_earlier(aside: Path) -> bool:
-    """Whether `_put_aside` has put a folder here."""
-    return not aside.is_symlink() and facts_of(aside).get(EARLIER) == aside.stem
 
 
 def _holds(entry: Path) -> bool:
@@ -301,16 +251,10 @@ def facts_of(folder: Path, only_whole: bool = False) -> dict[str, Any]:
     return _noted(folder / MARKER) if whole or not only_whole else {}
 
 
-def remove_leftovers(folder: Path, name: str) -> None:
-    """Remove what a killed run left of ``folder/name`` beside its place."""
-    for left in _left_behind(folder / name):
+def remove_leftovers(folder: Path) -> None:
+    """Remove what killed runs left of outputs in a folder."""
+    for left in folder.glob(f'.*{BESIDE}*'):
         shutil.rmtree(left, ignore_errors=True)
-
-
-def _left_behind(path: Path) -> list[Path]:
-    """Return the hidden folders beside ``path`` in which a run was writing it."""
-    found = path.parent.glob(f'.{glob.escape(path.name)}.wheel-terra-*')
-    return [place for place in found if place.is_dir() and not place.is_symlink()]
 
 
 def is_ours(folder: Path) -> bool:
@@ -362,42 +306,9 @@ def _refuse_place(path: Path, inputs: Iterable[Path]) -> None:
     if path.is_symlink():
         raise UserError(f'{path}: is a link; name what it leads to, or choose another path')
     target = _resolved(path)
-    for place, words in (
-        (Path.cwd(), 'is the working folder or holds it'),
-        (_home(), 'is a home folder or holds one'),
-    ):
-        if place is not None and (target == place or target in place.parents):
-            raise UserError(f'{path}: {words}; name a new folder')
+    if target == Path.cwd() or target in Path.cwd().parents:
+        raise UserError(f'{path}: is the working folder or holds it; name a new folder')
     refuse_inputs(path, inputs)
-
-
-def _remove_left_behind(path: Path) -> None:
-    """Remove the hidden folders of earlier runs that were killed while they wrote ``path``."""
-    for found in _left_behind(path):
-        held = _hold(found)
-        if held is not None:
-            shutil.rmtree(found, ignore_errors=True)
-            os.close(held)
-
-
-def _hold(folder: Path) -> int | None:
-    """Lock a folder as long as the returned descriptor is open, at most until the process ends.
-
-    None if another process holds it, or where folders cannot be locked.
-    """
-    try:
-        import fcntl
-    except ImportError:  # not a POSIX system
-        return None
-    descriptor = -1
-    try:
-        descriptor = os.open(folder, os.O_RDONLY)
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        if descriptor >= 0:
-            os.close(descriptor)
-        return None
-    return descriptor
 
 
 def _sync(path: Path) -> None:
@@ -407,13 +318,6 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _home() -> Path | None:
-    try:
-        return Path.home().resolve()
-    except (OSError, RuntimeError):
-        return None
 
 
 def _absolute(path: Path) -> Path:

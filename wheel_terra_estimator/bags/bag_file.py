@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""A rosbag2 folder (MCAP, or SQLite3) that is being written, closed whatever happens."""
+"""A rosbag2 folder (MCAP, or SQLite3) that is being written: whole, or not there."""
 
 from __future__ import annotations
 
@@ -54,9 +54,7 @@ class BagFile:
     def __enter__(self: Self) -> Self:
         from rosbags.rosbag2 import StoragePlugin, Writer
 
-        folder = self._stack.enter_context(
-            new_folder(self.path, self._overwrite, self._inputs, keep_partial=True)
-        )
+        folder = self._stack.enter_context(new_folder(self.path, self._overwrite, self._inputs))
         folder.rmdir()  # the library makes it
         self._writer = Writer(
             folder, version=9, storage_plugin=StoragePlugin[self._storage.upper()]
@@ -80,21 +78,18 @@ class BagFile:
         trace: TracebackType | None,
     ) -> None:
         with self._stack:
-            # Not the library's own exit, which leaves a file without index after any error.
             storage: Any = self._writer.storage
             try:
-                if isinstance(error, OSError):
+                if error is not None:
                     raise error
                 self._writer.close()
                 if self._storage == 'mcap':
                     add_checksums(storage.path)
-            except OSError as full:
-                if self._storage == 'mcap' and storage is not None:
+            except BaseException:
+                if self._storage == 'mcap':
                     with suppress(OSError):
                         storage.bio.raw.close()  # what is buffered has no place any more
-                self._stack.__exit__(type(full), full, full.__traceback__)
-            else:
-                self._stack.__exit__(kind, error, trace)
+                raise
 
     def note(self, key: str, value: str) -> None:
         """State something about the bag in the `custom_data` of its metadata."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -26,38 +27,32 @@ from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, S
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, OUTPUT_TYPES, stamp_of
 from wheel_terra_estimator.messages.diagnostics import NODE
 
-WHEEL_FIELDS = (
-    'slip',
-    'slip_std',
-    'slip_velocity',
-    'drawbar_pull',
-    'drawbar_pull_std',
-    'sinkage',
-    'sinkage_std',
-    'normal_load',
-    'rim_travel_left',
-    'pull_margin',
-    'slip_angle',
-    'slip_angle_std',
-    'lateral_force',
-    'lateral_force_std',
-)
-
+WHEEL_FIELDS = {
+    'slip': 'slip',
+    'slip_std': 'slip_std',
+    'slip_velocity': 'slip_velocity',
+    'drawbar_pull': 'drawbar_pull',
+    'drawbar_pull_std': 'drawbar_pull_std',
+    'sinkage': 'sinkage',
+    'sinkage_std': 'sinkage_std',
+    'normal_load': 'normal_load',
+    'rim_travel_left': 'rim_travel_left',
+    'pull_margin': 'pull_margin',
+    'slip_angle': 'sideways_known.angle',
+    'slip_angle_std': 'sideways_known.angle_std',
+    'lateral_force': 'sideways_known.force',
+    'lateral_force_std': 'sideways_known.force_std',
+}
+"""Quantity of a wheel -> field of an `EstimateSet`."""
 LONGEST_STEP = 1.0
 """A longer pause between sets, or a step back of the clock, is no time in any class [s]."""
 
-_SIDEWAYS = {
-    'slip_angle': 'angle',
-    'slip_angle_std': 'angle_std',
-    'lateral_force': 'force',
-    'lateral_force_std': 'force_std',
-}
-"""Quantities of `WHEEL_FIELDS` -> fields of `Sideways`."""
-_OWN_NAMES = {f'sideways_known.{field}': name for name, field in _SIDEWAYS.items()}
+_QUANTITIES = {field: name for name, field in WHEEL_FIELDS.items()}
+_values_of = attrgetter(*WHEEL_FIELDS.values())
 _TOPIC_FIELDS = {
     topic: names
     for topic, fields in JOINT_OUTPUTS.items()
-    if not set(WHEEL_FIELDS).isdisjoint(names := [_OWN_NAMES.get(f, f) for f in fields])
+    if not set(WHEEL_FIELDS).isdisjoint(names := [_QUANTITIES.get(f, f) for f in fields])
 }
 """Topic -> quantities that are its position, velocity and effort."""
 
@@ -200,11 +195,7 @@ class HistoryRecorder:
         """Append a set."""
         e = estimates
         self._slopes = e.slip_on_slope or self._slopes
-        aside = e.sideways_known
-        values = {
-            name: getattr(aside, _SIDEWAYS[name]) if name in _SIDEWAYS else getattr(e, name)
-            for name in WHEEL_FIELDS
-        }
+        values = dict(zip(WHEEL_FIELDS, _values_of(e), strict=True))
         self._figures.add(e.stamp, e.slip_class, values)
         general = (e.forward_velocity, e.forward_velocity_variance)
         row = np.concatenate([general, e.slip_class, *values.values()])

@@ -123,8 +123,7 @@ def _replay_into(
                 row = DriveRow(str(bags[i]), error=_words(row, paths[i]))
             rows[i] = row
     finally:
-        for task in tasks.values():
-            remove_leftovers(output, task.folder)
+        remove_leftovers(output)
     told = [replace(rows[i], bag=str(bag)) for i, bag in enumerate(bags)]
     with new_file(output / SUMMARY_TABLE, overwrite=True) as path:
         write_table(told, path)
@@ -142,8 +141,7 @@ def _folder(output: Path, bags: Sequence[Path], overwrite: bool) -> Iterator[Non
             'or give --overwrite'
         )
     if ours:
-        for left in output.glob('.*.wheel-terra-*'):
-            remove_leftovers(output, left.name[1:].rpartition('.wheel-terra-')[0])
+        remove_leftovers(output)
     entries = SUMMARY_TABLE, SUMMARY_PAGE
     with working_folder(output, overwrite, ours and not overwrite, entries, bags):
         try:

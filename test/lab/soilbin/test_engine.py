@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.cli.main import main
-from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_lab.soilbin import files, geometry, stability
 from wheel_terra_lab.soilbin.bookkeeping import SERIES
 
@@ -250,14 +249,11 @@ def test_imposed_slip_is_kept_and_a_wall_stops_the_wheel(coarse_run, tmp_path, c
     assert found['net_traction'] > 0
 
 
-def test_bed_that_does_not_settle_is_said_and_the_earlier_output_stands(tmp_path, capsys):
-    with working_folder(tmp_path / 'out', False, False, ['summary.json']):
-        (tmp_path / 'out' / 'summary.json').write_text('{}')
+def test_bed_that_does_not_settle_is_said_and_leaves_nothing(tmp_path, capsys):
     command = ['soilbin', 'run', 'quick', '-o', str(tmp_path / 'out'), '--no-cache', *SMALL]
-    command += ['-p', 'bed.settled_speed:=1.0e-9', '-p', 'bed.settling_time:=0.03', '--overwrite']
+    command += ['-p', 'bed.settled_speed:=1.0e-9', '-p', 'bed.settling_time:=0.03']
     assert main(command) == 2
-    assert (tmp_path / 'out' / 'summary.json').read_text() == '{}'
-    assert [path.name for path in tmp_path.iterdir()] == ['out']
+    assert list(tmp_path.iterdir()) == []
     said = capsys.readouterr().err.strip().splitlines()[-1]
     assert 'still moves at' in said
     assert 'raise soilbin.bed.settling_time' in said
