@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings made of recordings."""
+"""Recordings made of recordings, messages made of those of rosbags."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +9,8 @@ from typing import Any
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter
+from wheel_terra_estimator.messages.unpack import Message, unpack
 
 
 def beginning(source: Path, target: Path, seconds: float) -> Path:
@@ -35,3 +37,15 @@ def changed(source: Path, target: Path, change: Callable[[str, Any], Any]) -> Pa
                 if message is not None:
                     file.write(topic, message, log_time)
     return target
+
+
+def unpacked(kind: str, message: Any) -> Message:
+    """Return a message of rosbags as node and replay get it: out of its bytes."""
+    return unpack(kind, bytes(jazzy_types().serialize_cdr(message, kind)))
+
+
+class Converter(InputConverter):
+    """Converts messages of rosbags."""
+
+    def convert(self, topic: str, message: Any) -> Any:
+        return super().convert(topic, unpacked(INPUT_TYPES[topic], message))

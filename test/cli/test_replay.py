@@ -12,13 +12,13 @@ import pytest
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
-from wheel_terra_estimator.bags.message_types import topic_messages
+from wheel_terra_estimator.bags.message_types import messages_of
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import read_values
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.messages.convert import JOINT_STATE, stamp_of
+from wheel_terra_estimator.messages.convert import JOINT_STATE
 
 REAL = ('--remap', 'odom:=/wheel/odometry', '--remap', 'reference_odom:=/truth/odometry')
 THINNED = ('-p', 'reference_odom_max_rate:=1.0')
@@ -145,10 +145,9 @@ def test_slip_on_slopes_is_published_each_second(make_bag, config, tmp_path):
     assert main(['replay', str(make_bag()), *config, '-o', str(out)]) == 0
     topic = '/wheel_terra_estimator/slip_on_slope'
     with open_bag(out) as bag:
-        unpack = topic_messages(JOINT_STATE).unpack
-        told = [unpack(data) for _, _, data in bag.messages((topic,))]
-    stamps = [stamp_of(message) for message in told]
+        told = [message for _, _, message in messages_of(bag, {topic: JOINT_STATE})]
+    stamps = [message.stamp for message in told]
     assert len(told) >= 3 and all(round(d * 1e-9) == 1 for d in np.diff(stamps))
-    assert list(told[-1].name) == [f'slope_{slope}deg' for slope in range(-20, 31, 5)]
-    columns = told[-1].position, told[-1].effort, told[-1].velocity
+    assert list(told[-1].names) == [f'slope_{slope}deg' for slope in range(-20, 31, 5)]
+    columns = told[-1].numbers
     assert np.shape(columns) == (3, 11) and np.isfinite(columns).all()

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.bags.message_types import topic_messages
+from wheel_terra_estimator.bags.message_types import messages_of
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.simulated_drive import TRUTH_TOPICS, write_simulated_drive
 from wheel_terra_estimator.bags.storage import open_bag
@@ -53,12 +53,11 @@ def test_reading_it_back_gives_the_measurements(bag_path, drive):
 
 
 def test_variances_of_the_imu_are_those_of_its_sensors(bag_path, drive):
-    unpack, sensors = topic_messages(INPUT_TYPES['imu/data']).unpack, drive.configuration.sensors
+    sensors = drive.configuration.sensors
     with open_bag(bag_path) as bag:
-        message = unpack(next(iter(bag.messages(('/imu/data',))))[2])
-    for name in ('orientation', 'angular_rate', 'specific_force'):
-        field = {'angular_rate': 'angular_velocity', 'specific_force': 'linear_acceleration'}
-        stated = getattr(message, f'{field.get(name, name)}_covariance')
+        _, _, message = next(messages_of(bag, {'/imu/data': INPUT_TYPES['imu/data']}))
+    for begin, name in ((4, 'orientation'), (16, 'angular_rate'), (28, 'specific_force')):
+        stated = message.numbers[0][begin : begin + 9]
         wanted = getattr(sensors, f'{name}_std') ** 2 * np.eye(3)
         np.testing.assert_allclose(np.reshape(stated, (3, 3)), wanted, err_msg=name)
 
@@ -82,8 +81,8 @@ def test_true_slip_of_wheels_at_rest_is_unknown(tmp_path):
     write_simulated_drive(drive, tmp_path / 'bag')
     with open_bag(tmp_path / 'bag') as bag:
         truth = read_truth(bag, {}, drive.configuration)
-        unpack = topic_messages(JOINT_STATE).unpack
-        held = [unpack(data).position for _, _, data in bag.messages(('/ground_truth/slip',))]
+        slips = messages_of(bag, {'/ground_truth/slip': JOINT_STATE})
+        held = [message.numbers[0] for _, _, message in slips]
     assert np.isfinite(held).all()  # the contract: no output is ever nan
     assert truth is not None
     assert np.isnan(truth.slip.value[-1]).tolist() == 3 * [False, True]

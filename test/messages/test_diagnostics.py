@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from estimate_sets import STAMP, some_estimates
 
-from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.messages.diagnostics import (
     ERROR,
@@ -18,6 +17,7 @@ from wheel_terra_estimator.messages.diagnostics import (
     Diagnostics,
 )
 from wheel_terra_estimator.messages.pipeline import Pipeline
+from wheel_terra_estimator.messages.unpack import Message
 
 NAMES = ('left', 'right')
 
@@ -154,12 +154,10 @@ def test_two_faults_of_a_topic_are_both_told():
 def test_what_is_left_out_of_the_inputs_is_told_by_reason():
     """By the pipeline of node and replay alike, each reason apart, with its count."""
     pipeline = Pipeline(reader.load(['generic_six_wheel']))
-    names, make = pipeline.names, MessageFactory()
-    wild = np.full(len(names), math.inf)
-    header = make.header(100_000_000_000, '')
-    pipeline.hear('joint_states', make.joint_state(header, names, velocity=wild, effort=wild))
-    header = make.header(0, '')
-    pipeline.hear('joint_states', make.joint_state(header, names, velocity=np.ones(len(names))))
+    names, none = pipeline.names, np.zeros(0)
+    wild, some = np.full(len(names), math.inf), np.ones(len(names))
+    pipeline.hear('joint_states', Message(100_000_000_000, names, (none, wild, wild)))
+    pipeline.hear('joint_states', Message(0, names, (none, some, none)))
     pipeline.refuse('imu/data', 'damaged')
     message = pipeline.diagnostics.stale('no estimates')[0].message
     for words in ('wheel rate infinite', 'torque infinite', 'stamp is zero', 'imu/data: damaged'):

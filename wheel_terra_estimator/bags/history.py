@@ -24,8 +24,9 @@ from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.bags.writer import DIAGNOSTICS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, SlipOnSlope
-from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, OUTPUT_TYPES, stamp_of
+from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, OUTPUT_TYPES
 from wheel_terra_estimator.messages.diagnostics import NODE
+from wheel_terra_estimator.messages.unpack import Message
 
 WHEEL_FIELDS = {
     'slip': 'slip',
@@ -266,20 +267,19 @@ class _EstimateMessages:
         elif topic == 'slip_class' and self._latest:
             self._latest['slip_class'] = message.data
         elif topic == 'twist':
-            row = self._sets.setdefault(stamp_of(message), {})
-            row['forward_velocity'] = message.twist.twist.linear.x
-            row['forward_velocity_std'] = np.sqrt(message.twist.covariance[0])
+            row = self._sets.setdefault(message.stamp, {})
+            velocity, variance = message.numbers[0][[0, 6]]
+            row.update(forward_velocity=velocity, forward_velocity_std=np.sqrt(variance))
         elif topic == 'stuck':
             _follow(self._warnings, bool(message.data), log_time)
         elif topic == DIAGNOSTICS:
             self._add_reasons(message)
 
-    def _add_joints(self, topic: str, message: Any, log_time: int) -> None:
-        row = self._sets.setdefault(stamp_of(message), {})
-        columns = (message.position, message.velocity, message.effort)
-        row.update(zip(_TOPIC_FIELDS[topic], columns, strict=True))
+    def _add_joints(self, topic: str, message: Message, log_time: int) -> None:
+        row = self._sets.setdefault(message.stamp, {})
+        row.update(zip(_TOPIC_FIELDS[topic], message.numbers, strict=True))
         if topic == 'slip':
-            self._names, self._latest = tuple(message.name), row
+            self._names, self._latest = message.names, row
             row['log_time'] = log_time
 
     def _add_reasons(self, message: Any) -> None:

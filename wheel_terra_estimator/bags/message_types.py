@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from wheel_terra_estimator.messages.cdr import DamagedMessageError, TopicMessages
+from wheel_terra_estimator.messages.unpack import TYPES, DamagedMessageError, unpack
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.bags.storage import Bag
@@ -23,16 +23,22 @@ def jazzy_types() -> Any:
 
 
 def messages_of(bag: Bag, types: Mapping[str, str]) -> Iterator[tuple[int, str, Any]]:
-    """Yield log time [ns], topic and message of topics with their types; damaged ones left out."""
-    unpack = {topic: topic_messages(kind).unpack for topic, kind in types.items()}
+    """Yield log time [ns], topic and message of topics with their types; damaged ones left out.
+
+    A message is a `Message`, of types that the estimator does not hear one of rosbags.
+    """
     for log_time, topic, data in bag.messages(tuple(types)):
         try:
-            message = unpack[topic](data)
+            message = _message(types[topic], data)
         except DamagedMessageError:
             continue
         yield log_time, topic, message
 
 
-def topic_messages(kind: str) -> TopicMessages:
-    """Return what unpacks the messages of a topic; rosbags where it is not done quickly."""
-    return TopicMessages(kind, lambda data: jazzy_types().deserialize_cdr(data, kind))
+def _message(kind: str, data: bytes) -> Any:
+    if kind in TYPES:
+        return unpack(kind, data)
+    try:
+        return jazzy_types().deserialize_cdr(data, kind)
+    except Exception as error:  # the library lets many kinds through on damaged bytes
+        raise DamagedMessageError(str(error)) from None

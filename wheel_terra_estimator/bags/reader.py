@@ -7,22 +7,20 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
-from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import Measurement
-from wheel_terra_estimator.messages.cdr import DamagedMessageError
 from wheel_terra_estimator.messages.convert import (
     DAMAGED,
     INPUT_TYPES,
     InputConverter,
     input_layout,
 )
+from wheel_terra_estimator.messages.unpack import DamagedMessageError, Message, unpack
 
 
 def read(
@@ -63,7 +61,6 @@ class MeasurementReader:
     def __init__(self, bag: Bag, remaps: Mapping[str, str], configuration: Configuration) -> None:
         self.bag = bag
         self.converter = InputConverter(input_layout(configuration))
-        self._unpack = {name: topic_messages(kind).unpack for name, kind in INPUT_TYPES.items()}
         # Estimator's topic to the bag's, for the topics that are there
         self.topics: dict[str, str] = {}
         # Topics that the estimator could use and that are not in the bag
@@ -98,7 +95,7 @@ class MeasurementReader:
             if measurement is not None:
                 yield log_time, measurement
 
-    def messages(self) -> Iterator[tuple[int, str, Any]]:
+    def messages(self) -> Iterator[tuple[int, str, Message]]:
         """Yield (log time [ns], estimator's topic, message); what cannot be unpacked is counted."""
         names: dict[str, list[str]] = {}
         for name, topic in self.topics.items():
@@ -109,13 +106,13 @@ class MeasurementReader:
                 if message is not None:
                     yield log_time, name, message
 
-    def unpack(self, data: bytes, name: str) -> Any | None:
+    def unpack(self, data: bytes, name: str) -> Message | None:
         """Return the message in CDR bytes of an input topic; None, counted, if it is damaged."""
         if len(data) > limits.MESSAGE:
             self.rejected[name, f'above {limits.in_words(limits.MESSAGE)}'] += 1
             return None
         try:
-            return self._unpack[name](data)
+            return unpack(INPUT_TYPES[name], data)
         except DamagedMessageError:
             self.rejected[name, DAMAGED] += 1
             return None
@@ -164,10 +161,10 @@ class MeasurementReader:
         for _, _, data in self.bag.messages((self.topics['joint_states'],)):
             message = self.unpack(data, 'joint_states')
             if message is not None:
-                if not set(wanted).isdisjoint(message.name):
+                if not set(wanted).isdisjoint(message.names):
                     self.rejected.clear()  # they are counted when they are read
                     return
-                heard.update(dict.fromkeys(message.name))
+                heard.update(dict.fromkeys(message.names))
         raise UserError(
             f'{self.bag.path}: no wheel of wheels.names ({", ".join(wanted)}) is on '
             f'{self.topics["joint_states"]}, which holds {", ".join(heard) or "no names"}; '

@@ -28,7 +28,7 @@ from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.input_file import read_text
-from wheel_terra_estimator.messages.convert import ODOMETRY, stamp_of
+from wheel_terra_estimator.messages.convert import ODOMETRY
 from wheel_terra_estimator.messages.diagnostics import Diagnostics, Status
 from wheel_terra_estimator.messages.pipeline import RESET, Pipeline
 
@@ -238,7 +238,7 @@ def _in_order_of(arrival: Path, reader: MeasurementReader) -> Iterator[tuple[int
     lines = read_text(arrival, LARGEST_ARRIVAL_LOG).splitlines()
     stored: dict[tuple[str, int], deque[tuple[int, Any]]] = defaultdict(deque)
     for log_time, name, message in reader.messages():
-        stored[name, stamp_of(message)].append((log_time, message))
+        stored[name, message.stamp].append((log_time, message))
     log_time = 0
     for number, line in enumerate(lines, start=1):
         if line == RESET:

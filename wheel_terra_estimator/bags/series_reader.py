@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.bags.message_types import topic_messages
+from wheel_terra_estimator.arrays import IndexArray
 from wheel_terra_estimator.bags.reader import NO_INPUTS
 from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag
@@ -22,8 +23,8 @@ from wheel_terra_estimator.checks.series import (
     SinkageSeries,
     VelocitySeries,
 )
-from wheel_terra_estimator.messages.cdr import Alike
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
+from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
 
 MOST_MESSAGES = 400_000
 """Messages of a topic that are kept; a longer recording is judged by its beginning."""
@@ -97,8 +98,6 @@ def read_series(
             shortened = True
         elif len(data) <= limits.MESSAGE:
             collector.add(log_time, data)
-    for collector in collectors.values():
-        collector.unpack()
     garbage = Counter({collector.topic: collector.damaged for collector in collectors.values()})
     if garbage.total() or bag.damaged:
         for collector in collectors.values():
@@ -109,7 +108,7 @@ def read_series(
 
     def made(own: str) -> Any:
         collector = collectors.get(own)
-        return collector.series() if collector and collector.stamps.size else None
+        return collector.series() if collector and collector.stamps else None
 
     return Recording(
         name=name,
@@ -130,8 +129,6 @@ _STRAY = 1e9
 """Stamps of a damaged recording that lie so far [ns] from where the others do are damaged."""
 _STRAYS = 0.2
 """Greatest share of such stamps that damage explains."""
-_AT_ONCE = 4096
-"""Messages that are unpacked together: what is held of the recording itself."""
 
 
 def credible(values: Any) -> Any:
@@ -141,49 +138,42 @@ def credible(values: Any) -> Any:
 
 
 class _Collector:
-    """Numbers of one topic; `unpack` what was added before anything is read from it."""
+    """Numbers of one topic."""
+
+    columns: IndexArray | slice = slice(None)  # of the numbers of a message that are kept
 
     def __init__(self, topic: str, kind: str) -> None:
-        self.topic = topic
+        self.topic, self._kind = topic, kind
         self.arrivals: list[int] = []
-        self._messages = topic_messages(kind)
-        self._waiting: list[bytes] = []
-        self._kept: list[Alike] = []
-        self.stamps = self.log_times = np.zeros(0, dtype=np.int64)
-        self._rows: list[Any] = []  # of each of `_kept`, their rows in the order of arrival
+        self.stamps: list[int] = []  # of the messages that could be read, and their log times
+        self._log_times: list[int] = []
+        self._sound: Any = slice(None)  # which of them are kept
+        # Names and lengths of the lists of a message -> which messages have these; their numbers
+        self._alike: dict[Any, tuple[list[int], array[float]]] = {}
 
     def add(self, log_time: int, data: bytes) -> None:
         self.arrivals.append(log_time)
-        self._waiting.append(data)
-        if len(self._waiting) == _AT_ONCE:
-            self._unpack_waiting()
-
-    def unpack(self) -> None:
-        """Unpack what waits and put everything into the order of arrival."""
-        self._unpack_waiting()
-        places = [np.zeros(0, dtype=np.int64), *(alike.order for alike in self._kept)]
-        stamps = [np.zeros(0, dtype=np.int64), *(alike.stamps for alike in self._kept)]
-        arrived = np.concatenate(places)
-        order = np.argsort(arrived)
-        self.stamps = np.concatenate(stamps)[order]
-        self.log_times = np.array(self.arrivals, dtype=np.int64)[arrived[order]]
-        self._rows = [np.searchsorted(arrived, index, sorter=order) for index in places[1:]]
-        self._sound = np.arange(len(order))
-
-    def _unpack_waiting(self) -> None:
-        first = len(self.arrivals) - len(self._waiting)
-        for alike in self._messages.unpack_alike(self._waiting):
-            self._kept.append(self.needed(alike._replace(order=first + alike.order)))
-        self._waiting = []
+        try:
+            message = unpack(self._kind, data)
+        except DamagedMessageError:
+            return
+        numbers = [values[self.columns] for values in message.numbers]
+        key = message.names, tuple(map(len, numbers))
+        places, kept = self._alike.setdefault(key, ([], array('d')))
+        places.append(len(self.stamps))
+        for values in numbers:
+            kept.frombytes(values.astype(np.float64, copy=False).tobytes())
+        self.stamps.append(message.stamp)
+        self._log_times.append(log_time)
 
     @property
     def damaged(self) -> int:
         """Messages that could not be read."""
-        return len(self.arrivals) - self.stamps.size
+        return len(self.arrivals) - len(self.stamps)
 
     def leave_out_strays(self) -> int:
         """Leave out what is stamped far from its log time, unless much is; return how many."""
-        delays = self.log_times.astype(float) - self.stamps.astype(float)
+        delays = np.subtract(self._log_times, self.stamps, dtype=float)
         if not delays.size:
             return 0
         stray = np.abs(delays - np.median(delays)) > _STRAY
@@ -192,83 +182,74 @@ class _Collector:
         self._sound = np.flatnonzero(~stray)
         return int(stray.sum())
 
-    def needed(self, alike: Alike) -> Alike:
-        """Return what is kept of messages."""
-        raise NotImplementedError
-
     def series(self) -> Any:
         raise NotImplementedError
 
     @property
     def times(self) -> tuple[Any, Any]:
-        return self.stamps[self._sound], self.log_times[self._sound]
+        """Stamps and log times [ns]."""
+        stamps, log_times = (np.array(t, dtype=np.int64) for t in (self.stamps, self._log_times))
+        return stamps[self._sound], log_times[self._sound]
 
     def table(self, field: int, columns: int) -> Any:
-        """Return a field of numbers in the order of arrival, (messages, columns)."""
-        values = np.full((self.stamps.size, columns), math.nan)
-        for alike, rows in zip(self._kept, self._rows, strict=True):
-            self.fill(values, rows, alike.names, alike.numbers[field])
+        """Return a list of numbers of all messages, (messages, columns)."""
+        values = np.full((len(self.stamps), columns), math.nan)
+        for (names, lengths), (places, kept) in self._alike.items():
+            numbers = np.array(kept).reshape(len(places), sum(lengths))
+            begin = sum(lengths[:field])
+            self.fill(values, places, names, numbers[:, begin : begin + lengths[field]])
         return credible(values)[self._sound]
 
-    def fill(self, values: Any, rows: Any, names: tuple[str, ...], numbers: Any) -> None:
-        values[rows] = numbers
+    def fill(self, values: Any, places: list[int], names: tuple[str, ...], numbers: Any) -> None:
+        values[places] = numbers
 
 
 class _Joints(_Collector):
     """Joint states, sorted by name."""
 
-    def __init__(self, topic: str, kind: str) -> None:
-        super().__init__(topic, kind)
-        self.names: dict[str, int] = {}
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The first joints that were named."""
+        named = dict.fromkeys(name for names, _ in self._alike for name in names)
+        return tuple(named)[:MOST_JOINTS]
 
-    def needed(self, alike: Alike) -> Alike:
-        for name in alike.names:
-            if len(self.names) < MOST_JOINTS:
-                self.names.setdefault(name, len(self.names))
-        return alike
-
-    def fill(self, values: Any, rows: Any, names: tuple[str, ...], numbers: Any) -> None:
+    def fill(self, values: Any, places: list[int], names: tuple[str, ...], numbers: Any) -> None:
         if len(names) == numbers.shape[1]:
-            known = [i for i, name in enumerate(names) if name in self.names]
-            places = [self.names[names[i]] for i in known]
-            values[np.ix_(rows, places)] = numbers[:, known]
+            column = {name: i for i, name in enumerate(self.names)}
+            known = [i for i, name in enumerate(names) if name in column]
+            values[np.ix_(places, [column[names[i]] for i in known])] = numbers[:, known]
 
     def series(self) -> Any:
-        n = len(self.names)
-        position, rate, torque = (self.table(field, n) for field in range(3))
-        return JointSeries(self.topic, *self.times, tuple(self.names), rate, torque, position)
+        position, rate, torque = (self.table(field, len(self.names)) for field in range(3))
+        return JointSeries(self.topic, *self.times, self.names, rate, torque, position)
 
 
 class _Sinkage(_Joints):
     def series(self) -> Any:
-        names = tuple(self.names)
-        return SinkageSeries(self.topic, *self.times, names, self.table(0, len(names)))
+        return SinkageSeries(self.topic, *self.times, self.names, self.table(0, len(self.names)))
 
 
 class _Imu(_Collector):
-    def needed(self, alike: Alike) -> Alike:
-        (all_numbers,) = alike.numbers
-        fields = []
-        for at, count in ((25, 3), (13, 3), (0, 4)):  # specific force, angular rate, attitude
-            values = all_numbers[:, at : at + count].copy()
-            values[all_numbers[:, at + count] == -1.0] = math.nan  # its covariance: there is none
-            fields.append(values)
-        return alike._replace(numbers=(np.hstack(fields),))
+    # Specific force, angular rate, attitude; the first covariance of each
+    columns = np.array([25, 26, 27, 13, 14, 15, 0, 1, 2, 3, 28, 16, 4])
 
     def series(self) -> Any:
-        table = self.table(0, 10)
-        return ImuSeries(self.topic, *self.times, table[:, :3], table[:, 3:6], table[:, 6:])
+        table = self.table(0, len(self.columns))
+        force, rate, attitude, stated = np.split(table, (3, 6, 10), axis=1)
+        for field, values in enumerate((force, rate, attitude)):
+            values[stated[:, field] == -1.0] = math.nan  # there is none
+        return ImuSeries(self.topic, *self.times, force, rate, attitude)
 
 
 class _Velocity(_Collector):
-    def needed(self, alike: Alike) -> Alike:
-        (twist,) = alike.numbers
-        values = twist[:, [0, 1, 2, 5, 6]]
-        np.minimum(values[:, 4], 0.1 * LARGEST, out=values[:, 4])
-        return alike._replace(numbers=(values,))
+    columns = np.array([0, 1, 2, 5, 6])  # linear velocity, yaw rate; variance of the first
+
+    def fill(self, values: Any, places: list[int], names: tuple[str, ...], numbers: Any) -> None:
+        values[places] = numbers
+        values[places, 4] = np.minimum(numbers[:, 4], 0.1 * LARGEST)  # any number states it
 
     def series(self) -> Any:
-        table = self.table(0, 5)
+        table = self.table(0, len(self.columns))
         return VelocitySeries(self.topic, *self.times, table[:, :3], table[:, 3], table[:, 4])
 
 

@@ -21,8 +21,8 @@ from wheel_terra_estimator.estimation.contacts.steering import headings
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading, WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover
-from wheel_terra_estimator.messages.cdr import TWIST
-from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, OUTPUT_TYPES, stamp_of
+from wheel_terra_estimator.messages.convert import OUTPUT_TYPES
+from wheel_terra_estimator.messages.unpack import JOINT_STATE, ODOMETRY, TWIST, Message
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 BODY_VELOCITY = '/truth/odometry'
@@ -86,10 +86,8 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
     """Return the truth that needs no rover file: a simulator's, or a true body velocity alone."""
     if '/ground_truth/twist' in bag.topics:
         wheels = len(names)
-        both = _Values(
-            lambda m: [*_ordered(m, m.position, names), *_ordered(m, m.effort, names)], 2 * wheels
-        )
-        depth = _Values(lambda m: _ordered(m, m.position, names), wheels)
+        both = _Values(lambda m: [*_ordered(m, 0, names), *_ordered(m, 2, names)], 2 * wheels)
+        depth = _Values(lambda m: _ordered(m, 0, names), wheels)
         found = _thinned(
             bag,
             {
@@ -184,9 +182,9 @@ def _along_wheels(
     return np.array(rows).reshape(len(stamp), rover.wheel_count)
 
 
-def _ordered(message: Any, values: Any, names: tuple[str, ...]) -> list[float]:
-    """Return values in the order of the wheels, nan where the message has none."""
-    found = dict(zip(message.name, values, strict=False))
+def _ordered(message: Message, field: int, names: tuple[str, ...]) -> list[float]:
+    """Return a field in the order of the wheels, nan where the message has none."""
+    found = dict(zip(message.names, message.numbers[field], strict=False))
     return [float(found.get(name, np.nan)) for name in names]
 
 
@@ -196,7 +194,7 @@ def _thinned(bag: Bag, wanted: Mapping[str, _Values]) -> dict[str, WheelTruth]:
     there = {t: _TYPES[t] for t in wanted if t in bag.topics and bag.topics[t].type == _TYPES[t]}
     for time, topic, message in messages_of(bag, there):
         # A message without a header was logged at the stamp that it belongs to.
-        stamp = stamp_of(message) if hasattr(message, 'header') else time
+        stamp = message.stamp if isinstance(message, Message) else time
         rows[topic].add(stamp, wanted[topic].of(message))
     return {topic: _sorted(rows[topic], values.width) for topic, values in wanted.items()}
 
@@ -207,5 +205,5 @@ def _sorted(rows: ThinnedRows, width: int) -> WheelTruth:
     return WheelTruth(stamps[order], credible(values[order]))
 
 
-def _forward(message: Any) -> list[float]:
-    return [message.twist.twist.linear.x]
+def _forward(message: Message) -> list[float]:
+    return [float(message.numbers[0][0])]

@@ -16,8 +16,8 @@ from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages import diagnostics
-from wheel_terra_estimator.messages.cdr import EstimatePacker
 from wheel_terra_estimator.messages.convert import OUTPUT_TYPES
+from wheel_terra_estimator.messages.pack import pack
 
 NAMESPACE = f'/{diagnostics.NODE}'
 STUCK = f'{NAMESPACE}/stuck'
@@ -79,7 +79,7 @@ class EstimateBagWriter(BagFile):
         inputs: Iterable[Path] = (),
     ) -> None:
         super().__init__(path, TOPICS, latched=LATCHED, overwrite=overwrite, inputs=inputs)
-        self._packer = EstimatePacker(names)
+        self._names = names
         self._diagnostics = statuses or diagnostics.Diagnostics(names)
         self._stuck: tuple[bool, int] | None = None
 
@@ -103,7 +103,7 @@ class EstimateBagWriter(BagFile):
 
         `statuses` are what diagnostics said live, empty for nothing; None: it is asked now.
         """
-        for topic, data in self._packer.packed(estimates):
+        for topic, data in pack(estimates, self._names):
             self.write_raw(f'{NAMESPACE}/{topic}', data, log_time)
         self._write_stuck(estimates.stuck, estimates.stuck_direction, log_time)
         found = self._diagnostics.due(estimates) if statuses is None else statuses

@@ -1,10 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Message fields <-> typed measurements and estimates, the same code for the node and the replay.
+"""Messages -> typed measurements, estimates -> message fields; the same for node and replay.
 
-Messages are taken by their fields alone, so those of rclpy and those of rosbags both fit; nothing
-here imports either. What the numbers are worth is judged by the estimator core, only what does not
-fit the layout of a message is refused here.
+What the numbers are worth is judged by the estimator core, only what does not fit the layout of a
+message is refused here.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -32,13 +32,12 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.messages.unpack import IMU, JOINT_STATE, ODOMETRY, TWIST, Message
 
-JOINT_STATE = 'sensor_msgs/msg/JointState'
-ODOMETRY = 'nav_msgs/msg/Odometry'
 INPUT_TYPES = {
     'joint_states': JOINT_STATE,
     'odom': ODOMETRY,
-    'imu/data': 'sensor_msgs/msg/Imu',
+    'imu/data': IMU,
     'sinkage': JOINT_STATE,
     'leaving_angle': JOINT_STATE,
     'reference_odom': ODOMETRY,
@@ -83,7 +82,7 @@ _COLUMNS = {
 OUTPUT_TYPES = {
     **dict.fromkeys(JOINT_OUTPUTS, JOINT_STATE),
     'slip_class': 'std_msgs/msg/UInt8MultiArray',
-    'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
+    'twist': TWIST,
     'stuck_direction': 'std_msgs/msg/Int8',
     'stuck': 'std_msgs/msg/Bool',
 }
@@ -96,11 +95,9 @@ UNKNOWN_VARIANCE = 1e6
 
 DAMAGED = 'damaged message'
 """Why bytes are refused that are no message of their type."""
+_IMU_FIELDS = (0, 4, 13, 16, 25, 28, 37)
+"""Where attitude, angular rate and specific force begin, each with its covariance behind it."""
 _NO_WHEEL = 'none of the configured wheels in it'
-_INERTIAL_FIELDS = {
-    'linear_acceleration_covariance': 'linear acceleration',
-    'angular_velocity_covariance': 'angular velocity',
-}
 
 
 @dataclass(frozen=True)
@@ -160,7 +157,7 @@ class InputConverter:
         squares = np.square(self._rotation)
         self._shares = squares[0].tolist(), squares[2].tolist()
         """Of the variances along the sensor's axes in those along x and z of ``base_link``."""
-        self._readers: dict[str, Callable[[Any], Any]] = {
+        self._readers: dict[str, Callable[[Message], Any]] = {
             'joint_states': self._joint_states,
             'odom': self._odom,
             'imu/data': self._imu,
@@ -169,7 +166,7 @@ class InputConverter:
             'reference_odom': self._reference_odom,
         }
 
-    def convert(self, topic: str, message: Any) -> Measurement | None:
+    def convert(self, topic: str, message: Message) -> Measurement | None:
         """Return the measurement in a message of an input topic; None when it does not fit."""
         return self._readers[topic](message)
 
@@ -180,104 +177,109 @@ class InputConverter:
         there = ', '.join(self._unknown_names[topic]) or 'no name'
         return f'{reason} but {there}; wheels.names: {", ".join(self.layout.names)}'
 
-    def _joint_states(self, message: Any) -> WheelOdometry | None:
+    def _joint_states(self, message: Message) -> WheelOdometry | None:
         """Wheel rates, torques and steering angles; what the message does not hold is nan."""
+        _, velocity, effort = message.numbers
         steering = self._steering(message) if self.layout.steering else None
-        if steering is not None and not self._columns_of(message.name)[0]:
+        if steering is not None and not self._columns_of(message.names)[0]:
             blank = np.full(len(self.layout.names), math.nan)
-            return WheelOdometry(stamp_of(message), blank, blank, steering)
-        values = self._wheel_values('joint_states', message.name, message.velocity, 'velocity')
+            return WheelOdometry(message.stamp, blank, blank, steering)
+        values = self._wheel_values('joint_states', message.names, velocity, 'velocity')
         if values is None:
             return None
         torque = None
-        if len(message.effort):
-            torque = self._wheel_values('joint_states', message.name, message.effort, 'effort')
+        if len(effort):
+            torque = self._wheel_values('joint_states', message.names, effort, 'effort')
         if torque is None:
             torque = np.full(len(self.layout.names), math.nan)
         unknown = np.count_nonzero(np.isnan(values))
-        if unknown and unknown > len(values) - len(set(self._columns_of(message.name)[1])):
+        if unknown and unknown > len(values) - len(set(self._columns_of(message.names)[1])):
             self.rejected['joint_states', 'velocity of a wheel is nan (taken as unknown)'] += 1
         if self._reversed:
             with np.errstate(invalid='ignore'):  # a damaged nan may be a signalling one
                 values, torque = values * self.layout.directions, torque * self.layout.directions
-        return WheelOdometry(stamp_of(message), values, torque, steering)
+        return WheelOdometry(message.stamp, values, torque, steering)
 
-    def _steering(self, message: Any) -> FloatArray | None:
+    def _steering(self, message: Message) -> FloatArray | None:
         """Return the steering angles of the wheels [rad], nan where there is none; None: none."""
-        joints = self.layout.steering
-        there = [k for k, name in enumerate(message.name) if name in joints]
+        joints, position = self.layout.steering, message.numbers[0]
+        there = [k for k, name in enumerate(message.names) if name in joints]
         if not there:
             return None
-        if len(message.position) != len(message.name):
+        if len(position) != len(message.names):
             self.rejected['joint_states', 'position of steering joints missing'] += 1
             return None
         angles = np.full(len(self.layout.names), math.nan)
         for k in there:
-            angles[joints[message.name[k]]] = message.position[k]
+            angles[joints[message.names[k]]] = position[k]
         return angles
 
-    def _odom(self, message: Any) -> WheelOdometry:
+    def _odom(self, message: Message) -> WheelOdometry:
         """Wheel rates of a rover that publishes no joint states, from its wheel odometry."""
-        twist = message.twist.twist
+        forward, _, _, _, _, turn = message.numbers[0][:6].tolist()
         with np.errstate(all='ignore'):  # absurd values are judged later, number by number
-            rim_speed = twist.linear.x - twist.angular.z * self.layout.lateral_positions
+            rim_speed = forward - turn * self.layout.lateral_positions
             rate = rim_speed / self.layout.slip_radius
         if np.isnan(rim_speed).any():
             self.rejected['odom', 'velocity is nan (taken as unknown)'] += 1
-        return WheelOdometry(stamp_of(message), rate, np.full_like(rim_speed, math.nan))
+        return WheelOdometry(message.stamp, rate, np.full_like(rim_speed, math.nan))
 
-    def _imu(self, message: Any) -> InertialReading | None:
+    def _imu(self, message: Message) -> InertialReading | None:
         """Specific force, angular rate and attitude in ``base_link``; nan where not told."""
-        told = [getattr(message, field)[0] != -1.0 for field in _INERTIAL_FIELDS]  # REP 145
-        for words, there in zip(_INERTIAL_FIELDS.values(), told, strict=True):
+        values = message.numbers[0].tolist()
+        attitude, of_attitude, rates, of_rate, forces, of_force = (
+            values[begin:end] for begin, end in pairwise(_IMU_FIELDS)
+        )
+        told = of_force[0] != -1.0, of_rate[0] != -1.0  # REP 145
+        for words, there in zip(('linear acceleration', 'angular velocity'), told, strict=True):
             if not there:
                 self.rejected['imu/data', f'says that it has no {words} (covariance -1)'] += 1
         force, rate = (
-            _vector(vector) if there else np.full(3, math.nan)
-            for vector, there in zip(
-                (message.linear_acceleration, message.angular_velocity), told, strict=True
-            )
+            np.array(vector) if there else np.full(3, math.nan)
+            for vector, there in zip((forces, rates), told, strict=True)
         )
         orientation = None
-        if message.orientation_covariance[0] != -1.0:  # REP 145: -1 is "no orientation"
-            orientation = self._orientation(message.orientation)
+        if of_attitude[0] != -1.0:  # REP 145: -1 is "no orientation"
+            orientation = self._orientation(attitude)
         if orientation is None and not any(told):
             return None
         if self._mounted:
             with np.errstate(all='ignore'):
                 force, rate = self._rotation @ force, self._rotation @ rate
-        variance = self._inertial_variance(message)
-        return InertialReading(stamp_of(message), force, rate, orientation, variance)
+        variance = self._inertial_variance(of_force, of_rate, of_attitude)
+        return InertialReading(message.stamp, force, rate, orientation, variance)
 
-    def _inertial_variance(self, message: Any) -> InertialVariance:
+    def _inertial_variance(
+        self, of_force: list[float], of_rate: list[float], of_attitude: list[float]
+    ) -> InertialVariance:
         """Return the variances in an Imu along the axes that count; 0 where it states none.
 
         A sensor that measures along other axes than x and z has its own there; its orientation is
         about level axes, however it is mounted.
         """
-        force = _diagonal(message.linear_acceleration_covariance)
-        rate = _diagonal(message.angular_velocity_covariance)
-        x, y, _ = _diagonal(message.orientation_covariance)
+        force, rate = _diagonal(of_force), _diagonal(of_rate)
+        x, y, _ = _diagonal(of_attitude)
         if not self._mounted:
             return InertialVariance(force[0], rate[2], max(x, y))
         along, about = self._shares
         return InertialVariance(_weighted(along, force), _weighted(about, rate), max(x, y))
 
-    def _per_wheel(self, kind: Any, topic: str, message: Any) -> Any:
+    def _per_wheel(self, kind: Any, topic: str, message: Message) -> Any:
         """Return what a sensor at each wheel measured, a reading of a kind."""
-        values = self._wheel_values(topic, message.name, message.position, 'position')
-        return None if values is None else kind(stamp_of(message), values)
+        values = self._wheel_values(topic, message.names, message.numbers[0], 'position')
+        return None if values is None else kind(message.stamp, values)
 
-    def _reference_odom(self, message: Any) -> ReferenceVelocity:
+    def _reference_odom(self, message: Message) -> ReferenceVelocity:
         """Body velocity from a slip-free source."""
-        twist = message.twist
-        lateral, variance = float(twist.twist.linear.y), float(twist.covariance[7])
+        values = message.numbers[0].tolist()
+        forward, lateral, covariance = values[0], values[1], values[6:]
+        variance = covariance[7]
         # Zero is what a source that tells no lateral speed sends; 1e6 what it says of it.
         told = lateral != 0.0 and abs(lateral) < _FASTEST and not variance >= _FASTEST**2
         return ReferenceVelocity(
-            stamp_of(message),
-            float(twist.twist.linear.x),
-            float(twist.covariance[0]),
+            message.stamp,
+            forward,
+            covariance[0],
             lateral if told else math.nan,
             variance if variance > 0.0 else 0.0,
         )
@@ -312,13 +314,12 @@ class InputConverter:
                 self._columns[key] = columns
         return columns
 
-    def _orientation(self, quaternion: Any) -> FloatArray | None:
-        sensor = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])
-        norm = math.hypot(*sensor.tolist())
+    def _orientation(self, quaternion: list[float]) -> FloatArray | None:
+        norm = math.hypot(*quaternion)
         if not 0.5 < norm < 2.0:  # all zero is what many drivers send when there is none
             self.rejected['imu/data', 'orientation is not a unit quaternion (left out)'] += 1
             return None
-        sensor /= norm
+        sensor = np.array(quaternion) / norm
         if not self._mounted:
             return sensor
         return (Rotation.from_quat(sensor) * self.layout.imu_mounting.inv()).as_quat()
@@ -330,17 +331,13 @@ def stamp_of(message: Any) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-def _vector(vector: Any) -> FloatArray:
-    return np.array([vector.x, vector.y, vector.z], dtype=np.float64)
-
-
 def _diagonal(covariance: Sequence[float]) -> tuple[float, float, float]:
     """Return the three variances of a covariance, zeros where it states none.
 
     All zeros mean that it is unknown, -1 that there is no such quantity (sensor_msgs/Imu); an
     identity matrix is a placeholder, and so is what no variance can be.
     """
-    x, y, z = float(covariance[0]), float(covariance[4]), float(covariance[8])
+    x, y, z = covariance[::4]
     if min(x, y, z) > 0.0 and max(x, y, z) < math.inf and not x == y == z == 1.0:
         return x, y, z
     return 0.0, 0.0, 0.0

@@ -27,7 +27,6 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_policy_name_from_kind
-from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import SetBool, Trigger
@@ -37,8 +36,7 @@ from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.messages.cdr import DamagedMessageError, TopicMessages
-from wheel_terra_estimator.messages.convert import DAMAGED, INPUT_TYPES, stamp_of
+from wheel_terra_estimator.messages.convert import DAMAGED, INPUT_TYPES
 from wheel_terra_estimator.messages.diagnostics import (
     ERROR,
     NODE,
@@ -47,6 +45,7 @@ from wheel_terra_estimator.messages.diagnostics import (
     Status,
 )
 from wheel_terra_estimator.messages.pipeline import RESET, Pipeline
+from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
 from wheel_terra_estimator.ros import parameters
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
@@ -77,12 +76,6 @@ NAMES_PERIOD = 1.0  # [s] between two looks for a node of the same name
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 
 _SECOND = 1_000_000_000
-
-
-def _topic_messages(topic: str) -> TopicMessages:
-    """Return what unpacks the messages of an input topic; rclpy where it is not done quickly."""
-    kind = MESSAGE_TYPES[topic]
-    return TopicMessages(INPUT_TYPES[topic], lambda data: deserialize_message(data, kind))
 
 
 def _came(info: dict[str, Any]) -> int:
@@ -124,7 +117,6 @@ class EstimatorNode(LifecycleNode):
         self._publisher: EstimatePublisher | None = None
         self._views: LiveViews | None = None
         self._subscriptions_made: dict[str, Subscription] = {}
-        self._unpack = {topic: _topic_messages(topic).unpack for topic in MESSAGE_TYPES}
         self._timers_made: list[Timer] = []
         self._kept: KeptSoil | None = None
         self._active = self._declaring = False
@@ -304,16 +296,17 @@ class EstimatorNode(LifecycleNode):
         if pipeline is None:
             return  # was in the queue when the node was cleaned up
         try:
-            message = self._unpack[topic](data)
+            message = unpack(INPUT_TYPES[topic], data)
         except DamagedMessageError:
             pipeline.refuse(topic, DAMAGED)
             return
-        stamp = stamp_of(message)
-        self._arrival.write(f'{topic} {stamp}')
+        self._arrival.write(f'{topic} {message.stamp}')
         now = self._seconds()
         number = info.get('publication_sequence_number') if topic in self._numbered else None
         clock = self._nanoseconds()  # 0: none has come yet
-        self._watch_inputs.heard(topic, now, (clock - stamp) / _SECOND if clock else 0.0, number)
+        self._watch_inputs.heard(
+            topic, now, (clock - message.stamp) / _SECOND if clock else 0.0, number
+        )
         self._incompatible.pop(topic, None)
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)

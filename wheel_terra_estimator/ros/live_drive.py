@@ -29,10 +29,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Int8
 
 from wheel_terra_estimator.bags import check_before
@@ -53,7 +51,7 @@ from wheel_terra_estimator.bags.writer import (
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.messages.convert import stamp_of
+from wheel_terra_estimator.messages.unpack import JOINT_STATE, unpack
 from wheel_terra_estimator.output_folder import check_file, check_folder
 from wheel_terra_estimator.reporting import truth_scores
 from wheel_terra_estimator.reporting.drive_style import Border
@@ -297,7 +295,7 @@ def record(heard: Sequence[Heard], path: Path, start: int, overwrite: bool = Fal
     with BagFile(path, TOPICS, latched=LATCHED, overwrite=overwrite) as file:
         for _, topic, data in heard:
             if topic == f'{NAMESPACE}/slip':
-                log_time = max(log_time, stamp_of(deserialize_message(data, JointState)))
+                log_time = max(log_time, unpack(JOINT_STATE, data).stamp)
             file.write_raw(topic, data, log_time)
 
 

@@ -17,9 +17,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Int8, UInt8MultiArray
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.messages.cdr import EstimatePacker
 from wheel_terra_estimator.messages.convert import BASE_FRAME, JOINT_OUTPUTS
 from wheel_terra_estimator.messages.diagnostics import Status
+from wheel_terra_estimator.messages.pack import pack
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, output_profile
 
 SET_MESSAGES = {
@@ -55,8 +55,7 @@ class EstimatePublisher:
         self._stuck_publisher = make_publisher(node, Bool, '~/stuck', latched=True)
         self._direction_publisher = make_publisher(node, Int8, '~/stuck_direction', latched=True)
         self._diagnostics_publisher = make_publisher(node, DiagnosticArray, '/diagnostics')
-        # Bytes, as a recording has them: rclpy would check and convert every field.
-        self._packer = EstimatePacker(names)
+        self._names = names
 
     def destroy(self) -> None:
         """Take the topics away."""
@@ -72,7 +71,7 @@ class EstimatePublisher:
         """Publish the messages of a set that somebody listens to."""
         wanted = {t for t, p in self._of_sets.items() if p.get_subscription_count()}
         if wanted:
-            for topic, data in self._packer.packed(estimates, wanted):
+            for topic, data in pack(estimates, self._names, wanted):
                 self._of_sets[topic].publish(data)
         self.publish_stuck(estimates.stuck, estimates.stuck_direction)
 

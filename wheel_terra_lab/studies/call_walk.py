@@ -33,14 +33,16 @@ from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
 
+import numpy as np
+
 import wheel_terra_estimator
-from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.bags.table_to_bag import EXAMPLE
 from wheel_terra_estimator.cli.main import main as wheel_terra
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.shipped import demo_recording
 from wheel_terra_estimator.messages import convert
 from wheel_terra_estimator.messages.pipeline import Pipeline
+from wheel_terra_estimator.messages.unpack import Message
 
 PACKAGE = Path(wheel_terra_estimator.__file__).resolve().parent
 STEP = 20_000_000  # [ns] between two messages of the IMU; every fifth time the wheels, too
@@ -97,22 +99,24 @@ def _length(code: CodeType) -> int:
 def walk_of_message() -> Walk:
     """Drive, and note what the last message of wheel rates calls."""
     configuration = reader.load(list(ROVER))
-    pipeline, make = Pipeline(configuration), MessageFactory()
-    names = configuration.wheels.names
+    pipeline = Pipeline(configuration)
+    names, none = configuration.wheels.names, np.zeros(0)
     noted = Walk()
     for step in range(WARM + 1):
-        header = make.header(1_700_000_000_000_000_000 + step * STEP)
-        imu = make.imu(header, (0.0, 0.0, 9.80665), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-        pipeline.hear('imu/data', imu)
+        stamp = 1_700_000_000_000_000_000 + step * STEP
+        imu = np.zeros(37)
+        imu[[3, 27]] = 1.0, 9.80665  # level
+        pipeline.hear('imu/data', Message(stamp, (), (imu,)))
         if step % 50 == 10:
-            twist = make.twist_with_covariance(0.05, 0.0, [1e-4] + [0.0] * 35)
-            pipeline.hear('reference_odom', make.odometry(header, twist))
+            twist = np.zeros(42)
+            twist[[0, 6]] = 0.05, 1e-4
+            pipeline.hear('reference_odom', Message(stamp, (), (twist,)))
         if step % 10 == 5:
-            depths = make.joint_state(header, names, position=[0.02] * len(names))
-            pipeline.hear('sinkage', depths)
+            depths = np.full(len(names), 0.02), none, none
+            pipeline.hear('sinkage', Message(stamp, names, depths))
         if step % 5 == 0:
             count = len(names)
-            rates = make.joint_state(header, names, velocity=[0.5] * count, effort=[3.0] * count)
+            rates = Message(stamp, names, (none, np.full(count, 0.5), np.full(count, 3.0)))
             last = step == WARM
             with noted.noting() if last else contextlib.nullcontext():
                 sets = pipeline.hear('joint_states', rates)

@@ -1,0 +1,109 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Estimates as CDR bytes, which node and recordings send as they are.
+
+rclpy would check every field of a message, rosbags would make objects of it.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Container, Iterator, Sequence
+from functools import cache
+
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages.convert import (
+    BASE_FRAME,
+    JOINT_OUTPUTS,
+    joint_fields,
+    twist_fields,
+)
+
+SET_TOPICS = (*JOINT_OUTPUTS, 'slip_class', 'twist')
+"""Private topics that have a message of each set (``slip_on_slope``: once a second)."""
+
+_HEAD = b'\0\1\0\0'  # little-endian
+_AFTER_STAMP = 8  # [byte] from the first field, from where fields are aligned
+
+
+def pack(
+    estimates: EstimateSet, names: tuple[str, ...], wanted: Container[str] = SET_TOPICS
+) -> Iterator[tuple[str, bytes]]:
+    """Yield private topic and CDR bytes of the messages of a set on the topics wanted.
+
+    ``names``: of the wheels.
+    """
+    stamp = estimates.stamp
+    for topic, fields in joint_fields(estimates, names).items():
+        if topic in wanted:
+            yield topic, joint_state(stamp, *fields)
+        if topic == 'slip' and 'slip_class' in wanted:
+            yield 'slip_class', slip_classes(estimates.slip_class.tolist())
+    if 'twist' in wanted:
+        yield 'twist', twist_stamped(stamp, *twist_fields(estimates))
+
+
+def joint_state(
+    stamp: int,
+    names: tuple[str, ...],
+    position: Sequence[float],
+    velocity: Sequence[float],
+    effort: Sequence[float],
+) -> bytes:
+    """Return a ``sensor_msgs/msg/JointState``; the stamp in ns."""
+    counts = len(position), len(velocity), len(effort)
+    form, beginning = _joint_layout(names, counts)
+    time = divmod(stamp, 1_000_000_000)
+    lists = counts[0], *position, counts[1], *velocity, counts[2], *effort
+    return form.pack(_HEAD, *time, beginning, *lists)
+
+
+def twist_stamped(
+    stamp: int, velocity: tuple[float, float], yaw_rate: float, covariance: Sequence[float]
+) -> bytes:
+    """Return a ``geometry_msgs/msg/TwistWithCovarianceStamped``: velocity along x and y."""
+    form, beginning = _twist_layout()
+    time = divmod(stamp, 1_000_000_000)
+    return form.pack(_HEAD, *time, beginning, *velocity, 0.0, 0.0, 0.0, yaw_rate, *covariance)
+
+
+def slip_classes(classes: Sequence[int]) -> bytes:
+    """Return a ``std_msgs/msg/UInt8MultiArray`` of one dimension, ``wheel``."""
+    count, no_offset = len(classes), 0
+    label = _padded(struct.pack('<I', 1) + _string('wheel'), 4)
+    return _HEAD + label + struct.pack('<4I', count, count, no_offset, count) + bytes(classes)
+
+
+@cache
+def _joint_layout(names: tuple[str, ...], counts: Sequence[int]) -> tuple[struct.Struct, bytes]:
+    """Return how a message is packed, and what stands between its stamp and its numbers."""
+    beginning = _padded(_string(BASE_FRAME), 4) + struct.pack('<I', len(names))
+    for name in names:
+        beginning = _padded(beginning, 4) + _string(name)
+    beginning = _padded(beginning, 4)
+    at = _AFTER_STAMP + len(beginning)
+    form = f'<4siI{len(beginning)}s'
+    for count in counts:
+        form += 'I'
+        at += 4
+        if count:
+            padding = -at % 8
+            form += f'{padding}x{count}d'
+            at += padding + 8 * count
+    return struct.Struct(form), beginning
+
+
+@cache
+def _twist_layout() -> tuple[struct.Struct, bytes]:
+    beginning = _padded(_string(BASE_FRAME), 8)
+    return struct.Struct(f'<4siI{len(beginning)}s42d'), beginning
+
+
+def _string(text: str) -> bytes:
+    content = text.encode() + b'\0'
+    return struct.pack('<I', len(content)) + content
+
+
+def _padded(content: bytes, size: int) -> bytes:
+    """Fill up bytes behind the stamp (or the head) to a multiple of ``size``, which divides 8."""
+    return content + bytes(-len(content) % size)

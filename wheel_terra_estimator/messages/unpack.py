@@ -1,0 +1,105 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages out of their CDR bytes, for the node and for recordings alike.
+
+rclpy and rosbags make objects of every field of a message, which takes three to ten times as long;
+of the four types that are heard only stamp, names and numbers are used.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+import numpy as np
+
+from wheel_terra_estimator.arrays import FloatArray
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+IMU = 'sensor_msgs/msg/Imu'
+ODOMETRY = 'nav_msgs/msg/Odometry'
+TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+
+TYPES = frozenset({JOINT_STATE, IMU, ODOMETRY, TWIST})
+"""Types that are unpacked here."""
+_STRINGS = {JOINT_STATE: 1, IMU: 1, ODOMETRY: 2, TWIST: 1}
+"""Type -> strings between stamp and names or numbers."""
+_NUMBERS = {IMU: (0, 37), ODOMETRY: (43, 42), TWIST: (0, 42)}
+"""Type -> numbers that are passed over (a pose with its covariance), and that are taken."""
+_BODY = 4  # where the fields begin, and from where they are aligned [byte]
+_AFTER_STAMP = 12  # [byte]
+_LONGEST_PADDING = 3  # [byte] behind the last field
+_ORDERS = {b'\0\0': '>', b'\0\1': '<'}  # encapsulation -> order of bytes
+
+
+class DamagedMessageError(ValueError):
+    """Bytes that are no message of the type."""
+
+
+class Message(NamedTuple):
+    """Stamp [ns], names and numbers of a message.
+
+    ``numbers`` of a JointState: position, velocity and effort. Of an Imu: attitude (4, then 9
+    covariances), angular rate (3 and 9), specific force (3 and 9). Of Odometry and stamped twist:
+    linear and angular velocity (3 each), then 36 covariances.
+    """
+
+    stamp: int
+    names: tuple[str, ...]
+    numbers: tuple[FloatArray, ...]
+
+
+def unpack(kind: str, data: bytes) -> Message:
+    """Return a message of one of the four types.
+
+    Raises DamagedMessageError where the bytes are none.
+    """
+    try:
+        order = _ORDERS[data[:2]]
+        seconds, nanoseconds = struct.unpack_from(f'{order}iI', data, _BODY)
+        _, at = _strings(data, _AFTER_STAMP, _STRINGS[kind], order)
+        names: list[str] = []
+        numbers: list[FloatArray] = []
+        if kind == JOINT_STATE:
+            count, at = _count(data, at, order)
+            names, at = _strings(data, at, count, order)
+            for _ in range(3):
+                count, at = _count(data, at, order)
+                values, at = _numbers(data, at, count, order)
+                numbers.append(values)
+        else:
+            passed_over, count = _NUMBERS[kind]
+            values, at = _numbers(data, at, passed_over + count, order)
+            numbers.append(values[passed_over:])
+        if len(data) - at > _LONGEST_PADDING:
+            raise ValueError('more bytes than fields')
+    except (struct.error, KeyError, ValueError) as error:
+        raise DamagedMessageError(str(error)) from None
+    return Message(seconds * 1_000_000_000 + nanoseconds, tuple(names), tuple(numbers))
+
+
+def _count(data: bytes, at: int, order: str) -> tuple[int, int]:
+    """Return the number of entries of a list, and where the list begins [byte]."""
+    at += -(at - _BODY) % 4
+    (count,) = struct.unpack_from(f'{order}I', data, at)
+    return count, at + 4
+
+
+def _strings(data: bytes, at: int, count: int, order: str) -> tuple[list[str], int]:
+    """Return strings, and where they end [byte]."""
+    found = []
+    for _ in range(count):
+        size, at = _count(data, at, order)
+        text = data[at : at + size]
+        if len(text) < size or text[-1:] != b'\0':
+            raise ValueError('a string does not end')
+        found.append(text[:-1].decode())
+        at += size
+    return found, at
+
+
+def _numbers(data: bytes, at: int, count: int, order: str) -> tuple[FloatArray, int]:
+    """Return numbers, and where they end [byte]."""
+    if count:
+        at += -(at - _BODY) % 8
+    return np.frombuffer(data, f'{order}f8', count, at), at + 8 * count
