@@ -5,16 +5,12 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 import logging
-import sys
-import time
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from queue import Empty, Queue
 from typing import Any, TypeVar
 
 from wheel_terra_estimator.errors import UserError
@@ -26,32 +22,21 @@ Result = TypeVar('Result')
 _MOST_DIGITS = 4  # of a number of processes
 CONNECT_TIMEOUT = 10
 """Time [s] in which a Dask scheduler has to answer."""
-LOOK = 5
-"""Time [s] without a finished task after which the workers of a cluster are looked for."""
 WORKER_TIMEOUT = 120
-"""Time [s] that a cluster may be without workers."""
+"""Time [s] in which a cluster has to have a worker."""
 
 
 def add_jobs_argument(
-    parser: argparse.ArgumentParser, *aliases: str, default: int = 1, words: str = 'in parallel'
+    parser: argparse.ArgumentParser, default: int = 1, words: str = 'in parallel'
 ) -> None:
-    """Declare ``--jobs``, the same for every command; aliases are not shown in the help."""
+    """Declare ``--jobs``, the same for every command."""
     parser.add_argument('--jobs', type=_count, default=default, metavar='N', help=words)
-    for alias in aliases:
-        parser.add_argument(alias, dest='jobs', type=_count, help=argparse.SUPPRESS)
 
 
-def add_scheduler_argument(parser: argparse.ArgumentParser, *aliases: str, what: str) -> None:
-    """Declare ``--scheduler``, the same for every command; aliases are not shown in the help."""
+def add_scheduler_argument(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare ``--scheduler``, the same for every command."""
     words = f'Dask scheduler whose workers take the {what}, over files that all of them see'
-    for name in ('--scheduler', *aliases):
-        parser.add_argument(
-            name,
-            dest='scheduler',
-            type=_address,
-            metavar='ADDRESS',
-            help=argparse.SUPPRESS if name in aliases else words,
-        )
+    parser.add_argument('--scheduler', type=_address, metavar='ADDRESS', help=words)
 
 
 def finished(
@@ -115,88 +100,52 @@ def _on_this_machine(
 def _on_cluster(
     function: Callable[[Task], Result], tasks: Sequence[Task], address: str
 ) -> Generator[tuple[int, Result | Exception], None, None]:
-    client = _client(address)
-    with client:
-        done: Queue[int] = Queue()
+    with _client(address) as client:
+        from dask.distributed import as_completed
+
         futures = client.map(function, tasks, pure=False)
-        for i, future in enumerate(futures):
-            future.add_done_callback(lambda _, i=i: done.put(i))
-        watch = _ClusterWatch(client, address)
+        index = {future.key: i for i, future in enumerate(futures)}
+        done = 0
         try:
-            for count in range(len(tasks)):
-                while True:
-                    try:
-                        index = done.get(timeout=LOOK)
-                        break
-                    except Empty:
-                        watch.look(count, len(tasks))
-                if futures[index].cancelled():
+            for future in as_completed(futures):
+                if future.cancelled():
                     raise UserError(
-                        f'--scheduler {address}: the connection was lost; {count} of {len(tasks)} '
+                        f'--scheduler {address}: the connection was lost; {done} of {len(tasks)} '
                         'tasks are done: look at the scheduler and run it again'
                     )
-                yield index, _outcome(futures[index])
+                yield index[future.key], _outcome(future)
+                done += 1
         except BaseException:
             with suppress(Exception):  # of a cluster that is gone there is nothing to call off
-                client.cancel(futures, callback_timeout=LOOK)
+                client.cancel(futures)
             raise
 
 
 def _client(address: str) -> Any:
-    """Return a client of a scheduler that has answered."""
+    """Return a client of a scheduler that has answered and has a worker."""
     try:
-        from dask.distributed import Client, Security
-        from distributed.comm import connect
+        from dask.distributed import Client
     except ImportError as error:
         raise UserError(
             f"--scheduler: Dask is missing; pip install 'dask[distributed]' ({error})"
         ) from None
     for name in ('distributed', 'distributed.client'):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what is lost is told here
-
-    async def greet() -> None:
-        keys = Security().get_connection_args('client')
-        comm = await connect(address, timeout=CONNECT_TIMEOUT, **keys)
-        comm.abort()
-
-    try:  # a client waits for ever for what accepts and is silent
-        asyncio.run(asyncio.wait_for(greet(), CONNECT_TIMEOUT))
-        return Client(address, timeout=CONNECT_TIMEOUT)
+    try:
+        client = Client(address, timeout=CONNECT_TIMEOUT)
     except Exception as error:
-        said = 'it speaks something else'
-        if isinstance(error, (OSError, asyncio.TimeoutError)):
-            said = str(error) or f'it is silent for {CONNECT_TIMEOUT} s'
         raise UserError(
-            f'--scheduler {address}: no Dask scheduler answers there ({said}); '
+            f'--scheduler {address}: no Dask scheduler answers there ({error}); '
             'start one with: dask scheduler'
         ) from None
-
-
-class _ClusterWatch:
-    """Says that no worker is there, and ends it when that lasts."""
-
-    def __init__(self, client: Any, address: str) -> None:
-        self._client, self._address = client, address
-        self._alone_since: float | None = None
-
-    def look(self, done: int, total: int) -> None:
-        """Ask for the workers, some time after the last task was finished."""
-        try:
-            workers = self._client.sync(self._client.scheduler.ncores, callback_timeout=LOOK)
-            state = 'has no workers; start one with: dask worker ADDRESS'
-        except Exception:
-            workers = None
-            state = 'does not answer any more'
-        if workers:
-            self._alone_since = None
-            return
-        state = f'--scheduler {self._address}: it {state.replace("ADDRESS", self._address)}'
-        now = time.monotonic()
-        if self._alone_since is None:
-            self._alone_since = now
-            print(f'{state} (waiting for {WORKER_TIMEOUT:g} s)', file=sys.stderr, flush=True)
-        elif now - self._alone_since > WORKER_TIMEOUT:
-            raise UserError(f'{state}; {done} of {total} tasks are done')
+    try:
+        client.wait_for_workers(1, timeout=WORKER_TIMEOUT)
+    except TimeoutError:
+        client.close()
+        raise UserError(
+            f'--scheduler {address}: it has no workers; start one with: dask worker {address}'
+        ) from None
+    return client
 
 
 def _outcome(future: Any) -> Any:

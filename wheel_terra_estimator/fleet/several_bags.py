@@ -104,18 +104,11 @@ def _replay_into(
     output = settings.output
     paths = [path.absolute() for path in bags]
     rows: dict[int, DriveRow] = {}
-    digests: dict[int, str] = {}
-    compared = finished(partial(_digest, settings), paths, jobs, scheduler)
-    for i, digest in _shown(compared, len(paths), 'compared'):
-        if isinstance(digest, Exception):
-            rows[i] = DriveRow(str(bags[i]), error=_words(digest, paths[i]))
-        else:
-            digests[i] = digest
-    tasks = _tasks(paths, digests, output, rows)
+    tasks = _tasks(settings, paths, rows)
     numbers = list(tasks)
     replayed = finished(partial(_replay, settings), list(tasks.values()), jobs, scheduler)
     try:
-        for k, row in _shown(replayed, len(tasks), 'replayed'):
+        for k, row in _shown(replayed, len(tasks)):
             i = numbers[k]
             if isinstance(row, CannotWriteError):
                 raise row  # no fault of the recording: the next would fare no better
@@ -152,14 +145,20 @@ def _folder(output: Path, bags: Sequence[Path], overwrite: bool) -> Iterator[Non
 
 
 def _tasks(
-    paths: Sequence[Path], digests: Mapping[int, str], output: Path, rows: dict[int, DriveRow]
+    settings: Settings, paths: Sequence[Path], rows: dict[int, DriveRow]
 ) -> dict[int, _Task]:
-    """Return what is left to do, by number of the recording; rows that are there go to `rows`."""
-    done = {}
+    """Return what is left to do, by number of the recording; what is not goes to `rows`."""
+    output, done = settings.output, {}
     for folder in sorted(output.iterdir()):
         facts = facts_of(folder, only_whole=True) if folder.is_dir() else {}
         if isinstance(facts.get('digest'), str) and isinstance(facts.get('row'), dict):
             done[facts['digest']] = replace(DriveRow.from_json(facts['row']), folder=folder.name)
+    digests = {}
+    for i, path in enumerate(paths):
+        try:
+            digests[i] = _digest(settings, path)
+        except UserError as error:
+            rows[i] = DriveRow(str(path), error=_words(error, path))
     taken = {done[digest].folder for digest in digests.values() if digest in done}
     tasks = {}
     for i, digest in digests.items():
@@ -246,11 +245,11 @@ def _words(error: Exception, path: Path) -> str:
 
 
 def _shown(
-    outcomes: Generator[tuple[int, Any], None, None], total: int, what: str
+    outcomes: Generator[tuple[int, Any], None, None], total: int
 ) -> Iterator[tuple[int, Any]]:
     """Show the rate and the time left on a terminal; end the workers when the loop is left."""
     from tqdm import tqdm
 
     quiet = not sys.stderr.isatty()
     with closing(outcomes):
-        yield from tqdm(outcomes, total=total, unit='bag', desc=what, disable=quiet)
+        yield from tqdm(outcomes, total=total, unit='bag', disable=quiet)

@@ -80,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=['reference', 'no_reference'],
         help=f'what the estimator gets: {", ".join(MODES)}',
     )
-    add_jobs_argument(parser, '--processes', words='drives at a time')
+    add_jobs_argument(parser, words='drives at a time')
     parser.add_argument(
         '--measured',
         type=Path,

@@ -81,11 +81,10 @@ def add_study_arguments(parser: argparse.ArgumentParser) -> None:
     _cache(parser)
     add_jobs_argument(
         parser,
-        '--workers',
         default=0,
         words='engine processes at a time (default: one per core)',
     )
-    add_scheduler_argument(parser, '--dask', what='cases')
+    add_scheduler_argument(parser, what='cases')
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -129,7 +129,7 @@ def main() -> None:
     runner = commands.add_parser('run')
     runner.add_argument('file', type=Path)
     runner.add_argument('--per-group', type=int, default=20, help='campaigns per group and design')
-    add_jobs_argument(runner, '--processes', words='campaigns at a time')
+    add_jobs_argument(runner, words='campaigns at a time')
     fitter = commands.add_parser('fit')
     fitter.add_argument('file', type=Path)
     arguments = parser.parse_args()
