@@ -44,8 +44,8 @@ def write(path, content):
 
 
 def left_over(folder):
-    """Names in a folder that neither the node's files nor the lock account for."""
-    return {p.name for p in folder.iterdir()} - {'s.yaml', 's.yaml.state.json', '.s.yaml.lock'}
+    """Names in a folder that the node's files do not account for."""
+    return {p.name for p in folder.iterdir()} - {'s.yaml', 's.yaml.state.json'}
 
 
 @pytest.mark.parametrize('content', FOREIGN.values(), ids=FOREIGN)
@@ -81,7 +81,6 @@ def test_a_new_an_empty_and_an_own_file_are_written(tmp_path, configuration, bef
     kept = KeptSoil(path)
     kept.values(configuration)
     kept.save(LEARNED, STUCK)
-    kept.close()
     assert not kept.fault
     again = KeptSoil(path)
     assert again.values(configuration) == LEARNED
@@ -117,21 +116,6 @@ def test_an_own_file_that_does_not_suit_the_rover_is_told_and_left_alone(tmp_pat
     assert kept.fault, 'a warning that can be kept takes nothing back'
     assert path.read_text() == other_rover
     assert kept.warning() == STUCK
-
-
-def test_one_node_writes_and_the_other_says_so_until_the_first_has_ended(tmp_path):
-    path = tmp_path / 's.yaml'
-    first, second = KeptSoil(path), KeptSoil(path)
-    assert not first.fault
-    assert f'another node (process {os.getpid()} on ' in second.fault
-    first.save(LEARNED, STUCK)
-    with pytest.raises(UserError, match='give each a soil_file of its own'):
-        second.save({'soil.cohesion': 1.0}, StuckState())
-    second.forget_warning()
-    assert KeptSoil(path).warning() == STUCK
-    first.close()
-    second.save({'soil.cohesion': 1.0}, StuckState())
-    assert not second.fault
 
 
 @pytest.mark.parametrize('number', [errno.ENOSPC, errno.EROFS, errno.EIO, errno.EDQUOT])
@@ -201,14 +185,11 @@ def test_an_arrival_log_replaces_nothing_but_an_arrival_log(tmp_path):
         assert why_no_arrival_log(write(log, content))
 
 
-def test_one_node_writes_an_arrival_log_and_a_full_disk_ends_the_log_alone(tmp_path):
-    """A second writer would cut the first one's lines off; an error would end the estimator."""
+def test_a_full_disk_ends_the_arrival_log_alone(tmp_path):
+    """An error would end the estimator."""
     path, said = tmp_path / 'arrival.txt', []
     first = ArrivalLog(str(path), (), said.append)
     first.write('imu/data 1')
-    with pytest.raises(UserError, match=r'record_arrival: .* another node .* writes to it'):
-        ArrivalLog(str(path), (), said.append)
-    assert path.read_text() == 'imu/data 1\n'
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
     try:

@@ -221,28 +221,9 @@ def test_what_cannot_be_used_is_refused_at_the_start(listener, parameters, param
     assert Path(parameters).read_text() == before
 
 
-def test_one_limiter_keeps_its_stop_and_the_other_says_so_until_the_first_has_ended(
-    start, listener, tmp_path
-):
-    from diagnostic_msgs.msg import DiagnosticArray
-
-    node, until = listener
-    said = []
-    node.create_subscription(DiagnosticArray, '/diagnostics', said.append, 10)
-
-    def words_of(name):
-        words = [s.message for m in said for s in m.status if s.hardware_id == name]
-        return words[-1] if words else ''
-
-    path = tmp_path / 'new' / 'limiter.json'
-    keeps = ['-p', f'state_file:={path}']
-    first = start('traction_limiter_node', '--ros-args', *keeps)
-    until(path.exists)
-    start('traction_limiter_node', '--ros-args', '-r', '__node:=second', *keeps)
-    until(lambda: f'another node (process {first.pid} ' in words_of('second'))
-    assert 'state_file' not in words_of('traction_limiter')
-    first.kill()
-    until(lambda: words_of('second') and 'another node' not in words_of('second'))
+def test_what_is_refused_ends_the_process_with_one_line(start):
+    status, words = start('traction_limiter_node', '--ros-args', '-p', 'creep:=0.5').end()
+    assert status == 2 and "'creep_scale'" in words and 'Traceback' not in words, words
 
 
 def test_plain_twist(start, listener):

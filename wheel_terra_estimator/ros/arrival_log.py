@@ -13,7 +13,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 from wheel_terra_estimator.messages.pipeline import RESET
 from wheel_terra_estimator.output_folder import check_target
-from wheel_terra_estimator.ros.file_claim import FileClaim
 
 LONGEST_LINE = 100  # [byte]
 
@@ -28,11 +27,11 @@ def why_no_arrival_log(path: Path) -> str:
 
 
 class ArrivalLog:
-    """Line after line, ``TOPIC STAMP`` or `RESET`, to a file of which this node alone is writer.
+    """Line after line, ``TOPIC STAMP`` or `RESET`, to a file.
 
     ``inputs``: files that the node reads. ``complain``: is told, once, why the log ends early: a
     disk that is full ends the log, not the node. Raises UserError where it may not, or cannot, be
-    written, or another node writes it.
+    written.
     """
 
     def __init__(
@@ -43,10 +42,8 @@ class ArrivalLog:
         if not name:
             return
         path = Path(name).expanduser()
-        self._claim = FileClaim(path, 'record_arrival')
         try:
             check_target(path, True, inputs, foreign=why_no_arrival_log)
-            self._claim.take()
             self._file = path.open('w', encoding='utf-8', buffering=1)
         except (OSError, UserError) as error:
             reason = getattr(error, 'strerror', None)
@@ -68,5 +65,4 @@ class ArrivalLog:
         if self._file is not None:
             with suppress(OSError):
                 self._file.close()
-            self._claim.release()
             self._file = None

@@ -13,15 +13,13 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_target, try_to_write
-from wheel_terra_estimator.ros.file_claim import FileClaim
 
 
 class KeptSoil:
     """Soil, sensor biases and stuck warning of one node in the file of its ``soil_file``.
 
-    One node writes to a file, see `FileClaim`. A file that may
-    never be written to is refused; what may change (a folder that is missing, a disk that is full,
-    another node) is told in `fault`, and nothing is written as long as it stands.
+    A file that may never be written to is refused; what may change (a disk that is full) is told in
+    `fault`.
 
     ``inputs``: other files that the node reads. Raises UserError where the file is none of this
     program, or one of `inputs`.
@@ -31,7 +29,6 @@ class KeptSoil:
         self.path = path.resolve()
         self._state_path = soil_file.state_path(self.path)
         self.fault = ''  # why nothing is kept, in words; empty where it is
-        self._claim = FileClaim(self.path, 'soil_file')
         self._unusable = ''
         try:
             check_target(self.path, True, inputs, foreign=soil_file.why_foreign)
@@ -41,7 +38,6 @@ class KeptSoil:
                 'read at the start without that'
             ) from None
         try:
-            self._claim.take()
             try_to_write(self.path)
         except UserError as error:
             self.fault = str(error)
@@ -71,7 +67,6 @@ class KeptSoil:
         Raises UserError where it cannot be written, or must not be; also in `fault`.
         """
         try:
-            self._claim.take()
             try:
                 if learned and self._unusable:
                     raise UserError(self._unusable)
@@ -87,11 +82,6 @@ class KeptSoil:
     def forget_warning(self) -> None:
         """Remove the warning that was kept."""
         try:
-            self._claim.take()
             soil_file.clear_state(self._state_path)
         except UserError as error:
             self.fault = str(error)
-
-    def close(self) -> None:
-        """Let another node write to the file."""
-        self._claim.release()

@@ -248,8 +248,6 @@ class EstimatorNode(LifecycleNode):
             return
         self._active = False
         self._save_quietly()
-        if self._kept is not None:
-            self._kept.close()
         for timer in self._timers_made:
             self.destroy_timer(timer)
         for subscription in self._subscriptions_made.values():
@@ -399,8 +397,6 @@ class EstimatorNode(LifecycleNode):
 
         Raises UserError if that file may not be written to.
         """
-        if self._kept is not None:
-            self._kept.close()  # of a configuration that was refused
         if not configuration.soil_file:
             return None
         effects = str(configuration.flat()['effect_file'])

@@ -34,7 +34,6 @@ from wheel_terra_estimator.estimation.traction_limiter import Interlock, Limiter
 from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN, Status
 from wheel_terra_estimator.output_folder import cannot_write, check_file
-from wheel_terra_estimator.ros.file_claim import FileClaim
 from wheel_terra_estimator.ros.outputs import diagnostic_array
 from wheel_terra_estimator.ros.qos import input_profile, output_profile
 
@@ -59,7 +58,6 @@ class TractionLimiter(Node):
         name = str(self._declare('state_file', '', words))
         self._refuse_unknown()
         self._file = Path(name).expanduser() if name else None
-        self._claim = FileClaim(self._file, 'state_file') if self._file else None
         self._unkept = ''  # why the state is not in its file
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._state = self._start()
@@ -208,7 +206,7 @@ class TractionLimiter(Node):
     def _start(self) -> LimiterState:
         """Return the state at the start, stopped where the file says so."""
         state = LimiterState(still_since=self._now())
-        if self._file is None or self._claim is None:
+        if self._file is None:
             return state
         if self._file.name.endswith(soil_file.STATE):
             raise UserError(
@@ -229,14 +227,13 @@ class TractionLimiter(Node):
 
     def _keep(self, kept: soil_file.StuckState | None = None) -> None:
         """Write the present state (or the one that was found) to the file of this node."""
-        if self._file is None or self._claim is None:
+        if self._file is None:
             return
         if kept is None:
             stopped = self._state.interlock is not Interlock.FREE
             stamp = self.get_clock().now().nanoseconds
             kept = soil_file.StuckState(stopped, self._state.reason, stamp, self._state.direction)
         try:
-            self._claim.take()
             soil_file.write_state(self._file, kept)
             self._unkept = ''
         except UserError as error:
