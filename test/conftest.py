@@ -19,11 +19,11 @@ from typing import Any
 import hypothesis
 import pytest
 import yaml
+from message_factory import MessageFactory, serialised
 from retries import pytest_sessionfinish, pytest_terminal_summary  # noqa: F401
 from rosbags.rosbag2 import writer as bag_writer
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
@@ -226,7 +226,7 @@ def make_bag(tmp_path: Path, drive: list[tuple[str, Any, int]]) -> MakeBag:
         path = tmp_path / name
         with BagFile(path, topics or DRIVE_TOPICS, storage=storage) as file:
             for topic, message, log_time in drive if messages is None else messages:
-                file.write(topic, message, log_time)
+                file.write(topic, serialised(message), log_time)
         return path
 
     return make

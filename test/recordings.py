@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from message_factory import serialised
+
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.storage import open_bag
@@ -22,7 +24,7 @@ def beginning(source: Path, target: Path, seconds: float) -> Path:
             for log_time, topic, data in bag.messages(tuple(topics)):
                 first = log_time if first is None else first
                 if log_time - first < seconds * 1e9:
-                    file.write_raw(topic, data, log_time)
+                    file.write(topic, data, log_time)
     return target
 
 
@@ -35,13 +37,13 @@ def changed(source: Path, target: Path, change: Callable[[str, Any], Any]) -> Pa
             for log_time, topic, data in bag.messages(tuple(topics)):
                 message = change(topic, store.deserialize_cdr(data, topics[topic]))
                 if message is not None:
-                    file.write(topic, message, log_time)
+                    file.write(topic, serialised(message), log_time)
     return target
 
 
 def unpacked(kind: str, message: Any) -> Message:
     """Return a message of rosbags as node and replay get it: out of its bytes."""
-    return unpack(kind, bytes(jazzy_types().serialize_cdr(message, kind)))
+    return unpack(kind, serialised(message))
 
 
 class Converter(InputConverter):

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from estimate_sets import some_estimates
+from message_factory import MessageFactory, serialised
 
-from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.messages import pack
 from wheel_terra_estimator.messages.convert import BASE_FRAME, INPUT_TYPES
+from wheel_terra_estimator.messages.diagnostics import Status
 from wheel_terra_estimator.messages.unpack import (
     IMU,
     JOINT_STATE,
@@ -139,6 +140,32 @@ def test_packed_messages_are_the_bytes_of_rosbags(names, factory):
             factory.twist_stamped(header, 0.3, -0.2, covariance), TWIST
         )
         assert pack.twist_stamped(stamp, (0.3, 0.0), -0.2, covariance) == bytes(theirs)
+
+
+@pytest.mark.parametrize('frame', ['base_link', 'ab', 'ü', ''])
+@pytest.mark.parametrize('attitude', [None, (0.1, 0.2, 0.3, 0.9)])
+def test_inputs_are_packed_as_rosbags_packs_them(frame, attitude, factory):
+    force, rate, variances = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0)
+    theirs = factory.imu(factory.header(START, frame), force, rate, attitude, variances)
+    assert pack.imu(START, force, rate, attitude, variances, frame) == serialised(theirs)
+    covariance = [float(i) for i in range(36)]
+    twist = factory.twist_with_covariance(0.3, -0.1, covariance)
+    theirs = factory.odometry(factory.header(START, 'odom'), twist)
+    assert pack.odometry(START, 0.3, -0.1, covariance) == serialised(theirs)
+
+
+def test_warnings_and_diagnostics_are_packed_as_rosbags_packs_them(factory):
+    for value in (True, False):
+        assert pack.flag(value) == serialised(factory.bool(value))
+    for value in (-1, 0, 1):
+        assert pack.direction(value) == serialised(factory.int8(value))
+    statuses = [
+        Status(2, 'node', 'ü' * length, 'id', [('a', '1'), ('key', '')][:length])
+        for length in range(4)
+    ]
+    for some in ([], statuses[:1], statuses):
+        theirs = factory.diagnostic_array(factory.header(START), some)
+        assert pack.diagnostic_array(START, some) == serialised(theirs)
 
 
 def test_a_set_is_packed_for_the_topics_that_are_wanted(factory):

@@ -26,7 +26,7 @@ MEGABYTE = 2**20
 def fill(path: Path, count: int) -> None:
     with BagFile(path, {TOPIC: KIND, '/other': KIND}) as bag:
         for number in range(count):
-            bag.write_raw(TOPIC, number.to_bytes(8, 'little') * 1000, 1000 + number)
+            bag.write(TOPIC, number.to_bytes(8, 'little') * 1000, 1000 + number)
 
 
 @contextmanager

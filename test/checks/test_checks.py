@@ -16,6 +16,7 @@ from wheel_terra_estimator.checks.clocks import lag
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.imu import ImuState, check_imu
 from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.messages import pack
 
 WHOLE = rolling.recording()
 
@@ -436,11 +437,9 @@ def test_visual_odometry_is_the_reference_beside_joint_states(tmp_path):
         '/wheel_odom': 'nav_msgs/msg/Odometry',
     }
     with BagFile(tmp_path / 'bag', topics) as file:
-        header = file.messages.header(1)
-        file.write('/drive', file.messages.joint_state(header, ('a',), [0.0], [1.0], []), 1)
+        file.write('/drive', pack.joint_state(1, ('a',), [0.0], [1.0]), 1)
         for topic in ('/zed/visual_odometry', '/wheel_odom'):
-            twist = file.messages.twist_with_covariance(0.1, 0.0, np.zeros(36))
-            file.write(topic, file.messages.odometry(header, twist), 1)
+            file.write(topic, pack.odometry(1, 0.1, 0.0, [0.0] * 36), 1)
     with open_bag(tmp_path / 'bag') as bag:
         chosen = choose_topics(bag, {})
     assert chosen['joint_states'] == '/drive'

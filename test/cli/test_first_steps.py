@@ -8,6 +8,7 @@ import struct
 import numpy as np
 import pytest
 import yaml
+from message_factory import serialised
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.series_reader import read_series
@@ -63,7 +64,7 @@ def test_the_robot_description_of_a_recording(tmp_path):
     text = URDF.encode() + b'\0'
     with BagFile(tmp_path / 'bag', {'/robot_description': 'std_msgs/msg/String'}) as bag:
         data = b'\0\1\0\0' + struct.pack('<I', len(text)) + text
-        bag.write_raw('/robot_description', data, 1)
+        bag.write('/robot_description', data, 1)
     of_the_urdf(rover_of(['--bag', str(tmp_path / 'bag')], tmp_path))
 
 
@@ -141,13 +142,12 @@ def test_positions_need_wheels_that_count_one_way(tmp_path, capsys):
     assert set(np.diff(told.joints.stamp)) == {50_000_000}
 
 
-def test_an_imu_that_says_it_has_no_accelerometer(tmp_path):
+def test_an_imu_that_says_it_has_no_accelerometer(tmp_path, factory):
     with BagFile(tmp_path / 'bag', {'/imu/data': 'sensor_msgs/msg/Imu'}) as bag:
         for stamp in range(10**9, 4 * 10**9, 10**8):
-            header = bag.messages.header(stamp)
-            message = bag.messages.imu(header, [0.0] * 3, [0.1, 0.2, 0.3], None)
+            message = factory.imu(factory.header(stamp), [0.0] * 3, [0.1, 0.2, 0.3], None)
             message.linear_acceleration_covariance[0] = -1.0
-            bag.write('/imu/data', message, stamp)
+            bag.write('/imu/data', serialised(message), stamp)
     with open_bag(tmp_path / 'bag') as bag:
         told = read_series(bag, {}, 'bag')
     assert np.isnan(told.imu.force).all() and np.allclose(told.imu.rate, [0.1, 0.2, 0.3])

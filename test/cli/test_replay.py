@@ -101,14 +101,14 @@ def test_interrupted_replay_leaves_a_readable_bag(
 ):
     """Ctrl-C in the midst of a drive of half a minute (of a process: test_several_bags)."""
     bag, out = make_bag(messages=make_drive(300), name='long'), tmp_path / 'out'
-    write, count = BagFile.write_raw, itertools.count()
+    write, count = BagFile.write, itertools.count()
 
     def interrupted(*arguments: Any) -> None:
         write(*arguments)
         if next(count) == 1500:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(BagFile, 'write_raw', interrupted)
+    monkeypatch.setattr(BagFile, 'write', interrupted)
     assert main(['replay', str(bag), *config, '-o', str(out)]) == 130
     assert 'interrupted' in capsys.readouterr().out
     with open_bag(out) as opened:

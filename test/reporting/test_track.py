@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from estimate_sets import some_estimates
+from message_factory import serialised
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.storage import open_bag
@@ -121,7 +122,7 @@ def test_an_odometry_in_the_recording(rover, factory, tmp_path):
             message = factory.odometry(factory.header(START + i * STEP), twist)
             message.pose.pose.position.x = 5.0 + 0.01 * i
             message.pose.pose.orientation.w = 1.0
-            file.write('/slam', message, START + i * STEP)
+            file.write('/slam', serialised(message), START + i * STEP)
     with open_bag(path) as bag:
         odometry = read_odometry(bag, '/slam')
         with pytest.raises(UserError, match='no odometry on /other; there is /slam'):

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Any, TypeVar
 from zlib import crc32
 
-from wheel_terra_estimator.bags.message_factory import MessageFactory
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.salvage import mcap_records as mcap
 from wheel_terra_estimator.bags.salvage.compression import unpack
 from wheel_terra_estimator.output_folder import check_folder, new_folder
@@ -41,7 +41,6 @@ class BagFile:
         inputs: Iterable[Path] = (),
     ) -> None:
         self.path = path
-        self.messages = MessageFactory()
         self.counts: Counter[str] = Counter()  # messages written, by topic
         self._topics = dict(topics)
         self._latched = latched
@@ -64,7 +63,7 @@ class BagFile:
             topic: self._writer.add_connection(
                 topic,
                 kind,
-                typestore=self.messages.store,
+                typestore=jazzy_types(),
                 offered_qos_profiles=[_qos(topic in self._latched)],
             )
             for topic, kind in self._topics.items()
@@ -95,13 +94,8 @@ class BagFile:
         """State something about the bag in the `custom_data` of its metadata."""
         self._writer.set_custom_data(key, value)
 
-    def write(self, topic: str, message: Any, log_time: int) -> None:
-        """Append a message at a log time [ns]."""
-        data = self.messages.store.serialize_cdr(message, self._topics[topic])
-        self.write_raw(topic, data, log_time)
-
-    def write_raw(self, topic: str, data: bytes | memoryview, log_time: int) -> None:
-        """Append a message that is serialised already (CDR)."""
+    def write(self, topic: str, data: bytes | memoryview, log_time: int) -> None:
+        """Append a message (CDR) at a log time [ns]."""
         self._writer.write(self._connections[topic], log_time, data)
         self.counts[topic] += 1
 

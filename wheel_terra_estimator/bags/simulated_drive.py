@@ -5,11 +5,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
@@ -20,6 +20,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.messages import pack
 from wheel_terra_estimator.messages.convert import (
     BASE_FRAME,
     INPUT_TYPES,
@@ -60,7 +61,6 @@ class _Sender:
 
     def __init__(self, bag: BagFile, configuration: Configuration) -> None:
         self._bag = bag
-        self._make = bag.messages
         self._wheels = configuration.wheels
         self._figures = configuration.sensors
         self._mounting = input_layout(configuration).imu_mounting
@@ -73,24 +73,22 @@ class _Sender:
         elif isinstance(measurement, InertialReading):
             self._bag.write('/imu/data', self._imu(measurement), log_time)
         elif isinstance(measurement, SinkageReading):
-            self._bag.write(
-                '/sinkage', self._joints(measurement.stamp, measurement.sinkage), log_time
-            )
+            message = self._joints(measurement.stamp, measurement.sinkage)
+            self._bag.write('/sinkage', message, log_time)
         elif isinstance(measurement, LeavingAngleReading):
             message = self._joints(measurement.stamp, measurement.leaving_angle)
             self._bag.write('/leaving_angle', message, log_time)
         elif isinstance(measurement, ReferenceVelocity):
             self._reference(measurement, log_time)
 
-    def _joints(self, stamp: int, values: Any) -> Any:
-        return self._make.joint_state(self._make.header(stamp), self._wheels.names, values)
+    def _joints(self, stamp: int, values: FloatArray) -> bytes:
+        return pack.joint_state(stamp, self._wheels.names, values.tolist())
 
     def _wheel_odometry(self, odometry: WheelOdometry, log_time: int) -> None:
-        wheels, header = self._wheels, self._make.header(odometry.stamp)
+        wheels, names = self._wheels, self._wheels.names
         rate, torque = odometry.rate * wheels.direction, odometry.torque * wheels.direction
-        if odometry.steering is None:
-            message = self._make.joint_state(header, wheels.names, velocity=rate, effort=torque)
-        else:
+        position = np.zeros(0)
+        if odometry.steering is not None:
             # Joints of drives and of steering in one message, as joint_state_broadcaster sends it.
             angles = {
                 joint: odometry.steering[i]
@@ -98,13 +96,12 @@ class _Sender:
                 if joint
             }
             none = np.full(len(angles), np.nan)
-            message = self._make.joint_state(
-                header,
-                (*wheels.names, *angles),
-                np.concatenate([np.full(wheels.count, np.nan), list(angles.values())]),
-                np.concatenate([rate, none]),
-                np.concatenate([torque, none]),
-            )
+            names = (*names, *angles)
+            position = np.concatenate([np.full(wheels.count, np.nan), list(angles.values())])
+            rate, torque = np.concatenate([rate, none]), np.concatenate([torque, none])
+        message = pack.joint_state(
+            odometry.stamp, names, position.tolist(), rate.tolist(), torque.tolist()
+        )
         self._bag.write('/joint_states', message, log_time)
         rim = odometry.rate * wheels.slip_radius
         known = ~np.isnan(rim)
@@ -112,11 +109,11 @@ class _Sender:
             # Body motion that rolling wheels would give: v - turn y = rim speed.
             layout = np.stack([np.ones(wheels.count), -wheels.y], axis=1)[known]
             forward, turn = np.linalg.lstsq(layout, rim[known], rcond=None)[0]
-            twist = self._make.twist_with_covariance(forward, turn, 1e-4 * np.eye(6))
-            header = self._make.header(odometry.stamp, 'odom')
-            self._bag.write('/odom', self._make.odometry(header, twist), log_time)
+            covariance = (1e-4 * np.eye(6)).ravel().tolist()
+            message = pack.odometry(odometry.stamp, forward, turn, covariance)
+            self._bag.write('/odom', message, log_time)
 
-    def _imu(self, reading: InertialReading) -> Any:
+    def _imu(self, reading: InertialReading) -> bytes:
         figures = self._figures
         force, rate = reading.specific_force, reading.angular_rate
         orientation = reading.orientation
@@ -124,8 +121,8 @@ class _Sender:
             force, rate = self._into_sensor @ force, self._into_sensor @ rate
             if orientation is not None:
                 orientation = (Rotation.from_quat(orientation) * self._mounting).as_quat()
-        return self._make.imu(
-            self._make.header(reading.stamp, 'imu_link' if self._mounted else BASE_FRAME),
+        return pack.imu(
+            reading.stamp,
             force.tolist(),
             rate.tolist(),
             None if orientation is None else orientation.tolist(),
@@ -134,13 +131,13 @@ class _Sender:
                 figures.angular_rate_std**2,
                 figures.specific_force_std**2,
             ),
+            'imu_link' if self._mounted else BASE_FRAME,
         )
 
     def _reference(self, reference: ReferenceVelocity, log_time: int) -> None:
-        covariance = reference.variance * np.eye(6)
-        twist = self._make.twist_with_covariance(reference.forward, 0.0, covariance)
-        header = self._make.header(reference.stamp, 'odom')
-        self._bag.write('/reference_odom', self._make.odometry(header, twist), log_time)
+        covariance = (reference.variance * np.eye(6)).ravel().tolist()
+        message = pack.odometry(reference.stamp, reference.forward, 0.0, covariance)
+        self._bag.write('/reference_odom', message, log_time)
 
 
 class _TruthSender:
@@ -162,9 +159,8 @@ class _TruthSender:
             self._row += 1
 
     def _write(self, row: int) -> None:
-        truth, make = self._truth, self._bag.messages
+        truth = self._truth
         stamp = int(truth.stamp[row])
-        header = make.header(stamp)
         self._slip = np.where(np.isnan(truth.slip[row]), self._slip, truth.slip[row])
         columns = {
             'slip': (self._slip, truth.slip_velocity[row], truth.drawbar_pull[row]),
@@ -172,19 +168,15 @@ class _TruthSender:
             'slip_angle': (truth.slip_angle[row], (), truth.lateral_force[row]),
         }
         for name, fields in columns.items():
-            self._bag.write(
-                f'{TRUTH}/{name}', make.joint_state(header, self._names, *fields), stamp
-            )
-        self._bag.write(f'{TRUTH}/slip_class', make.slip_class(truth.slip_class[row]), stamp)
-        twist = make.twist_stamped(
-            header,
-            float(truth.forward_velocity[row]),
-            float(truth.yaw_rate[row]),
-            np.zeros((6, 6)),
-        )
-        twist.twist.twist.linear.y = float(truth.lateral_velocity[row])
+            values = (np.asarray(field).tolist() for field in fields)
+            message = pack.joint_state(stamp, self._names, *values)
+            self._bag.write(f'{TRUTH}/{name}', message, stamp)
+        classes = pack.slip_classes(truth.slip_class[row].tolist())
+        self._bag.write(f'{TRUTH}/slip_class', classes, stamp)
+        velocity = float(truth.forward_velocity[row]), float(truth.lateral_velocity[row])
+        twist = pack.twist_stamped(stamp, velocity, float(truth.yaw_rate[row]), [0.0] * 36)
         self._bag.write(f'{TRUTH}/twist', twist, stamp)
         stuck = bool(truth.stuck[row])
         if stuck != self._stuck:
             self._stuck = stuck
-            self._bag.write(f'{TRUTH}/stuck', make.bool(stuck), stamp)
+            self._bag.write(f'{TRUTH}/stuck', pack.flag(stuck), stamp)

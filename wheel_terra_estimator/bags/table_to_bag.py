@@ -20,6 +20,7 @@ from wheel_terra_estimator.configuration.column_map import UNITS, entry_of, fact
 from wheel_terra_estimator.configuration.parameters import nearest
 from wheel_terra_estimator.csv_file import number, open_csv
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.messages import pack
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
 EXAMPLE = """\
@@ -272,7 +273,6 @@ class _Sender:
         self.bag, self.layout, self.table, self.held = bag, layout, table, held
         self.last: dict[str, tuple[list[str], int]] = {}  # a reading, and rows since
         self.decimal_comma = decimal_comma
-        self.make = bag.messages
         self.sent = 0
         self.short: dict[int, None] = {}  # lines, in order
         self.places: deque[tuple[int, float, float]] = deque()  # stamp [ns], place
@@ -284,16 +284,15 @@ class _Sender:
             column = self.layout.time.name
             raise UserError(f'{self.table}, line {line}, column {column}: no time from 0 on')
         stamp = max(round(seconds * 1e6) * 1000, 1)  # of a date no more is held; 0 is no stamp
-        header = self.make.header(stamp)
         joints = self.layout.joints
         rates, torques, angles = (
             [self.value(line, row, columns.get(field)) for columns in joints.values()]
             for field in _JOINT
         )
         if _any_told(rates) or _any_told(angles):
-            message = self.make.joint_state(
-                header,
-                list(joints),
+            message = pack.joint_state(
+                stamp,
+                tuple(joints),
                 velocity=rates,
                 effort=torques if _any_told(torques) else (),
                 position=angles if _any_told(angles) else (),
@@ -334,8 +333,7 @@ class _Sender:
         quaternion = [values.get(f'orientation.{axis}') for axis in (*_AXES, 'w')]
         whole = all(part is not None for part in quaternion)
         orientation = [float(part or 0.0) for part in quaternion] if whole else None
-        message = self.make.imu(self.make.header(stamp), force, rate, orientation)
-        self.bag.write('/imu/data', message, stamp)
+        self.bag.write('/imu/data', pack.imu(stamp, force, rate, orientation), stamp)
 
     def _speed(self, stamp: int, place: list[float], *, degrees: bool) -> tuple[int, float]:
         """Return the speed between two positions, at the stamp in their middle; nan for none."""
@@ -357,7 +355,7 @@ class _Sender:
         columns = self.layout.sinkage
         depths = [self.value(line, row, column) for column in columns.values()]
         if _any_told(depths):
-            message = self.make.joint_state(self.make.header(stamp), list(columns), position=depths)
+            message = pack.joint_state(stamp, tuple(columns), position=depths)
             self.bag.write('/sinkage', message, stamp)
 
     def _reference(self, line: int, row: list[str], stamp: int, rates: list[float]) -> None:
@@ -377,9 +375,7 @@ class _Sender:
         variance = self.value(line, row, columns.get('variance'))
         covariance = [0.0] * 36
         covariance[0] = 0.0 if math.isnan(variance) else variance  # 0: the rover file decides
-        twist = self.make.twist_with_covariance(speed, 0.0, covariance)
-        message = self.make.odometry(self.make.header(stamp, 'odom'), twist)
-        self.bag.write('/reference_odom', message, arrival)
+        self.bag.write('/reference_odom', pack.odometry(stamp, speed, 0.0, covariance), arrival)
 
 
 def _mean(values: list[float]) -> float:

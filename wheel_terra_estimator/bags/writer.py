@@ -15,9 +15,8 @@ from wheel_terra_estimator.bags import bag_metadata
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.messages import diagnostics
+from wheel_terra_estimator.messages import diagnostics, pack
 from wheel_terra_estimator.messages.convert import OUTPUT_TYPES
-from wheel_terra_estimator.messages.pack import pack
 
 NAMESPACE = f'/{diagnostics.NODE}'
 STUCK = f'{NAMESPACE}/stuck'
@@ -103,17 +102,15 @@ class EstimateBagWriter(BagFile):
 
         `statuses` are what diagnostics said live, empty for nothing; None: it is asked now.
         """
-        for topic, data in pack(estimates, self._names):
-            self.write_raw(f'{NAMESPACE}/{topic}', data, log_time)
+        for topic, data in pack.pack(estimates, self._names):
+            self.write(f'{NAMESPACE}/{topic}', data, log_time)
         self._write_stuck(estimates.stuck, estimates.stuck_direction, log_time)
         found = self._diagnostics.due(estimates) if statuses is None else statuses
         if found:
-            header = self.messages.header(estimates.stamp)
-            array = self.messages.diagnostic_array(header, list(found))
-            self.write(DIAGNOSTICS, array, log_time)
+            self.write(DIAGNOSTICS, pack.diagnostic_array(estimates.stamp, found), log_time)
 
     def _write_stuck(self, stuck: bool, direction: int, log_time: int) -> None:
         if (stuck, direction) != self._stuck:
             self._stuck = stuck, direction
-            self.write(STUCK_DIRECTION, self.messages.int8(direction), log_time)
-            self.write(STUCK, self.messages.bool(stuck), log_time)
+            self.write(STUCK_DIRECTION, pack.direction(direction), log_time)
+            self.write(STUCK, pack.flag(stuck), log_time)

@@ -1,15 +1,16 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates as CDR bytes, which node and recordings send as they are.
+"""Messages as CDR bytes, which node and recordings send as they are.
 
-rclpy would check every field of a message, rosbags would make objects of it.
+rclpy would check every field of a message, rosbags would make objects of it. Stamps are in ns.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from functools import cache
+from itertools import chain
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages.convert import (
@@ -18,12 +19,16 @@ from wheel_terra_estimator.messages.convert import (
     joint_fields,
     twist_fields,
 )
+from wheel_terra_estimator.messages.diagnostics import Status
 
 SET_TOPICS = (*JOINT_OUTPUTS, 'slip_class', 'twist')
 """Private topics that have a message of each set (``slip_on_slope``: once a second)."""
 
 _HEAD = b'\0\1\0\0'  # little-endian
 _AFTER_STAMP = 8  # [byte] from the first field, from where fields are aligned
+_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+_NO_POSE = (0.0, 0.0, 0.0, *_UPRIGHT, *(0.1 if i % 7 == 0 else 0.0 for i in range(36)))
+"""Origin and placeholder of its covariance, of an Odometry that states a twist only."""
 
 
 def pack(
@@ -46,11 +51,11 @@ def pack(
 def joint_state(
     stamp: int,
     names: tuple[str, ...],
-    position: Sequence[float],
-    velocity: Sequence[float],
-    effort: Sequence[float],
+    position: Sequence[float] = (),
+    velocity: Sequence[float] = (),
+    effort: Sequence[float] = (),
 ) -> bytes:
-    """Return a ``sensor_msgs/msg/JointState``; the stamp in ns."""
+    """Return a ``sensor_msgs/msg/JointState``."""
     counts = len(position), len(velocity), len(effort)
     form, beginning = _joint_layout(names, counts)
     time = divmod(stamp, 1_000_000_000)
@@ -62,9 +67,28 @@ def twist_stamped(
     stamp: int, velocity: tuple[float, float], yaw_rate: float, covariance: Sequence[float]
 ) -> bytes:
     """Return a ``geometry_msgs/msg/TwistWithCovarianceStamped``: velocity along x and y."""
-    form, beginning = _twist_layout()
-    time = divmod(stamp, 1_000_000_000)
-    return form.pack(_HEAD, *time, beginning, *velocity, 0.0, 0.0, 0.0, yaw_rate, *covariance)
+    return _numbers(stamp, (BASE_FRAME,), (*velocity, 0.0, 0.0, 0.0, yaw_rate, *covariance))
+
+
+def odometry(stamp: int, forward: float, yaw_rate: float, covariance: Sequence[float]) -> bytes:
+    """Return a ``nav_msgs/msg/Odometry`` that states a twist only."""
+    twist = forward, 0.0, 0.0, 0.0, 0.0, yaw_rate, *covariance
+    return _numbers(stamp, ('odom', BASE_FRAME), (*_NO_POSE, *twist))
+
+
+def imu(
+    stamp: int,
+    force: Sequence[float],
+    rate: Sequence[float],
+    attitude: Sequence[float] | None,
+    variances: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    frame: str = BASE_FRAME,
+) -> bytes:
+    """Return a ``sensor_msgs/msg/Imu``; ``variances`` of attitude, angular rate and force."""
+    of_attitude, of_rate, of_force = ([v, 0, 0, 0, v, 0, 0, 0, v] for v in variances)
+    if attitude is None:
+        attitude, of_attitude = _UPRIGHT, [-1.0] + [0.0] * 8
+    return _numbers(stamp, (frame,), (*attitude, *of_attitude, *rate, *of_rate, *force, *of_force))
 
 
 def slip_classes(classes: Sequence[int]) -> bytes:
@@ -72,6 +96,31 @@ def slip_classes(classes: Sequence[int]) -> bytes:
     count, no_offset = len(classes), 0
     label = _padded(struct.pack('<I', 1) + _string('wheel'), 4)
     return _HEAD + label + struct.pack('<4I', count, count, no_offset, count) + bytes(classes)
+
+
+def flag(value: bool) -> bytes:
+    """Return a ``std_msgs/msg/Bool``."""
+    return _HEAD + bytes([value])
+
+
+def direction(value: int) -> bytes:
+    """Return a ``std_msgs/msg/Int8``."""
+    return struct.pack('<4sb', _HEAD, value)
+
+
+def diagnostic_array(stamp: int, statuses: Iterable[Status]) -> bytes:
+    """Return a ``diagnostic_msgs/msg/DiagnosticArray``."""
+    found = list(statuses)
+    body = struct.pack('<iI', *divmod(stamp, 1_000_000_000)) + _string(BASE_FRAME)
+    body = _padded(body, 4) + struct.pack('<I', len(found))
+    for status in found:
+        body += bytes([status.level])
+        for text in (status.name, status.message, status.hardware_id):
+            body = _padded(body, 4) + _string(text)
+        body = _padded(body, 4) + struct.pack('<I', len(status.values))
+        for text in chain.from_iterable(status.values):
+            body = _padded(body, 4) + _string(text)
+    return _HEAD + body
 
 
 @cache
@@ -94,9 +143,18 @@ def _joint_layout(names: tuple[str, ...], counts: Sequence[int]) -> tuple[struct
 
 
 @cache
-def _twist_layout() -> tuple[struct.Struct, bytes]:
-    beginning = _padded(_string(BASE_FRAME), 8)
-    return struct.Struct(f'<4siI{len(beginning)}s42d'), beginning
+def _layout(strings: tuple[str, ...], count: int) -> tuple[struct.Struct, bytes]:
+    """Return how so many numbers behind a stamp and strings are packed, and these strings."""
+    beginning = b''
+    for text in strings:
+        beginning = _padded(beginning, 4) + _string(text)
+    beginning = _padded(beginning, 8)
+    return struct.Struct(f'<4siI{len(beginning)}s{count}d'), beginning
+
+
+def _numbers(stamp: int, strings: tuple[str, ...], numbers: Sequence[float]) -> bytes:
+    form, beginning = _layout(strings, len(numbers))
+    return form.pack(_HEAD, *divmod(stamp, 1_000_000_000), beginning, *numbers)
 
 
 def _string(text: str) -> bytes:

@@ -50,7 +50,7 @@ from wheel_terra_estimator.ros import parameters
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
-from wheel_terra_estimator.ros.outputs import EstimatePublisher, time_message
+from wheel_terra_estimator.ros.outputs import EstimatePublisher
 from wheel_terra_estimator.ros.qos import FREQUENT, OVERRIDABLE, input_profile
 
 if TYPE_CHECKING:
@@ -326,7 +326,7 @@ class EstimatorNode(LifecycleNode):
         if self._views is not None:
             self._views.publish(estimates)
         if statuses := self._pipeline.diagnostics.due(estimates):
-            self._say(time_message(estimates.stamp), statuses, now)
+            self._say(estimates.stamp, statuses, now)
 
     def _on_incompatible_qos(self, topic: str, event: Any) -> None:
         policy = qos_policy_name_from_kind(event.last_policy_kind)
@@ -443,7 +443,7 @@ class EstimatorNode(LifecycleNode):
             self.get_logger().info(f'no longer stuck: {self._warned.reason}')
 
     def _say(
-        self, stamp: Any, statuses: list[Status], now: float, *, expected: bool = False
+        self, stamp: int, statuses: list[Status], now: float, *, expected: bool = False
     ) -> None:
         """Publish diagnostics; log a change of the node's level, and each fault when it is new.
 
@@ -485,7 +485,7 @@ class EstimatorNode(LifecycleNode):
         wait = DIAGNOSTICS_PERIOD + (WATCH_PERIOD if flowing else 0.0)
         if now - self._diagnostics_at < wait and not level_changes:
             return
-        stamp = self.get_clock().now().to_msg()
+        stamp = self.get_clock().now().nanoseconds
         if not (silent or stopped) and self._latest is not None:
             self._say(stamp, diagnostics.now(self._latest), now)
             return

@@ -33,8 +33,8 @@ from wheel_terra_estimator.estimation.traction_law import LimiterTuning
 from wheel_terra_estimator.estimation.traction_limiter import Interlock, LimiterState, Velocity
 from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN, Status
+from wheel_terra_estimator.messages.pack import diagnostic_array
 from wheel_terra_estimator.output_folder import cannot_write, check_file
-from wheel_terra_estimator.ros.outputs import diagnostic_array
 from wheel_terra_estimator.ros.qos import input_profile, output_profile
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
@@ -199,7 +199,7 @@ class TractionLimiter(Node):
             'clock_offset_s': f'{state.clock_offset or 0.0:.2f}',
         }
         status = Status(level, f'{name}: limiter', words, name, list(values.items()))
-        self._diagnostics.publish(diagnostic_array(self.get_clock().now().to_msg(), [status]))
+        self._diagnostics.publish(diagnostic_array(self.get_clock().now().nanoseconds, [status]))
 
     # -- What is kept over a restart ------------------------------------------------------------
 

@@ -296,7 +296,7 @@ def record(heard: Sequence[Heard], path: Path, start: int, overwrite: bool = Fal
         for _, topic, data in heard:
             if topic == f'{NAMESPACE}/slip':
                 log_time = max(log_time, unpack(JOINT_STATE, data).stamp)
-            file.write_raw(topic, data, log_time)
+            file.write(topic, data, log_time)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

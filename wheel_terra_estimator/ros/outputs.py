@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistWithCovarianceStamped
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
@@ -17,9 +17,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Int8, UInt8MultiArray
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.messages.convert import BASE_FRAME, JOINT_OUTPUTS
+from wheel_terra_estimator.messages import pack
+from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS
 from wheel_terra_estimator.messages.diagnostics import Status
-from wheel_terra_estimator.messages.pack import pack
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, output_profile
 
 SET_MESSAGES = {
@@ -71,7 +71,7 @@ class EstimatePublisher:
         """Publish the messages of a set that somebody listens to."""
         wanted = {t for t, p in self._of_sets.items() if p.get_subscription_count()}
         if wanted:
-            for topic, data in pack(estimates, self._names, wanted):
+            for topic, data in pack.pack(estimates, self._names, wanted):
                 self._of_sets[topic].publish(data)
         self.publish_stuck(estimates.stuck, estimates.stuck_direction)
 
@@ -82,27 +82,9 @@ class EstimatePublisher:
             self._direction_publisher.publish(Int8(data=direction))
             self._stuck_publisher.publish(Bool(data=stuck))
 
-    def publish_diagnostics(self, stamp: Time, statuses: Sequence[Status]) -> None:
-        """Publish statuses on ``/diagnostics``."""
-        self._diagnostics_publisher.publish(diagnostic_array(stamp, statuses))
-
-
-def diagnostic_array(stamp: Time, statuses: Sequence[Status]) -> DiagnosticArray:
-    """Return statuses as a message."""
-    message = DiagnosticArray()
-    message.header.stamp = stamp
-    message.header.frame_id = BASE_FRAME
-    message.status = [
-        DiagnosticStatus(
-            level=bytes([status.level]),
-            name=status.name,
-            message=status.message,
-            hardware_id=status.hardware_id,
-            values=[KeyValue(key=key, value=value) for key, value in status.values],
-        )
-        for status in statuses
-    ]
-    return message
+    def publish_diagnostics(self, stamp: int, statuses: Sequence[Status]) -> None:
+        """Publish statuses on ``/diagnostics``; the stamp in ns."""
+        self._diagnostics_publisher.publish(pack.diagnostic_array(stamp, statuses))
 
 
 def time_message(stamp: int) -> Time:

@@ -283,16 +283,14 @@ def _rover_text() -> str:
 
 @cache
 def _real_messages() -> tuple[bytes, ...]:
-    from wheel_terra_estimator.bags.message_factory import MessageFactory
+    from wheel_terra_estimator.messages import pack
 
-    factory = MessageFactory()
     found = []
     for step in range(60):
-        header = factory.header(START + step * 10**8)
-        joints = factory.joint_state(header, ('left', 'right'), velocity=(2.0, 2.0), effort=(3, 3))
-        imu = factory.imu(header, (0.1, 0.0, 9.8), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-        for message in (joints, imu):
-            found.append(bytes(factory.store.serialize_cdr(message, message.__msgtype__)))
+        stamp = START + step * 10**8
+        names, rates, torques = ('left', 'right'), (2.0, 2.0), (3.0, 3.0)
+        found.append(pack.joint_state(stamp, names, velocity=rates, effort=torques))
+        found.append(pack.imu(stamp, (0.1, 0.0, 9.8), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
     return tuple(found)
 
 

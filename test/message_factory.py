@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages built from plain values without ROS (Jazzy's definitions, as rosbags ships them)."""
+"""Messages of rosbags built from plain values: an independent truth for the bytes of ours."""
 
 from __future__ import annotations
 
@@ -14,6 +14,11 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.messages.convert import BASE_FRAME, JOINT_STATE
 from wheel_terra_estimator.messages.diagnostics import Status
+
+
+def serialised(message: Any) -> bytes:
+    """Return the CDR bytes of a message of rosbags."""
+    return bytes(jazzy_types().serialize_cdr(message, message.__msgtype__))
 
 
 class MessageFactory:
