@@ -10,15 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from estimate_sets import some_estimates
-from message_factory import serialised
 
-from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.storage import open_bag
-from wheel_terra_estimator.bags.track import COLUMNS, TrackRecorder, read_odometry
+from wheel_terra_estimator.bags.track import COLUMNS, TrackRecorder
 from wheel_terra_estimator.cli.main import main
-from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import InertialReading
-from wheel_terra_estimator.messages.convert import ODOMETRY
 from wheel_terra_estimator.reporting.drive_figure import way_figure
 from wheel_terra_estimator.reporting.track_table import write_track
 
@@ -112,26 +107,6 @@ def test_table_and_strip(rover, tmp_path):
     begin, end = (float(v) for v in re.match(r'M([\d.]+) [\d.]+H([\d.]+)', high).groups())
     way = track.values['distance'][track.values['slip_class'] == 2]
     assert (begin, end) == (pytest.approx(way[0], rel=1e-4), pytest.approx(way[-1], abs=0.05))
-
-
-def test_an_odometry_in_the_recording(rover, factory, tmp_path):
-    path = tmp_path / 'bag'
-    with BagFile(path, {'/slam': ODOMETRY}) as file:
-        for i in range(0, 100, 10):
-            twist = factory.twist_with_covariance(0.0, 0.0, [0.0] * 36)
-            message = factory.odometry(factory.header(START + i * STEP), twist)
-            message.pose.pose.position.x = 5.0 + 0.01 * i
-            message.pose.pose.orientation.w = 1.0
-            file.write('/slam', serialised(message), START + i * STEP)
-    with open_bag(path) as bag:
-        odometry = read_odometry(bag, '/slam')
-        with pytest.raises(UserError, match='no odometry on /other; there is /slam'):
-            read_odometry(bag, '/other')
-    track = recorded(rover, drive(rover, 200)).track(odometry)
-    assert track.source == 'odometry on /slam'
-    seconds = (track.stamp - START) / STEP
-    np.testing.assert_allclose(track.values['x'], 5.0 + 0.01 * seconds, atol=1e-9)
-    assert track.stamp[-1] <= odometry.stamp[-1], 'no place where the odometry is silent'
 
 
 def test_what_a_track_cannot_be_is_said_first(tmp_path, capsys):

@@ -20,7 +20,7 @@ from wheel_terra_estimator.bags.history import EstimateHistory, HistoryRecorder
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import MOST_ROWS
-from wheel_terra_estimator.bags.track import Track, TrackRecorder, read_odometry
+from wheel_terra_estimator.bags.track import Track, TrackRecorder
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
@@ -81,7 +81,6 @@ class Options:
     every_set: bool = False
     progress: bool = True
     smooth: bool = False  # whether the estimates are those of the fixed-interval smoother
-    odometry: str = ''  # topic of the bag whose positions the track has; empty: it is reckoned
 
 
 DEFAULT = Options()
@@ -101,7 +100,6 @@ def replay(
     and for an output path that is taken.
     """
     arrival, smooth = options.arrival, options.smooth
-    places = read_odometry(bag, options.odometry) if options.odometry else None
     reader = MeasurementReader(bag, remaps, configuration)
     tracker = TrackRecorder(configuration)
     smoother = DriveSmoother(configuration) if smooth else None
@@ -154,7 +152,7 @@ def replay(
         learned=core.learned(),
         taught=core.taught(),
         filtered=filtered() if filtered is not None else None,
-        track=tracker.track(places),
+        track=tracker.track(),
     )
 
 

@@ -4,32 +4,26 @@
 
 The position is reckoned in the plane from the estimated body velocity along the heading: that of
 the reported orientation where there is one, else the estimated yaw rate; the height from the pitch
-of the reported orientation. Or it is taken from an odometry in the recording.
+of the reported orientation.
 """
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IntArray
-from wheel_terra_estimator.bags.message_types import jazzy_types
-from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     Measurement,
     heading_of,
 )
-from wheel_terra_estimator.messages.convert import ODOMETRY, stamp_of
 
 SPACING = 0.02
 """Way between two points of a track [m]."""
@@ -66,8 +60,8 @@ COLUMNS = {
 class Track:
     """Points along a drive, (k,) each.
 
-    ``values`` by the names of `COLUMNS`: position [m] and heading [rad] from the first point, or of
-    the odometry; ``distance`` travelled; medians of slip and its deviation over the wheels; the
+    ``values`` by the names of `COLUMNS`: position [m] and heading [rad] from the first point;
+    ``distance`` travelled; medians of slip and its deviation over the wheels; the
     worst known class of a wheel (255: none is known); greatest sinkage; sum of the pull margins;
     learned shear strength and bearing modulus over those stated (1: as stated); the probability of
     an entrapment and whether the warning ran.
@@ -135,21 +129,15 @@ class TrackRecorder:
             self._next = self._distance + SPACING
             self._rows.add(estimates.stamp, self._row(estimates))
 
-    def track(self, odometry: Track | None = None) -> Track:
-        """Return the track, on the positions of an `odometry` where one is given."""
+    def track(self) -> Track:
+        """Return the track."""
         columns = self._rows.values(len(COLUMNS)).T
-        values = dict(zip(COLUMNS, columns, strict=True))
-        stamp = self._rows.stamps()
-        if odometry is None:
-            yaw = 'orientation' if self._attitudes else 'yaw rate'
-            return Track(stamp, values, f'reckoned from estimated velocity and {yaw}')
-        inside = (stamp >= odometry.stamp[0]) & (stamp <= odometry.stamp[-1])
-        there = {
-            name: np.interp(stamp[inside], odometry.stamp, odometry.values[name])
-            for name in ('x', 'y', 'z', 'heading')
-        }
-        kept = {name: column[inside] for name, column in values.items()}
-        return Track(stamp[inside], kept | there, odometry.source)
+        yaw = 'orientation' if self._attitudes else 'yaw rate'
+        return Track(
+            self._rows.stamps(),
+            dict(zip(COLUMNS, columns, strict=True)),
+            f'reckoned from estimated velocity and {yaw}',
+        )
 
     def _attitude(self, stamp: int) -> tuple[float, float] | None:
         """Return heading [rad] and sine of the climb last known of late; None: not known."""
@@ -179,35 +167,3 @@ class TrackRecorder:
                 float(estimates.stuck),
             ]
         )
-
-
-def read_odometry(bag: Bag, topic: str) -> Track:
-    """Read the positions of an odometry (nav_msgs/Odometry) in a recording.
-
-    Raises UserError where there is none.
-    """
-    if topic not in bag.topics or bag.topics[topic].type != ODOMETRY:
-        known = [name for name, there in bag.topics.items() if there.type == ODOMETRY]
-        raise UserError(
-            f'{bag.path}: no odometry on {topic}; '
-            + (f'there is {", ".join(known)}' if known else 'there is none in the recording')
-        )
-    rows: dict[int, list[float]] = {}
-    for _, _, data in bag.messages([topic]):
-        try:
-            message: Any = jazzy_types().deserialize_cdr(data, ODOMETRY)
-        except Exception:  # the library lets many kinds through on damaged bytes
-            continue
-        pose = message.pose.pose
-        turned = np.array([getattr(pose.orientation, axis) for axis in 'xyzw'])
-        place = [pose.position.x, pose.position.y, pose.position.z]
-        row = [*place, float(heading_of(turned))]
-        if np.isfinite(row).all():
-            rows[stamp_of(message)] = row
-    if not rows:
-        raise UserError(f'{bag.path}: the odometry on {topic} holds no positions')
-    stamps = sorted(rows)
-    table = np.array([rows[stamp] for stamp in stamps])
-    table[:, 3] = np.unwrap(table[:, 3])
-    values: Mapping[str, FloatArray] = dict(zip(('x', 'y', 'z', 'heading'), table.T, strict=True))
-    return Track(np.array(stamps, dtype=np.int64), dict(values), f'odometry on {topic}')

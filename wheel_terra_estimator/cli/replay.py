@@ -61,13 +61,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'units in the header',
     )
     parser.add_argument(
-        '--track-odometry',
-        default='',
-        metavar='TOPIC',
-        help='odometry in the recording that gives the positions of the map (default: dead '
-        'reckoning)',
-    )
-    parser.add_argument(
         '--save-soil',
         action=Output,
         metavar='F.yaml',
@@ -148,7 +141,6 @@ def _options(arguments: argparse.Namespace) -> Options:
         arrival=arguments.arrival,
         every_set=bool(arguments.table),
         smooth=arguments.smooth,
-        odometry=arguments.track_odometry,
     )
 
 

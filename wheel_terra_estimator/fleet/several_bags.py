@@ -191,9 +191,8 @@ def _digest(settings: Settings, path: Path) -> str:
         'values': values,
         'stated': sorted(configuration.stated),
         'remaps': dict(settings.remaps),
-        'files': [settings.report, settings.table],
+        'files': [settings.report, settings.table, settings.track],
         'smooth': settings.options.smooth,
-        'track': [settings.track, settings.options.odometry],
     }
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     digest.update(json.dumps(stated, sort_keys=True, default=str).encode())
