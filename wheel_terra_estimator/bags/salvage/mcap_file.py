@@ -414,10 +414,6 @@ class McapFile:
         else:  # at second try, the times in the head may be what is damaged
             possible = [mcap.Possible(_IN_CHUNK, known, head.start, head.end)]
             possible.append(mcap.Possible(_IN_CHUNK, known))
-        whole = self._whole_pass(piece.begin, content.data, possible[0], wanted, allowed)
-        if whole is not None:
-            self._add_work(_ROW_SIZE * whole.counts.total())
-            return whole
         found = [self._pass(piece.begin, content.data, possible[0], wanted, allowed)]
         for each in possible[1:]:
             if found[-1].lost_bytes:
@@ -428,56 +424,6 @@ class McapFile:
             # Few messages lie outside of the times of the head: these are damaged, not the head.
             best.lost_between.append((None, None))
         return best
-
-    def _whole_pass(
-        self,
-        place: int,
-        data: bytes,
-        possible: mcap.Possible,
-        wanted: Collection[int],
-        allowed: int,
-    ) -> Reading | None:
-        """Read records that stand one behind the other to the end; None where they do not.
-
-        It gives what `_pass` gives, and only saves its doubts.
-        """
-        found = Reading()
-        rows = found.rows
-        counts: dict[int, int] = defaultdict(int)
-        first, last = mcap.LATEST, 0
-        at, end, head = 0, len(data), mcap.HEAD + mcap.MESSAGE_HEAD
-        unpack = mcap.MESSAGE_RECORD.unpack_from
-        known, start, latest = possible.channels, possible.start, possible.end
-        any_channel = not known
-        while at < end:
-            if data[at] == mcap.MESSAGE and at + head <= end:
-                _, length, channel, _, time, _ = unpack(data, at)
-                after = at + mcap.HEAD + length
-                if (
-                    after > end
-                    or not mcap.MESSAGE_HEAD <= length <= possible.longest
-                    or not start <= time <= latest
-                    or not (any_channel or channel in known)
-                ):
-                    return None
-                counts[channel] += 1
-                first = time if time < first else first
-                last = time if time > last else last
-                if channel in wanted:
-                    rows.append((time, place + at + head, channel, data[at + head : after]))
-                    allowed -= length - mcap.MESSAGE_HEAD + _ROW_SIZE
-                    if allowed < 0:
-                        raise self._too_much()
-            else:
-                record = mcap.fitting_record(data, at, end, possible)
-                if record is None:
-                    return None
-                found.definitions.append(record)
-                after = record.end
-            at = after
-        found.start, found.last = first, last
-        found.counts.update(counts)
-        return found
 
     def _too_much(self) -> UserError:
         return UserError(

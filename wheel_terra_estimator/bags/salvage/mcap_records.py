@@ -52,7 +52,7 @@ _LENGTHS = {
 }
 
 _RECORD = struct.Struct('<BQ')
-MESSAGE_RECORD = _MESSAGE = struct.Struct('<BQHIQQ')
+_MESSAGE = struct.Struct('<BQHIQQ')
 _CHUNK = struct.Struct('<BQQQQII')
 _WINDOWS = (2**12, 2**20)
 """Bytes that a search through damage looks at together: at first, and at most."""
@@ -148,21 +148,13 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
         yield before
 
 
-def fitting_record(content: Buffer, at: int, end: int, possible: Possible) -> Record | None:
-    """Return the record that fits at a place, whatever stands behind it."""
+def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | None:
+    """Return the record at a place if one can be there."""
     if not _fits(content, at, end, possible):
         return None
     opcode, length = _RECORD.unpack_from(content, at)
-    return Record(opcode, at + HEAD, at + HEAD + length)
-
-
-def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | None:
-    """Return the record at a place if one can be there."""
-    record = fitting_record(content, at, end, possible)
-    if record is None:
-        return None
-    opcode, after = record.opcode, record.end
-    record = record._replace(end=min(after, end))
+    after = at + HEAD + length
+    record = Record(opcode, at + HEAD, min(after, end))
     if after < end and _fits(content, after, end, possible):
         return record
     if after == end and opcode != CHUNK:  # no closed file ends with a chunk
