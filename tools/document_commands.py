@@ -14,22 +14,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from wheel_terra_estimator.cli.main import LABORATORY, sub_parsers
-from wheel_terra_estimator.cli.parser import Parser
 
 PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'commands.md'
 _INTRODUCTION = """# Commands
 
 Written by `python tools/document_commands.py` from the help of the commands; do not edit.
 
-`wheel-terra COMMAND --help` says what most runs need, `--help-all` the same as this page. After
-colcon the commands are `ros2 run wheel_terra_estimator wheel-terra COMMAND`. Every command takes
+`wheel-terra COMMAND --help` says the same as this page. After colcon the commands are
+`ros2 run wheel_terra_estimator wheel-terra COMMAND`. Every command takes
 `--debug` (traceback of an error), every one that writes `--overwrite` (replace an earlier output).
 Completion in bash and zsh comes with the package; in a virtual environment
 `eval "$(wheel-terra --print-completion bash)"` turns it on. [Exit status](exit_status.md).
 """
 _LABORATORY = """## Of the laboratory
 
-Options: `wheel-terra COMMAND --help-all`.
+Options: `wheel-terra COMMAND --help`.
 """
 
 
@@ -64,16 +63,15 @@ def _name(row: str) -> str:
     return row.partition(': ')[0]
 
 
-def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
+def _section(parser: argparse.ArgumentParser, title: str, depth: int) -> Iterator[str]:
     yield f'{"#" * depth} `{title}`\n'
     yield f'{_sentence(parser.description or "")}\n'
     if parser.epilog:
         examples = [line.strip() for line in parser.epilog.splitlines()[1:]]
         yield '\n'.join(['```sh', *examples, '```\n'])
-    for group, actions in parser.groups().items():
-        rows = [row for action in actions if (row := _row(action)) and _name(row) not in _common()]
-        if rows:
-            yield '\n'.join([f'{group.capitalize()}:\n', *rows, ''])
+    rows = [_row(action) for action in parser._actions]
+    if own := [row for row in rows if row and _name(row) not in _common()]:
+        yield '\n'.join([*own, ''])
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             helps = {choice.dest: choice.help or '' for choice in action._choices_actions}
@@ -85,7 +83,7 @@ def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
 def _row(action: argparse.Action) -> str:
     if isinstance(action, argparse._SubParsersAction | argparse._HelpAction):
         return ''
-    if action.dest in ('debug', 'help_all', 'overwrite') or action.help == argparse.SUPPRESS:
+    if action.dest in ('debug', 'overwrite') or action.help == argparse.SUPPRESS:
         return ''
     value = ''
     if action.nargs != 0:

@@ -27,7 +27,7 @@ def test_text_names_every_effect_and_parameter(capsys):
 
 
 def test_json_holds_what_a_program_needs(capsys):
-    assert main(['effects', '--format', 'json']) == 0
+    assert main(['effects', '--json']) == 0
     records = {record['name']: record for record in json.loads(capsys.readouterr().out)}
     assert records.keys() == catalogue().keys()
     digging = records['lug_digging']

@@ -37,19 +37,7 @@ _PARAMETER_FIELDS = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument('names', nargs='*', metavar='NAME', help='only these, in full')
-    parser.add_argument(
-        '--format',
-        choices=('text', 'json'),
-        default='text',
-        help='text (default), or json for programs',
-    )
-    parser.add_argument(
-        '--json',
-        dest='format',
-        action='store_const',
-        const='json',
-        help='the same as --format json',
-    )
+    parser.add_argument('--json', action='store_true', help='print them as JSON')
     parser.add_argument(
         '--load',
         type=Path,
@@ -74,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
             hint = f"did you mean '{close[0]}'? " if close else ''
             raise UserError(f'no effect {name}; {hint}there are: {", ".join(known)}')
     chosen = {name: known[name] for name in arguments.names or known}
-    sys.stdout.write(as_json(chosen) if arguments.format == 'json' else as_text(chosen))
+    sys.stdout.write(as_json(chosen) if arguments.json else as_text(chosen))
     return 0
 
 

@@ -80,8 +80,7 @@ def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, Parser]]:
     parser = Parser(
         prog='wheel-terra',
         description='Slip, sinkage and drawbar pull of rover wheels in loose soil.',
-        epilog='Help of a command, with examples: wheel-terra COMMAND --help; all of its options: '
-        '--help-all',
+        epilog='Help of a command, with examples: wheel-terra COMMAND --help',
     )
     parser.add_argument('--version', action='version', version=__version__)
     parser.add_argument('--debug', action='store_true', help=DEBUG_HELP)

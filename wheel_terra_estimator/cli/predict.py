@@ -58,7 +58,6 @@ CURVES = {
     'slip': 'slip {:g}',
 }
 """How a picture names its curves, by what they are not drawn over."""
-ANGLES = ('entrance_angle', 'peak_stress_angle', 'leaving_angle')
 PICTURES = ('.png', '.svg', '.pdf')
 
 
@@ -106,12 +105,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='law of the contact (see models/laws) in place of rover.contact_law',
     )
     parser.add_argument(
-        '--table',
-        choices=('csv', 'text'),
-        default='csv',
-        help='layout on standard output (default csv, as diagnose reads it)',
-    )
-    parser.add_argument(
         '--noise',
         metavar='Z,F,T[,L]',
         help='make virtual measurements: add normal noise of these standard deviations to sinkage '
@@ -120,7 +113,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--seed', type=int, default=1, metavar='N', help='draws the noise (default 1)'
     )
-    parser.add_argument('--angles', action='store_true', help='add the contact angles [rad]')
     add_output(parser, 'write a picture (.png, .svg, .pdf) or a table (.csv) instead', 'FILE')
     parser.add_argument('--overwrite', action='store_true', help='replace an existing FILE')
     configuration_reader.add_arguments(parser)
@@ -162,12 +154,9 @@ def run(arguments: argparse.Namespace) -> int:
     result.pop('slip_angle', None)
     if sideways:
         result['slip_angle'] = columns['slip_angle']
-    if arguments.angles:
-        result.pop('leaving_angle', None)
     # As the sensors of the wheel would read them, like the tables of measurements.
     answers = Readings.of(configuration, _wheel_index(arguments, configuration)).of_answer(state)
     answers |= {SIDEWAYS: state.lateral_force} if sideways else {}
-    answers |= {name: getattr(state, name) for name in ANGLES if arguments.angles}
     result |= {name: np.where(overloaded, np.nan, values) for name, values in answers.items()}
     if arguments.noise is not None:
         result = _measured(result, arguments.noise, arguments.seed)
@@ -202,7 +191,7 @@ def _write(
     """Write the table or the picture where the arguments want it."""
     output: Path | None = arguments.output
     if output is None:
-        (_write_csv if arguments.table == 'csv' else _write_text)(result, sys.stdout)
+        _write_csv(result, sys.stdout)
         return
     with new_file(output, arguments.overwrite) as fresh:
         if output.suffix.lower() == '.csv':
@@ -329,14 +318,6 @@ def _write_csv(columns: Mapping[str, FloatArray], stream: Any) -> None:
     writer.writerow(columns)
     for row in zip(*columns.values(), strict=True):
         writer.writerow(f'{value:.9g}' if np.isfinite(value) else '' for value in row)
-
-
-def _write_text(columns: Mapping[str, FloatArray], stream: Any) -> None:
-    heads = [f'{name} [{unit_of(name)}]' for name in columns]
-    stream.write('  '.join(heads) + '\n')
-    for row in zip(*columns.values(), strict=True):
-        cells = (f'{value:.5g}'.rjust(len(head)) for value, head in zip(row, heads, strict=True))
-        stream.write('  '.join(cells) + '\n')
 
 
 def _title(arguments: argparse.Namespace, configuration: Configuration) -> str:
