@@ -24,6 +24,7 @@ from retries import pytest_sessionfinish, pytest_terminal_summary  # noqa: F401
 from rosbags.rosbag2 import writer as bag_writer
 
 from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
@@ -223,10 +224,20 @@ def make_bag(tmp_path: Path, drive: list[tuple[str, Any, int]]) -> MakeBag:
         name: str = 'drive',
         storage: str = 'mcap',
     ) -> Path:
-        path = tmp_path / name
-        with BagFile(path, topics or DRIVE_TOPICS, storage=storage) as file:
-            for topic, message, log_time in drive if messages is None else messages:
-                file.write(topic, serialised(message), log_time)
+        path, told = tmp_path / name, drive if messages is None else messages
+        if storage == 'mcap':
+            with BagFile(path, topics or DRIVE_TOPICS) as file:
+                for topic, message, log_time in told:
+                    file.write(topic, serialised(message), log_time)
+            return path
+        plugin = bag_writer.StoragePlugin.SQLITE3
+        with bag_writer.Writer(path, version=9, storage_plugin=plugin) as writer:
+            connections = {
+                topic: writer.add_connection(topic, kind, typestore=jazzy_types())
+                for topic, kind in (topics or DRIVE_TOPICS).items()
+            }
+            for topic, message, log_time in told:
+                writer.write(connections[topic], log_time, serialised(message))
         return path
 
     return make

@@ -203,33 +203,6 @@ def test_output_that_fails_is_no_error_of_the_program(number, room, arguments):
         assert room is not None, 'all was written'
 
 
-CLOSED = """
-import os, sys
-for number in {closed}:
-    os.close(number)
-os.execv(sys.executable, [sys.executable, '-m', 'wheel_terra_estimator.cli.main', *{arguments}])
-"""
-
-
-@pytest.mark.parametrize('closed', [(1,), (0, 1, 2)])
-def test_closed_streams(tmp_path, closed):
-    path = tmp_path / 'rows.csv'
-    line = f'predict --config hit_wh3 --config hit_fit --slip 0:0.8:9 -o {path}'.split()
-    others = [(['effects'], 0), (['check', str(path)], 2)] if len(closed) == 3 else []
-    for arguments, status in [(line, 0), *others]:
-        code = CLOSED.format(closed=closed, arguments=arguments)
-        ended = subprocess.run([sys.executable, '-c', code], capture_output=True, check=False)
-        assert ended.returncode == status, ended.stderr
-        assert b'Traceback' not in ended.stderr + ended.stdout
-    assert path.read_text().count('\n') == 10
-
-
-def test_a_path_that_is_not_utf8_is_refused_before_anything_is_written(tmp_path, capsys):
-    assert main.main(['simulate', '-o', str(tmp_path / 'drive\udcff')]) == 2
-    assert 'not UTF-8' in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_terminal_that_knows_ascii_alone(capsys, monkeypatch):
     plain = io.TextIOWrapper(io.BytesIO(), encoding='ascii')
     monkeypatch.setattr(sys, 'stdout', plain)

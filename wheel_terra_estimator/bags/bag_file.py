@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""A rosbag2 folder (MCAP, or SQLite3) that is being written: whole, or not there."""
+"""A rosbag2 folder (MCAP) that is being written: whole, or not there."""
 
 from __future__ import annotations
 
@@ -36,7 +36,6 @@ class BagFile:
         # Topics offered as transient local with depth 1; all others are volatile with depth 10
         latched: Collection[str] = (),
         overwrite: bool = False,
-        storage: str = 'mcap',
         # What is read meanwhile: the bag is never written into it or over it
         inputs: Iterable[Path] = (),
     ) -> None:
@@ -44,7 +43,6 @@ class BagFile:
         self.counts: Counter[str] = Counter()  # messages written, by topic
         self._topics = dict(topics)
         self._latched = latched
-        self._storage = storage
         self._overwrite = overwrite
         self._inputs = tuple(inputs)
         self._stack = ExitStack()
@@ -55,9 +53,7 @@ class BagFile:
 
         folder = self._stack.enter_context(new_folder(self.path, self._overwrite, self._inputs))
         folder.rmdir()  # the library makes it
-        self._writer = Writer(
-            folder, version=9, storage_plugin=StoragePlugin[self._storage.upper()]
-        )
+        self._writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
         self._writer.open()
         self._connections = {
             topic: self._writer.add_connection(
@@ -82,12 +78,10 @@ class BagFile:
                 if error is not None:
                     raise error
                 self._writer.close()
-                if self._storage == 'mcap':
-                    add_checksums(storage.path)
+                add_checksums(storage.path)
             except BaseException:
-                if self._storage == 'mcap':
-                    with suppress(OSError):
-                        storage.bio.raw.close()  # what is buffered has no place any more
+                with suppress(OSError):
+                    storage.bio.raw.close()  # what is buffered has no place any more
                 raise
 
     def note(self, key: str, value: str) -> None:

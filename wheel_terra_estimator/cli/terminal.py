@@ -11,7 +11,6 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
-from pathlib import Path
 from types import FrameType
 from typing import IO, Any
 
@@ -37,21 +36,6 @@ def one_line(text: str) -> str:
         half = LONGEST_LINE // 2
         line = f'{line[:half]} ... {line[-half:]}'
     return line
-
-
-def is_utf8(text: str) -> bool:
-    """Return whether an argument holds no bytes that are not UTF-8."""
-    return not any('\ud800' <= character <= '\udfff' for character in text)
-
-
-def open_closed_streams() -> None:
-    """Put what drops everything in the place of standard streams that the caller has closed.
-
-    Else the next file that is opened would take the number of one, and with it the output.
-    """
-    for name, mode in (('stdin', 'r'), ('stdout', 'w'), ('stderr', 'w')):
-        if getattr(sys, name) is None:
-            setattr(sys, name, Path(os.devnull).open(mode, encoding='utf-8'))  # noqa: SIM115
 
 
 def discard_output() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import IndexArray, IntArray
+from wheel_terra_estimator.arrays import IndexArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.bags.writer import Origin
@@ -21,8 +21,6 @@ from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.reporting import truth_scores
 
 COMPARED = ('slip', 'sinkage', 'drawbar_pull', 'normal_load', 'rim_travel_left', 'pull_margin')
-NEAREST = 30_000_000
-"""Sets of the two runs that lie this close together [ns] belong together."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ def compare(
             f'{names[1]}: its wheels ({", ".join(second.names)}) are not those of {names[0]} '
             f'({", ".join(first.names)}); compare estimates of one drive'
         )
-    a, b = common_rows(first.stamp, second.stamp)
+    _, a, b = np.intersect1d(first.stamp, second.stamp, return_indices=True)
     if not a.size:
         raise UserError(
             f'{names[1]}: no stamp in common with {names[0]}; compare estimates of one drive'
@@ -101,19 +99,6 @@ def compare(
         ),
         origins=origins,
     )
-
-
-def common_rows(first: IntArray, second: IntArray) -> tuple[IndexArray, IndexArray]:
-    """Return rows of both that belong together: each of the first, the nearest of the second."""
-    if not first.size or not second.size:
-        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
-    right = np.clip(np.searchsorted(second, first), 1, max(second.size - 1, 1))
-    left = np.minimum(right, second.size) - 1
-    right = np.minimum(right, second.size - 1)
-    nearer = np.abs(second[left] - first) <= np.abs(second[right] - first)
-    match = np.where(nearer, left, right)
-    close = np.abs(second[match] - first) <= NEAREST
-    return np.flatnonzero(close), match[close]
 
 
 def _difference(

@@ -355,36 +355,25 @@ class McapFile:
         waiting = sorted(
             (p for p in self._pieces if p.channels is None or p.channels & wanted),
             key=lambda p: (p.start, p.begin),
-            reverse=True,
         )
-        heap: list[tuple[Row, Iterator[Row], int]] = []
-        held = 0
-        while waiting or heap:
-            while waiting and (not heap or waiting[-1].start <= heap[0][0][0]):
-                rows = self._rows(waiting.pop(), wanted, held)
-                if rows and not heap and (not waiting or waiting[-1].start > rows[-1][0]):
-                    yield from rows  # no other piece lies between
-                elif rows:
-                    size = _size(rows)
-                    held += size
-                    rest = iter(rows)
-                    heapq.heappush(heap, (next(rest), rest, size))
-            if not heap:
-                return
-            row, rest, size = heap[0]
-            yield row
-            following = next(rest, None)
-            if following is None:
-                heapq.heappop(heap)
-                held -= size
-            else:
-                heapq.heapreplace(heap, (following, rest, size))
+        heap: list[Row] = []
+        held = 0  # [byte]
+        for piece in waiting:
+            while heap and heap[0][0] < piece.start:
+                row = heapq.heappop(heap)
+                held -= _size(row)
+                yield row
+            for row in self._rows(piece, wanted, held):
+                heapq.heappush(heap, row)
+                held += _size(row)
+        while heap:
+            yield heapq.heappop(heap)
 
     def _rows(self, piece: Piece, wanted: frozenset[int], held: int) -> list[Row]:
         content = self._content(piece)
         reading = self._read(piece, content, wanted, limits.HELD - held)
         self._note_damage(piece, content, reading)
-        return sorted(reading.rows, key=lambda row: row[:2])
+        return reading.rows
 
     def _content(self, piece: Piece) -> Content:
         """Return the bytes of a piece; a copy, so that nothing of the file stays in memory."""
@@ -585,8 +574,8 @@ def _votes(piece: Piece, content: Content) -> int:
     return _UNPACKED if piece.head is not None and piece.head.codec else _PLAIN
 
 
-def _size(rows: list[Row]) -> int:
-    return sum(len(row[3]) + _ROW_SIZE for row in rows)
+def _size(row: Row) -> int:
+    return len(row[3]) + _ROW_SIZE
 
 
 def _span(piece: Piece, first: int | None, last: int | None) -> tuple[int, int] | None:
