@@ -41,11 +41,9 @@ def test_a_failing_filter_is_said_in_summary_and_diagnostics(
 
     with open_bag(make_bag()) as bag:
         result = replay(bag, rover, {})
-        assert result.counters['filter_restarts'] == 0
         assert not any('started anew' in note for note in result.notes)
         monkeypatch.setattr(WheelSoilEstimator, 'estimates', failing)
         result = replay(bag, rover, {}, tmp_path / 'out')
-    assert result.counters['filter_restarts'] == 1
     assert any('filter failed and was started anew once' in note for note in result.notes)
     assert b'filter_restarts' in next((tmp_path / 'out').glob('*.mcap')).read_bytes()
 
@@ -64,4 +62,4 @@ def test_odometry_that_might_be_the_reference_is_named(tmp_path):
         assert set(used) == {'reference_odom'}
         with_reference = replay(bag, reader.load(drive.configuration), used)
     assert not [note for note in with_reference.notes if 'reference_odom:=' in note]
-    assert with_reference.counters['filter_restarts'] == result.counters['filter_restarts'] == 0
+    assert 'started anew' not in ' '.join((*with_reference.notes, *result.notes))

@@ -161,8 +161,10 @@ def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
     listener, tmp_path, monkeypatch
 ):
     """The state is kept with a sync of the disk; a bag played back sends ``~/stuck``, too."""
+    from diagnostic_msgs.msg import DiagnosticArray
     from geometry_msgs.msg import TwistStamped
     from rclpy.parameter import Parameter
+    from rclpy.serialization import deserialize_message
     from std_msgs.msg import Bool
 
     from wheel_terra_estimator.configuration import soil_file
@@ -190,7 +192,7 @@ def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
     node._say()
     other = listener[0].create_publisher(Bool, 'wheel_terra_estimator/stuck', 1)
     node._say()
-    words = [message.status[0].message for message in said]
+    words = [deserialize_message(data, DiagnosticArray).status[0].message for data in said]
     assert ['2 publishers' in word for word in words] == [False, True], words
     for publisher in (rival, other):
         listener[0].destroy_publisher(publisher)

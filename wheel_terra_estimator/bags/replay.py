@@ -11,7 +11,7 @@ import threading
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
@@ -61,11 +61,11 @@ class Replay:
     topics: dict[str, str]  # input topic of the estimator -> topic in the bag
     heard: Counter[str]
     rejected: Counter[tuple[str, str]]  # (input topic, reason)
-    counters: dict[str, Any]
     notes: tuple[str, ...]
-    interrupted: bool
-    learned: dict[str, Any]  # configuration key -> value, see `EstimatorCore.learned`
-    track: Track
+    interrupted: bool = False
+    # Configuration key -> value, see `EstimatorCore.learned`
+    learned: dict[str, Any] = field(default_factory=dict)
+    track: Track | None = None
     taught: tuple[Taught, ...] = ()
     filtered: EstimateHistory | None = None  # what the filter said, where ``history`` is smoothed
 
@@ -143,7 +143,6 @@ def replay(
         topics=reader.topics,
         heard=pipeline.received,
         rejected=reader.rejected + pipeline.rejected,
-        counters=pipeline.counters(),
         notes=(
             *([SMOOTHED] if smooth else []),
             *_notes(bag, reader, pipeline, interrupted.is_set()),

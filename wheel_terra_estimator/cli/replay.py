@@ -125,7 +125,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(_as_dict(drive, arguments.smooth), indent=2))
     else:
-        print(_as_text(drive))
+        print(drive.as_text)
     written = _write_outputs(drive, arguments)
     if not arguments.json:
         for what, path in written.items():
@@ -183,18 +183,6 @@ def _as_dict(drive: Drive, smoothed: bool) -> dict[str, Any]:
         live = drive.filter_errors
         told['filter'] = {'truth': truth_scores.as_dict(live) if live else None}
     return told
-
-
-def _as_text(drive: Drive) -> str:
-    from wheel_terra_estimator.reporting import truth_scores
-    from wheel_terra_estimator.reporting.drive_summary import as_text
-
-    lines = [as_text(drive.summary)]
-    if drive.errors:
-        lines += truth_scores.as_lines(drive.errors)
-        if drive.filter_errors:
-            lines += truth_scores.beside(drive.errors, drive.filter_errors)
-    return '\n'.join(lines)
 
 
 def _write_outputs(drive: Drive, arguments: argparse.Namespace) -> dict[str, Path]:

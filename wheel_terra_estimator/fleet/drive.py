@@ -16,6 +16,7 @@ from wheel_terra_estimator.checks.finding import CheckReport
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import (
+    drive_summary,
     estimates_table,
     track_table,
     truth_scores,
@@ -39,6 +40,16 @@ class Drive:
     summary: DriveSummary
     filter_errors: truth_scores.TruthErrors | None = None  # where the estimates are smoothed
 
+    @property
+    def as_text(self) -> str:
+        """What the terminal shows."""
+        lines = [drive_summary.as_text(self.summary)]
+        if self.errors:
+            lines += truth_scores.as_lines(self.errors)
+            if self.filter_errors:
+                lines += truth_scores.beside(self.errors, self.filter_errors)
+        return '\n'.join(lines)
+
     def write_table(self, path: Path, overwrite: bool) -> None:
         """Write the estimates as a table."""
         with new_file(path, overwrite) as fresh:
@@ -46,6 +57,7 @@ class Drive:
 
     def write_track(self, path: Path, overwrite: bool) -> None:
         """Write the track as a table."""
+        assert self.result.track is not None
         with new_file(path, overwrite) as fresh:
             track_table.write_track(self.result.track, fresh)
 
@@ -84,11 +96,21 @@ def replay_drive(
         on_checked(checked)
         result = replay(bag, configuration, remaps, output, options)
         truth = read_truth(bag, remaps, configuration)
+    return summed_up(path.resolve().name, configuration, checked, result, truth)
+
+
+def summed_up(
+    title: str,
+    configuration: Configuration,
+    checked: CheckReport,
+    result: Replay,
+    truth: Truth | None,
+) -> Drive:
+    """Return what is known of a recording after its replay."""
     errors, filter_errors = (
         truth_scores.judged(history, truth, result.topics, configuration) if history else None
         for history in (result.history, result.filtered)
     )
-    title = path.resolve().name
     notes = list(result.notes)
     if not configuration.soil_stated:
         notes.append(NO_SOIL)

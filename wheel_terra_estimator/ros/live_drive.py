@@ -18,6 +18,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,6 +38,7 @@ from wheel_terra_estimator.bags import check_before
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import read_estimates
 from wheel_terra_estimator.bags.reader import MeasurementReader, parse_remaps
+from wheel_terra_estimator.bags.replay import Replay
 from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.bags.truth import read_truth
@@ -51,12 +53,9 @@ from wheel_terra_estimator.bags.writer import (
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.fleet.drive import summed_up
 from wheel_terra_estimator.messages.unpack import JOINT_STATE, unpack
 from wheel_terra_estimator.output_folder import check_file, check_folder
-from wheel_terra_estimator.reporting import truth_scores
-from wheel_terra_estimator.reporting.drive_style import Border
-from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
-from wheel_terra_estimator.reporting.replay_report import write_replay_report
 from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
 from wheel_terra_estimator.ros.outputs import SET_MESSAGES
 
@@ -342,26 +341,15 @@ def _run(arguments: argparse.Namespace) -> None:
         start = next(bag.messages(tuple(reader.topics.values()))).log_time
         record(heard, arguments.output, start, arguments.overwrite)
         truth = read_truth(bag, remaps, configuration)
-        counts = {name: bag.topics[topic].message_count for name, topic in reader.topics.items()}
     with open_bag(arguments.output) as estimates:
         history = read_estimates(estimates)
-    title = f'{arguments.bag.resolve().name}, live'
-    border = Border.of(configuration)
-    summary = summarise(title, history, reader.topics, counts, {}, reader.notes, border)
-    errors = truth_scores.judged(history, truth, reader.topics, configuration)
-    print('\n'.join([as_text(summary), *(truth_scores.as_lines(errors) if errors else ())]))
+    heard_of = {name: bag.topics[topic].message_count for name, topic in reader.topics.items()}
+    result = Replay(history, reader.topics, Counter(heard_of), Counter(), tuple(reader.notes))
+    told = summed_up(f'{arguments.bag.resolve().name}, live', configuration, checked, result, truth)
+    print(told.as_text)
     print(f'estimates: {arguments.output}')
     if arguments.report:
-        write_replay_report(
-            arguments.report,
-            summary,
-            history,
-            truth,
-            configuration,
-            overwrite=arguments.overwrite,
-            errors=errors,
-            findings=checked.findings,
-        )
+        told.write_report(arguments.report, arguments.overwrite)
         print(f'report: {arguments.report}')
 
 
