@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.bags.message_types import jazzy_types
-from wheel_terra_estimator.messages.convert import BASE_FRAME, JOINT_STATE
+from wheel_terra_estimator.messages.convert import JOINT_STATE
 from wheel_terra_estimator.messages.diagnostics import Status
+from wheel_terra_estimator.messages.pack import BASE_FRAME
 
 
 def serialised(message: Any) -> bytes:

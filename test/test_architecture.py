@@ -116,34 +116,67 @@ def rules(table):
     return found
 
 
-# What modules of a folder may import, at the top or inside a function: folders of the package, *
-# for all but ros, and libraries beyond the standard one. A new folder needs a line here.
-MAY_USE = rules("""
-every folder: arrays errors csv_file frames glossary input_file output_folder scheduler \
-    worker_pool __version__
-terramechanics: | numpy
-configuration: terramechanics | numpy yaml
-# filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
-estimation: configuration terramechanics | numpy filterpy scipy
-messages: configuration estimation checks | numpy scipy
-checks: configuration estimation | numpy scipy
-# Sensors of the simulated rover give the estimator's typed measurements.
-simulation: configuration terramechanics estimation | numpy scipy
-# compression or backports: zstd by Python version
-bags: configuration terramechanics estimation messages simulation checks \
-    | numpy scipy yaml rosbags lz4 compression backports tqdm
-reporting: configuration terramechanics estimation bags checks | numpy matplotlib jinja2
-# Replay of whole recordings, one or many.
-fleet: configuration terramechanics bags checks reporting | tqdm
-# It has a report of its own, and the wheel loads of its drives are those of the estimator.
-discrepancy: configuration terramechanics estimation reporting bags | numpy scipy matplotlib jinja2
-ros: configuration estimation messages bags reporting \
-    | numpy rclpy rcl_interfaces builtin_interfaces diagnostic_msgs geometry_msgs nav_msgs \
-    sensor_msgs std_msgs std_srvs visualization_msgs
-api: * | numpy pandas matplotlib  # the public Python interface
-cli: * | numpy tqdm matplotlib
-""")
-COMMON, _ = MAY_USE.pop('every folder')
+# Folder -> (folders of the package, libraries beyond the standard one) that its modules may
+# import, at the top or inside a function. A new folder needs a line here.
+COMMON = {
+    'arrays',
+    'errors',
+    'csv_file',
+    'frames',
+    'glossary',
+    'input_file',
+    'output_folder',
+    'scheduler',
+    'worker_pool',
+    '__version__',
+}
+PICTURES = {'matplotlib', 'jinja2'}
+MAY_USE = {
+    'terramechanics': (set(), {'numpy'}),
+    'configuration': ({'terramechanics'}, {'numpy', 'yaml'}),
+    # filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
+    'estimation': ({'configuration', 'terramechanics'}, {'numpy', 'filterpy', 'scipy'}),
+    'messages': ({'configuration', 'estimation', 'checks'}, {'numpy', 'scipy'}),
+    'checks': ({'configuration', 'estimation'}, {'numpy', 'scipy'}),
+    # Sensors of the simulated rover give the estimator's typed measurements.
+    'simulation': ({'configuration', 'terramechanics', 'estimation'}, {'numpy', 'scipy'}),
+    'bags': (
+        {'configuration', 'terramechanics', 'estimation', 'messages', 'simulation', 'checks'},
+        {
+            'numpy',
+            'scipy',
+            'yaml',
+            'rosbags',
+            'lz4',
+            'compression',
+            'backports',
+            'tqdm',
+        },  # zstd by Python version
+    ),
+    'reporting': (
+        {'configuration', 'terramechanics', 'estimation', 'bags', 'checks'},
+        {'numpy'} | PICTURES,
+    ),
+    # Replay of whole recordings, one or many.
+    'fleet': (
+        {'configuration', 'terramechanics', 'bags', 'checks', 'reporting'},
+        {'tqdm'},
+    ),
+    # It has a report of its own, and the wheel loads of its drives are those of the estimator.
+    'discrepancy': (
+        {'configuration', 'terramechanics', 'estimation', 'reporting', 'bags'},
+        {'numpy', 'scipy'} | PICTURES,
+    ),
+    'ros': (
+        {'configuration', 'estimation', 'messages', 'bags', 'fleet'},
+        {'numpy', 'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'diagnostic_msgs'}
+        | {'geometry_msgs', 'nav_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'}
+        | {'visualization_msgs'},
+    ),
+    # The public Python interface: all but the node.
+    'api': (None, {'numpy', 'pandas', 'matplotlib'}),
+    'cli': (None, {'numpy', 'tqdm', 'matplotlib'}),  # None: all but ros
+}
 LABORATORY = PACKAGE.with_name('wheel_terra_lab')
 # Its commands, reproduction and studies use what they like.
 LABORATORY_MAY_USE = rules("""

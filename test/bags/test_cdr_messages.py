@@ -12,8 +12,9 @@ from estimate_sets import some_estimates
 from message_factory import MessageFactory, serialised
 
 from wheel_terra_estimator.messages import pack
-from wheel_terra_estimator.messages.convert import BASE_FRAME, INPUT_TYPES
+from wheel_terra_estimator.messages.convert import INPUT_TYPES
 from wheel_terra_estimator.messages.diagnostics import Status
+from wheel_terra_estimator.messages.pack import BASE_FRAME
 from wheel_terra_estimator.messages.unpack import (
     IMU,
     JOINT_STATE,

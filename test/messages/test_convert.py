@@ -1,23 +1,19 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to measurements, estimates to message fields."""
+"""Messages to measurements."""
 
 import math
 from typing import Any
 
 import numpy as np
 import pytest
-from estimate_sets import STAMP, some_estimates
+from estimate_sets import STAMP
 from recordings import Converter
 from scipy.spatial.transform import Rotation
 
-from wheel_terra_estimator.estimation.estimates import SlipOnSlope
-from wheel_terra_estimator.estimation.sideways import Sideways
 from wheel_terra_estimator.messages.convert import (
     input_layout,
-    joint_fields,
     stamp_of,
-    twist_fields,
 )
 
 
@@ -261,53 +257,6 @@ def test_sinkage_leaving_angle_and_reference(converter, factory):
     twist = factory.twist_with_covariance(0.7, 0.1, [4e-4] + [0.0] * 35)
     reference = converter.convert('reference_odom', factory.odometry(header, twist))
     assert (reference.forward, reference.variance) == (0.7, 4e-4)
-
-
-def test_every_output_field_is_where_the_contract_wants_it():
-    aside = Sideways(*((k, k + 0.5) for k in range(4)), 0.02, 1e-4)
-    e = some_estimates(sideways=aside)
-    names = ('left', 'right')
-    found = joint_fields(e, names)
-    table = {
-        'slip': (e.slip, e.slip_velocity, e.drawbar_pull),
-        'sinkage': (e.sinkage, e.sinkage_rate, e.normal_load),
-        'slip_stddev': (e.slip_std, e.slip_velocity_std, e.drawbar_pull_std),
-        'sinkage_stddev': (e.sinkage_std, e.sinkage_rate_std, e.normal_load_std),
-        'mobility': (e.rim_travel_left, [], e.pull_margin),
-        'soil': (e.soil, [], e.soil_std),
-        'slip_angle': (e.sideways.angle, [], e.sideways.force),
-        'slip_angle_stddev': (e.sideways.angle_std, [], e.sideways.force_std),
-    }
-    assert list(found) == list(table)
-    for topic, columns in table.items():
-        assert found[topic].name == (names if topic != 'soil' else e.soil_names)
-        assert [list(column) for column in found[topic][1:]] == [list(c) for c in columns]
-
-
-def test_slips_on_slopes_go_out_where_a_set_has_them():
-    slopes = SlipOnSlope(*np.arange(33.0).reshape(3, 11))
-    found = joint_fields(some_estimates(slip_on_slope=slopes), ('left', 'right'))
-    assert found['slip_on_slope'].name == tuple(f'slope_{d}deg' for d in range(-20, 31, 5))
-    assert found['slip_on_slope'].position == slopes.slip.tolist()
-    assert found['slip_on_slope'].effort == slopes.std.tolist()
-    assert found['slip_on_slope'].velocity == slopes.entrapment.tolist()
-
-
-def test_twist_covariance_is_row_major_and_positive():
-    e = some_estimates()
-    twist = twist_fields(e)
-    assert twist.velocity == (e.forward_velocity, 0.0)
-    assert np.array(twist.covariance).reshape(6, 6)[1, 1] == 1.0
-    e = some_estimates(sideways=Sideways(*((0.0, 0.0),) * 4, 0.02, 1e-4))
-    twist = twist_fields(e)
-    assert twist.velocity == (e.forward_velocity, 0.02)
-    assert twist.yaw_rate == e.yaw_rate
-    matrix = np.array(twist.covariance).reshape(6, 6)
-    assert matrix[1, 1] == 1e-4
-    assert matrix[0, 0] == e.forward_velocity_variance
-    assert matrix[5, 5] == e.yaw_rate_variance
-    assert (np.diag(matrix) > 0.0).all()
-    assert np.count_nonzero(matrix - np.diag(np.diag(matrix))) == 0
 
 
 @pytest.fixture

@@ -24,8 +24,8 @@ from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.bags.writer import DIAGNOSTICS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, SlipOnSlope
-from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, OUTPUT_TYPES
 from wheel_terra_estimator.messages.diagnostics import NODE
+from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS, OUTPUT_TYPES
 from wheel_terra_estimator.messages.unpack import Message
 
 WHEEL_FIELDS = {

@@ -21,12 +21,8 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.messages import pack
-from wheel_terra_estimator.messages.convert import (
-    BASE_FRAME,
-    INPUT_TYPES,
-    OUTPUT_TYPES,
-    input_layout,
-)
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, input_layout
+from wheel_terra_estimator.messages.pack import BASE_FRAME, OUTPUT_TYPES
 from wheel_terra_estimator.simulation.drive import SimulatedDrive
 
 TRUTH = '/ground_truth'

@@ -21,7 +21,7 @@ from wheel_terra_estimator.estimation.contacts.steering import headings
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading, WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover
-from wheel_terra_estimator.messages.convert import OUTPUT_TYPES
+from wheel_terra_estimator.messages.pack import OUTPUT_TYPES
 from wheel_terra_estimator.messages.unpack import JOINT_STATE, ODOMETRY, TWIST, Message
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 

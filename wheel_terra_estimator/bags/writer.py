@@ -16,7 +16,7 @@ from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages import diagnostics, pack
-from wheel_terra_estimator.messages.convert import OUTPUT_TYPES
+from wheel_terra_estimator.messages.pack import OUTPUT_TYPES
 
 NAMESPACE = f'/{diagnostics.NODE}'
 STUCK = f'{NAMESPACE}/stuck'

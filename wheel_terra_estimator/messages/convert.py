@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages -> typed measurements, estimates -> message fields; the same for node and replay.
+"""Messages of the inputs -> typed measurements, the same for node and replay.
 
 What the numbers are worth is judged by the estimator core, only what does not fit the layout of a
 message is refused here.
@@ -14,15 +14,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.estimation.estimates import SLOPE_NAMES, EstimateSet
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     InertialVariance,
@@ -32,7 +30,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
-from wheel_terra_estimator.messages.unpack import IMU, JOINT_STATE, ODOMETRY, TWIST, Message
+from wheel_terra_estimator.messages.unpack import IMU, JOINT_STATE, ODOMETRY, Message
 
 INPUT_TYPES = {
     'joint_states': JOINT_STATE,
@@ -45,54 +43,7 @@ INPUT_TYPES = {
 """Input topics of the estimator (relative names) and their message types."""
 
 
-class JointFields(NamedTuple):
-    """Fields of an output JointState; an empty list is an empty field."""
-
-    name: tuple[str, ...]
-    position: list[float]
-    velocity: list[float]
-    effort: list[float]
-
-
-class TwistFields(NamedTuple):
-    """Fields of the output twist, in ``base_link``."""
-
-    velocity: tuple[float, float]  # along x and y [m/s]
-    yaw_rate: float  # [rad/s]
-    covariance: list[float]  # 6 x 6, row by row (x, y, z, then rotations; REP 103)
-
-
-JOINT_OUTPUTS = {
-    'slip': ('slip', 'slip_velocity', 'drawbar_pull'),
-    'sinkage': ('sinkage', 'sinkage_rate', 'normal_load'),
-    'slip_stddev': ('slip_std', 'slip_velocity_std', 'drawbar_pull_std'),
-    'sinkage_stddev': ('sinkage_std', 'sinkage_rate_std', 'normal_load_std'),
-    'mobility': ('rim_travel_left', '', 'pull_margin'),
-    'soil': ('soil', '', 'soil_std'),
-    'slip_on_slope': ('slip_on_slope.slip', 'slip_on_slope.entrapment', 'slip_on_slope.std'),
-    'slip_angle': ('sideways_known.angle', '', 'sideways_known.force'),
-    'slip_angle_stddev': ('sideways_known.angle_std', '', 'sideways_known.force_std'),
-}
-"""Outputs that are a JointState: topic -> fields of a set that are its position, velocity and
-effort, '' for none; node, replay and recordings publish these."""
-_COLUMNS = {
-    topic: tuple(attrgetter(field) if field else None for field in fields)
-    for topic, fields in JOINT_OUTPUTS.items()
-}
-OUTPUT_TYPES = {
-    **dict.fromkeys(JOINT_OUTPUTS, JOINT_STATE),
-    'slip_class': 'std_msgs/msg/UInt8MultiArray',
-    'twist': TWIST,
-    'stuck_direction': 'std_msgs/msg/Int8',
-    'stuck': 'std_msgs/msg/Bool',
-}
-"""Private output topics of the estimator and their message types."""
-
-BASE_FRAME = 'base_link'
 _FASTEST = 30.0  # lateral speed that no rover has [m/s]
-UNKNOWN_VARIANCE = 1e6
-"""Variance of the twist components that are not estimated (finite, so that no filter chokes)."""
-
 DAMAGED = 'damaged message'
 """Why bytes are refused that are no message of their type."""
 _IMU_FIELDS = (0, 4, 13, 16, 25, 28, 37)
@@ -345,27 +296,3 @@ def _diagonal(covariance: Sequence[float]) -> tuple[float, float, float]:
 
 def _weighted(shares: Sequence[float], variances: Sequence[float]) -> float:
     return sum(share * variance for share, variance in zip(shares, variances, strict=True))
-
-
-def joint_fields(estimates: EstimateSet, names: tuple[str, ...]) -> dict[str, JointFields]:
-    """Return the fields of `JOINT_OUTPUTS` by topic, as published; without those not due."""
-    made = {}
-    others = {'soil': estimates.soil_names, 'slip_on_slope': SLOPE_NAMES}
-    for topic, columns in _COLUMNS.items():
-        if topic == 'slip_on_slope' and estimates.slip_on_slope is None:
-            continue  # once a second
-        values = [np.asarray(column(estimates)).tolist() if column else [] for column in columns]
-        made[topic] = JointFields(others.get(topic, names), *values)
-    return made
-
-
-def twist_fields(estimates: EstimateSet) -> TwistFields:
-    """Return the fields of ``twist``, as published."""
-    aside = estimates.sideways_known
-    diagonal = [UNKNOWN_VARIANCE] * 6
-    diagonal[0] = estimates.forward_velocity_variance
-    diagonal[1] = aside.velocity_variance
-    diagonal[5] = estimates.yaw_rate_variance
-    covariance = [0.0] * 36
-    covariance[::7] = diagonal
-    return TwistFields((estimates.forward_velocity, aside.velocity), estimates.yaw_rate, covariance)

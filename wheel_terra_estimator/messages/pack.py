@@ -11,16 +11,43 @@ import struct
 from collections.abc import Container, Iterable, Iterator, Sequence
 from functools import cache
 from itertools import chain
+from operator import attrgetter
 
-from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.messages.convert import (
-    BASE_FRAME,
-    JOINT_OUTPUTS,
-    joint_fields,
-    twist_fields,
-)
+import numpy as np
+
+from wheel_terra_estimator.estimation.estimates import SLOPE_NAMES, EstimateSet
 from wheel_terra_estimator.messages.diagnostics import Status
+from wheel_terra_estimator.messages.unpack import JOINT_STATE, TWIST
 
+JOINT_OUTPUTS = {
+    'slip': ('slip', 'slip_velocity', 'drawbar_pull'),
+    'sinkage': ('sinkage', 'sinkage_rate', 'normal_load'),
+    'slip_stddev': ('slip_std', 'slip_velocity_std', 'drawbar_pull_std'),
+    'sinkage_stddev': ('sinkage_std', 'sinkage_rate_std', 'normal_load_std'),
+    'mobility': ('rim_travel_left', '', 'pull_margin'),
+    'soil': ('soil', '', 'soil_std'),
+    'slip_on_slope': ('slip_on_slope.slip', 'slip_on_slope.entrapment', 'slip_on_slope.std'),
+    'slip_angle': ('sideways_known.angle', '', 'sideways_known.force'),
+    'slip_angle_stddev': ('sideways_known.angle_std', '', 'sideways_known.force_std'),
+}
+"""Outputs that are a JointState: topic -> fields of a set that are its position, velocity and
+effort, '' for none; node, replay and recordings publish these."""
+_COLUMNS = {
+    topic: tuple(attrgetter(field) if field else None for field in fields)
+    for topic, fields in JOINT_OUTPUTS.items()
+}
+OUTPUT_TYPES = {
+    **dict.fromkeys(JOINT_OUTPUTS, JOINT_STATE),
+    'slip_class': 'std_msgs/msg/UInt8MultiArray',
+    'twist': TWIST,
+    'stuck_direction': 'std_msgs/msg/Int8',
+    'stuck': 'std_msgs/msg/Bool',
+}
+"""Private output topics of the estimator and their message types."""
+
+BASE_FRAME = 'base_link'
+UNKNOWN_VARIANCE = 1e6
+"""Variance of the twist components that are not estimated (finite, so that no filter chokes)."""
 SET_TOPICS = (*JOINT_OUTPUTS, 'slip_class', 'twist')
 """Private topics that have a message of each set (``slip_on_slope``: once a second)."""
 
@@ -39,13 +66,23 @@ def pack(
     ``names``: of the wheels.
     """
     stamp = estimates.stamp
-    for topic, fields in joint_fields(estimates, names).items():
-        if topic in wanted:
-            yield topic, joint_state(stamp, *fields)
+    others = {'soil': estimates.soil_names, 'slip_on_slope': SLOPE_NAMES}
+    for topic, columns in _COLUMNS.items():
+        due = topic != 'slip_on_slope' or estimates.slip_on_slope is not None  # once a second
+        if due and topic in wanted:
+            fields = [np.asarray(c(estimates)).tolist() if c else [] for c in columns]
+            yield topic, joint_state(stamp, others.get(topic, names), *fields)
         if topic == 'slip' and 'slip_class' in wanted:
             yield 'slip_class', slip_classes(estimates.slip_class.tolist())
     if 'twist' in wanted:
-        yield 'twist', twist_stamped(stamp, *twist_fields(estimates))
+        aside = estimates.sideways_known
+        covariance = [0.0] * 36
+        covariance[::7] = [UNKNOWN_VARIANCE] * 6
+        covariance[0] = estimates.forward_velocity_variance
+        covariance[7] = aside.velocity_variance
+        covariance[35] = estimates.yaw_rate_variance
+        velocity = estimates.forward_velocity, aside.velocity
+        yield 'twist', twist_stamped(stamp, velocity, estimates.yaw_rate, covariance)
 
 
 def joint_state(

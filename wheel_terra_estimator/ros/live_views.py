@@ -20,7 +20,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.messages.convert import BASE_FRAME
+from wheel_terra_estimator.messages.pack import BASE_FRAME
 from wheel_terra_estimator.ros.outputs import make_publisher, time_message
 
 MARKER_PERIOD = 200_000_000

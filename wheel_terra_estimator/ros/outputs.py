@@ -18,8 +18,8 @@ from std_msgs.msg import Bool, Int8, UInt8MultiArray
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages import pack
-from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS
 from wheel_terra_estimator.messages.diagnostics import Status
+from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, output_profile
 
 SET_MESSAGES = {

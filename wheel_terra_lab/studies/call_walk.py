@@ -40,7 +40,7 @@ from wheel_terra_estimator.bags.table_to_bag import EXAMPLE
 from wheel_terra_estimator.cli.main import main as wheel_terra
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.shipped import demo_recording
-from wheel_terra_estimator.messages import convert
+from wheel_terra_estimator.messages.pack import pack
 from wheel_terra_estimator.messages.pipeline import Pipeline
 from wheel_terra_estimator.messages.unpack import Message
 
@@ -121,7 +121,7 @@ def walk_of_message() -> Walk:
             with noted.noting() if last else contextlib.nullcontext():
                 sets = pipeline.hear('joint_states', rates)
                 for estimates in sets:
-                    convert.joint_fields(estimates, names)
+                    list(pack(estimates, names))
             assert not last or sets
     return noted
 
