@@ -67,7 +67,7 @@ class Replay:
     learned: dict[str, Any] = field(default_factory=dict)
     track: Track | None = None
     taught: tuple[Taught, ...] = ()
-    filtered: EstimateHistory | None = None  # what the filter said, where ``history`` is smoothed
+    smoothed: bool = False
 
 
 @dataclass(frozen=True)
@@ -121,11 +121,8 @@ def replay(
             writer.state_origin(configuration, bag.path.resolve().name)
         interrupted = stack.enter_context(_until_interrupted())
         heard = events(messages, pipeline, interrupted)
-        filtered = None
         if smoother is not None:
-            live = HistoryRecorder(pipeline.names, most)
-            heard = smoothed(heard, smoother, live, pipeline.diagnostics)
-            filtered = live.history
+            heard = smoothed(heard, smoother, pipeline.diagnostics)
         recorder = HistoryRecorder(pipeline.names, most)
         for event in heard:
             if event.estimates is not None:
@@ -150,7 +147,7 @@ def replay(
         interrupted=interrupted.is_set(),
         learned=core.learned(),
         taught=core.taught(),
-        filtered=filtered() if filtered is not None else None,
+        smoothed=smooth,
         track=tracker.track(),
     )
 
@@ -178,7 +175,6 @@ def events(
 def smoothed(
     events: Iterator[Event],  # of the forward pass, whose estimator is that of the smoother
     smoother: DriveSmoother,
-    live: HistoryRecorder,  # gets the sets of the filter
     diagnostics: Diagnostics,  # asked set by set, as the live node asks it
 ) -> Iterator[Event]:
     """Yield the events of a drive with the sets of its smoother, once all have come."""
@@ -187,7 +183,6 @@ def smoothed(
         if event.estimates is None:
             starts.append(event)
             continue
-        live.add(event.estimates)
         statuses = diagnostics.due(event.estimates)
         smoother.keep(event.estimates, (tuple(starts), event.log_time, statuses))
         starts = []

@@ -123,7 +123,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
         print_findings,
     )
     if arguments.json:
-        print(json.dumps(_as_dict(drive, arguments.smooth), indent=2))
+        print(json.dumps(_as_dict(drive), indent=2))
     else:
         print(drive.as_text)
     written = _write_outputs(drive, arguments)
@@ -172,16 +172,13 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
         check_folder(arguments.output, arguments.overwrite)
 
 
-def _as_dict(drive: Drive, smoothed: bool) -> dict[str, Any]:
+def _as_dict(drive: Drive) -> dict[str, Any]:
     from wheel_terra_estimator.reporting import truth_scores
     from wheel_terra_estimator.reporting.drive_summary import as_dict
 
     told = as_dict(drive.summary)
     told['findings'] = drive.checked.as_dict()['findings']
     told['truth'] = truth_scores.as_dict(drive.errors) if drive.errors else None
-    if smoothed:
-        live = drive.filter_errors
-        told['filter'] = {'truth': truth_scores.as_dict(live) if live else None}
     return told
 
 

@@ -38,7 +38,6 @@ class Drive:
     truth: Truth | None
     errors: truth_scores.TruthErrors | None
     summary: DriveSummary
-    filter_errors: truth_scores.TruthErrors | None = None  # where the estimates are smoothed
 
     @property
     def as_text(self) -> str:
@@ -46,8 +45,6 @@ class Drive:
         lines = [drive_summary.as_text(self.summary)]
         if self.errors:
             lines += truth_scores.as_lines(self.errors)
-            if self.filter_errors:
-                lines += truth_scores.beside(self.errors, self.filter_errors)
         return '\n'.join(lines)
 
     def write_table(self, path: Path, overwrite: bool) -> None:
@@ -72,8 +69,7 @@ class Drive:
             overwrite=overwrite,
             findings=self.checked.findings,
             errors=self.errors,
-            filtered=self.result.filtered,
-            filter_errors=self.filter_errors,
+            smoothed=self.result.smoothed,
             track=self.result.track,
         )
 
@@ -107,10 +103,7 @@ def summed_up(
     truth: Truth | None,
 ) -> Drive:
     """Return what is known of a recording after its replay."""
-    errors, filter_errors = (
-        truth_scores.judged(history, truth, result.topics, configuration) if history else None
-        for history in (result.history, result.filtered)
-    )
+    errors = truth_scores.judged(result.history, truth, result.topics, configuration)
     notes = list(result.notes)
     if not configuration.soil_stated:
         notes.append(NO_SOIL)
@@ -118,4 +111,4 @@ def summed_up(
         title, result.history, result.topics, result.heard, result.rejected, notes,
         Border.of(configuration), result.taught,
     )  # fmt: skip
-    return Drive(configuration, checked, result, truth, errors, summary, filter_errors)
+    return Drive(configuration, checked, result, truth, errors, summary)

@@ -38,9 +38,8 @@ def drive_figure(
     history: EstimateHistory,
     truth: Truth | None,
     border: Border,
-    filtered: EstimateHistory | None = None,
 ) -> TimeFigure:
-    """Return the figure of a drive; ``filtered`` is drawn in grey where it was smoothed."""
+    """Return the figure of a drive."""
     names = short_names(history.names)
     slip = known(history, 'slip', border)
     panels = (
@@ -51,17 +50,11 @@ def drive_figure(
         Panel('drawbar pull [N]', 0.21),
     )
     end = float(history.seconds[-1])
-    switches = _switches(names, truth, filtered)
+    switches = _switches(names, truth)
     figure = TimeFigure(panels, switches, end, 'time since the first estimate [s]')
     _velocity(figure, history, truth)
     for wheel, name in enumerate(names):
         switch = f'wheel {wheel}'
-        if filtered is not None:
-            for panel, quantity, scale in QUANTITIES:
-                live = scale * known(filtered, quantity, border)[:, wheel]
-                figure.line(
-                    panel, filtered.seconds, live, f'{name}, filter', RIM_COLOUR, switch, 'filter'
-                )
         for panel, quantity, scale in QUANTITIES:
             line = scale * known(history, quantity, border)[:, wheel]
             half = scale * BAND * history.values[f'{quantity}_std'][:, wheel]
@@ -122,9 +115,7 @@ def slopes_figure(found: SlipOnSlope) -> TimeFigure:
     return figure
 
 
-def _switches(
-    names: list[str], truth: Truth | None, filtered: EstimateHistory | None
-) -> list[Switch]:
+def _switches(names: list[str], truth: Truth | None) -> list[Switch]:
     wheels = [
         Switch(f'wheel {i}', name, colour=LINE_COLOURS[i % len(LINE_COLOURS)])
         for i, name in enumerate(names)
@@ -132,8 +123,6 @@ def _switches(
     wheels.append(Switch('band', f'± {BAND:g} standard deviations', on=False))
     if truth is not None:
         wheels.append(Switch('truth', 'truth of each wheel', on=False))
-    if filtered is not None:
-        wheels.append(Switch('filter', 'the filter, as it was live', colour=RIM_COLOUR))
     return wheels
 
 

@@ -44,14 +44,12 @@ def write_replay_report(
     overwrite: bool = False,
     findings: Sequence[Any] = (),
     errors: TruthErrors | None = None,
-    filtered: EstimateHistory | None = None,
-    filter_errors: TruthErrors | None = None,
+    smoothed: bool = False,
     track: Track | None = None,
 ) -> None:
     """Write the report of a drive.
 
-    ``errors`` are those against a truth that may judge the estimates; ``filtered`` and
-    ``filter_errors`` are of the filter, where the estimates are those of the smoother.
+    ``errors`` are those against a truth that may judge the estimates.
     """
     from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -66,19 +64,16 @@ def write_replay_report(
         cards=_cards(summary),
         classes=[(c.name.lower(), colour) for c, colour in CLASS_COLOURS.items()],
         wheels=[_wheel_row(wheel) for wheel in summary.wheels],
-        figure=drive_figure(history, truth, border, filtered) if summary.sets else None,
+        figure=drive_figure(history, truth, border) if summary.sets else None,
         findings=findings,
         warnings=_warnings(summary, errors),
         errors=[_error_row(error) for error in errors.quantities] if errors else [],
-        filter_errors=(
-            [_error_row(error) for error in filter_errors.quantities] if filter_errors else []
-        ),
         taught=[_taught_row(row) for row in summary.taught],
         slopes=slopes_figure(history.slip_on_slope) if history.slip_on_slope else None,
         way=way_figure(track) if track else None,
         strengths=[(words, colour) for words, _, _, colour in STRENGTHS],
         position=track.source if track else '',
-        smoothed=filtered is not None,
+        smoothed=smoothed,
         truth_source=truth.source if truth else '',
         provenance=configuration.provenance,
         parameters=[(key, values[key]) for key in values if key in configuration.stated],

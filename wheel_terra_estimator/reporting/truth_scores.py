@@ -222,18 +222,6 @@ def as_lines(errors: TruthErrors) -> list[str]:
     return lines
 
 
-def beside(errors: TruthErrors, filtered: TruthErrors) -> list[str]:
-    """Return lines that set the rms errors of a smoother beside those of the filter."""
-    lines = [f'    {"rms of the filter":18}{"":10}{"smoother":>10}{"ratio":>10}']
-    live = {q.name: q for q in filtered.quantities}
-    for q in errors.quantities:
-        before = live[q.name].rms
-        ratio = f'{q.rms / before:.2f}' if before > 0.0 else '-'
-        label = f'{q.name} [{q.unit}]'
-        lines.append(f'    {label:22}{before:>6.3g}{q.rms:>10.3g}{ratio:>10}')
-    return lines
-
-
 def as_dict(errors: TruthErrors) -> dict[str, Any]:
     """Return the errors for JSON."""
     return {
