@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -46,8 +45,6 @@ INPUT_TYPES = {
 _FASTEST = 30.0  # lateral speed that no rover has [m/s]
 DAMAGED = 'damaged message'
 """Why bytes are refused that are no message of their type."""
-_IMU_FIELDS = (0, 4, 13, 16, 25, 28, 37)
-"""Where attitude, angular rate and specific force begin, each with its covariance behind it."""
 _NO_WHEEL = 'none of the configured wheels in it'
 
 
@@ -178,9 +175,8 @@ class InputConverter:
     def _imu(self, message: Message) -> InertialReading | None:
         """Specific force, angular rate and attitude in ``base_link``; nan where not told."""
         values = message.numbers[0].tolist()
-        attitude, of_attitude, rates, of_rate, forces, of_force = (
-            values[begin:end] for begin, end in pairwise(_IMU_FIELDS)
-        )
+        attitude, rates, forces = values[:4], values[13:16], values[25:28]
+        of_attitude, of_rate, of_force = values[4:13], values[16:25], values[28:]
         told = of_force[0] != -1.0, of_rate[0] != -1.0  # REP 145
         for words, there in zip(('linear acceleration', 'angular velocity'), told, strict=True):
             if not there:

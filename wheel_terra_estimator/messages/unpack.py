@@ -29,7 +29,21 @@ _NUMBERS = {IMU: (0, 37), ODOMETRY: (43, 42), TWIST: (0, 42)}
 _BODY = 4  # where the fields begin, and from where they are aligned [byte]
 _AFTER_STAMP = 12  # [byte]
 _LONGEST_PADDING = 3  # [byte] behind the last field
-_ORDERS = {b'\0\0': '>', b'\0\1': '<'}  # encapsulation -> order of bytes
+
+
+class _Order(NamedTuple):
+    """How stamps, lengths and numbers are read in one order of bytes."""
+
+    stamp: struct.Struct
+    length: struct.Struct
+    number: np.dtype[np.float64]
+
+
+_ORDERS = {
+    head: _Order(struct.Struct(f'{sign}iI'), struct.Struct(f'{sign}I'), np.dtype(f'{sign}f8'))
+    for head, sign in ((b'\0\1', '<'), (b'\0\0', '>'))
+}
+"""First bytes of a message -> order of its bytes."""
 
 
 class DamagedMessageError(ValueError):
@@ -56,7 +70,7 @@ def unpack(kind: str, data: bytes) -> Message:
     """
     try:
         order = _ORDERS[data[:2]]
-        seconds, nanoseconds = struct.unpack_from(f'{order}iI', data, _BODY)
+        seconds, nanoseconds = order.stamp.unpack_from(data, _BODY)
         _, at = _strings(data, _AFTER_STAMP, _STRINGS[kind], order)
         names: list[str] = []
         numbers: list[FloatArray] = []
@@ -78,28 +92,29 @@ def unpack(kind: str, data: bytes) -> Message:
     return Message(seconds * 1_000_000_000 + nanoseconds, tuple(names), tuple(numbers))
 
 
-def _count(data: bytes, at: int, order: str) -> tuple[int, int]:
+def _count(data: bytes, at: int, order: _Order) -> tuple[int, int]:
     """Return the number of entries of a list, and where the list begins [byte]."""
     at += -(at - _BODY) % 4
-    (count,) = struct.unpack_from(f'{order}I', data, at)
+    (count,) = order.length.unpack_from(data, at)
     return count, at + 4
 
 
-def _strings(data: bytes, at: int, count: int, order: str) -> tuple[list[str], int]:
+def _strings(data: bytes, at: int, count: int, order: _Order) -> tuple[list[str], int]:
     """Return strings, and where they end [byte]."""
-    found = []
+    found, length = [], order.length.unpack_from
     for _ in range(count):
-        size, at = _count(data, at, order)
-        text = data[at : at + size]
+        at += -(at - _BODY) % 4
+        (size,) = length(data, at)
+        text = data[at + 4 : at + 4 + size]
         if len(text) < size or text[-1:] != b'\0':
             raise ValueError('a string does not end')
         found.append(text[:-1].decode())
-        at += size
+        at += 4 + size
     return found, at
 
 
-def _numbers(data: bytes, at: int, count: int, order: str) -> tuple[FloatArray, int]:
+def _numbers(data: bytes, at: int, count: int, order: _Order) -> tuple[FloatArray, int]:
     """Return numbers, and where they end [byte]."""
     if count:
         at += -(at - _BODY) % 8
-    return np.frombuffer(data, f'{order}f8', count, at), at + 8 * count
+    return np.frombuffer(data, order.number, count, at), at + 8 * count

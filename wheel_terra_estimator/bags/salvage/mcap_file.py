@@ -293,7 +293,7 @@ class McapFile:
 
     def _add_loose(self, record: mcap.Record) -> None:
         """Lengthen the last stretch of messages, or begin a new one."""
-        time = mcap.message(self._map, record).log_time
+        time = record.log_time
         at = record.begin - mcap.HEAD
         last = self._pieces[-1] if self._pieces else None
         if (
@@ -429,7 +429,9 @@ class McapFile:
         allowed: int,
     ) -> Reading:
         found = Reading()
-        counts, rows = found.counts, found.rows
+        rows = found.rows
+        counts: dict[int, int] = defaultdict(int)
+        start, last = found.start, found.last
         time: int | None = None
         gap_after: tuple[int | None] | None = None
         for item in mcap.records(data, 0, len(data), possible):
@@ -438,9 +440,11 @@ class McapFile:
                 self._add_work(_GAP_WORK)
                 gap_after = gap_after or (time,)
             elif item.opcode == mcap.MESSAGE:
-                channel, time, begin, end = mcap.message(data, item)
+                _, head, end, channel, time = item
+                begin = head + mcap.MESSAGE_HEAD
                 counts[channel] += 1
-                found.start, found.last = min(found.start, time), max(found.last, time)
+                start = time if time < start else start
+                last = time if time > last else last
                 if gap_after:
                     found.lost_between.append((gap_after[0], time))
                     gap_after = None
@@ -453,6 +457,8 @@ class McapFile:
                 found.definitions.append(item)
         if gap_after:
             found.lost_between.append((gap_after[0], None))
+        found.counts.update(counts)
+        found.start, found.last = start, last
         return found
 
     def _note_damage(self, piece: Piece, content: Content, reading: Reading) -> None:

@@ -62,11 +62,13 @@ Buffer: TypeAlias = 'bytes | mmap'
 
 
 class Record(NamedTuple):
-    """A record: its opcode and where its content begins and ends."""
+    """A record: its opcode, where its content begins and ends, two fields of a message."""
 
     opcode: int
     begin: int
     end: int
+    channel: int = 0
+    log_time: int = 0
 
 
 class Gap(NamedTuple):
@@ -121,7 +123,7 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
                 and (any_channel or channel in channels)
                 and (after == end or _head_fits(content, after, end, possible))
             ):
-                record = Record(MESSAGE, at + HEAD, after)
+                record = Record(MESSAGE, at + HEAD, after, channel, log_time)
         record = record or _record(content, at, end, possible)
         if record is not None and behind_damage and CHUNK in possible.opcodes:
             behind_damage = record.opcode != CHUNK
@@ -155,6 +157,9 @@ def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | 
     opcode, length = _RECORD.unpack_from(content, at)
     after = at + HEAD + length
     record = Record(opcode, at + HEAD, min(after, end))
+    if opcode == MESSAGE:
+        _, _, channel, _, log_time, _ = _MESSAGE.unpack_from(content, at)
+        record = record._replace(channel=channel, log_time=log_time)
     if after < end and _fits(content, after, end, possible):
         return record
     if after == end and opcode != CHUNK:  # no closed file ends with a chunk
@@ -266,21 +271,6 @@ def chunk_head(content: Buffer, at: int, end: int) -> ChunkHead | None:
     if codec not in CODECS or packed != length - CHUNK_HEAD - letters:
         return None
     return ChunkHead(start, last, size, checksum, codec, begin, packed)
-
-
-class Message(NamedTuple):
-    """Fields of a message record and where its data stand."""
-
-    channel: int
-    log_time: int
-    begin: int
-    end: int
-
-
-def message(content: Buffer, record: Record) -> Message:
-    """Return the fields of a message record."""
-    _, _, channel, _, log_time, _ = _MESSAGE.unpack_from(content, record.begin - HEAD)
-    return Message(channel, log_time, record.begin + MESSAGE_HEAD, record.end)
 
 
 def schema(content: Buffer, record: Record) -> tuple[int, str]:
