@@ -162,7 +162,7 @@ class _Collector:
         places, kept = self._alike.setdefault(key, ([], array('d')))
         places.append(len(self.stamps))
         for values in numbers:
-            kept.frombytes(values.astype(np.float64, copy=False).tobytes())
+            kept.frombytes(values.tobytes())
         self.stamps.append(message.stamp)
         self._log_times.append(log_time)
 

@@ -117,4 +117,6 @@ def _numbers(data: bytes, at: int, count: int, order: _Order) -> tuple[FloatArra
     """Return numbers, and where they end [byte]."""
     if count:
         at += -(at - _BODY) % 8
-    return np.frombuffer(data, order.number, count, at), at + 8 * count
+    values = np.frombuffer(data, order.number, count, at)
+    native = values if order.number.isnative else values.astype(np.float64)
+    return native, at + 8 * count
