@@ -403,10 +403,10 @@ class McapFile:
         else:  # at second try, the times in the head may be what is damaged
             possible = [mcap.Possible(_IN_CHUNK, known, head.start, head.end)]
             possible.append(mcap.Possible(_IN_CHUNK, known))
-        found = [self._pass(piece.begin, content.data, possible[0], wanted, allowed)]
+        found = [self._pass(piece.begin, content, possible[0], wanted, allowed)]
         for each in possible[1:]:
             if found[-1].lost_bytes:
-                found.append(self._pass(piece.begin, content.data, each, wanted, allowed))
+                found.append(self._pass(piece.begin, content, each, wanted, allowed))
         self._add_work(_ROW_SIZE * sum(reading.counts.total() for reading in found))
         best = min(found, key=lambda reading: reading.lost_bytes)
         if best is not found[0] and 2 * found[0].counts.total() > best.counts.total():
@@ -423,18 +423,19 @@ class McapFile:
     def _pass(
         self,
         place: int,
-        data: bytes,
+        content: Content,
         possible: mcap.Possible,
         wanted: Collection[int],
         allowed: int,
     ) -> Reading:
-        found = Reading()
+        found, data = Reading(), content.data
         rows = found.rows
         counts: dict[int, int] = defaultdict(int)
         start, last = found.start, found.last
         time: int | None = None
         gap_after: tuple[int | None] | None = None
-        for item in mcap.records(data, 0, len(data), possible):
+        records = mcap.records(data, 0, len(data), possible)
+        for item in mcap.sound_records(data, possible) if content.sound else records:
             if isinstance(item, mcap.Gap):
                 found.lost_bytes += item.end - item.begin
                 self._add_work(_GAP_WORK)

@@ -150,6 +150,20 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
         yield before
 
 
+def sound_records(content: Buffer, possible: Possible) -> Iterator[Record | Gap]:
+    """Yield the records of a chunk whose checksum is right: each stands where the last one ends."""
+    at, end = 0, len(content)
+    unpack = _MESSAGE.unpack_from
+    while at + HEAD + MESSAGE_HEAD <= end and content[at] in (MESSAGE, SCHEMA, CHANNEL):
+        opcode, length, channel, _, log_time, _ = unpack(content, at)
+        after = at + HEAD + length
+        if after > end or (opcode == MESSAGE and length < MESSAGE_HEAD):
+            break  # not even so
+        yield Record(opcode, at + HEAD, after, channel, log_time)
+        at = after
+    yield from records(content, at, end, possible)
+
+
 def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | None:
     """Return the record at a place if one can be there."""
     if not _fits(content, at, end, possible):
