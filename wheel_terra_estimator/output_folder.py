@@ -239,8 +239,8 @@ def mark(
     _write_marker(folder, {*earlier, *entries}, facts or {})
 
 
-def facts_of(folder: Path, only_whole: bool = False) -> dict[str, Any]:
-    """Return what a command noted in the marker of a folder (where all listed files are there)."""
+def facts_of(folder: Path) -> dict[str, Any]:
+    """Return what a command noted in the marker of a folder, where all listed files are there."""
     if not is_ours(folder):
         return {}
     try:
@@ -248,7 +248,7 @@ def facts_of(folder: Path, only_whole: bool = False) -> dict[str, Any]:
     except UserError:
         return {}
     whole = all(name.endswith('/') or (folder / name).is_file() for name in listed)
-    return _noted(folder / MARKER) if whole or not only_whole else {}
+    return _noted(folder / MARKER) if whole else {}
 
 
 def remove_leftovers(folder: Path) -> None:

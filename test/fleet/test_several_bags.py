@@ -115,7 +115,7 @@ def test_bags_of_one_name_get_folders_of_their_own(bags, config, tmp_path, capsy
     ('more', 'words'),
     [
         ([], 'add -o DIR'),
-        (['-o', 'taken'], 'choose another path or give --overwrite'),
+        (['-o', 'taken'], 'is not overwritten; choose another path'),
         (['-o', 'o', '--report', 'there/r.html'], 'give a plain name such as r.html'),
         (['-o', 'o', '--jobs', '0'], 'give 1 or more'),
         (['-o', 'o', '--arrival', 'log'], 'belongs to one recording'),

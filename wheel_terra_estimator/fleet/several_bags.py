@@ -13,7 +13,7 @@ import hashlib
 import json
 import sys
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -26,7 +26,6 @@ from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.fleet.drive import replay_drive
 from wheel_terra_estimator.output_folder import (
     CannotWriteError,
-    cannot_write,
     facts_of,
     is_ours,
     mark,
@@ -44,8 +43,6 @@ from wheel_terra_estimator.terramechanics.effects import load_file
 
 SUMMARY_TABLE = 'summary.csv'
 SUMMARY_PAGE = 'summary.html'
-HOLDS = {'holds': 'replays of several recordings'}
-"""Note in the marker of the folder that holds the folders of the recordings."""
 
 DIGEST_SIZE = 20
 """Bytes of a digest: no two recordings have the same."""
@@ -92,7 +89,10 @@ def replay_bags(
     same call goes on from there. Returns them in the order of `bags`; one that failed has its
     error.
     """
-    with _folder(settings.output, bags, overwrite):
+    if is_ours(settings.output):
+        remove_leftovers(settings.output)
+    entries = SUMMARY_TABLE, SUMMARY_PAGE
+    with working_folder(settings.output, overwrite, not overwrite, entries, bags):
         settings = replace(settings, output=settings.output.absolute())
         return _replay_into(settings, bags, jobs, scheduler)
 
@@ -124,33 +124,13 @@ def _replay_into(
     return told
 
 
-@contextmanager
-def _folder(output: Path, bags: Sequence[Path], overwrite: bool) -> Iterator[None]:
-    """Make the folder, or go on with one that an earlier run of this kind has begun."""
-    ours = is_ours(output) and facts_of(output).items() >= HOLDS.items()
-    if output.exists() and not ours and not overwrite:
-        raise UserError(
-            f'{output}: exists and holds no replays of several recordings; choose another path '
-            'or give --overwrite'
-        )
-    if ours:
-        remove_leftovers(output)
-    entries = SUMMARY_TABLE, SUMMARY_PAGE
-    with working_folder(output, overwrite, ours and not overwrite, entries, bags):
-        try:
-            mark(output, [], HOLDS)
-        except OSError as error:
-            raise cannot_write(output, error) from None
-        yield
-
-
 def _tasks(
     settings: Settings, paths: Sequence[Path], rows: dict[int, DriveRow]
 ) -> dict[int, _Task]:
     """Return what is left to do, by number of the recording; what is not goes to `rows`."""
     output, done = settings.output, {}
     for folder in sorted(output.iterdir()):
-        facts = facts_of(folder, only_whole=True) if folder.is_dir() else {}
+        facts = facts_of(folder) if folder.is_dir() else {}
         if isinstance(facts.get('digest'), str) and isinstance(facts.get('row'), dict):
             done[facts['digest']] = replace(DriveRow.from_json(facts['row']), folder=folder.name)
     digests = {}
