@@ -6,7 +6,6 @@ import re
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, Border, known
@@ -82,36 +81,6 @@ def test_the_same_picture_is_the_same_text_and_no_setting_stays():
         made.append(picture(figure))
     assert made[0] == made[1]
     assert dict(mpl.rcParams) == before
-
-
-def test_a_picture_is_compact_and_every_point_stays_where_it_was():
-    import base64
-    import re
-    from io import StringIO
-
-    from matplotlib.figure import Figure
-
-    x = np.linspace(0.0, 1.0, 200)
-    with picture_style():
-        figure = Figure()
-        axes = figure.subplots()
-        axes.plot(x, np.sin(20.0 * x))
-        axes.scatter(x[::10], x[::10] ** 2)
-        plain = StringIO()
-        figure.savefig(plain, format='svg', metadata={'Date': None})
-    made = base64.b64decode(picture(figure).partition(',')[2]).decode()
-
-    def coordinates(svg: str) -> str:
-        return ' '.join(re.findall(r' (?:d|x|y)="([^"]*)"', svg))
-
-    def places(svg: str) -> list[float]:
-        return [float(number) for number in re.findall(r'-?\d+\.?\d*', coordinates(svg))]
-
-    assert len(made) < len(plain.getvalue())
-    assert not re.search(r'\.\d{3}', coordinates(made))  # hundredths of a point are enough
-    assert not re.search(r'\n +<', made)
-    assert places(made) == pytest.approx(places(plain.getvalue()), abs=0.011)
-    assert 'metadata' not in made
 
 
 def test_text_of_others_is_escaped(tmp_path):

@@ -63,6 +63,7 @@ _SETTINGS: dict[Any, Any] = {
     'svg.fonttype': 'none',
     'svg.hashsalt': 'wheel_terra_estimator',  # the same picture is the same file
     'font.family': 'sans-serif',
+    'font.sans-serif': ['DejaVu Sans', 'Verdana'],
     'font.size': 9.5,
     'axes.edgecolor': EDGE,
     'axes.labelcolor': INK,
