@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
@@ -124,23 +125,31 @@ def _on_cluster(
 def _client(address: str) -> Any:
     """Return a client of a scheduler that has answered and has a worker."""
     try:
-        from dask.distributed import Client
+        from dask.distributed import Client, Security
+        from distributed.comm import connect
     except ImportError as error:
         raise UserError(
             f"--scheduler: Dask is missing; pip install 'dask[distributed]' ({error})"
         ) from None
     for name in ('distributed', 'distributed.client'):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what is lost is told here
-    try:
+
+    async def greet() -> None:
+        keys = Security().get_connection_args('client')
+        (await connect(address, timeout=CONNECT_TIMEOUT, **keys)).abort()
+
+    try:  # a client waits for ever for what accepts and is silent
+        asyncio.run(asyncio.wait_for(greet(), CONNECT_TIMEOUT))
         client = Client(address, timeout=CONNECT_TIMEOUT)
     except Exception as error:
+        said = str(error) or f'it is silent for {CONNECT_TIMEOUT} s'
         raise UserError(
-            f'--scheduler {address}: no Dask scheduler answers there ({error}); '
+            f'--scheduler {address}: no Dask scheduler answers there ({said}); '
             'start one with: dask scheduler'
         ) from None
     try:
         client.wait_for_workers(1, timeout=WORKER_TIMEOUT)
-    except TimeoutError:
+    except (TimeoutError, asyncio.TimeoutError):
         client.close()
         raise UserError(
             f'--scheduler {address}: it has no workers; start one with: dask worker {address}'

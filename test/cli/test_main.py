@@ -100,7 +100,7 @@ def examples():
 
 @pytest.fixture(scope='module')
 def parser():
-    return main.build_parser()
+    return main._parsers(main.COMMANDS)[0]
 
 
 @pytest.mark.parametrize('line', list(examples()))

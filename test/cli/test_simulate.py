@@ -105,7 +105,6 @@ def test_log_times_are_arrivals(bag_path):
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        ([], '-o DIR is missing'),
         (['-o', 'x', '--scenario', 'clim_soft_patch'], 'climb_soft_patch'),
         (['-o', 'x', '--seed', '-1'], '--seed'),
         (['-o', 'x', '--duration', '0'], '--duration'),
@@ -126,8 +125,3 @@ def test_bad_arguments(
     assert words in error
     assert error.count('\n') == 1
     assert not list(tmp_path.iterdir())
-
-
-def test_list_names_the_shipped_scenarios(capsys):
-    assert main(['simulate', '--list']) == 0
-    assert 'climb_soft_patch' in capsys.readouterr().out

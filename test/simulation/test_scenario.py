@@ -9,7 +9,7 @@ from wheel_terra_estimator.configuration import shipped
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.simulation import scenario as scenarios
 
-NAMES = sorted(scenarios.shipped_scenarios())
+NAMES = [n.removeprefix('scenarios/') for n in shipped.files() if n.startswith('scenarios/')]
 
 
 @pytest.mark.parametrize(

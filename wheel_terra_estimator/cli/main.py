@@ -63,11 +63,6 @@ INTERRUPTED = 130
 DEBUG_HELP = 'show the traceback of an error'
 
 
-def build_parser() -> Parser:
-    """Return the parser of all sub-commands."""
-    return _parsers(_commands_here())[0]
-
-
 def sub_parsers() -> dict[str, Parser]:
     """Return sub-command -> its parser."""
     return _parsers(_commands_here())[1]

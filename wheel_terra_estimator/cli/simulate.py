@@ -31,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=shipped.FileName,
         default=DEFAULT,
         metavar='F',
-        help=f'scenario file, or the bare name of a shipped one (default: {DEFAULT})',
+        help='scenario file, or the bare name of a shipped one (wheel-terra config list scenarios; '
+        f'default: {DEFAULT})',
     )
     parser.add_argument(
         '--rover',
@@ -39,12 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='F',
         help="rover file, or the bare name of a shipped one, in place of the scenario's rover",
     )
-    parser.add_argument('--list', action='store_true', help='list the shipped scenarios and stop')
     parser.add_argument('--seed', type=int, default=0, help='decides all random quantities')
     parser.add_argument(
         '--duration', type=float, metavar='S', help="length of the drive in place of the scenario's"
     )
-    add_output(parser, 'rosbag2 folder (MCAP)')
+    add_output(parser, 'rosbag2 folder (MCAP)', required=True)
     configuration_reader.add_arguments(parser)
     parser.add_argument(
         '--overwrite', action='store_true', help='replace an earlier bag of the same name'
@@ -55,12 +55,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.simulation import scenario as scenarios
 
-    if arguments.list:
-        for name, description in scenarios.shipped_scenarios().items():
-            print(f'{name:24s} {description}')
-        return 0
-    if arguments.output is None:
-        raise UserError('-o DIR is missing: say where the bag goes')
     if arguments.seed < 0:
         raise UserError(f'--seed {arguments.seed}: must not be negative')
     scenario = scenarios.load(

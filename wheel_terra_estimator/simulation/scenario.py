@@ -149,15 +149,6 @@ def _on_rover(
     return {**checked, 'faults.wheel': moved}
 
 
-def shipped_scenarios() -> dict[str, str]:
-    """Return name -> description of the scenarios that come with the package."""
-    return {
-        key.removeprefix('scenarios/'): str(ros_yaml.read(path).get('description', ''))
-        for key, path in shipped.files().items()
-        if key.startswith('scenarios/')
-    }
-
-
 def _checked(name: str, values: Mapping[str, Any]) -> dict[str, Any]:
     for key in values:
         if key not in DECLARED:
