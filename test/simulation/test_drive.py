@@ -221,10 +221,11 @@ def test_entrapment_needs_a_second_and_clears_after_three():
 ENTRAPPING = {'climb_soft_patch', 'slow_entrapment', 'stalling_drives', 'turns'}
 NEAR_THE_LIMIT = {'steep_climb'}  # entrapped on few seeds
 SEEDS = range(2, 6)
+NAMES = [n.removeprefix('scenarios/') for n in shipped.files() if n.startswith('scenarios/')]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('name', [n for n in shipped.files() if n.startswith('scenarios/')])
+@pytest.mark.parametrize('name', NAMES)
 def test_scenarios_do_what_they_say(name):
     found = []
     for seed in SEEDS:
