@@ -38,7 +38,6 @@ _EXCESS_GAIN = 0.2  # smoothing of reading less model, per cycle
 _SHRINKAGE = 2.0
 """Noise variances taken off the square of an excess (James and Stein 1961): nothing below its
 noise is believed, all of what is far above it."""
-_TURNING_LOSS = 5.0  # trust in an excess lost per lateral motion
 _SCRUB_STD = 0.1  # of the load at full lateral motion: pushed sideways
 
 
@@ -125,7 +124,7 @@ class Pulls(Component[PullState]):
                 own[i] = std[i] ** 2
             else:
                 excess[i] = self._smoothed_excess(excess[i], readings[i], torques[i])
-                beyond = self._believed(excess[i], readings[i], lateral_motion)
+                beyond = self._believed(excess[i], readings[i])
                 if beyond and torque_by_strength[i]:
                     torques[i] += beyond
                     pulls[i] += beyond * pull_by_strength[i] / torque_by_strength[i]
@@ -189,12 +188,12 @@ class Pulls(Component[PullState]):
             return excess
         return excess + _EXCESS_GAIN * (reading - model - excess)
 
-    def _believed(self, excess: float, reading: float, lateral_motion: float) -> float:
+    def _believed(self, excess: float, reading: float) -> float:
         """Return what of the excess is beyond the sensor's errors [N m].
 
         The filter takes torque for one piece of information per ground, so that slip and soil are
         not torn along T(s) = const. The pull may follow at once: it hangs on the torque alone,
-        whatever the strength. Not in turns, which push the soil sideways, too.
+        whatever the strength.
         """
         if isnan(reading):
             return 0.0
@@ -206,4 +205,4 @@ class Pulls(Component[PullState]):
         )
         square = max(excess * excess, TINY)
         believed = max(1.0 - _SHRINKAGE * noise / square, 0.0)
-        return excess * believed * max(1.0 - _TURNING_LOSS * lateral_motion, 0.0)
+        return excess * believed
