@@ -270,23 +270,21 @@ def test_two_readings_of_the_sinkage_are_the_textbook_update(parts, ekf, sinkage
     assert float(ekf.covariance[zi, zi]) == pytest.approx(1.0 / information)
 
 
-def sinkage_predicted(
-    parts, x, loads=None, angle=NAN, angle_std=0.0, reference_known=True, rims=FORWARD
-):
+def sinkage_predicted(parts, x, loads=None, angle=NAN, angle_std=0.0, rims=FORWARD):
     """Return the prediction over a tenth of a second, and the travel."""
     prediction = Prediction.unchanged(x)
-    cycle = parts.cycle(rims, loads, leaving_angles=(angle,) * 6, reference_known=reference_known)
+    cycle = parts.cycle(rims, loads, leaving_angles=(angle,) * 6)
     process = SinkageProcess(parts.rover, parts.layout, parts.models, angle_std)
     return prediction, process.predict(prediction, x, cycle)
 
 
-def relaxed(parts, ekf, seconds, reference_known=True, speed=0.05, start=None):
+def relaxed(parts, ekf, seconds, speed=0.05, start=None):
     x, travel = ekf.mean.copy(), 0.0
     x[SPEED] = speed
     if start is not None:
         x[parts.layout.sinkage] = start
     for _ in range(round(10 * seconds)):
-        prediction, way = sinkage_predicted(parts, x, reference_known=reference_known)
+        prediction, way = sinkage_predicted(parts, x)
         x, travel = prediction.mean, travel + way
     return x[parts.layout.sinkage], travel, prediction
 
@@ -328,17 +326,6 @@ def test_the_error_of_a_measured_leaving_angle_loosens_the_sinkage(parts, ekf):
     assert (np.abs(there - here) > 1e-7).all()
     assert unsure - sure == pytest.approx((there - here) ** 2, rel=0.05)
     assert (predicted(NAN, std)[1] == predicted(NAN, 0.0)[1]).all()
-
-
-def test_sinkage_tells_half_as_much_of_the_slip_without_a_reference(parts, ekf):
-    columns = [
-        relaxed(parts, ekf, 0.1, reference_known=known, speed=0.035)[2].F[
-            parts.layout.sinkage, SPEED
-        ]
-        for known in (True, False)
-    ]
-    assert (columns[0] != 0.0).all()
-    assert columns[1] == pytest.approx(0.5 * columns[0])
 
 
 # -- Soil -------------------------------------------------------------------------------------

@@ -45,9 +45,6 @@ _PRESSURE_POWER = 0.5
 _LONGEST_STEP = 0.7  # ln of the sinkage in one cycle
 _RELAXATION_SLOPE = 0.9  # of the relaxation that acts on the covariance
 _LEAST_MEMORY = 0.05  # of the sinkage in the covariance
-_LAW_SHARE = 0.5
-"""Of the slip that the bearing law would see in the sinkage, without reference: its errors (n0,
-n1, the zero of the sensor) stay the same all the way, readings do not average them out."""
 _LAW_ERROR = 0.05  # of the sinkage per contact length
 _DIGGING = 0.05  # of the slip velocity times slip
 _SLOPE_KEEP = 0.9  # smoothing of the derivatives over about a second of cycles
@@ -70,7 +67,7 @@ class _Motion(NamedTuple):
     speed: FloatArray  # [m/s]
     rim: FloatArray  # [m/s]
     by_speed: FloatArray
-    """Speed of each wheel by that of the body, as far as it counts as a sensor of slip [-]."""
+    """Speed of each wheel by that of the body [-]."""
     dt: float  # [s]
 
 
@@ -124,8 +121,7 @@ class SinkageProcess(Component[SinkageState]):
                 stiffness=x[layout.stiffness],
                 slip_sinkage=float(x[SLIP_SINKAGE]),
             )
-            share = 1.0 if cycle.reference_known else _LAW_SHARE
-            by_speed = share * direction * np.array(cycle.headings.by_speed)
+            by_speed = direction * np.array(cycle.headings.by_speed)
             self._relax(prediction, states, _Motion(speed, rim, by_speed, dt), relaxes)
         return dt * float(travel[turning].sum()) / len(rims)
 
