@@ -10,6 +10,7 @@ import pytest
 
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.salvage import limits
+from wheel_terra_estimator.bags.salvage import mcap_records as mcap
 from wheel_terra_estimator.bags.storage import open_bag
 
 
@@ -27,3 +28,9 @@ def test_a_message_that_is_heard_has_a_limit_of_its_own(
         heard = list(reader.measurements())
     assert heard
     assert reader.rejected['imu/data', 'above 200 B']
+
+
+def test_empty_records_in_a_chunk_with_a_right_checksum_are_not_held() -> None:
+    schemas = (bytes([mcap.SCHEMA]) + bytes(8)) * 1000
+    possible = mcap.Possible((mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE))
+    assert list(mcap.sound_records(schemas, possible)) == [mcap.Gap(0, len(schemas))]

@@ -157,7 +157,11 @@ def sound_records(content: Buffer, possible: Possible) -> Iterator[Record | Gap]
     while at + HEAD + MESSAGE_HEAD <= end and content[at] in (MESSAGE, SCHEMA, CHANNEL):
         opcode, length, channel, _, log_time, _ = unpack(content, at)
         after = at + HEAD + length
-        if after > end or (opcode == MESSAGE and length < MESSAGE_HEAD):
+        if opcode == MESSAGE:
+            fits = after <= end and length >= MESSAGE_HEAD
+        else:  # nothing that defines no topic is held: there may be millions of them
+            fits = _fits(content, at, end, possible)
+        if not fits:
             break  # not even so
         yield Record(opcode, at + HEAD, after, channel, log_time)
         at = after
