@@ -262,6 +262,11 @@ def is_ours(folder: Path) -> bool:
     return (folder / MARKER).is_file()
 
 
+def lists(folder: Path, names: Iterable[str]) -> bool:
+    """Whether the marker of a folder lists all of these names."""
+    return is_ours(folder) and {*names} <= {*_listed(folder)}
+
+
 class CannotWriteError(UserError):
     """The disk takes no more, or takes nothing here."""
 

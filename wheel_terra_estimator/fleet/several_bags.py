@@ -27,7 +27,7 @@ from wheel_terra_estimator.fleet.drive import replay_drive
 from wheel_terra_estimator.output_folder import (
     CannotWriteError,
     facts_of,
-    is_ours,
+    lists,
     mark,
     new_file,
     remove_leftovers,
@@ -89,12 +89,22 @@ def replay_bags(
     same call goes on from there. Returns them in the order of `bags`; one that failed has its
     error.
     """
-    if is_ours(settings.output):
-        remove_leftovers(settings.output)
     entries = SUMMARY_TABLE, SUMMARY_PAGE
+    if lists(settings.output, entries):
+        remove_leftovers(settings.output)
+    elif not overwrite and _is_taken(settings.output):
+        raise UserError(
+            f'{settings.output}: exists and holds no replays of several recordings; choose '
+            'another path or give --overwrite'
+        )
     with working_folder(settings.output, overwrite, not overwrite, entries, bags):
         settings = replace(settings, output=settings.output.absolute())
         return _replay_into(settings, bags, jobs, scheduler)
+
+
+def _is_taken(path: Path) -> bool:
+    """Whether something other than an empty folder stands here."""
+    return any(path.iterdir()) if path.is_dir() else path.exists()
 
 
 def _replay_into(
