@@ -255,3 +255,10 @@ def test_shared_memory_that_is_full_is_said(monkeypatch):
     monkeypatch.setattr('wheel_terra_estimator.worker_pool.ProcessPoolExecutor', full)
     with pytest.raises(UserError, match='/dev/shm'), worker_pool(2):
         pass
+
+
+@pytest.mark.parametrize(('words', 'status'), [('effects', 0), ('check nowhere', 2)])
+def test_exit_status_with_closed_streams(words, status):
+    code = 'import sys; from wheel_terra_estimator.cli.main import main; sys.exit(main())'
+    script = f'"{sys.executable}" -c "{code}" {words} >&- 2>&-'
+    assert subprocess.run(['bash', '-c', script], check=False).returncode == status

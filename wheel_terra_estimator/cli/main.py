@@ -24,6 +24,7 @@ from wheel_terra_estimator.cli.parser import UNUSABLE_INPUT, Parser, Printing, c
 from wheel_terra_estimator.cli.terminal import (
     discard_output,
     harmless_output,
+    open_closed_streams,
     termination_as_interrupt,
 )
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError, outside_cause
@@ -181,6 +182,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     # to be said before numpy is imported; what the user has set stays.
     for library in ('OMP', 'OPENBLAS'):
         os.environ.setdefault(f'{library}_NUM_THREADS', '1')
+    open_closed_streams()
     words = sys.argv[1:] if argv is None else argv
     try:
         parser, subs = _parsers([word for word in words if word in COMMANDS][:1])

@@ -38,6 +38,13 @@ def one_line(text: str) -> str:
     return line
 
 
+def open_closed_streams() -> None:
+    """Put what drops everything in the place of output streams that the caller has closed."""
+    for name in ('stdout', 'stderr'):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, 'w', encoding='utf-8'))  # noqa: SIM115, PTH123
+
+
 def discard_output() -> None:
     """Drop what is still to be written to standard output where it can no longer be."""
     try:
