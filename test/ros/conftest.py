@@ -3,6 +3,7 @@
 """The real rclpy over loopback, in a domain of its own; skipped visibly where there is none."""
 
 import fcntl
+import gc
 import importlib.util
 import os
 import random
@@ -49,6 +50,13 @@ def own_domain():
             yield
             return
     pytest.fail('all 100 ROS domains are taken by other test runs')
+
+
+@pytest.fixture(scope='module', autouse=True)
+def no_node_stays():
+    """Managed nodes of this process lie in cycles: the next test would hear of another node."""
+    yield
+    gc.collect()
 
 
 class NodeProcess:
