@@ -190,7 +190,7 @@ class Outputs:
         if sum(load) < _BELIEVED_LOAD * rover.mass * rover.gravity:
             # Upside down, in free fall or wrongly mounted: nothing is known.
             return [share] * len(load), [share] * len(load)
-        mean_load_std = rover.load_std * sum(load) / len(load)
+        mean_load_std = math.hypot(rover.load_std, rover.open_load_std) * sum(load) / len(load)
         loads = [mean_load_std if given.loads.force_known else w for w in load]
         pulls = [
             min(std, w if w > 0.0 else _UNLOADED_STD)
