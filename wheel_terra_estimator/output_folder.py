@@ -32,6 +32,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 from typing import Any
@@ -190,13 +191,21 @@ def working_folder(
 
     Where the block ends with no result the folder goes, and the place is free for the next try.
 
-    ``resume``: whether to go on with a folder as it is, where it is one of ours. ``entries``: all
-    names that the command may write there, as in `mark`. Raises UserError as `check_folder`.
+    ``resume``: whether to go on with a folder as it is, where an earlier run of the command made
+    it. ``entries``: all names that the command may write there, as in `mark`. Raises UserError as
+    `check_folder`.
     """
-    if resume and path.is_dir():
+    entries = [*entries]
+    earlier = is_ours(path) and {*entries} <= _listed(path)
+    if earlier:
+        _remove_leftovers(path)
+    if resume and path.exists():
         _refuse_place(path, inputs)
-        if not is_ours(path):
-            _own_files(path)  # refuses all but an empty folder
+        if not earlier and not (path.is_dir() and not any(path.iterdir())):
+            raise UserError(
+                f'{path}: exists and holds nothing that this command can go on with; choose '
+                'another path or give --overwrite'
+            )
     elif path.exists() and not overwrite:
         raise UserError(
             f'{path}: exists already; --resume goes on with it, --overwrite replaces it'
@@ -215,6 +224,7 @@ def working_folder(
         yield
     finally:
         with suppress(OSError, UserError):
+            _remove_leftovers(path)
             if path.is_dir() and not any(_holds(path / name) for name in _own_files(path)):
                 _remove_own_files(path)
 
@@ -251,20 +261,16 @@ def facts_of(folder: Path) -> dict[str, Any]:
     return _noted(folder / MARKER) if whole else {}
 
 
-def remove_leftovers(folder: Path) -> None:
-    """Remove what killed runs left of outputs in a folder."""
-    for left in folder.glob(f'.*{BESIDE}*'):
-        shutil.rmtree(left, ignore_errors=True)
+def _remove_leftovers(folder: Path) -> None:
+    """Remove what killed runs left, beside its place, of outputs that a folder lists."""
+    for name in _listed(folder):
+        for left in folder.glob(f'.{escape(name.rstrip("/"))}{BESIDE}*'):
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def is_ours(folder: Path) -> bool:
     """Whether a folder bears the marker of this program."""
     return (folder / MARKER).is_file()
-
-
-def lists(folder: Path, names: Iterable[str]) -> bool:
-    """Whether the marker of a folder lists all of these names."""
-    return is_ours(folder) and {*names} <= {*_listed(folder)}
 
 
 class CannotWriteError(UserError):

@@ -110,7 +110,7 @@ def test_only_a_folder_of_several_replays_is_continued(bags, config, tmp_path, c
     before = sorted(tmp_path.rglob('*'))
     capsys.readouterr()
     assert main(['replay', bags[0], bags[2], *config, '-o', str(out)]) == 2
-    assert 'holds no replays of several recordings' in capsys.readouterr().err
+    assert 'holds nothing that this command can go on with' in capsys.readouterr().err
     assert sorted(tmp_path.rglob('*')) == before
 
 
@@ -129,7 +129,7 @@ def test_bags_of_one_name_get_folders_of_their_own(bags, config, tmp_path, capsy
     ('more', 'words'),
     [
         ([], 'add -o DIR'),
-        (['-o', 'taken'], 'holds no replays of several recordings; choose another path'),
+        (['-o', 'taken'], 'holds nothing that this command can go on with; choose another path'),
         (['-o', 'o', '--report', 'there/r.html'], 'give a plain name such as r.html'),
         (['-o', 'o', '--jobs', '0'], 'give 1 or more'),
         (['-o', 'o', '--arrival', 'log'], 'belongs to one recording'),

@@ -27,10 +27,8 @@ from wheel_terra_estimator.fleet.drive import replay_drive
 from wheel_terra_estimator.output_folder import (
     CannotWriteError,
     facts_of,
-    lists,
     mark,
     new_file,
-    remove_leftovers,
     working_folder,
 )
 from wheel_terra_estimator.reporting.fleet_summary import (
@@ -90,21 +88,9 @@ def replay_bags(
     error.
     """
     entries = SUMMARY_TABLE, SUMMARY_PAGE
-    if lists(settings.output, entries):
-        remove_leftovers(settings.output)
-    elif not overwrite and _is_taken(settings.output):
-        raise UserError(
-            f'{settings.output}: exists and holds no replays of several recordings; choose '
-            'another path or give --overwrite'
-        )
     with working_folder(settings.output, overwrite, not overwrite, entries, bags):
         settings = replace(settings, output=settings.output.absolute())
         return _replay_into(settings, bags, jobs, scheduler)
-
-
-def _is_taken(path: Path) -> bool:
-    """Whether something other than an empty folder stands here."""
-    return any(path.iterdir()) if path.is_dir() else path.exists()
 
 
 def _replay_into(
@@ -117,16 +103,13 @@ def _replay_into(
     tasks = _tasks(settings, paths, rows)
     numbers = list(tasks)
     replayed = finished(partial(_replay, settings), list(tasks.values()), jobs, scheduler)
-    try:
-        for k, row in _shown(replayed, len(tasks)):
-            i = numbers[k]
-            if isinstance(row, CannotWriteError):
-                raise row  # no fault of the recording: the next would fare no better
-            if isinstance(row, Exception):
-                row = DriveRow(str(bags[i]), error=_words(row, paths[i]))
-            rows[i] = row
-    finally:
-        remove_leftovers(output)
+    for k, row in _shown(replayed, len(tasks)):
+        i = numbers[k]
+        if isinstance(row, CannotWriteError):
+            raise row  # no fault of the recording: the next would fare no better
+        if isinstance(row, Exception):
+            row = DriveRow(str(bags[i]), error=_words(row, paths[i]))
+        rows[i] = row
     told = [replace(rows[i], bag=str(bag)) for i, bag in enumerate(bags)]
     with new_file(output / SUMMARY_TABLE, overwrite=True) as path:
         write_table(told, path)
