@@ -137,7 +137,7 @@ reporting: configuration terramechanics estimation bags checks | numpy matplotli
 fleet: configuration terramechanics bags checks reporting | tqdm
 # It has a report of its own, and the wheel loads of its drives are those of the estimator.
 discrepancy: configuration terramechanics estimation reporting bags | numpy scipy matplotlib jinja2
-ros: configuration estimation messages bags fleet \
+ros: configuration estimation messages \
     | numpy rclpy rcl_interfaces builtin_interfaces diagnostic_msgs geometry_msgs nav_msgs \
     sensor_msgs std_msgs std_srvs visualization_msgs
 api: * | numpy pandas matplotlib  # the public Python interface

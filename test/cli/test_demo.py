@@ -36,7 +36,7 @@ def test_a_node_that_is_not_found_does_not_end_the_demo(monkeypatch, tmp_path, c
 
 
 def test_the_exit_status_is_that_of_the_live_drive():
-    live_drive = pytest.importorskip('wheel_terra_estimator.ros.live_drive')
+    live_drive = pytest.importorskip('wheel_terra_lab.live_drive')
     assert demo.NODE_NOT_FOUND == live_drive.NOT_FOUND
 
 

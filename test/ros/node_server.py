@@ -98,12 +98,14 @@ class NodeServer:
         )
         theirs.close()
 
-    def start(self, module: str, arguments: Sequence[str]) -> ForkedProcess:
-        """Start a node as ``python -m wheel_terra_estimator.ros.MODULE ARGUMENTS`` would."""
+    def start(
+        self, module: str, arguments: Sequence[str], package: str = PACKAGE
+    ) -> ForkedProcess:
+        """Start a node as ``python -m PACKAGE.MODULE ARGUMENTS`` would."""
         # A file, not a pipe: nobody has to read it while the node runs.
         output = tempfile.TemporaryFile('w+')  # noqa: SIM115 - closed when it was read
         request = {
-            'start': f'{PACKAGE}.{module}',
+            'start': f'{package}.{module}',
             'arguments': list(arguments),
             'environment': dict(os.environ),
             'folder': str(Path.cwd()),

@@ -54,7 +54,7 @@ REPLAY = {
 
 
 def run_live(source, live, *options):
-    from wheel_terra_estimator.ros import live_drive
+    from wheel_terra_lab import live_drive
 
     assert live_drive.main([str(source), '-o', str(live), *options]) == 0
 
@@ -72,7 +72,7 @@ def assert_same_bits(live, again, least):
 @pytest.fixture
 def forked_node(node_server, monkeypatch):
     """The player of a recording gets its node from the server."""
-    from wheel_terra_estimator.ros import live_drive
+    from wheel_terra_lab import live_drive
 
     def start_node(arguments):
         return node_server.start('estimator_node', arguments)
@@ -108,7 +108,7 @@ def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
 def test_ctrl_c_ends_a_live_drive_without_a_traceback(node_server, tmp_path):
     arguments = [str(DEMO / 'pathfinder'), '--config', 'pathfinder', '--rate', '0.1']
     arguments += ['-o', str(tmp_path / 'out'), '--arrival', str(tmp_path / 'arrival.txt')]
-    process = node_server.start('live_drive', arguments)
+    process = node_server.start('live_drive', arguments, 'wheel_terra_lab')
     until = time.monotonic() + 60.0
     while not (tmp_path / 'arrival.txt').is_file() and time.monotonic() < until:
         time.sleep(0.1)

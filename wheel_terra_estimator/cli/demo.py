@@ -3,8 +3,8 @@
 """``wheel-terra demo``: two shipped drives through the real node, and a blind trial.
 
 The entrapment of a simulated six-wheel rover, whose ground truth is known, and a piece of a real
-drive of the Pathfinder rover. The node hears them over DDS; where there is no rclpy the same drives
-go through ``wheel-terra replay``, which gives the same numbers. The trial is a table made
+drive of the Pathfinder rover. The node hears them over DDS; where rclpy or the laboratory is missing the
+same drives go through ``wheel-terra replay``, which gives the same numbers. The trial is a table made
 by ``wheel-terra trial``, in which an effect is hidden: it is diagnosed blind, then compared with
 the withheld truth.
 """
@@ -30,7 +30,7 @@ from wheel_terra_estimator.output_folder import check_folder, working_folder
 SEAL_SHA256 = '78c7f9baa4662e0969d5b5dff2c94fbd5cbd89ae14923cf0fcc754b1af82c5c7'
 """Of the shipped ``sealed.json``, which says what was hidden in the table beside it."""
 NODE_NOT_FOUND = 4
-"""Exit status of ``ros.live_drive`` where DDS does not connect it with the node."""
+"""Exit status of the laboratory's ``live_drive`` where DDS does not connect it with the node."""
 AT_ONCE = 2
 """Parts that run side by side: most of a drive is work of one core."""
 DOMAINS = 101
@@ -101,11 +101,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _show(arguments: argparse.Namespace, output: Path) -> int:
     """Run drives and trial into the folder; return the first status that is not 0."""
-    live = not arguments.no_node and importlib.util.find_spec('rclpy') is not None
+    there = all(importlib.util.find_spec(name) for name in ('rclpy', 'wheel_terra_lab'))
+    live = not arguments.no_node and there
     if live:
         print('The drives go over DDS to estimator_node, as fast as it takes them.')
     else:
-        why = '' if arguments.no_node else 'There is no rclpy here (no sourced Jazzy): '
+        why = '' if arguments.no_node else 'There is no rclpy here (no sourced Jazzy), or no laboratory: '
         print(f'{why}the drives go through `wheel-terra replay`; the numbers are the same.')
     with ThreadPoolExecutor(AT_ONCE) as pool:
         drives = [pool.submit(_drive, i, output, live) for i in range(len(DRIVES))]
@@ -189,7 +190,7 @@ def _drive(number: int, output: Path, live: bool) -> Part:
 def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:
     from wheel_terra_estimator.configuration.shipped import demo_recording
 
-    command = ['wheel_terra_estimator.ros.live_drive']
+    command = ['wheel_terra_lab.live_drive']
     if not live:
         command = ['wheel_terra_estimator.cli.main', 'replay']
     command += [str(demo_recording(drive.name))]

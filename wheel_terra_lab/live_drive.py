@@ -5,7 +5,7 @@
 The live counterpart of ``wheel-terra replay``, for demonstrations and for the test that both give
 the same numbers::
 
-    python -m wheel_terra_estimator.ros.live_drive BAG -o OUT --report report.html --config ROVER
+    python -m wheel_terra_lab.live_drive BAG -o OUT --report report.html --config ROVER
 
 The node runs in a process of its own, with reliable inputs and deep queues, so that the recording
 is heard in full however loaded the machine is.
