@@ -14,7 +14,7 @@ import numpy as np
 from wheel_terra_estimator.checks import geometry, imu, torque, turning
 from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, Evidence
 from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
-from wheel_terra_estimator.checks.run import configured_mounting, examine
+from wheel_terra_estimator.checks.run import examine
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.ros_yaml import Value, format_value
@@ -118,7 +118,7 @@ def _directions(changes: _Changes, report: CheckReport, configuration: Configura
 def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
     all_told = [f for f in report.findings if f.parameter in imu.MOUNTING]
     if any(f.confidence <= LEAST_SURE for f in all_told):  # a rival may be it
-        evidence, all_told = evidence.turned(configured_mounting(evidence.facts.configuration)), []
+        evidence, all_told = evidence.turned(evidence.facts.mounting), []
     told = all_told[0] if all_told else None
     rotation, std = evidence.rotation, told.std if told is not None else None
     source = told.words if told is not None else 'mean specific force'
@@ -134,10 +134,9 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
 
 
 def _biases(changes: _Changes, evidence: Evidence) -> None:
-    configuration = evidence.facts.configuration
     seen = imu.gyro_bias(evidence)
-    if seen is not None and configuration is not None:
-        whole = (seen[0] + configuration.sensors.angular_rate_bias).round(6).tolist()
+    if seen is not None:
+        whole = (seen[0] + evidence.facts.sensors.angular_rate_bias).round(6).tolist()
         source = 'mean of the gyro at rest'
         changes.add('sensors.angular_rate_bias', whole, float(np.max(seen[1])), source)
 
@@ -175,7 +174,6 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
 
 def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
     configuration, figures = evidence.facts.configuration, report.figures
-    assert configuration is not None
     told = next((finding for finding in _sure(report) if finding.fault == 'radius'), None)
     open_yet = any(finding.fault == 'reference_scale' for finding in report.findings)
     rolling, source = evidence.facts.radius, 'straight stretches against the other wheels'

@@ -19,6 +19,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import of_offset
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
+from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Channel, Recording
 from wheel_terra_estimator.checks.statistics import (
     averaged,
@@ -29,7 +30,6 @@ from wheel_terra_estimator.checks.statistics import (
 )
 from wheel_terra_estimator.checks.transport import FUTURE
 from wheel_terra_estimator.checks.trial import Trial, halves, worst
-from wheel_terra_estimator.configuration.configuration import Configuration
 
 STEP = 0.05  # time between the values that are compared [s]
 LONGEST = {'imu': 2.0, 'reference': 3.0}  # greatest lag that is looked for [s]
@@ -86,14 +86,12 @@ CHANNELS = {
 """Channel of a recording -> its name in ``sensors.*_stamp_offset``."""
 
 
-def corrected(recording: Recording, configuration: Configuration | None) -> Recording:
+def corrected(recording: Recording, facts: RoverFacts) -> Recording:
     """Return the recording with the stamp offsets of the rover file taken off."""
-    if configuration is None:
-        return recording
     changes: dict[str, Any] = {}
     for name, key in CHANNELS.items():
         channel = getattr(recording, name)
-        offset = round(float(getattr(configuration.sensors, f'{key}_stamp_offset')) * 1e9)
+        offset = round(float(getattr(facts.sensors, f'{key}_stamp_offset')) * 1e9)
         if channel is not None and offset:
             changes[name] = shifted(channel, offset)
     return replace(recording, **changes) if changes else recording
@@ -166,7 +164,7 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
         return NotChecked('delay', reason)
     std = _whole_std(evidence, name, told)
     against = told.by + told.trial.words('unlike part', '')
-    told_of = of_offset(name, told.value, std, against, evidence.facts.configuration)
+    told_of = of_offset(name, told.value, std, against, evidence.facts)
     return evidence.found(f'{name}_offset', 0.97, **told_of)
 
 

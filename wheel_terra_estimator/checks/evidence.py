@@ -18,7 +18,6 @@ from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Channel, JointSeries, Recording
 from wheel_terra_estimator.checks.statistics import averaged, bend_noise, moving_mean, robust_std
-from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 Mask = BoolArray
 
@@ -309,16 +308,14 @@ def gather(
             column = joints.names.index(name)
             rate[:, index] = facts.direction[index] * joints.rate[rows, column]
             torque[:, index] = facts.direction[index] * joints.torque[rows, column]
-    if facts.configuration is not None and joints.position is not None:
+    if joints.position is not None:
         for index, name in enumerate(facts.configuration.wheels.steering_joints):
             if name in joints.names:
                 angle = joints.position[rows, joints.names.index(name)]
                 known = np.isfinite(angle)
                 if known.any():
                     steering[:, index] = np.interp(time, time[known], angle[known])
-    errors = SensorErrors(facts.configuration) if facts.configuration is not None else None
-    if errors is not None:
-        torque = errors.torque.true(torque)
+    torque = facts.errors.torque.true(torque)
     force = gyro = None
     imu = recording.imu
     if imu is not None and imu.stamp.size > 1 and time.size > 1:
@@ -326,9 +323,8 @@ def gather(
         width = float(np.median(np.diff(time)))
         force = averaged(at, np.nan_to_num(imu.force) @ rotation.T, time, width)
         gyro = averaged(at, np.nan_to_num(imu.rate) @ rotation.T, time, width)
-        if errors is not None:
-            force = force - errors.specific_force_bias
-            gyro = gyro - errors.angular_rate_bias
+        force = force - facts.errors.specific_force_bias
+        gyro = gyro - facts.errors.angular_rate_bias
     return Evidence(recording, facts, time, rate, torque, force, gyro, rotation, figures, steering)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.checks.finding import Finding
-from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.configuration.parameters import plain_table
 
 RATE_UNITS = {
@@ -76,13 +76,11 @@ def found(
 
 
 def of_offset(
-    name: str, left: float, std: float, against: str, configuration: Configuration | None
+    name: str, left: float, std: float, against: str, facts: RoverFacts
 ) -> dict[str, Any]:
     """Return what a finding says of stamps that are ``left`` [s] off beyond what is stated."""
-    key = f'{name}_stamp_offset'
-    stated = 0.0 if configuration is None else float(getattr(configuration.sensors, key))
     return {
-        'value': round(left + stated, 3),
+        'value': round(left + float(getattr(facts.sensors, f'{name}_stamp_offset')), 3),
         'std': round(std, 3),
         'name': name,
         'size': abs(left),

@@ -195,9 +195,7 @@ def _resistance(evidence: Evidence, seen: float) -> Estimate | NotChecked:
 
     Zeros of the torques look like it; what no firm ground costs is not taken off as slip.
     """
-    facts = evidence.facts
-    assert facts.configuration is not None
-    sensors = facts.configuration.sensors
+    facts, sensors = evidence.facts, evidence.facts.sensors
     arm = len(facts.names) / float(np.mean(facts.radius)) / (facts.mass * facts.gravity)
     std = math.hypot(float(sensors.torque_zero_std) * arm, float(sensors.torque_gain_std) * seen)
     unlike = abs(seen - RESISTANCE.value) > 3.0 * math.hypot(std, RESISTANCE.std)
@@ -222,7 +220,6 @@ def _referred_to_slip_radius(evidence: Evidence, ratio: Estimate) -> Estimate:
     soil gives way along the contact as well.
     """
     configuration = evidence.facts.configuration
-    assert configuration is not None
     lugs = float(np.mean(configuration.wheels.lug_height / evidence.facts.radius))
     stated = configuration.effects.get('lug_shear_radius', {}).get('lam')
     shear = Estimate(0.5, UNIFORM_STD) if stated is None else Estimate(float(stated), 0.0)
@@ -235,17 +232,16 @@ def _referred_to_slip_radius(evidence: Evidence, ratio: Estimate) -> Estimate:
 
 def _depth(evidence: Evidence) -> Estimate:
     """Return sinkage over radius on the straight."""
-    series, configuration = evidence.recording.sinkage, evidence.facts.configuration
-    assert configuration is not None
+    series, facts = evidence.recording.sinkage, evidence.facts
     if series is None or not series.stamp.size:
         return FIRM_DEPTH
     straight = evidence.rim_at(series.stamp, evidence.straight.astype(float)) > 0.99
-    _, rows = without_stated_errors(evidence.facts, series)
+    _, rows = without_stated_errors(facts, series)
     if np.isfinite(rows[straight]).sum() < LEAST_DEPTHS:
         return FIRM_DEPTH
-    sensors, radius = configuration.sensors, float(np.mean(configuration.wheels.radius))
+    radius = float(np.mean(facts.configuration.wheels.radius))
     depth = float(np.nanmedian(rows[straight])) / radius
-    std = max(float(sensors.sinkage_zero_std), float(sensors.sinkage_std) / 2.0) / radius
+    std = max(float(facts.sensors.sinkage_zero_std), facts.sensors.sinkage_std / 2.0) / radius
     return Estimate(max(depth, 0.0), std) if depth < DEEPEST else FIRM_DEPTH
 
 
@@ -255,7 +251,6 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if isinstance(told, NotChecked):
         return [told], evidence
     (ratio, trial, _), facts = told, evidence.facts
-    assert facts.configuration is not None
     radius = float(np.mean(facts.radius))
     evidence.figures['rover.rolling_radius_m'] = round(radius * ratio.value, 5)
     evidence.figures['rover.rolling_radius_std_m'] = round(radius * ratio.std, 5)

@@ -371,10 +371,8 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     design = np.stack([[one, zero, cos, sin], [zero, one, -sin, cos]]).transpose(2, 0, 1)
     target = force[:, :2] / float(np.median(force[:, 2]))
     along, across = block_fit(design.reshape(-1, 4), target.ravel())[:2]
-    floor = FLAT_TURN_STD
-    if evidence.facts.configuration is not None:
-        sensors = evidence.facts.configuration.sensors
-        floor = math.hypot(floor, sensors.specific_force_bias_std / evidence.facts.gravity)
+    facts = evidence.facts
+    floor = math.hypot(FLAT_TURN_STD, facts.sensors.specific_force_bias_std / facts.gravity)
     turns = np.column_stack([yaw, np.ones(yaw.size)])[turning, : 2 if seen is None else 1]
     tilt = np.array([along.value, across.value])
     # A sensor whose x axis points up by p reads +g sin p on x; one rolled by q reads -g sin q on y.
@@ -499,10 +497,8 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     size = math.hypot(tilt.roll.value, tilt.pitch.value)
     if size < LEAST_MOUNTING or tilt.sigmas < 4.0:
         return [], evidence
-    gravity, biases = evidence.facts.gravity, np.zeros(3)
+    gravity, biases = evidence.facts.gravity, evidence.facts.sensors.specific_force_bias
     off = gravity * np.array([-tilt.pitch.value, tilt.roll.value, 0.0])
-    if evidence.facts.configuration is not None:
-        biases += evidence.facts.configuration.sensors.specific_force_bias
     zero = f'sensors.specific_force_bias: [{listed(biases + off, ".2f")}]'
     words = {'size': math.degrees(size), 'zero': math.sin(size) * gravity, 'biases': zero}
     sure = confidence(tilt.sigmas) * max(tilt.sure, 1.0 - tilt.sure)
@@ -545,11 +541,10 @@ def mounting_finding(
 
 def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
     """Compare noise and bias with what the rover file states."""
-    imu, configuration = evidence.recording.imu, evidence.facts.configuration
-    if imu is None or configuration is None or evidence.gyro is None or evidence.force is None:
+    imu, facts = evidence.recording.imu, evidence.facts
+    if imu is None or not facts.known or evidence.gyro is None or evidence.force is None:
         return []
-    outcomes: list[Outcome] = []
-    sensors = configuration.sensors
+    outcomes, sensors = list[Outcome](), facts.sensors
     for values, key, unit in (
         (imu.force, 'specific_force_std', 'm/s^2'),
         (imu.rate, 'angular_rate_std', 'rad/s'),

@@ -16,7 +16,6 @@ from wheel_terra_estimator.checks.faults import found
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import JointSeries, Recording
-from wheel_terra_estimator.configuration.configuration import Configuration
 
 DEFAULT_TOPICS = {
     'joint_states': '/joint_states',
@@ -26,10 +25,12 @@ DEFAULT_TOPICS = {
 }
 
 
-def check_required(recording: Recording, configuration: Configuration | None) -> list[Outcome]:
-    """Return the inputs that the estimator cannot do without and the recording does not have."""
+def check_required(recording: Recording, own: str) -> list[Outcome]:
+    """Return the inputs that the estimator cannot do without and the recording does not have.
+
+    ``own``: topic of the wheel odometry.
+    """
     outcomes: list[Outcome] = []
-    own = configuration.wheel_odometry if configuration is not None else 'joint_states'
     if (recording.joints if own == 'joint_states' else recording.wheel_odometry) is None:
         other = recording.wheel_odometry
         cure = f'record the wheel rates, or name their topic: --remap {own}:=/TOPIC'
@@ -99,7 +100,6 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
 
 def _steering(joints: JointSeries, facts: RoverFacts) -> list[Outcome]:
     """Return joints that steer, where the rover file has none."""
-    assert facts.configuration is not None
     steering = [name for name in joints.names if 'steer' in name.lower()]
     if not steering or any(facts.configuration.wheels.steering_joints):
         return []

@@ -24,7 +24,6 @@ from wheel_terra_estimator.checks.run import (
     WHILE_DRIVING,
     Mended,
     against_each_other,
-    configured_mounting,
 )
 from wheel_terra_estimator.checks.series import (
     ImuSeries,
@@ -35,7 +34,6 @@ from wheel_terra_estimator.checks.series import (
 )
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import StepInputs
-from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 Floats = tuple[float, ...]
 
@@ -114,8 +112,6 @@ class OnlineChecks:
     def __init__(self, configuration: Configuration) -> None:
         self._configuration = configuration
         self._facts = rover_facts.from_configuration(configuration)
-        self._errors = SensorErrors(configuration)
-        self._mounting = configured_mounting(configuration)
         self._radius: list[float] = self._facts.radius.tolist()
         self.reset()
 
@@ -237,7 +233,7 @@ class OnlineChecks:
 
     def window(self) -> Recording:
         """Return what is kept as a recording: as the sensors read, on the right stamps."""
-        facts, errors = self._facts, self._errors
+        facts, errors = self._facts, self._facts.errors
         stamp = np.array([row.stamp for row in self._rows], dtype=np.int64)
         rate, torques, depth, inertial, velocity = (
             np.array([row[i] for row in self._rows]) for i in range(1, 6)
@@ -258,7 +254,7 @@ class OnlineChecks:
         # A reading with a part that is no number says nothing of the sensor.
         k, base = np.isfinite(inertial).all(axis=1), inertial.reshape(-1, 2, 3)
         read = base + np.stack([errors.specific_force_bias, errors.angular_rate_bias])
-        force, turning = ((read[k, i] @ self._mounting) for i in (0, 1))
+        force, turning = ((read[k, i] @ facts.mounting) for i in (0, 1))
         none = np.full((force.shape[0], 4), np.nan)
         felt = ImuSeries('imu/data', stamp[k], stamp[k], force, turning, none)
         k = there(depth)

@@ -219,9 +219,8 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     evidence.figures['reference.stated_std_m_s'] = float(f'{usual:.3g}')
     if stated.size and np.ptp(stated):
         return []  # what changes is no placeholder
-    configuration = evidence.facts.configuration
-    own = configuration.sensors.reference_std if configuration is not None else 0.0
-    expected = usual or float(own or 0.0)  # what the estimator goes by
+    own = evidence.facts.sensors.reference_std if evidence.facts.known else 0.0
+    expected = usual or float(own)  # what the estimator goes by
     # Errors wander: what is stated may well be more than the scatter, but not more than the speed.
     usual_speed = float(np.quantile(np.abs(forward), 0.9))
     if expected and noise / COVARIANCE_FACTOR <= expected <= usual_speed:

@@ -8,12 +8,15 @@ import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 _LEFT = re.compile(r'(^|[^a-z])(left|l|fl|ml|rl|lf|lm|lr|bl|lb)([^a-z]|$)')
 _RIGHT = re.compile(r'(^|[^a-z])(right|r|fr|mr|rr|rf|rm|br|rb)([^a-z]|$)')
@@ -26,11 +29,12 @@ _WHEEL = re.compile(r'wheel|drive|traction')
 class RoverFacts:
     """The rover as the checks see it; arrays are (n,) in the order of ``names``.
 
-    ``side`` is +1 on the left, -1 on the right, 0 unknown. Without a rover file (``configuration``
-    None) radius, mass and track are nan.
+    ``side`` is +1 on the left, -1 on the right, 0 unknown. Without a rover file (not ``known``)
+    radius, mass and track are nan, and the configuration is that of the defaults.
     """
 
-    configuration: Configuration | None
+    configuration: Configuration
+    known: bool
     names: tuple[str, ...]
     side: FloatArray
     lateral: FloatArray  # y [m]
@@ -40,9 +44,24 @@ class RoverFacts:
     gravity: float
 
     @property
-    def known(self) -> bool:
-        """Whether there is a rover file."""
-        return self.configuration is not None
+    def sensors(self) -> Any:
+        """What is stated of the sensors."""
+        return self.configuration.sensors
+
+    @cached_property
+    def errors(self) -> SensorErrors:
+        """Stated zeros and gains."""
+        return SensorErrors(self.configuration)
+
+    @cached_property
+    def mounting(self) -> FloatArray:
+        """Stated (3, 3) rotation from the IMU's frame into ``base_link``."""
+        from scipy.spatial.transform import Rotation  # heavy
+
+        angles = [
+            getattr(self.sensors, f'imu_mounting_{axis}') for axis in ('roll', 'pitch', 'yaw')
+        ]
+        return np.asarray(Rotation.from_euler('xyz', angles).as_matrix())
 
     def named(self, which: Any) -> str:
         """Return the wheels that are picked (n,), in words."""
@@ -58,6 +77,7 @@ def from_configuration(configuration: Configuration) -> RoverFacts:
     wheels = configuration.wheels
     return RoverFacts(
         configuration=configuration,
+        known=True,
         names=wheels.names,
         side=np.sign(wheels.y),
         lateral=wheels.y,
@@ -73,7 +93,10 @@ def from_names(joints: Sequence[str]) -> RoverFacts:
     names = wheel_names(joints)
     count = len(names)
     return RoverFacts(
-        configuration=None,
+        configuration=reader.from_parameters(
+            {'wheels.names': [f'wheel_{i}' for i in range(max(count, 1))]}, complete=False
+        ),
+        known=False,
         names=names,
         side=np.array([side_of(name) for name in names], dtype=float),
         lateral=np.full(count, np.nan),

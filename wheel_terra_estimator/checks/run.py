@@ -123,19 +123,20 @@ def _examined(
     remapped: Sequence[str],
     report: CheckReport,
 ) -> Evidence | None:
-    recording = clocks.corrected(recording, configuration)
     if configuration is not None:
         facts = rover_facts.from_configuration(configuration)
     else:
         facts = rover_facts.from_names(recording.joints.names if recording.joints else ())
+    recording = clocks.corrected(recording, facts)
+    own = facts.configuration.wheel_odometry
     mended = Mended(report)
-    mended('drop_outs', None, lambda: names.check_required(recording, configuration))
+    mended('drop_outs', None, lambda: names.check_required(recording, own))
     mended('unknown_name', None, lambda: names.check_topics(recording, remapped))
     stated = facts
     facts = mended('missing_wheel', facts, lambda: names.check_wheel_names(recording, stated))
     late: dict[str, float] = {}
     late = mended(
-        'order', late, lambda: transport.check_transport(recording, configuration, report.figures)
+        'order', late, lambda: transport.check_transport(recording, stated, report.figures)
     )
     for name, offset in late.items():
         on_time = clocks.shifted(getattr(recording, name), round(offset * 1e9))
@@ -187,8 +188,7 @@ def against_each_other(
     recording: Recording, facts: RoverFacts, checks: Sequence[Check], mended: Mended
 ) -> Evidence | None:
     """Hold one channel against another; None where hardly any wheel rates are."""
-    rotation = configured_mounting(facts.configuration)
-    state = imu.ImuState(recording, rotation, facts.gravity)
+    state = imu.ImuState(recording, facts.mounting, facts.gravity)
     state = mended('gravity', state, lambda: imu.check_imu(state), 'check_imu')
     facts = replace(facts, gravity=state.gravity)
     evidence = gather(state.recording, facts, state.rotation, mended.report.figures)
@@ -257,14 +257,3 @@ def _known(series: Series, known: NDArray[np.bool_]) -> Series | None:
     """Return the rows of a channel in which all is known; None for none."""
     kept = np.asarray(known.all(axis=1))
     return rows_of(series, kept) if kept.any() else None
-
-
-def configured_mounting(configuration: Configuration | None) -> NDArray[np.float64]:
-    """Return the (3, 3) rotation that the rover file states for the IMU."""
-    from scipy.spatial.transform import Rotation  # heavy
-
-    if configuration is None:
-        return np.eye(3)
-    sensors = configuration.sensors
-    angles = [getattr(sensors, f'imu_mounting_{axis}') for axis in ('roll', 'pitch', 'yaw')]
-    return np.asarray(Rotation.from_euler('xyz', angles).as_matrix())

@@ -19,7 +19,7 @@ from wheel_terra_estimator.checks.series import SinkageSeries
 from wheel_terra_estimator.checks.statistics import bend_noise, correlation
 from wheel_terra_estimator.checks.torque import thrust
 from wheel_terra_estimator.checks.trial import halves
-from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorErrors
+from wheel_terra_estimator.estimation.sensor_errors import LinearErrors
 
 DEEPEST = 1.2  # sinkage over radius that no wheel gets out of [-]
 LEAST_READINGS = 50
@@ -60,8 +60,8 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     middle = np.array([_median(column) for column in table.T])
     evidence.figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
     evidence.figures['sinkage.noise_m'] = noise = float(f'{_reading_noise(table):.3g}')
-    configuration = evidence.facts.configuration
-    if configuration and noise > ANOTHER_UNIT * float(configuration.sensors.sinkage_std):
+    facts = evidence.facts
+    if facts.known and noise > ANOTHER_UNIT * float(facts.sensors.sinkage_std):
         reason = f'sinkage scatters by {noise:.2g} m: noise, or another unit; drive in soft ground'
         unknown = np.full_like(sinkage.sinkage, np.nan)  # zeros and signs would be those of noise
         mended = evidence.with_channel('sinkage', sinkage=unknown)
@@ -81,21 +81,15 @@ def without_stated_errors(
     facts: RoverFacts, sinkage: SinkageSeries
 ) -> tuple[list[str], FloatArray]:
     """Return wheels and their readings (k, p) without the errors that the rover file states."""
-    if facts.configuration is None:
+    if not facts.known:
         return list(sinkage.names), sinkage.sinkage
-    own, errors = _own_names(facts, sinkage), SensorErrors(facts.configuration).sinkage
-    names = [name for name in sinkage.names if name in own]
+    # The wheels as the sinkage names them: as the joints do, or the rover file.
+    pairs = zip(facts.names, facts.configuration.wheels.names, strict=True)
+    own = [now if now in sinkage.names else stated for now, stated in pairs]
+    names, errors = [name for name in sinkage.names if name in own], facts.errors.sinkage
     rows = [own.index(name) for name in names]
     table = sinkage.sinkage[:, [sinkage.names.index(name) for name in names]]
     return names, LinearErrors(errors.zero[rows], errors.gain[rows]).true(table)
-
-
-def _own_names(facts: RoverFacts, sinkage: SinkageSeries) -> list[str]:
-    """Return the wheels as the sinkage names them: as the joints do, or the rover file."""
-    if facts.configuration is None:
-        return []
-    pairs = zip(facts.names, facts.configuration.wheels.names, strict=True)
-    return [now if now in sinkage.names else stated for now, stated in pairs]
 
 
 def _median(column: FloatArray) -> float:
@@ -104,9 +98,9 @@ def _median(column: FloatArray) -> float:
 
 
 def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatArray]:
-    configuration = evidence.facts.configuration
-    radius = float(np.nanmean(evidence.facts.radius)) if configuration else 0.5
-    stated = configuration.sensors.sinkage_std if configuration else 0.002
+    facts = evidence.facts
+    radius = float(np.nanmean(facts.radius)) if facts.known else 0.5
+    stated = facts.sensors.sinkage_std
     noise = _reading_noise(table)
     level = float(np.nanmedian(np.abs(table)))
     off = {}
@@ -134,8 +128,7 @@ def _reading_noise(table: FloatArray) -> float:
 def _sign_and_zero(
     evidence: Evidence, names: list[str], table: FloatArray, middle: FloatArray
 ) -> list[Outcome]:
-    configuration = evidence.facts.configuration
-    lugs = float(np.max(configuration.wheels.lug_height)) if configuration else 0.0
+    lugs = float(np.max(evidence.facts.configuration.wheels.lug_height))
     limit, usual = BELOW_ZERO + lugs, float(np.nanmedian(middle))
     if usual < -limit:
         top = float(np.nanmedian(np.nanquantile(table, 0.98, axis=0)))
@@ -198,10 +191,7 @@ def _lasting(table: FloatArray, index: int, far: float) -> bool:
 def _zero(evidence: Evidence, names: list[str], left: float, std: float, how: str) -> Finding:
     """Return the finding of a zero [m] that is left in the readings of some wheels."""
     facts = evidence.facts
-    zeros, gain = np.zeros(len(facts.names)), np.ones(len(facts.names))
-    if facts.configuration is not None:
-        errors = SensorErrors(facts.configuration).sinkage
-        zeros, gain = errors.zero.copy(), errors.gain
+    zeros, gain = facts.errors.sinkage.zero.copy(), facts.errors.sinkage.gain
     rows = [facts.names.index(name) for name in names if name in facts.names]
     zeros[rows] += gain[rows] * left
     value = round(float(np.mean(zeros[rows])), 4) if rows else round(left, 4)

@@ -27,7 +27,6 @@ from wheel_terra_estimator.checks.statistics import (
     runs,
 )
 from wheel_terra_estimator.checks.trial import Trial, tried
-from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 UPHILL_ENOUGH = -0.02  # specific force along the drive at which a wheel takes power [g]
 SIGN_SIGMAS = 4.0
@@ -182,8 +181,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if traction < LEAST_TRACTION < size:
         reason = 'torque: does not fit the slopes: mounting of the IMU, or zeros of the torques'
         return _not_told(reason), evidence
-    assert facts.configuration is not None
-    open_to = 1.0 + 3.0 * float(facts.configuration.sensors.torque_gain_std)
+    open_to = 1.0 + 3.0 * float(facts.sensors.torque_gain_std)
     if size >= LEAST_TRACTION and traction <= MOST_TRACTION * open_to:
         return [], evidence
     seen = traction if size >= LEAST_TRACTION else size
@@ -249,7 +247,7 @@ def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     Only a scale changes what slopes and what rolling take of it alike.
     """
     facts, fit = evidence.facts, slope_fit(evidence)
-    if isinstance(fit, NotChecked) or facts.configuration is None or not facts.has_sides():
+    if isinstance(fit, NotChecked) or not facts.has_sides():
         return [], evidence
     if fit.gain.sigmas_from(0.0) < GAIN_SIGMAS or (fit.shares <= 0.0).any():
         return [], evidence  # the IMU does not feel these slopes along x
@@ -292,16 +290,12 @@ def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def whole_gain(evidence: Evidence, left: float) -> FloatArray:
     """Return the gains (n,) of which a factor ``left`` remains behind those stated."""
-    configuration = evidence.facts.configuration
-    stated = 1.0 if configuration is None else SensorErrors(configuration).torque.gain
-    return np.full(len(evidence.facts.names), left) * stated
+    return left * evidence.facts.errors.torque.gain
 
 
 def whole_zeros(evidence: Evidence, left: list[Estimate]) -> list[Estimate]:
     """Return the zeros [N m] of which ``left`` remains behind those stated."""
-    configuration = evidence.facts.configuration
-    assert configuration is not None
-    errors = SensorErrors(configuration).torque
+    errors = evidence.facts.errors.torque
     return [
         Estimate(float(zero + gain * one.value), float(gain) * one.std)
         for one, zero, gain in zip(left, errors.zero, errors.gain, strict=True)
@@ -333,7 +327,6 @@ def torque_gain(evidence: Evidence) -> Slopes | NotChecked:
 
 def _gain(evidence: Evidence) -> list[Outcome]:
     facts, fit = evidence.facts, torque_gain(evidence)
-    assert facts.configuration is not None
     if isinstance(fit, NotChecked):
         return _not_told(fit.reason)
     gain, std = fit.gain
@@ -341,7 +334,7 @@ def _gain(evidence: Evidence) -> list[Outcome]:
     evidence.figures['torque.gain_std'] = round(std, 4)
     if abs(gain - 1.0) < LEAST_GAIN_ERROR or gain <= 0.0:
         return []
-    open_yet = facts.configuration.sensors.torque_gain_std  # by the rover file
+    open_yet = facts.sensors.torque_gain_std  # by the rover file
     sigmas = Estimate(gain, math.hypot(std, open_yet)).sigmas_from(1.0)
     if sigmas < GAIN_SIGMAS:
         return _not_told(
@@ -436,17 +429,14 @@ def drive_friction(evidence: Evidence) -> Estimate | NotChecked:
         wheels.append(block_fit(design, np.nan_to_num(evidence.torque[rows, i]))[0])
     mean = float(np.mean([wheel.value for wheel in wheels]))
     scatter = float(np.std([wheel.value for wheel in wheels])) / math.sqrt(len(wheels))
-    zero = 0.0
-    if not both and evidence.facts.configuration is not None:
-        zero = float(evidence.facts.configuration.sensors.torque_zero_std)
+    zero = 0.0 if both else float(evidence.facts.sensors.torque_zero_std)
     noise = max(wheel.std for wheel in wheels)
     return Estimate(mean, math.hypot(scatter, zero / math.sqrt(len(wheels)), noise))
 
 
 def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     facts, rest, where = evidence.facts, evidence.at_rest, 'driving both ways'
-    assert facts.configuration is not None
-    stated = max(float(facts.configuration.sensors.torque_zero_std), 1e-3)
+    stated = max(float(facts.sensors.torque_zero_std), 1e-3)
     driving = float(np.nanmedian(np.abs(evidence.torque[evidence.moving])))
     if zeros is None:
         if rest.sum() < LEAST_MOVING_ROWS:

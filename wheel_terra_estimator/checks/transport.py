@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.faults import found, of_offset
 from wheel_terra_estimator.checks.finding import Outcome
+from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Channel, JointSeries, Recording, SinkageSeries
 from wheel_terra_estimator.checks.statistics import robust_std
-from wheel_terra_estimator.configuration.configuration import Configuration
 
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
@@ -32,7 +32,7 @@ CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
 
 
 def check_transport(
-    recording: Recording, configuration: Configuration | None, figures: dict[str, Any]
+    recording: Recording, facts: RoverFacts, figures: dict[str, Any]
 ) -> tuple[list[Outcome], dict[str, float]]:
     """Return what is wrong with the stamps, and how late those of a channel are by log time [s]."""
     outcomes: list[Outcome] = []
@@ -82,7 +82,7 @@ def check_transport(
             outcomes.append(found('order', channel.topic, 0.99, how=how))
             continue
         std = math.hypot(robust_std(channel.late), robust_std(recording.joints.late), ARRIVAL_STD)
-        words = of_offset(name, -value, std, 'log time: two clocks', configuration)
+        words = of_offset(name, -value, std, 'log time: two clocks', facts)
         outcomes.append(found(f'{name}_offset', channel.topic, 0.999, **words))
         told[key] = -value
     return outcomes, told

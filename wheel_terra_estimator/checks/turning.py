@@ -256,10 +256,9 @@ def check_steering_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 def check_steering_sign(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels that are steered against the turn of gyro and rims, and these mended."""
     facts, rows, track = evidence.facts, evidence.turning, track_ratio(evidence)
-    there = np.isfinite(evidence.steering).any() and facts.configuration is not None
+    there = np.isfinite(evidence.steering).any()
     if not there or track is None or track < 0.0 or rows.sum() < LEAST_TURNING_ROWS:
         return [], evidence
-    assert facts.configuration is not None
     steering, turn = np.nan_to_num(evidence.steering[rows]), evidence.yaw[rows, None]
 
     def fits(angles: FloatArray) -> FloatArray:
@@ -482,8 +481,7 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def _sides_exchanged(facts: RoverFacts) -> list[str]:
     """Return the names with each left wheel in the place of the right one beside it."""
-    names = list(facts.names)
-    forward = np.zeros(len(names)) if facts.configuration is None else facts.configuration.wheels.x
+    names, forward = list(facts.names), facts.configuration.wheels.x
     left, right = (
         sorted(np.flatnonzero(facts.side == side).tolist(), key=lambda i: -float(forward[i]))
         for side in (1.0, -1.0)
@@ -532,10 +530,9 @@ def track_ratio(evidence: Evidence) -> float | None:
 
 def skids(evidence: Evidence) -> bool:
     """Return whether wheels do not roll as the track says in turns: several rows not steered."""
-    configuration = evidence.facts.configuration
-    if configuration is None:
+    wheels = evidence.facts.configuration.wheels
+    if not evidence.facts.known:
         return True
-    wheels = configuration.wheels
     known = np.isfinite(evidence.steering).all(axis=0)
     fixed = wheels.x[~known]
     unknown = bool((np.array(wheels.steered) & ~known).any())

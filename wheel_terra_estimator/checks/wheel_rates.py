@@ -134,7 +134,7 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if evidence.gyro is not None:
         rows &= np.abs(evidence.yaw) * np.abs(facts.lateral).max() < SAME_SPEED * middle
     few = rows.sum() < 2 * LEAST_MOVING_ROWS or speed.shape[1] < 3
-    if few or facts.configuration is None:
+    if few or not facts.known:
         return [], evidence
     ratio = speed[rows] / middle[rows, None]
     ratios = [np.nanmedian(part, axis=0) for part in (ratio, *np.array_split(ratio, 2))]
@@ -255,10 +255,10 @@ def _speed_ratio(evidence: Evidence) -> float | None:
 
 def check_noise(evidence: Evidence) -> list[Outcome]:
     """Compare the noise and the steps of the rates with what the rover file states."""
-    configuration, rows = evidence.facts.configuration, evidence.moving
-    if configuration is None or rows.sum() < 60:
+    facts, rows = evidence.facts, evidence.moving
+    if not facts.known or rows.sum() < 60:
         return []
-    stated = float(configuration.sensors.wheel_rate_std)
+    stated = float(facts.sensors.wheel_rate_std)
     interval, noise, by_steps = _intervals(evidence.time)[rows], [], []
     for rate in evidence.rate.T:
         bend = np.diff(rate, 2)[rows[1:-1]] / math.sqrt(6.0)
