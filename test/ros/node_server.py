@@ -98,9 +98,7 @@ class NodeServer:
         )
         theirs.close()
 
-    def start(
-        self, module: str, arguments: Sequence[str], package: str = PACKAGE
-    ) -> ForkedProcess:
+    def start(self, module: str, arguments: Sequence[str], package: str = PACKAGE) -> ForkedProcess:
         """Start a node as ``python -m PACKAGE.MODULE ARGUMENTS`` would."""
         # A file, not a pipe: nobody has to read it while the node runs.
         output = tempfile.TemporaryFile('w+')  # noqa: SIM115 - closed when it was read

@@ -3,10 +3,10 @@
 """``wheel-terra demo``: two shipped drives through the real node, and a blind trial.
 
 The entrapment of a simulated six-wheel rover, whose ground truth is known, and a piece of a real
-drive of the Pathfinder rover. The node hears them over DDS; where rclpy or the laboratory is missing the
-same drives go through ``wheel-terra replay``, which gives the same numbers. The trial is a table made
-by ``wheel-terra trial``, in which an effect is hidden: it is diagnosed blind, then compared with
-the withheld truth.
+drive of the Pathfinder rover. The node hears them over DDS; where rclpy or the laboratory is
+missing the same drives go through ``wheel-terra replay``, which gives the same numbers. The trial
+is a table made by ``wheel-terra trial``, in which an effect is hidden: it is diagnosed blind, then
+compared with the withheld truth.
 """
 
 from __future__ import annotations
@@ -106,7 +106,11 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
     if live:
         print('The drives go over DDS to estimator_node, as fast as it takes them.')
     else:
-        why = '' if arguments.no_node else 'There is no rclpy here (no sourced Jazzy), or no laboratory: '
+        why = (
+            ''
+            if arguments.no_node
+            else 'There is no rclpy here (no sourced Jazzy), or no laboratory: '
+        )
         print(f'{why}the drives go through `wheel-terra replay`; the numbers are the same.')
     with ThreadPoolExecutor(AT_ONCE) as pool:
         drives = [pool.submit(_drive, i, output, live) for i in range(len(DRIVES))]
