@@ -91,16 +91,8 @@ def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) 
 def number(cell: Any, where: str, decimal_comma: bool = False) -> float:
     """Return the number in a cell; nan where nothing was measured.
 
-    Raises UserError for what is not a number, or not a finite one.
-
-    Parameters
-    ----------
-    cell : str, or a value of a DataFrame
-        What stands there.
-    where : str
-        What an error names: file, line, column.
-    decimal_comma : bool
-        Whether a comma is the decimal mark.
+    Raises UserError for what is not a number, or not a finite one; it names ``where``: file, line,
+    column.
     """
     value = value_of(cell, decimal_comma)
     if value is None:

@@ -49,16 +49,9 @@ def finished(
     worked on are run once more. Raises UserError where Dask is not installed or its scheduler does
     not answer.
 
-    Parameters
-    ----------
-    function : callable
-        One at the top of a module, so that it can be sent to another process.
-    tasks : sequence
-        Its arguments, which can be pickled.
-    jobs : int
-        Processes on this machine.
-    address : str
-        Of a Dask scheduler; its workers are used in place of processes of this machine.
+    ``function`` stands at the top of a module and ``tasks`` can be pickled, so that both can be
+    sent to another process. ``jobs``: processes on this machine; ``address``: of a Dask scheduler,
+    whose workers are used in their place.
     """
     if address:
         return _on_cluster(function, tasks, address)

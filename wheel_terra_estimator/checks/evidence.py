@@ -265,11 +265,11 @@ class Evidence:
         smooth = moving_mean(np.nan_to_num(reference.velocity[:, 0]), rows)
         return _shared(np.interp(self.time, self.seconds(reference), np.abs(smooth)))
 
-    def rim_at(self, stamp: IntArray, values: FloatArray, half: float = AROUND) -> FloatArray:
-        """Return means of (k,) values within ``half`` [s] around stamps [ns]; nan for none."""
+    def rim_at(self, stamp: IntArray, values: FloatArray) -> FloatArray:
+        """Return means of (k,) values within `AROUND` of stamps [ns]; nan for none."""
         at = (stamp - self.origin) * 1e-9
-        first = np.searchsorted(self.time, at - half)
-        last = np.searchsorted(self.time, at + half, side='right')
+        first = np.searchsorted(self.time, at - AROUND)
+        last = np.searchsorted(self.time, at + AROUND, side='right')
         total = np.concatenate([[0.0], np.cumsum(values)])
         return np.where(
             last > first, (total[last] - total[first]) / np.maximum(last - first, 1), np.nan

@@ -52,6 +52,7 @@ LEAST_TRACK_ERROR = 0.08
 MOST_HIDDEN = 0.7  # speed over rim speed of slip that torques off zero may hide, at least [-]
 UNSEEN_SLIP = 0.035  # slip that widens a track where no straight tells it, one deviation [-]
 STEERED_STD = 0.04  # slip of steered wheels in curves, as a share of the track, one deviation [-]
+MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steered, at most [-]
 CLEAR_TURN = 0.95  # correlation of gyro and difference of the sides that a turn has [-]
 
 
@@ -388,7 +389,7 @@ def rolling_track(evidence: Evidence) -> Told | NotChecked:
     if isinstance(told, NotChecked):
         return told
     soft = evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
-    if soft or _depth(evidence).value > SOFT_DEPTH or turning.unlike_in_turns(evidence):
+    if soft or _depth(evidence).value > SOFT_DEPTH or turning.left_in_turns(evidence) > MOST_UNLIKE:
         reason = 'wheels slip in turns, whatever the track; drive circles on firm ground'
         return NotChecked('track', reason)
     speeds, ratio = _straight_speeds(evidence), told.ratio

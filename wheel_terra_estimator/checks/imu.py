@@ -439,15 +439,10 @@ def without_yaw(seen: Estimate) -> FloatArray:
     """Return the rotation that takes a yaw off; right angles are meant where they fit."""
     from scipy.spatial.transform import Rotation  # heavy
 
-    quarter = round(seen.value / (math.pi / 2.0)) * math.pi / 2.0
-    angle = quarter if _quarter(seen) else seen.value
+    angle, apart = seen.value, math.remainder(seen.value, math.pi / 2.0)
+    if abs(apart) < 2.5 * max(seen.std, math.radians(4.0)) and abs(angle) > LEAST_QUARTER:
+        angle = round(angle / (math.pi / 2.0)) * math.pi / 2.0
     return np.asarray(Rotation.from_rotvec([0.0, 0.0, -angle]).as_matrix())
-
-
-def _quarter(seen: Estimate) -> bool:
-    """Return whether a yaw may be a whole quarter turn."""
-    apart = math.remainder(seen.value, math.pi / 2.0)
-    return abs(apart) < 2.5 * max(seen.std, math.radians(4.0)) and abs(seen.value) > LEAST_QUARTER
 
 
 def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

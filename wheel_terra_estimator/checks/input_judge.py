@@ -57,14 +57,9 @@ class InputJudge:
                 self._failed = True
 
     def judged(self, estimates: EstimateSet, health: Mapping[str, Any]) -> EstimateSet:
-        """Return the estimates; slip is not judged while a finding stands.
+        """Return the estimates of the last step; slip is not judged while a finding stands.
 
-        Parameters
-        ----------
-        estimates : EstimateSet
-            Of the last step.
-        health : mapping
-            What the estimator says of itself.
+        ``health``: what the estimator says of itself.
         """
         self._follow(estimates)
         faults = _told({**estimates.faults, **_misfits(health)}, self._checks.remarks)

@@ -364,13 +364,6 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
     return [Estimate(zero.value, math.hypot(zero.std, resists)) for zero, _ in fits]
 
 
-def _calm_force(evidence: Evidence) -> FloatArray:
-    """Return horizontal specific forces (k, 2) without vibration [m/s^2]."""
-    assert evidence.force is not None
-    width = evidence.rows_in(SLOPE_TIME)
-    return np.column_stack([moving_mean(column, width) for column in evidence.force[:, :2].T])
-
-
 def like_a_pitch(evidence: Evidence, zeros: list[Estimate]) -> bool:
     """Return whether zeros are one in all torques, as a pitch of the IMU that no circle told is."""
     told = evidence.figures.get('imu.tilt_std_deg', math.inf) < math.degrees(EVEN_GROUND_STD)
@@ -386,7 +379,9 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     sense = np.sign(smooth[rows])
     if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
         return None
-    slopes, facts = _calm_force(evidence)[rows], evidence.facts
+    width, facts = evidence.rows_in(SLOPE_TIME), evidence.facts  # without vibration
+    calm = [moving_mean(column, width) for column in evidence.force[:, :2].T]
+    slopes = np.column_stack(calm)[rows]
     load = np.nan_to_num(facts.mass * slopes[:, :1] * facts.radius / len(facts.names))
     table = np.nan_to_num(evidence.torque[rows]) - load
     # What is left of slopes along both axes: the IMU may be turned about z.

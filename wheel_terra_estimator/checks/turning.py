@@ -15,7 +15,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,6 @@ Mask = BoolArray
 
 TRIAL_ROWS = 1000  # rows, spread over the drive, that hypotheses are compared on
 MOST_STEERING = 3.3  # steering angle that no wheel has [rad]
-MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steered, at most [-]
 MOST_WHEELS = 10  # wheels for which all combinations of signs are tried
 LEAST_TURNING_ROWS = 40  # rows with a turn by the gyro that the wheels must account for
 MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2  # residual of a cure; of steered wheels, at most [-]
@@ -184,11 +183,6 @@ def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
     return Comparison(fixes[best], whole[best], worst(trials))
 
 
-def sign_fixes(count: int) -> list[Fix]:
-    """Return nothing, and every other combination of signs."""
-    return [Fix((1, *signs)) for signs in itertools.product((1, -1), repeat=count - 1)]
-
-
 def exchanges(stretch: Turning) -> list[Fix]:
     """Return nothing, and every left wheel exchanged with a right one; two wheels are the sides.
 
@@ -201,14 +195,6 @@ def exchanges(stretch: Turning) -> list[Fix]:
         rows = [list(itertools.combinations(side, 2)) for side in (left, right)]
         told += [(pair,) for side in rows for pair in side] + list(zip(*rows, strict=False))
     return [Fix((1,) * count), *(Fix((1,) * count, tuple(pairs)) for pairs in told)]
-
-
-def compare_exchanges(stretch: Turning) -> Comparison | None:
-    """Compare exchanged wheels in the turns alone, where they show; None for too few of them."""
-    turns, count = stretch.turns, stretch.speed.shape[1]
-    if count < 3 or turns.sum() < 2 * LEAST_TURNING_ROWS:
-        return None
-    return compare(stretch.rows(turns), exchanges(stretch))
 
 
 # In a recording ----------------------------------------------------------------------------------
@@ -314,9 +300,9 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if np.isfinite(mended.steering).any():  # steering joints are named as before, or with it
             order = [facts.names.index(name) for name in _sides_exchanged(facts)]
             both = mended, replace(mended, steering=mended.steering[:, order])
-            mended = min(both, key=_left_in_turns)
+            mended = min(both, key=left_in_turns)
     if blame == 'reference' and evidence.recording.reference is not None:
-        alone = bool(turn) or told.force is not None
+        alone = bool(turn) or told[1] is not None
         sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels count backwards')
         outcomes.append(evidence.found('reference_reversed', sure, value=-1.0, rival=rival))
         velocity = -evidence.recording.reference.velocity
@@ -330,10 +316,11 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     if not 2 <= count <= MOST_WHEELS:
         return _Chosen(signs)
     stretch = stretch_of(evidence, there, rows)
-    best = compare(stretch, [*sign_fixes(count), *exchanges(stretch)[1:]])
-    if not best.trial.falls:
-        again = compare_exchanges(stretch)
-        best = again if again is not None and again.trial.falls else best
+    signed = [Fix((1, *those)) for those in itertools.product((1, -1), repeat=count - 1)]
+    best = compare(stretch, [*signed, *exchanges(stretch)[1:]])
+    if not best.trial.falls and count > 2 and stretch.turns.sum() >= 2 * LEAST_TURNING_ROWS:
+        again = compare(stretch.rows(stretch.turns), exchanges(stretch))  # they show in turns alone
+        best = again if again.trial.falls else best
     # Nothing is clearly better than what the rover file says, or good enough.
     steered = np.isfinite(evidence.steering).any()
     if not best.trial.falls or best.trial.after > (MOST_LEFT_STEERED if steered else MOST_LEFT):
@@ -352,30 +339,28 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     return _Chosen(signs, turn, exchanged, trial, 0.99 if best.trial.passes else 0.5)
 
 
-class _Told(NamedTuple):
-    """Agreement of the common speed with the reference and with the specific force; None: none."""
-
-    reference: float | None
-    force: float | None
+_Agreement: TypeAlias = 'tuple[float | None, float | None]'
 
 
-def _blame(told: _Told, half_reversed: bool, turn: float) -> str:
+def _blame(told: _Agreement, half_reversed: bool, turn: float) -> str:
     """Return what runs backwards: the wheels beyond the signs that were found, the reference, ''.
 
     ``half_reversed``: half of the wheels or more have a negative sign; ``turn``: track by the
     turns, negative where they run against the gyro, 0 without turns.
     """
-    against_force = told.force is not None and told.force < 0.0
-    if told.reference is None:
+    reference, force = told
+    against_force = force is not None and force < 0.0
+    if reference is None:
         return 'wheels' if turn < 0.0 and against_force else ''
-    if told.reference >= 0.0:
+    if reference >= 0.0:
         return ''
     # Wheels or reference are backwards: with the turns on their side it is not the wheels.
     others = half_reversed and turn <= 0.0  # it is the other half that counts backwards
     return 'wheels' if others or turn < 0.0 or (not turn and against_force) else 'reference'
 
 
-def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
+def _told_direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
+    """Return how the common speed agrees with reference and specific force; None: not told."""
     speed = row_medians(np.nan_to_num(evidence.rate) * signs)
     reference, by_reference, by_force = evidence.recording.reference, None, None
     if reference is not None:
@@ -393,7 +378,7 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
         slopes = slope_fit(signed)  # torques that carry the rover up or down them
         if isinstance(slopes, Slopes) and slopes.gain.sigmas_from(0.0) > SCALE_SIGMAS:
             by_force = float(np.sign(slopes.gain.value))
-    return _Told(by_reference, by_force)
+    return by_reference, by_force
 
 
 def _backwards(
@@ -511,7 +496,7 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [NotChecked('unit', 'gyro: no clear turn in it; drive a circle')], evidence
     # Of exchanged wheels the sides turn alike, but not the wheels of a side.
     scaled = GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]
-    if not scaled or _left_in_turns(evidence) > MOST_SCALED:
+    if not scaled or left_in_turns(evidence) > MOST_SCALED:
         return [], evidence
     told = {'times': 1.0 / abs(ratio), 'how': 'turning of the wheels'}
     finding = evidence.found('gyro_degrees', 0.95, value=math.radians(1.0), **told)
@@ -539,12 +524,7 @@ def skids(evidence: Evidence) -> bool:
     return unknown or float(np.ptp(fixed)) > 0.3 * float(np.ptp(wheels.y)) if fixed.size else False
 
 
-def unlike_in_turns(evidence: Evidence) -> bool:
-    """Return whether no track makes the wheels roll alike in turns."""
-    return _left_in_turns(evidence) > MOST_UNLIKE
-
-
-def _left_in_turns(evidence: Evidence) -> float:
+def left_in_turns(evidence: Evidence) -> float:
     """Return the residual of the wheels in turns [-]."""
     there, rows = _known(evidence)
     stretch = stretch_of(evidence, there, rows & evidence.turning)

@@ -175,8 +175,10 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         reason = 'wheel rates: neither reference nor turn in it; drive a circle'
         return [NotChecked('unit', reason)], evidence
     turns = track is not None and abs(track) > LEAST_ROLLING_TRACK  # as rad/s do
-    rim_unit = {} if turns else _rim_unit(float(np.nanmean(facts.radius)))
-    units = _fitting_units(ratio, track, {**RATE_UNITS, **rim_unit})
+    radius, known = float(np.nanmean(facts.radius)), dict(RATE_UNITS)
+    if not turns and radius < LARGE_WHEEL:  # else too near to rad/s
+        known['metres per second of the rim'] = 1.0 / radius
+    units = _fitting_units(ratio, track, known)
     rolls = ratio and track and abs(ratio * track - 1.0) < SAME_SCALE
     scaled = ratio is not None and ratio > MOST_COUNT and not OF_RADII[0] < ratio < OF_RADII[1]
     if track and rolls and scaled and not units:
@@ -227,11 +229,6 @@ def _unit_findings(
     ]
     factor = math.nan if len(units) != 1 else next(iter(units.values()))
     return findings, evidence.with_rate(evidence.rate * factor)
-
-
-def _rim_unit(radius: float) -> dict[str, float]:
-    """Return the speed of a rim as a unit; that of a large wheel is too near to rad/s."""
-    return {'metres per second of the rim': 1.0 / radius} if 0.0 < radius < LARGE_WHEEL else {}
 
 
 def _speed_ratio(evidence: Evidence) -> float | None:

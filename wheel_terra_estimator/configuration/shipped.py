@@ -82,16 +82,9 @@ class FileName(str):
 def find(name: str | Path, kind: str = '', folder: Path | None = None) -> Path:
     """Return the file that ``name`` means: a path, or the bare name of a shipped file.
 
-    Raises UserError if nothing or more than one file answers to the name.
-
-    Parameters
-    ----------
-    name : str or pathlib.Path
-        A path, a bare name (``frostyboy``) or one with its folder (``soils/hit_lss1``).
-    kind : str
-        Folder to search (``scenarios``); empty: all.
-    folder : pathlib.Path or None
-        Where the shipped files lie; None: those of the package.
+    A bare name (``frostyboy``) may have its folder in front (``soils/hit_lss1``); ``kind``: folder
+    to search (``scenarios``), empty: all; ``folder``: where the shipped files lie, None: those of
+    the package. Raises UserError if nothing or more than one file answers to the name.
     """
     path = Path(name).expanduser()
     if path.is_file():

@@ -117,11 +117,6 @@ def write_state(path: Path, state: StuckState) -> None:
         fresh.write_text(json.dumps(asdict(state)) + '\n', encoding='utf-8')
 
 
-def clear_state(path: Path) -> None:
-    """Forget the warning."""
-    path.unlink(missing_ok=True)
-
-
 def _why_no_state(path: Path) -> str:
     try:
         read_state(path)

@@ -35,18 +35,11 @@ Pose = FloatArray  # (4, 4)
 
 
 def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None) -> RoverSketch:
-    """Return the rover that a URDF describes.
+    """Return the rover that a URDF describes (xacro has to be expanded first).
 
+    ``wheels``: names of the wheel joints; default: continuous joints whose name or link says wheel.
+    ``data``: the document, where it does not stand in a file; ``path`` then names it in errors.
     Raises UserError for no URDF, no wheels, or a wheel without a radius.
-
-    Parameters
-    ----------
-    path : Path
-        URDF file (xacro has to be expanded first).
-    wheels : sequence of str
-        Names of the wheel joints; default: continuous joints whose name or link says wheel.
-    data : bytes, optional
-        The document, where it does not stand in a file; ``path`` then names it in errors.
     """
     robot = _Robot(path, _parse(path, data))
     joints = robot.joints

@@ -56,16 +56,10 @@ class InputWatch:
         self._looked_at = now
 
     def heard(self, topic: str, now: float, delay: float, number: int | None) -> None:
-        """Note a message.
+        """Note a message at a steady time [s].
 
-        Parameters
-        ----------
-        now : float
-            Steady time [s].
-        delay : float
-            Time of the node's clock less the stamp [s].
-        number : int or None
-            The publisher's count of its messages; None where several publish or it is not known.
+        ``delay``: time of the node's clock less the stamp [s]. ``number``: the publisher's count of
+        its messages; None where several publish or it is not known.
         """
         state = self._topics.setdefault(topic, _Topic())
         if state.received:

@@ -12,7 +12,7 @@ from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.output_folder import check_target, try_to_write
+from wheel_terra_estimator.output_folder import cannot_write, check_target, try_to_write
 
 
 class KeptSoil:
@@ -82,6 +82,6 @@ class KeptSoil:
     def forget_warning(self) -> None:
         """Remove the warning that was kept."""
         try:
-            soil_file.clear_state(self._state_path)
-        except UserError as error:
-            self.fault = str(error)
+            self._state_path.unlink(missing_ok=True)
+        except OSError as error:
+            self.fault = str(cannot_write(self._state_path, error))

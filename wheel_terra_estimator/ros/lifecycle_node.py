@@ -78,11 +78,6 @@ LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 _SECOND = 1_000_000_000
 
 
-def _came(info: dict[str, Any]) -> int:
-    """Return when a message came to this process [ns], or where unknown when it was sent."""
-    return int(info['received_timestamp'] or info['source_timestamp'])
-
-
 class WithInfo:
     """A callback that takes a message and what the middleware knows of it.
 
@@ -286,7 +281,9 @@ class EstimatorNode(LifecycleNode):
             with subscription.handle:
                 while found := subscription.handle.take_message(subscription.msg_type, True):
                     taken.append((topic, *found))
-        for topic, data, info in sorted(taken, key=lambda each: _came(each[2])):
+        # When a message came to this process [ns], or where that is unknown when it was sent.
+        taken.sort(key=lambda each: each[2]['received_timestamp'] or each[2]['source_timestamp'])
+        for topic, data, info in taken:
             self._hear(topic, data, info)
 
     def _hear(self, topic: str, data: bytes, info: dict[str, Any]) -> None:
@@ -318,7 +315,7 @@ class EstimatorNode(LifecycleNode):
         if self._pipeline.core.warning.state is not self._warned:
             self._warned = self._pipeline.core.warning.state
             self._log_stuck()
-            self._save_warning()
+            self._save_quietly(soil=False)
         if not (self._active and self._enabled):
             self._pipeline.diagnostics.follow(estimates)
             return
@@ -369,13 +366,13 @@ class EstimatorNode(LifecycleNode):
             if self._pipeline is None:
                 response.message = 'not configured: nothing was learned'
             return response
+        learned = self._pipeline.core.learned()
+        response.success = bool(learned)
+        response.message = str(self._kept.path) if learned else 'no estimates yet: nothing learned'
         try:
-            written = self._save()
+            self._kept.save(learned, self._warned)
         except UserError as error:
             response.success, response.message = False, str(error)
-            return response
-        response.success = written
-        response.message = str(self._kept.path) if written else 'no estimates yet: nothing learned'
         return response
 
     def _set_enabled(
@@ -409,26 +406,15 @@ class EstimatorNode(LifecycleNode):
             self.get_logger().error(f'stuck before the restart: {state.reason}')
         return state
 
-    def _save(self) -> bool:
-        """Write what was learned; return whether there was anything."""
-        assert self._pipeline is not None and self._kept is not None
-        learned = self._pipeline.core.learned()
-        self._kept.save(learned, self._warned)
-        return bool(learned)
-
-    def _save_quietly(self) -> None:
+    def _save_quietly(self, soil: bool = True) -> None:
+        """Write what was learned, and the warning, or that alone."""
         if self._pipeline is not None and self._kept is not None:
             with suppress(UserError):  # stands in the diagnostics
-                self._save()
+                self._kept.save(self._pipeline.core.learned() if soil else {}, self._warned)
 
     def _save_now_and_then(self) -> None:
         if self._latest is not None:
             self._save_quietly()
-
-    def _save_warning(self) -> None:
-        if self._kept is not None:
-            with suppress(UserError):
-                self._kept.save({}, self._warned)
 
     # -- What the operator sees -----------------------------------------------------------------
 

@@ -59,7 +59,8 @@ def run_node(module: str, name: str, args: list[str] | None = None) -> int:
         try:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         except Exception as error:  # rcl's: a parameter file or argument that cannot be read
-            print(f'{_first_line(error)}', file=sys.stderr)
+            # What rcl complains of, without the places in its source.
+            print(str(error).splitlines()[0].partition(', at ')[0], file=sys.stderr)
             return 2
         node = factory()
         if signals is not None:
@@ -78,11 +79,6 @@ def run_node(module: str, name: str, args: list[str] | None = None) -> int:
             node.destroy_node()
         try_shutdown()
     return status
-
-
-def _first_line(error: Exception) -> str:
-    """Return what rcl complains of, without the places in its source."""
-    return str(error).splitlines()[0].partition(', at ')[0]
 
 
 def _spin(node: Any, stopped: Callable[[], bool]) -> None:

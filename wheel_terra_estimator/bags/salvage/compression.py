@@ -29,17 +29,10 @@ class Unpacked(NamedTuple):
 
 
 def unpack(codec: str, packed: bytes | memoryview, size: int) -> Unpacked:
-    """Unpack a chunk.
+    """Unpack a chunk, which may be cut or damaged, by one of `CODECS`.
 
-    Parameters
-    ----------
-    codec : str
-        One of `CODECS`.
-    packed : bytes-like
-        Packed data, maybe cut or damaged.
-    size : int
-        Unpacked size that the file states [byte]; 0: none. It may be damaged: how much there is
-        decides, not what is stated. Nothing above `limits.unpacked` is unpacked.
+    ``size``: unpacked size that the file states [byte]; 0: none. It may be damaged: how much there
+    is decides, not what is stated. Nothing above `limits.unpacked` is unpacked.
     """
     most = limits.unpacked(len(packed)) if codec else limits.CHUNK
     too_large = f'a chunk is above {in_words(most)}'
