@@ -120,7 +120,7 @@ def rules(table):
 # for all but ros, and libraries beyond the standard one. A new folder needs a line here.
 MAY_USE = rules("""
 every folder: arrays errors csv_file frames glossary input_file output_folder scheduler \
-    worker_pool __version__
+    __version__
 terramechanics: | numpy
 configuration: terramechanics | numpy yaml
 # filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.

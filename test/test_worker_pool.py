@@ -19,7 +19,7 @@ from wheel_terra_lab.evaluation import bench, tables
 PROGRAM = """
 import os, sys, time
 from wheel_terra_estimator.cli.terminal import termination_as_interrupt
-from wheel_terra_estimator.worker_pool import worker_pool
+from wheel_terra_estimator.scheduler import worker_pool
 
 def work(_):
     os.write(1, f'{os.getpid()}\\n'.encode())  # one write: two workers share the pipe

@@ -43,14 +43,12 @@ from wheel_terra_estimator.errors import UserError
 MARKER = '.wheel-terra.json'
 """File in an output folder that lists what the program wrote there; folders end in ``/``."""
 
-LEAST_ROOM = 2**16
-"""Room on the disk [byte] without which nothing is begun."""
+LEAST_ROOM = 2**16  # room on the disk [byte] without which nothing is begun
 
 BESIDE = '.wheel-terra-'
 """In the name of a hidden folder in which an output is written, beside its place."""
 
-LARGEST_MARKER = 16 * 2**20
-"""A marker is a short list: a longer file [byte] is none of ours."""
+LARGEST_MARKER = 16 * 2**20  # A marker is a short list: a longer file [byte] is none of ours
 
 
 def check_target(

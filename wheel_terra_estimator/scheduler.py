@@ -7,24 +7,27 @@ from __future__ import annotations
 import argparse
 import asyncio
 import logging
+import multiprocessing
+import os
+import signal
+import threading
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection
+from multiprocessing.connection import wait as wait_for_one
 from typing import Any, TypeVar
 
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.worker_pool import worker_pool
 
 Task = TypeVar('Task')
 Result = TypeVar('Result')
 
 _MOST_DIGITS = 4  # of a number of processes
-CONNECT_TIMEOUT = 10
-"""Time [s] in which a Dask scheduler has to answer."""
-WORKER_TIMEOUT = 120
-"""Time [s] in which a cluster has to have a worker."""
+CONNECT_TIMEOUT = 10  # time [s] in which a Dask scheduler has to answer
+WORKER_TIMEOUT = 120  # time [s] in which a cluster has to have a worker
 
 
 def add_jobs_argument(
@@ -89,6 +92,45 @@ def _on_this_machine(
         if isinstance(outcome, BrokenProcessPool):
             outcome = UserError('its process was killed twice; is there enough memory?')
         yield index, outcome
+
+
+@contextmanager
+def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield a pool of processes; after an error in the block its workers are stopped at once.
+
+    Raises UserError where the machine has no shared memory left for them.
+    """
+    told, tell = multiprocessing.Pipe(duplex=False)
+    try:
+        pool = ProcessPoolExecutor(processes, initializer=_watch, initargs=(told,))
+    except (OSError, ImportError) as error:  # its semaphores are files there
+        raise UserError(
+            f'processes side by side need shared memory: {error}; look at df -h /dev/shm and make '
+            'room (in a container: --shm-size)'
+        ) from None
+    try:
+        yield pool
+    except BaseException:
+        tell.send_bytes(b'stop')  # nobody takes it out, so that every worker sees it
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+        tell.close()
+        told.close()
+
+
+def _watch(told: Connection) -> None:
+    """Let a worker end when its parent has ended or says so; Ctrl-C is the parent's affair."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    parent = multiprocessing.parent_process()
+    watched: list[Any] = [told] if parent is None else [told, parent.sentinel]
+
+    def end_with_parent() -> None:
+        wait_for_one(watched)
+        os._exit(1)
+
+    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def _on_cluster(

@@ -34,7 +34,6 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from std_msgs.msg import Bool, Int8
 
-from wheel_terra_estimator.bags import check_before
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import read_estimates
 from wheel_terra_estimator.bags.reader import MeasurementReader, parse_remaps
@@ -53,7 +52,7 @@ from wheel_terra_estimator.bags.writer import (
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.fleet.drive import summed_up
+from wheel_terra_estimator.fleet.drive import check_before, findings_as_lines, summed_up
 from wheel_terra_estimator.messages.unpack import JOINT_STATE, unpack
 from wheel_terra_estimator.output_folder import check_file, check_folder
 from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
@@ -334,8 +333,8 @@ def _run(arguments: argparse.Namespace) -> None:
     check_folder(arguments.output, arguments.overwrite, inputs)
     with open_bag(arguments.bag) as bag:
         reader = MeasurementReader(bag, remaps, configuration)
-        checked = check_before.check_before(bag, configuration, remaps)
-        for line in check_before.as_lines(checked):
+        checked = check_before(bag, configuration, remaps)
+        for line in findings_as_lines(checked):
             print(line, flush=True)
         heard = drive(bag, configuration, remaps, arguments.rate, arguments.arrival)
         start = next(bag.messages(tuple(reader.topics.values()))).log_time

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import completion, main
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.worker_pool import worker_pool
+from wheel_terra_estimator.scheduler import worker_pool
 
 
 def complaint(capsys, *arguments):
@@ -252,7 +252,7 @@ def test_shared_memory_that_is_full_is_said(monkeypatch):
     def full(*arguments, **others):
         raise OSError(errno.ENOSPC, 'No space left on device')
 
-    monkeypatch.setattr('wheel_terra_estimator.worker_pool.ProcessPoolExecutor', full)
+    monkeypatch.setattr('wheel_terra_estimator.scheduler.ProcessPoolExecutor', full)
     with pytest.raises(UserError, match='/dev/shm'), worker_pool(2):
         pass
 

@@ -15,11 +15,9 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import read_text
 
 NAME = 'metadata.yaml'
-LARGEST = 4 * 2**20
-"""Greatest size of the file [byte]; a thousand topics need one megabyte."""
+LARGEST = 4 * 2**20  # greatest size of the file [byte]; a thousand topics need one megabyte
 
-MOST_VALUES = 200_000
-"""Keys and values; a topic has about a hundred."""
+MOST_VALUES = 200_000  # keys and values; a topic has about a hundred
 
 _LONGEST_NUMBER = 19  # digits
 Kind = TypeVar('Kind')

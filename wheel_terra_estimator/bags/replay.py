@@ -32,11 +32,9 @@ from wheel_terra_estimator.messages.convert import ODOMETRY
 from wheel_terra_estimator.messages.diagnostics import Diagnostics, Status
 from wheel_terra_estimator.messages.pipeline import RESET, Pipeline
 
-LONG_DRIVE = 20_000
-"""Number of messages from which a progress bar is shown."""
+LONG_DRIVE = 20_000  # number of messages from which a progress bar is shown
 
-LARGEST_ARRIVAL_LOG = 256 * 2**20
-"""Size [byte] of an arrival log of ten hours."""
+LARGEST_ARRIVAL_LOG = 256 * 2**20  # size [byte] of an arrival log of ten hours
 
 _STAMP = re.compile(r'-?[0-9]{1,19}')
 TRUTH_TOPICS = ('/ground_truth/', '/truth/')

@@ -28,8 +28,7 @@ from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
 
 MOST_MESSAGES = 400_000
 """Messages of a topic that are kept; a longer recording is judged by its beginning."""
-MOST_JOINTS = 64
-"""Joints of a topic that are kept."""
+MOST_JOINTS = 64  # joints of a topic that are kept
 
 _REFERENCE_WORDS = ('reference', 'truth', 'visual', 'vio', 'gps', 'gnss', 'rtk', 'mocap', 'vo')
 _JOINT_WORDS = ('joint_states', 'wheel', 'joint')
@@ -123,12 +122,10 @@ def read_series(
     )
 
 
-LARGEST = 1e9
-"""A number beyond this is damage in any unit."""
+LARGEST = 1e9  # A number beyond this is damage in any unit
 _STRAY = 1e9
 """Stamps of a damaged recording that lie so far [ns] from where the others do are damaged."""
-_STRAYS = 0.2
-"""Greatest share of such stamps that damage explains."""
+_STRAYS = 0.2  # greatest share of such stamps that damage explains
 
 
 def credible(values: Any) -> Any:

@@ -81,16 +81,14 @@ _REFERENCE = {
 }
 _PLACES = (('position.x', 'position.y'), ('latitude', 'longitude'))
 EARTH_RADIUS = 6_371_000.0  # mean [m]
-BASELINE = 1.0
-"""Positions so far apart [s] make a speed: closer ones are noise."""
+BASELINE = 1.0  # positions so far apart [s] make a speed: closer ones are noise
 ONE_WAY = 0.5
 """Share of their rate that the wheels have in common, metre for metre, if all count one way [-]."""
 _JOINT = {'velocity': 'rate', 'effort': 'torque', 'position': 'angle'}
 _TOPICS = ('joint_states', 'imu/data', 'sinkage', 'reference_odom')
 REGULAR = 0.8
 """Share of the runs of one value as long as the others of a sensor whose value is held [-]."""
-LEAST_RUNS = 10
-"""Runs of one value that tell it."""
+LEAST_RUNS = 10  # runs of one value that tell it
 
 
 @dataclass(frozen=True)

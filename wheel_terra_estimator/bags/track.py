@@ -19,18 +19,12 @@ from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.measurements import (
-    InertialReading,
-    Measurement,
-    heading_of,
-)
+from wheel_terra_estimator.estimation.measurements import InertialReading, Measurement, heading_of
 
-SPACING = 0.02
-"""Way between two points of a track [m]."""
+SPACING = 0.02  # way between two points of a track [m]
 PAUSE = 1.0
 """Time after which a point is added without way [s]; also the longest step that is reckoned on."""
-ATTITUDE_PERIOD = 0.05
-"""Time between two attitudes that are kept [s]."""
+ATTITUDE_PERIOD = 0.05  # time between two attitudes that are kept [s]
 MOST_POINTS = 200_000
 """Points that are kept: 4 km without a gap; of a longer drive every second, fourth ... one."""
 _SECOND = 1e-9  # of a nanosecond

@@ -22,14 +22,16 @@ from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Channel, Recording
 from wheel_terra_estimator.checks.statistics import (
+    Trial,
     averaged,
     correlation,
     even_times,
+    halves,
     moving_mean,
     without_drift,
+    worst,
 )
 from wheel_terra_estimator.checks.transport import FUTURE
-from wheel_terra_estimator.checks.trial import Trial, halves, worst
 
 STEP = 0.05  # time between the values that are compared [s]
 LONGEST = {'imu': 2.0, 'reference': 3.0}  # greatest lag that is looked for [s]

@@ -101,13 +101,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run_one(arguments: argparse.Namespace) -> int:
-    from wheel_terra_estimator.bags import check_before
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.checks.finding import CheckReport
-    from wheel_terra_estimator.fleet.drive import replay_drive
+    from wheel_terra_estimator.fleet.drive import findings_as_lines, replay_drive
 
     def print_findings(checked: CheckReport) -> None:
-        for line in () if arguments.json else check_before.as_lines(checked):
+        for line in () if arguments.json else findings_as_lines(checked):
             print(line)
 
     (bag,) = arguments.bags

@@ -11,11 +11,9 @@ from yaml import YAMLError
 
 __all__ = ['YAMLError', 'load', 'load_texts']
 
-DEEPEST = 32
-"""Levels of a document; ROS parameter files have about five."""
+DEEPEST = 32  # levels of a document; ROS parameter files have about five
 
-MOST_VALUES = 20_000
-"""Keys and values of a document; the largest of ours has about 400."""
+MOST_VALUES = 20_000  # keys and values of a document; the largest of ours has about 400
 
 _EVENTS: Any = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)
 

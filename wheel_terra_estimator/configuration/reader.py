@@ -17,11 +17,7 @@ from typing import Any
 
 from wheel_terra_estimator.configuration import ros_yaml, shipped
 from wheel_terra_estimator.configuration.configuration import Configuration, law
-from wheel_terra_estimator.configuration.parameters import (
-    Parameter,
-    declared,
-    nearest,
-)
+from wheel_terra_estimator.configuration.parameters import Parameter, declared, nearest
 from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.configuration.soil_units import doubtful_units
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError

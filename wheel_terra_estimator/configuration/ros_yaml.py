@@ -28,8 +28,7 @@ Value: TypeAlias = 'Scalar | list[Any]'
 
 _TRUE = frozenset({'Y', 'y', 'yes', 'Yes', 'YES', 'true', 'True', 'TRUE', 'on', 'On', 'ON'})
 _FALSE = frozenset({'N', 'n', 'no', 'No', 'NO', 'false', 'False', 'FALSE', 'off', 'Off', 'OFF'})
-LONGEST_INTEGER = 24
-"""Digits, leading zeros too: those of 64 bits to the base 8, and the prefix."""
+LONGEST_INTEGER = 24  # digits, leading zeros too: those of 64 bits to the base 8, and the prefix
 
 _NULL = frozenset({'', '~', 'null', 'Null', 'NULL'})
 _INTEGER = re.compile(r'[+-]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)')

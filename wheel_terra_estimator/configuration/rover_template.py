@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.configuration.ros_yaml import Value, format_value
 
-DEFAULT_WIDTH_SHARE = 0.6
-"""Width over radius of a wheel whose width is not known [-]."""
+DEFAULT_WIDTH_SHARE = 0.6  # width over radius of a wheel whose width is not known [-]
 CENTRE_HEIGHT = 1.4
 """Height of a centre of gravity that is not known, over the wheel radius [-]: low four-wheel rovers
 have 1.3 to 1.4."""

@@ -19,11 +19,9 @@ from wheel_terra_estimator.output_folder import new_file
 _LATEST_STAMP = 2**63 - 1  # [ns]
 HEADER = 'Learned by the estimator on the drive; read at its next start.'
 """First line, as a comment, of every soil file."""
-STATE = '.state.json'
-"""Behind the name of a soil file: the file that keeps the warning."""
+STATE = '.state.json'  # behind the name of a soil file: the file that keeps the warning
 _COMMENT = f'{HEADER}\nWritten anew each time: keep nothing of your own in it.'
-_SECTIONS = ('soil.', 'sensors.')
-"""Of the keys that are written."""
+_SECTIONS = ('soil.', 'sensors.')  # of the keys that are written
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ LARGEST_FILE = 20_000_000  # [byte]
 DEEPEST_CHAIN = 1000
 BASE_LINKS = ('base_link', 'base_footprint')
 
-_UPRIGHT = 0.8
-"""Cosine between the axis of a joint that steers and the vertical, at least."""
+_UPRIGHT = 0.8  # cosine between the axis of a joint that steers and the vertical, at least
 
 Pose = FloatArray  # (4, 4)
 

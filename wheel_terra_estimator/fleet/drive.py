@@ -8,11 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from wheel_terra_estimator.bags.check_before import check_before
 from wheel_terra_estimator.bags.replay import DEFAULT, Options, Replay, replay
-from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.series_reader import read_series
+from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.bags.truth import Truth, read_truth
-from wheel_terra_estimator.checks.finding import CheckReport
+from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, CheckReport, shown
+from wheel_terra_estimator.checks.run import check_recording, run_apart
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import (
@@ -26,6 +27,8 @@ from wheel_terra_estimator.reporting.drive_summary import DriveSummary, summaris
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
 
 NO_SOIL = 'no soil was stated (--config): the default sand was the first guess, learned from there'
+
+QUICK_MESSAGES = 60_000  # messages of a topic that the checks before a replay look at
 
 
 @dataclass(frozen=True)
@@ -112,3 +115,27 @@ def summed_up(
         Border.of(configuration), result.taught,
     )  # fmt: skip
     return Drive(configuration, checked, result, truth, errors, summary)
+
+
+def check_before(bag: Bag, configuration: Configuration, remaps: Mapping[str, str]) -> CheckReport:
+    """Return what the checks found; nothing that fails there keeps the replay from its work."""
+    report = CheckReport()
+    recording = run_apart(
+        report,
+        'order',
+        None,
+        lambda: read_series(bag, remaps, bag.path.resolve().name, QUICK_MESSAGES),
+    )
+    return report if recording is None else check_recording(recording, configuration, tuple(remaps))
+
+
+def findings_as_lines(checked: CheckReport) -> list[str]:
+    """Return the lines of a terminal."""
+    return [
+        *(f'finding: {line}' for line in shown(checked.findings)),
+        *(
+            f'not checked: {entry.kind}: {entry.reason}'
+            for entry in checked.not_checked
+            if entry.reason == INTERNAL_ERROR
+        ),
+    ]

@@ -31,21 +31,15 @@ from wheel_terra_estimator.output_folder import (
     new_file,
     working_folder,
 )
-from wheel_terra_estimator.reporting.fleet_summary import (
-    DriveRow,
-    write_summary_page,
-    write_table,
-)
+from wheel_terra_estimator.reporting.fleet_summary import DriveRow, write_summary_page, write_table
 from wheel_terra_estimator.scheduler import finished
 from wheel_terra_estimator.terramechanics.effects import load_file
 
 SUMMARY_TABLE = 'summary.csv'
 SUMMARY_PAGE = 'summary.html'
 
-DIGEST_SIZE = 20
-"""Bytes of a digest: no two recordings have the same."""
-READ_AT_ONCE = 2**20
-"""Bytes of a recording that are read at a time for its digest."""
+DIGEST_SIZE = 20  # bytes of a digest: no two recordings have the same
+READ_AT_ONCE = 2**20  # bytes of a recording that are read at a time for its digest
 
 
 @dataclass(frozen=True)

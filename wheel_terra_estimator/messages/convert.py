@@ -43,8 +43,7 @@ INPUT_TYPES = {
 
 
 _FASTEST = 30.0  # lateral speed that no rover has [m/s]
-DAMAGED = 'damaged message'
-"""Why bytes are refused that are no message of their type."""
+DAMAGED = 'damaged message'  # why bytes are refused that are no message of their type
 _NO_WHEEL = 'none of the configured wheels in it'
 
 
@@ -81,8 +80,7 @@ def input_layout(configuration: Configuration) -> InputLayout:
         lateral_positions=wheels.y,
         slip_radius=wheels.slip_radius,
         imu_mounting=Rotation.from_euler(  # about fixed x, then y, then z, as in URDF
-            'xyz',
-            [sensors.imu_mounting_roll, sensors.imu_mounting_pitch, sensors.imu_mounting_yaw],
+            'xyz', [sensors.imu_mounting_roll, sensors.imu_mounting_pitch, sensors.imu_mounting_yaw]
         ),
         wheel_odometry=configuration.wheel_odometry,
     )

@@ -17,14 +17,11 @@ from wheel_terra_estimator.messages.fault_log import FaultLog
 OK, WARN, ERROR, STALE = range(4)
 
 NODE = 'wheel_terra_estimator'
-PERIOD = 1_000_000_000
-"""Time between two messages when no level changes [ns]."""
+PERIOD = 1_000_000_000  # time between two messages when no level changes [ns]
 
-NO_TIME_TO_STUCK = 600.0
-"""Time to an entrapment [s] that is said where none is in sight."""
+NO_TIME_TO_STUCK = 600.0  # time to an entrapment [s] that is said where none is in sight
 
-START = 1_000_000_000
-"""In the first second inputs may be on their way [ns]."""
+START = 1_000_000_000  # in the first second inputs may be on their way [ns]
 
 SMALLEST = 1e-12
 """Smaller numbers are written as 0: no unit of this package makes them anything else."""

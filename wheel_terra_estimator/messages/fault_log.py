@@ -8,8 +8,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-MEMORY = 10_000_000_000
-"""How long a fault stands in words after it was last seen [ns]."""
+MEMORY = 10_000_000_000  # how long a fault stands in words after it was last seen [ns]
 
 _NUMBER = re.compile(r'[0-9]+(\.[0-9]+)?')
 

@@ -21,8 +21,7 @@ from wheel_terra_estimator.estimation.timing.input_log import Estimator
 from wheel_terra_estimator.messages.convert import InputConverter, input_layout
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
 
-RESET = 'reset'
-"""Line of an arrival log for a call of ``~/reset``."""
+RESET = 'reset'  # line of an arrival log for a call of ``~/reset``
 
 
 class Pipeline:

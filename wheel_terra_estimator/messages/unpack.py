@@ -20,8 +20,7 @@ IMU = 'sensor_msgs/msg/Imu'
 ODOMETRY = 'nav_msgs/msg/Odometry'
 TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 
-TYPES = frozenset({JOINT_STATE, IMU, ODOMETRY, TWIST})
-"""Types that are unpacked here."""
+TYPES = frozenset({JOINT_STATE, IMU, ODOMETRY, TWIST})  # types that are unpacked here
 _STRINGS = {JOINT_STATE: 1, IMU: 1, ODOMETRY: 2, TWIST: 1}
 """Type -> strings between stamp and names or numbers."""
 _NUMBERS = {IMU: (0, 37), ODOMETRY: (43, 42), TWIST: (0, 42)}

@@ -37,13 +37,7 @@ from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages.convert import DAMAGED, INPUT_TYPES
-from wheel_terra_estimator.messages.diagnostics import (
-    ERROR,
-    NODE,
-    OK,
-    STALE,
-    Status,
-)
+from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, Status
 from wheel_terra_estimator.messages.pipeline import RESET, Pipeline
 from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
 from wheel_terra_estimator.ros import parameters

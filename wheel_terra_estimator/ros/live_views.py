@@ -25,10 +25,8 @@ from wheel_terra_estimator.ros.outputs import make_publisher, time_message
 
 MARKER_PERIOD = 200_000_000
 """Least time between two sets of markers [ns of stamps]: an eye sees no more."""
-LIFETIME = 2
-"""Markers of a node that says nothing more disappear after this time [s]."""
-ARROW_RADII = 3.0
-"""Length of the arrow of a pull as great as the wheel's load, in wheel radii."""
+LIFETIME = 2  # markers of a node that says nothing more disappear after this time [s]
+ARROW_RADII = 3.0  # length of the arrow of a pull as great as the wheel's load, in wheel radii
 SURFACE_THICKNESS = 0.004  # of the plate that shows the surface of the soil [m]
 SURFACE_SHARE = 1.5  # of the wheel's diameter and width
 ARROW_SHAFT, ARROW_HEAD = 0.08, 0.2  # diameters, in wheel radii

@@ -89,8 +89,7 @@ class Reading:
 Row = tuple[int, int, int, bytes]
 """Log time [ns], place in the file, channel and data of a message."""
 
-_ROW_SIZE = 250
-"""Memory that a row takes beside its data [byte]."""
+_ROW_SIZE = 250  # memory that a row takes beside its data [byte]
 
 
 class McapFile:

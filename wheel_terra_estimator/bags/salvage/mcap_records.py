@@ -25,15 +25,11 @@ MESSAGE_INDEX, CHUNK_INDEX, ATTACHMENT, STATISTICS = 0x07, 0x08, 0x09, 0x0B
 ATTACHMENT_INDEX, METADATA, METADATA_INDEX = 0x0A, 0x0C, 0x0D
 SUMMARY_OFFSET, DATA_END = 0x0E, 0x0F
 
-HEAD = 9
-"""Opcode and length [byte]."""
-MESSAGE_HEAD = 22
-"""Channel, sequence number, log time and publish time [byte]."""
-CHUNK_HEAD = 40
-"""Times, size, checksum and two lengths, without the name of the compression [byte]."""
+HEAD = 9  # opcode and length [byte]
+MESSAGE_HEAD = 22  # channel, sequence number, log time and publish time [byte]
+CHUNK_HEAD = 40  # times, size, checksum and two lengths, without the name of the compression [byte]
 
-LATEST = 2**63 - 1
-"""Latest log time [ns] that is one."""
+LATEST = 2**63 - 1  # latest log time [ns] that is one
 
 _EARLIEST = 10**18  # log time [ns] of a recording: the year 2001
 _LONGEST_WAY = 60 * 10**9  # from the publisher to the recorder [ns]
