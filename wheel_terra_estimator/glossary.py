@@ -7,7 +7,6 @@ from __future__ import annotations
 import csv
 import functools
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,13 +37,6 @@ def used_in(text: str) -> list[Term]:
         for term in terms()
         if any(re.search(rf'\b{re.escape(w)}\b', plain) for w in (term.term, term.also) if w)
     ]
-
-
-def as_markdown(chosen: Iterable[Term]) -> str:
-    """Return words as a list of the site."""
-    return '\n'.join(
-        f'- **{t.term}**{f" ({t.also})" if t.also else ""}: {t.meaning}' for t in chosen
-    )
 
 
 def as_text(word: str = '') -> str:

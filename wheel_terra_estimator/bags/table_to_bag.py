@@ -23,37 +23,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.messages import pack
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
-EXAMPLE = """\
-# Which column of the table is what. Units: see below; sign: -1 turns a value round.
-# Between the columns: comma, semicolon or tab; with the latter two, 0,5 is read as 0.5.
-time: {column: time, unit: s}             # s, ms, us or ns; any zero
-joint_states:                             # one entry per wheel, as in wheels.names
-  front_left:
-    velocity: {column: rpm_fl, unit: rpm} # rad/s, deg/s, rpm, rev/s, or m/s with radius: 0.15
-    effort: {column: torque_fl, unit: N m}  # N m or N mm; leave it out if there is none
-  front_right:
-    velocity: {column: rpm_fr, unit: rpm, sign: -1}
-    effort: {column: torque_fr, unit: N m, sign: -1}
-# front_left_steering:                    # a joint that steers (wheels.steering_joints)
-#   position: {column: angle_fl, unit: deg}  # rad or deg, positive left
-imu/data:                                 # leave out what there is not
-  linear_acceleration.x: {column: ax, unit: g}   # m/s^2 or g, with gravity
-  linear_acceleration.y: {column: ay, unit: g}
-  linear_acceleration.z: {column: az, unit: g}
-  angular_velocity.x: {column: gx, unit: deg/s}  # rad/s or deg/s
-  angular_velocity.y: {column: gy, unit: deg/s}
-  angular_velocity.z: {column: gz, unit: deg/s}
-# orientation.x: {column: qx}             # the quaternion, all four of x, y, z, w, if there is one
-# orientation.y: {column: qy}
-# orientation.z: {column: qz}
-# orientation.w: {column: qw}
-sinkage:
-  front_left: {column: sinkage_fl, unit: mm}     # m, cm or mm
-reference_odom:
-  linear.x: {column: gps_speed, unit: m/s}       # m/s or km/h; or positions, as below
-# position.x: {column: east, unit: m}            # with position.y; or latitude and longitude:
-# latitude: {column: lat, unit: deg}
-"""
+EXAMPLE = Path(__file__).with_name('columns_example.yaml').read_text(encoding='utf-8')
 
 _SI = {
     'time': 's',

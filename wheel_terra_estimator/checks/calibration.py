@@ -13,11 +13,12 @@ import numpy as np
 
 from wheel_terra_estimator.checks import geometry, imu, torque, turning
 from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, Evidence
+from wheel_terra_estimator.checks.faults import untold
 from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
 from wheel_terra_estimator.checks.run import examine
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.configuration.ros_yaml import Value, format_value
+from wheel_terra_estimator.configuration.ros_yaml import Value, as_text, format_value
 from wheel_terra_estimator.errors import UserError
 
 WORTH_CHANGING = 0.2  # relative change of a noise or rate that is written, at least [-]
@@ -25,12 +26,6 @@ NOISE_STD = 0.1  # relative deviation of a noise that a drive tells [-]
 LEAST_SURE = 0.8  # confidence from which a cure is written [-]
 CLEAR = 2.0  # deviations by which a number is off, from which another is written [-]
 BLUNT_REFERENCE = 0.005  # error of the radius by noise of the reference that is told [-]
-
-NO_CENTRE_OF_GRAVITY = NotChecked(
-    'mass',
-    'centre of gravity: a drive does not tell it (ruts shift the torques as much as the slope '
-    'does); weigh the axles on the level and on a ramp',
-)
 
 
 @dataclass(frozen=True)
@@ -75,7 +70,7 @@ def calibrate(
         _torques(changes, evidence)
         _friction(changes, evidence, report)
     _track(changes, evidence)
-    report.not_checked.append(NO_CENTRE_OF_GRAVITY)
+    report.not_checked.append(untold('mass', 'centre'))
     mended = {change.key for change in changes.made}
     rivals = ('mass', 'reference_scale' if 'wheels.radius' in mended else '')
     left = [f for f in report.findings if f.parameter not in mended and f.fault not in rivals]
@@ -235,17 +230,13 @@ def as_file(calibration: Calibration, configuration: Configuration, recording: s
     values = configuration.flat()
     keys = [key for key in values if key in configuration.stated or key in changes]
     keys += [key for key in changes if key not in values]
-    lines = [f'# Calibrated from the recording {recording}.', '#']
-    lines += ['# Not seen in it, and left as it was:'] if calibration.not_seen else []
-    lines += [f'#   {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
-    lines += ['/**:', '  ros__parameters:']
-    for key in keys:
-        told = changes.get(key)
-        value = told.after if told is not None else values[key]
-        if told is not None:
-            lines.append(f'    # {_in_words(told)}')
-        lines.append(f'    {key}: {format_value(_as_declared(value, values.get(key)))}')
-    return '\n'.join(lines) + '\n'
+    lines = [f'Calibrated from the recording {recording}.', '']
+    lines += ['Not seen in it, and left as it was:'] if calibration.not_seen else []
+    lines += [f'  {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
+    after = {key: changes[key].after if key in changes else values[key] for key in keys}
+    declared = {key: _as_declared(value, values.get(key)) for key, value in after.items()}
+    notes = {key: _in_words(change) for key, change in changes.items()}
+    return as_text(declared, '\n'.join(lines), notes)
 
 
 def _as_declared(value: Value, before: Value | None) -> Value:

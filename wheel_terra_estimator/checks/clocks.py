@@ -17,7 +17,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.faults import of_offset
+from wheel_terra_estimator.checks.faults import of_offset, untold
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Channel, Recording
@@ -162,8 +162,7 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
     channel = _channel(evidence, name)
     if not told.steady:
         off = ' and '.join(f'{late:+.2f} s' for late in told.halves)
-        reason = f'{channel.topic}: stamps run {off} off in the halves: a clock drifts; synchronise'
-        return NotChecked('delay', reason)
+        return untold('delay', 'drifts', topic=channel.topic, off=off)
     std = _whole_std(evidence, name, told)
     against = told.by + told.trial.words('unlike part', '')
     told_of = of_offset(name, told.value, std, against, evidence.facts)
@@ -177,9 +176,9 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
     """Return how late the IMU is after the wheels; turns and accelerations must not contradict."""
     imu, difference = evidence.recording.imu, evidence.side_difference
     if imu is None or evidence.gyro is None:
-        return NotChecked('delay', 'IMU against wheels: no IMU')
+        return untold('delay', 'no_imu')
     if evidence.period > SLOWEST:
-        return NotChecked('delay', 'IMU against wheels: the wheels are told too seldom')
+        return untold('delay', 'seldom')
     time, at = even_times(evidence.time, STEP), evidence.seconds(imu)
     turned = started = None
     if np.isfinite(difference).any():
@@ -196,13 +195,10 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
         started = lag_of(time, change, time, felt, 'imu', 'starts')
     best = turned or started
     if best is None:
-        return NotChecked('delay', 'IMU against wheels: no clear turns in it; drive a circle')
+        return untold('delay', 'no_turns')
     apart = 0.0 if turned is None or started is None else abs(turned.value - started.value)
     if started is not None and started.steady and apart > APART + 3.0 * best.std:
-        reason = (
-            f'IMU against wheels: turns and starts are {apart:.2f} s apart: no offset does that'
-        )
-        return NotChecked('delay', reason)
+        return untold('delay', 'unlike', apart=apart)
     evidence.figures['imu.delay_s'] = round(best.value, 3)
     return best
 
@@ -211,16 +207,16 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     """Return how late the reference is after the wheels, by starts and stops."""
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < 10:
-        return NotChecked('delay', 'no reference velocity in it (visual odometry, GNSS)')
+        return untold('delay', 'no_reference')
     time, at = even_times(evidence.time, STEP), evidence.seconds(reference)
     order = np.argsort(at, kind='stable')
     forward, rim = reference.velocity[order, 0], _even(evidence, evidence.rim, time)
     slow = time.size < 2 or float(np.median(np.diff(at[order]))) > SLOWEST
     if slow or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
-        return NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')
+        return untold('delay', 'no_change')
     told = lag_of(time - STEP, rim, at[order], forward, 'reference', 'speeds')  # means up to then
     if told is None:
-        return NotChecked('delay', 'reference: does not follow the wheels closely enough')
+        return untold('delay', 'does_not_follow')
     evidence.figures['reference.delay_s'] = round(told.value, 3)
     return told
 

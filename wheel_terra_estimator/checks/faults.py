@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wheel_terra_estimator.checks.finding import Finding
+from wheel_terra_estimator.checks.finding import Finding, NotChecked
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.configuration.parameters import plain_table
 
@@ -43,6 +43,7 @@ FAULTS = {
     for name, entry in plain_table(Path(__file__).with_name('faults.yaml')).items()
 }
 """The faults, worst first: one table for recordings and while driving."""
+NOT_CHECKED = plain_table(Path(__file__).with_name('not_checked.yaml'))  # by kind and reason
 RANK = {key: rank for rank, key in enumerate(FAULTS)}  # place of a fault, worst first
 
 
@@ -73,6 +74,11 @@ def found(
         cure=fault.cure.format(**figures),
         fault=key,
     )
+
+
+def untold(kind: str, why: str, **figures: Any) -> NotChecked:
+    """Return why a kind of fault was not checked, in the words of `not_checked.yaml`."""
+    return NotChecked(kind, NOT_CHECKED[kind][why].format(**figures))
 
 
 def of_offset(

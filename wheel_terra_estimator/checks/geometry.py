@@ -13,7 +13,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask
-from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, listed
+from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, listed, untold
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
@@ -41,7 +41,6 @@ RESISTANCE = Estimate(0.08, 0.05)  # of firm ground over the weight [-]
 UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)  # where no torque tells it [-]
 SOFT_DEPTH = 0.06  # sinkage over radius above which ground is not taken for firm [-]
 MOST_ROUNDING = 0.02  # error of the mean rate by rounding, over the working rate, at most [-]
-ROUNDED = 'rates are rounded to coarse steps, so their mean is off; publish more digits'
 SLOPE_OF_SLIP = Estimate(0.2, 0.2)  # slip over traction of firm ground [-]
 NOT_SEEN = Estimate(0.0, 1e3)  # the same where there are no slopes
 LEAST_SEEN = 0.5  # weight of the drive from which it tells its slip [-]
@@ -106,24 +105,23 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
     """
     reference, facts, figures = evidence.recording.reference, evidence.facts, evidence.figures
     if reference is None:
-        return NotChecked('radius', 'no reference velocity in it')
+        return untold('radius', 'no_reference')
     if not facts.known:
-        return NotChecked('radius', 'no rover file')
+        return untold('radius', 'no_file')
     if 'wheels.rad_per_count' in figures:
-        return NotChecked('radius', 'rates in counts: a radius looks like other counts per turn')
+        return untold('radius', 'counts')
     if rounding(evidence) > MOST_ROUNDING:
-        return NotChecked('radius', ROUNDED)
+        return untold('radius', 'rounded')
     speeds = _straight_speeds(evidence)
     if speeds is None:
-        return NotChecked('radius', 'no straight, steady stretch with a reference in it')
+        return untold('radius', 'no_straight')
     plain = speeds.ratio
     # No estimator is better than the mean of independent readings of the reference.
     bound = bend_noise(speeds.forward) / max(float(np.linalg.norm(speeds.rim)), 1e-6)
     figures['rover.radius_bound_by_reference_m'] = round(bound * float(np.mean(facts.radius)), 5)
     figures['rover.speed_over_rim_speed'] = round(plain.value, 4)
     if not OF_RADII[0] < plain.value < OF_RADII[1]:
-        reason = f'speed over rim speed is {plain.value:.2f}: stuck, or signs, unit or scale'
-        return NotChecked('radius', reason)
+        return untold('radius', 'far_off', ratio=plain.value)
     ratio = _without_slip(evidence, speeds, plain)
     if isinstance(ratio, NotChecked):
         return ratio
@@ -158,16 +156,12 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
         # Nothing but a larger radius makes a rover outrun its rolling wheels.
         return Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD))
     else:
-        return NotChecked('radius', 'no torque: a ratio of speeds may be slip')
+        return untold('radius', 'no_torque')
     depth = _depth(evidence).value
     middle = float(np.median(demand)) + resistance.value
     as_slip = (plain.value < 1.0) == (middle >= 0.0)  # downhill wheels skid: faster than the rims
     if as_slip and depth > SOFT_DEPTH:
-        return NotChecked(
-            'radius',
-            f'soft ground (sinkage {depth:.2f} of the radius): a ratio of speeds may be slip; '
-            'drive ten metres over firm ground',
-        )
+        return untold('radius', 'soft', depth=depth)
     seen = NOT_SEEN
     if demand.any():
         both = block_fit(
@@ -180,11 +174,7 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + seen.std**2)
     slope = max(weight * seen.value + (1.0 - weight) * SLOPE_OF_SLIP.value, 0.0)
     if as_slip and weight < LEAST_SEEN:
-        return NotChecked(
-            'radius',
-            'no slopes tell the slip of this ground, and a ratio of speeds may be slip; drive up '
-            'and down a slope, or measure ten metres with a tape',
-        )
+        return untold('radius', 'no_slopes')
     slip, skid = slope * middle, slope * resistance.value
     value = plain.value / (1.0 - slip) * (1.0 - 0.5 * skid)
     slope_std = math.sqrt(weight) * seen.std
@@ -202,11 +192,7 @@ def _resistance(evidence: Evidence, seen: float) -> Estimate | NotChecked:
     std = math.hypot(float(sensors.torque_zero_std) * arm, float(sensors.torque_gain_std) * seen)
     unlike = abs(seen - RESISTANCE.value) > 3.0 * math.hypot(std, RESISTANCE.std)
     if unlike or seen > SOFT_TRACTION:
-        return NotChecked(
-            'radius',
-            f'the torques ask for {seen:.2f} of the weight on the level: soft ground, or their '
-            'zero or scale is off; drive ten metres over firm ground',
-        )
+        return untold('radius', 'costly', seen=seen)
     share = RESISTANCE.std**2 / (RESISTANCE.std**2 + std**2)
     value = share * seen + (1.0 - share) * RESISTANCE.value
     return Estimate(max(value, 0.0), math.sqrt(share) * std)
@@ -262,8 +248,7 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not lopsided and (abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < RADIUS_SIGMAS):
         return [], evidence
     if not (trial.falls or lopsided):
-        reason = 'speed over rim speed is another in each half: drive ten metres over firm ground'
-        return [NotChecked('radius', reason)], evidence
+        return [untold('radius', 'halves')], evidence
     apart = sides.value * facts.side if lopsided else np.zeros(facts.side.size)
     scale, wheels = ratio.value * (1.0 + 0.5 * apart), facts.configuration.wheels
     rims = facts.radius * scale - (wheels.slip_radius - wheels.radius)  # lugs stay
@@ -358,12 +343,12 @@ def track_ratio(evidence: Evidence) -> Told | NotChecked:
     """Return effective over configured track from the gyro and the difference of the sides."""
     facts, difference = evidence.facts, evidence.side_difference
     if evidence.gyro is None or not facts.known or not facts.has_sides():
-        return NotChecked('track', 'no IMU, or sides not known')
+        return untold('track', 'no_sides')
     rows = evidence.turning & np.isfinite(difference)
     yaw, difference = evidence.yaw[rows], difference[rows]
     clear = rows.sum() > 60 and correlation(yaw, difference) > CLEAR_TURN
     if not clear or float(np.quantile(np.abs(evidence.gyro[:, 2]), 0.95)) < LEAST_TURN_RATE:
-        return NotChecked('track', 'no clear turn in it; drive a circle both ways')
+        return untold('track', 'no_turn')
     track = stated_track(evidence)
 
     turns = np.column_stack([yaw, np.ones(yaw.size)])[:, : 1 if evidence.rested else 2]
@@ -377,7 +362,7 @@ def track_ratio(evidence: Evidence) -> Told | NotChecked:
         ratio = Estimate(ratio.value, math.hypot(ratio.std, STEERED_STD * ratio.value))
     trial = tried(lambda part: fitted(part).value, 1.0, yaw**2)
     if abs(ratio.value - 1.0) > LEAST_TRACK_ERROR and not trial.falls:
-        return NotChecked('track', 'the turns of both halves of the drive need different tracks')
+        return untold('track', 'halves')
     return Told(ratio, trial)
 
 
@@ -391,8 +376,7 @@ def rolling_track(evidence: Evidence) -> Told | NotChecked:
         return told
     soft = evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
     if soft or _depth(evidence).value > SOFT_DEPTH or turning.left_in_turns(evidence) > MOST_UNLIKE:
-        reason = 'wheels slip in turns, whatever the track; drive circles on firm ground'
-        return NotChecked('track', reason)
+        return untold('track', 'slip_in_turns')
     speeds, ratio = _straight_speeds(evidence), told.ratio
     slip = UNSEEN_SLIP if speeds is None else speeds.ratio.value - 1.0
     seen = Estimate(ratio.value, math.hypot(ratio.std, slip))
@@ -403,9 +387,9 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     """Return a track that the turns contradict."""
     figures = evidence.figures
     if 'wheels.rad_per_count' in figures:
-        return [NotChecked('track', 'rates in counts: a track looks like other counts per turn')]
+        return [untold('track', 'counts')]
     if rounding(evidence) > MOST_ROUNDING:
-        return [NotChecked('track', ROUNDED)]
+        return [untold('track', 'rounded')]
     told = track_ratio(evidence)
     if isinstance(told, NotChecked):
         return [told]
@@ -413,8 +397,7 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     figures['rover.effective_over_stated_track'] = round(ratio.value, 3)
     figures['rover.effective_track_m'] = round(ratio.value * stated, 4)
     if turning.skids(evidence):
-        skid = f'the wheels skid in turns as if the track were {ratio.value * stated:.3f} m'
-        return [NotChecked('track', f'{skid}: no recording tells it; measure it with a tape')]
+        return [untold('track', 'skids', track=ratio.value * stated)]
     rolling = rolling_track(evidence)
     if isinstance(rolling, NotChecked):
         return [NotChecked(kind, rolling.reason) for kind in ('track', 'radius')]

@@ -17,9 +17,9 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, LONGEST_GAP, Evidence
-from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
+from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed, untold
 from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS, felt_senses, felt_yaw
-from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.finding import Finding, Outcome
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
     DRIFT,
@@ -111,9 +111,7 @@ Judged = tuple[list[Outcome], ImuState]
 def check_imu(state: ImuState) -> Judged:
     """Return what the IMU says against itself, and the recording with that mended."""
     if state.recording.imu is None or state.imu.stamp.size < LEAST_MESSAGES:
-        none: list[Outcome] = [
-            NotChecked(kind, 'hardly any IMU message in it') for kind in ('mounting', 'gravity')
-        ]
+        none: list[Outcome] = [untold(kind, 'no_imu') for kind in ('mounting', 'gravity')]
         return none, replace(state, usable_force=False, usable_gyro=False)
     outcomes, state = _placeholders(state)
     force, gyro = 'usable_force', 'usable_gyro'
@@ -162,8 +160,7 @@ def _placeholders(state: ImuState) -> Judged:
             outcomes.append(state.found('force_zero', 0.999, field=field))
         elif not there:
             of, tells = ('gravity', 'slope and load') if name == 'force' else ('sign', 'turns')
-            reason = f'the IMU has no {field}, or says so: nothing tells {tells}'
-            outcomes.append(NotChecked(of, reason))
+            outcomes.append(untold(of, f'{name}_missing', field=field, tells=tells))
     state = replace(state, **usable)
     known = np.isfinite(imu.orientation).all(axis=1)
     orientation = imu.orientation[known]
@@ -227,8 +224,7 @@ def _gravity(state: ImuState) -> Judged:
     for place, there in GRAVITIES.items():
         if abs(size / there - 1.0) <= GRAVITY_TOLERANCE:
             return told('planet', there, place=place), replace(state, gravity=there)
-    reason = f'mean specific force is {size:.3g}, gravity {gravity:.4g} m/s^2: scale, or gravity'
-    return [NotChecked('gravity', reason)], state
+    return [untold('gravity', 'unlike', size=size, gravity=gravity)], state
 
 
 def _against_orientation(state: ImuState) -> Judged:
@@ -421,8 +417,7 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [told_of], replace(evidence, force=evidence.force * signs)
     seen = yaw_of_imu(evidence)
     if seen is None:
-        reason = 'yaw of the IMU: no lively starts and stops in it'
-        return [NotChecked('mounting', reason)], evidence
+        return [untold('mounting', 'no_starts')], evidence
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
         return [], evidence
@@ -480,15 +475,13 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     tilt = small_tilt(evidence)
     if tilt is None:
-        reason = 'no full circle in it: mounting not told from slope; drive a circle both ways'
-        return [NotChecked('mounting', reason)], evidence
+        return [untold('mounting', 'no_circle')], evidence
     std = math.degrees(tilt.std)
     evidence.figures['imu.tilt_roll_deg'] = round(math.degrees(tilt.roll.value), 3)
     evidence.figures['imu.tilt_pitch_deg'] = round(math.degrees(tilt.pitch.value), 3)
     evidence.figures['imu.tilt_std_deg'] = round(std, 3)
     if not tilt.std <= EVEN_GROUND_STD:  # nan: an axis without a number
-        reason = 'the circles lie on uneven ground or on the edge of a slope; drive them on a plane'
-        return [NotChecked('mounting', reason)], evidence
+        return [untold('mounting', 'uneven')], evidence
     size = math.hypot(tilt.roll.value, tilt.pitch.value)
     if size < LEAST_MOUNTING or tilt.sigmas < 4.0:
         return [], evidence
@@ -557,8 +550,7 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
             outcomes.append(evidence.found('imu_noise', confidence(noise / stated), **told))
     seen = gyro_bias(evidence)
     if seen is None:
-        reason = f'IMU: no standstill of {LEAST_STANDSTILL:g} s in it; stand still for 10 s'
-        return [*outcomes, NotChecked('zero', reason)]
+        return [*outcomes, untold('zero', 'no_rest', least=LEAST_STANDSTILL)]
     bias, std = seen
     evidence.figures['imu.gyro_bias_rad_s'] = [float(f'{b:.3g}') for b in bias]
     worst = int(np.argmax(np.abs(bias)))

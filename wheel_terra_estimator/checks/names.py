@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.checks.faults import found
-from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.faults import found, untold
+from wheel_terra_estimator.checks.finding import Finding, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 
@@ -66,7 +66,7 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     """Return wheels that are absent from the recording, and the facts with the names it has."""
     joints = recording.joints
     if joints is None:
-        return [NotChecked('missing_wheel', 'no joint states in the recording')], facts
+        return [untold('missing_wheel', 'no_joints')], facts
     if not facts.known:
         return [], facts
     silent = {

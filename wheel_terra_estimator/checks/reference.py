@@ -10,7 +10,8 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
-from wheel_terra_estimator.checks.finding import NotChecked, Outcome
+from wheel_terra_estimator.checks.faults import untold
+from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.series import VelocitySeries
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,
@@ -114,8 +115,7 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         mended = evidence.with_channel('reference', velocity=along)
         return [evidence.found('reference_world', 0.95)], mended
     if in_body < STEADY:
-        reason = 'reference: its direction keeps neither to the rover nor to the world'
-        return [NotChecked('mounting', reason)], evidence
+        return [untold('mounting', 'reference_frame')], evidence
     return [], evidence
 
 
@@ -148,8 +148,8 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     fitting = reference_units(ratio)
     near = {unit: f for unit, f in fitting.items() if abs(ratio / f - 1.0) < WITHOUT_SLIP}
     if len(fitting) > 1 and not near:  # which of them, the slip hides
-        reason = f'{ratio:.3g} times the rim speed: {" or ".join(fitting)}, or its scale'
-        return [NotChecked('unit', f'reference: {reason}; drive on firm ground')], evidence
+        several = ' or '.join(fitting)
+        return [untold('unit', 'reference_several', ratio=ratio, units=several)], evidence
     fitting = near or fitting
     for unit, factor in fitting.items():
         told = {'value': 1.0 / factor, 'ratio': ratio, 'unit': unit}
@@ -180,7 +180,7 @@ def check_jumps(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return velocities that leave their neighbours, and the evidence with these made calm."""
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < LEAST_REFERENCES:
-        return [NotChecked('jumps', 'hardly any reference velocity in it')], evidence
+        return [untold('jumps', 'few')], evidence
     forward, at = reference.velocity[:, 0], evidence.seconds(reference)
     off, speed = lonely(forward[:, None])[:, 0], float(np.quantile(np.abs(forward), 0.8))
     usual = max(robust_std(np.diff(forward)), 1e-6)
@@ -200,7 +200,7 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     """Compare the stated variance with the scatter of the velocity."""
     reference = evidence.recording.reference
     if reference is None:
-        return [NotChecked('covariance', 'no reference velocity in it (visual odometry, GNSS)')]
+        return [untold('covariance', 'no_reference')]
     forward = reference.velocity[:, 0]
     if reference.stamp.size < LEAST_REFERENCES or not np.ptp(forward):
         return []  # no reading of a speed

@@ -92,10 +92,10 @@ def from_names(joints: Sequence[str]) -> RoverFacts:
     """Return what the names of joints suggest: which are wheels, and where they are."""
     names = wheel_names(joints)
     count = len(names)
+    nowhere: dict[str, Any] = {'rover.suspension': 'shares'}  # rigid needs places
+    nowhere['wheels.names'] = [f'wheel_{i}' for i in range(max(count, 1))]
     return RoverFacts(
-        configuration=reader.from_parameters(
-            {'wheels.names': [f'wheel_{i}' for i in range(max(count, 1))]}, complete=False
-        ),
+        configuration=reader.from_parameters(nowhere, complete=False),
         known=False,
         names=names,
         side=np.array([side_of(name) for name in names], dtype=float),

@@ -34,7 +34,7 @@ from wheel_terra_estimator.checks import (
     wheel_rates,
 )
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, gather
-from wheel_terra_estimator.checks.faults import RANK, found
+from wheel_terra_estimator.checks.faults import RANK, found, untold
 from wheel_terra_estimator.checks.finding import (
     INTERNAL_ERROR,
     CheckReport,
@@ -145,7 +145,7 @@ def _examined(
     recording = mended('placeholder', stamped, lambda: _whole_rows(stamped))
     evidence = against_each_other(recording, facts, AGAINST_EACH_OTHER, mended)
     if evidence is None:
-        report.not_checked.append(NotChecked('sign', 'no wheel rates to compare with'))
+        report.not_checked.append(untold('sign', 'no_rates'))
     if not report.findings and not _drives(evidence):
         topic = recording.joints.topic if recording.joints is not None else ''
         report.take([found('no_drive', topic, 0.99)])

@@ -12,8 +12,8 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, row_medians
-from wheel_terra_estimator.checks.faults import listed
-from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.faults import listed, untold
+from wheel_terra_estimator.checks.finding import Finding, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import SinkageSeries
 from wheel_terra_estimator.checks.statistics import bend_noise, correlation, halves
@@ -30,41 +30,28 @@ ALIKE_SHARE = 0.4  # change of an offset over a drive that is still a zero, as a
 DEEP_STD = 0.02  # deviation of a zero of all wheels: their true sinkage [m]
 ODD_ZERO = 0.01  # A wheel that reads this much less or more than every other of its side [m] is odd
 
-ORDER = NotChecked(
-    'exchanged_wheels',
-    'order of the sinkage sensors: a drive does not tell it; lift one wheel after the other and '
-    'see which reading changes',
-)
-
-STAMPS = NotChecked(
-    'delay',
-    'sinkage: no motion tells its stamps; those ahead of their arrival are told, the others: '
-    'synchronise the clocks',
-)
-
 
 def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return what is wrong with the sinkage readings, and the evidence with their signs mended."""
     sinkage = evidence.recording.sinkage
     if sinkage is None:
-        return [NotChecked('zero', 'no sinkage in the recording')], evidence
-    outcomes: list[Outcome] = [ORDER, STAMPS]
+        return [untold('zero', 'no_sinkage')], evidence
+    outcomes: list[Outcome] = [untold('exchanged_wheels', 'sinkage_order')]
+    outcomes.append(untold('delay', 'sinkage'))
     names, table = without_stated_errors(evidence.facts, sinkage)
     few = not names or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS
     if few or not np.nan_to_num(table).any():
-        reason = 'hardly any readings' if few else '0 in every message: firm ground, or nothing'
-        kind = 'zero' if few else 'placeholder'
-        return [*outcomes, NotChecked(kind, f'sinkage: {reason}')], evidence
+        why = ('zero', 'sinkage_few') if few else ('placeholder', 'sinkage_zero')
+        return [*outcomes, untold(*why)], evidence
     unit, table = _unit(evidence, table)
     middle = np.array([_median(column) for column in table.T])
     evidence.figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
     evidence.figures['sinkage.noise_m'] = noise = float(f'{_reading_noise(table):.3g}')
     facts = evidence.facts
     if facts.known and noise > ANOTHER_UNIT * float(facts.sensors.sinkage_std):
-        reason = f'sinkage scatters by {noise:.2g} m: noise, or another unit; drive in soft ground'
         unknown = np.full_like(sinkage.sinkage, np.nan)  # zeros and signs would be those of noise
         mended = evidence.with_channel('sinkage', sinkage=unknown)
-        return [*outcomes, *unit, NotChecked('unit', reason)], mended
+        return [*outcomes, *unit, untold('unit', 'sinkage_scatters', noise=noise)], mended
     told = _sign_and_zero(evidence, names, table, middle)
     outcomes += [*unit, *told]
     known = sinkage.sinkage
@@ -144,7 +131,7 @@ def _sign_and_zero(
         return [either, replace(zero, confidence=0.45)]
     outcomes: list[Outcome] = []
     if np.nanmedian(np.abs(middle)) < limit:
-        outcomes.append(NotChecked('sign', 'sinkage: hardly any in it; drive where it is soft'))
+        outcomes.append(untold('sign', 'sinkage_shallow'))
     for index, name in enumerate(names):
         others, own = np.delete(middle, index), float(middle[index])
         if others.size < 2 or not np.isfinite(own):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from wheel_terra_estimator.checks.evidence import (
     SETTLING,
     Evidence,
 )
-from wheel_terra_estimator.checks.faults import listed
+from wheel_terra_estimator.checks.faults import listed, untold
 from wheel_terra_estimator.checks.felt_motion import felt_yaw
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
@@ -62,19 +63,19 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return what is wrong with the torques."""
     known = np.isfinite(evidence.torque).any(axis=0)
     if not known.any():
-        return _not_told('no torque in it (effort is empty or nan)'), evidence
+        return _not_told('no_torque'), evidence
     if not np.nan_to_num(evidence.torque).any():
         blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
         return [evidence.found('torque_placeholder', 0.99)], blank
     unsigned = [] if evidence.force is None else _unsigned(evidence)
     if unsigned:
         blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
-        return [*unsigned, *_not_told('a torque without a sign')], blank
+        return [*unsigned, *_not_told('no_sign')], blank
     outcomes, evidence = _signs(evidence)
     if not evidence.facts.known or evidence.force is None:
         return outcomes, evidence
     if not known.all():
-        return [*outcomes, *_not_told('a wheel without torque: the sum is not known')], evidence
+        return [*outcomes, *_not_told('not_all')], evidence
     odd, evidence = _odd_scale(evidence)
     outcomes += odd
     zeros = torque_zeros(evidence)
@@ -92,8 +93,8 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [*outcomes, *_gain(evidence), *wrong], evidence
 
 
-def _not_told(reason: str) -> list[Outcome]:
-    return [NotChecked(kind, reason) for kind in ('gain', 'mass')]
+def _not_told(why: str, **figures: float) -> list[Outcome]:
+    return [untold(kind, why, **figures) for kind in ('gain', 'mass')]
 
 
 def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -103,7 +104,7 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """
     facts, told = evidence.facts, answers(evidence)
     if told is None:
-        return [NotChecked('sign', 'torque: neither slope nor start without a turn')], evidence
+        return [untold('sign', 'torque_no_change')], evidence
     usual = float(np.median([abs(answer.value) for answer, _ in told]))
     agree = all(answer.value * level.value > 0.0 for answer, level in told)
     wrong, unsure = [], []
@@ -115,8 +116,8 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             wrong.append(i)
         elif brakes:
             unsure.append(facts.names[i])
-    reason = f'torque of {", ".join(unsure)}: zero, or wheels push against each other; stop and go'
-    outcomes: list[Outcome] = [NotChecked('sign', reason)] if unsure else []
+    why = untold('sign', 'torque_unsure', wheels=', '.join(unsure))
+    outcomes: list[Outcome] = [why] if unsure else []
     if not wrong:
         return outcomes, evidence
     torque = evidence.torque.copy()
@@ -168,10 +169,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts, rows = evidence.facts, evidence.straight
     assert evidence.force is not None
     if rows.sum() < LEAST_MOVING_ROWS:
-        reason = (
-            'torque: no straight, steady stretch in it: wheels push against each other in turns'
-        )
-        return [NotChecked('gain', reason)], evidence
+        return [untold('gain', 'no_straight')], evidence
     level = (thrust(evidence) - facts.mass * evidence.force[:, 0]) * np.sign(evidence.rim)
     traction = _middle_mean(level[rows]) / (facts.mass * facts.gravity)
     evidence.figures['torque.level_traction'] = round(traction, 4)
@@ -180,14 +178,13 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [finding], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
     size = _middle_mean(np.abs(thrust(evidence)[rows])) / (facts.mass * facts.gravity)
     if traction < LEAST_TRACTION < size:
-        reason = 'torque: does not fit the slopes: mounting of the IMU, or zeros of the torques'
-        return _not_told(reason), evidence
+        return _not_told('unlike_slopes'), evidence
     open_to = 1.0 + 3.0 * float(facts.sensors.torque_gain_std)
     if size >= LEAST_TRACTION and traction <= MOST_TRACTION * open_to:
         return [], evidence
     seen = traction if size >= LEAST_TRACTION else size
     finding = evidence.found('torque_scale', 0.8, traction=seen)
-    return [finding, NotChecked('mass', 'torques have no credible scale')], evidence
+    return [finding, untold('mass', 'no_scale')], evidence
 
 
 def _middle_mean(values: FloatArray) -> float:
@@ -213,7 +210,7 @@ def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
     """Return the scale of the torques by slopes, and its trial on halves, or why not."""
     rows = evidence.straight
     if evidence.force is None or rows.sum() < 3 * LEAST_MOVING_ROWS:
-        return NotChecked('gain', 'torque: hardly any straight, steady stretch in it')
+        return untold('gain', 'few_straights')
     # Noise of a regressor makes a slope look flat: both sides are means over the same time.
     along = moving_mean(evidence.force[:, 0], SMOOTH_ROWS)[rows]
     pushed = moving_mean(thrust(evidence), SMOOTH_ROWS)[rows]
@@ -221,12 +218,10 @@ def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
     down, up = np.quantile(along * sense, (0.05, 0.95))
     scatter = float(np.std(along))
     if scatter < LEAST_SLOPE_STD or max(down, -up) > -UP_AND_DOWN:
-        steepest, there = max(up, -down), 'no slopes'
-        if steepest > UP_AND_DOWN:
-            by = math.degrees(steepest / evidence.facts.gravity)
-            there = f'slopes to one side alone, by {by:.1f} degrees,'
-        reason = f'torque: {there} in it; drive up and down 5 to 10 degrees'
-        return NotChecked('gain', reason)
+        steepest = max(up, -down)
+        if steepest <= UP_AND_DOWN:
+            return untold('gain', 'no_slopes')
+        return untold('gain', 'one_way', by=math.degrees(steepest / evidence.facts.gravity))
     columns = [evidence.facts.mass * along, sense]
     if (sense > 0).any() and (sense < 0).any():
         columns.append(np.ones(along.size))
@@ -270,8 +265,7 @@ def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     gain[wheel] = math.exp(float(apart[wheel].mean()))
     if 2.0 * far.min() > far.max():
         both = ' and '.join(facts.names[i] for i in pair)
-        reason = f'torque of {both}: another scale of one, or another load; lift and turn them'
-        return [NotChecked('gain', reason)], evidence
+        return [untold('gain', 'one_of_two', wheels=both)], evidence
     whole = whole_gain(evidence, 1.0) * gain
     mended = evidence.with_rate(evidence.rate, evidence.torque / gain)
     again = slope_fit(mended)
@@ -311,14 +305,9 @@ def torque_gain(evidence: Evidence) -> Slopes | NotChecked:
     traction = evidence.figures.get('torque.level_traction', 1.0)
     traction = max(traction, traction / max(fit.gain.value, 1e-3))  # with this scale as well
     if traction > SOFT_TRACTION:
-        return NotChecked(
-            'gain', f'torque: soft ground (it costs {traction:.2f} of the weight); drive on firm'
-        )
+        return untold('gain', 'soft', traction=traction)
     if abs(fit.gain.value - 1.0) > LEAST_GAIN_ERROR and not fit.trial.falls:
-        return NotChecked(
-            'gain',
-            'torque: its scale by one half of the drive does not fit the slopes of the other',
-        )
+        return untold('gain', 'halves')
     apart = min(0.5 * fit.trial.after, 1.0)
     # A body that digs in reads uphill where thrust rises: slopes seem to cost less, never more.
     tilt = RUT_TILT * traction**2 * evidence.facts.gravity / fit.scatter
@@ -329,7 +318,7 @@ def torque_gain(evidence: Evidence) -> Slopes | NotChecked:
 def _gain(evidence: Evidence) -> list[Outcome]:
     facts, fit = evidence.facts, torque_gain(evidence)
     if isinstance(fit, NotChecked):
-        return _not_told(fit.reason)
+        return [fit, replace(fit, kind='mass')]
     gain, std = fit.gain
     evidence.figures['torque.gain'] = round(gain, 4)
     evidence.figures['torque.gain_std'] = round(std, 4)
@@ -338,9 +327,7 @@ def _gain(evidence: Evidence) -> list[Outcome]:
     open_yet = facts.sensors.torque_gain_std  # by the rover file
     sigmas = Estimate(gain, math.hypot(std, open_yet)).sigmas_from(1.0)
     if sigmas < GAIN_SIGMAS:
-        return _not_told(
-            f'torque: {gain:.2f} +- {std:.2f} is within this and what the rover file leaves open'
-        )
+        return _not_told('left_open', gain=gain, std=std)
     whole = whole_gain(evidence, gain)
     middle, mass = float(np.mean(whole)), facts.mass * gain
     words = {'gain': gain, 'off': std, 'mass': mass, 'gains': listed(whole, '.3f')}
@@ -414,8 +401,7 @@ def drive_friction(evidence: Evidence) -> Estimate | NotChecked:
     """
     rows = evidence.in_air
     if rows.sum() < LEAST_MOVING_ROWS:
-        reason = 'drive friction: let the wheels turn in the air for ten seconds, both ways'
-        return NotChecked('zero', reason)
+        return untold('zero', 'in_air')
     sense = np.sign(evidence.rate[rows])
     ways = (sense > 0).any(axis=1).sum(), (sense < 0).any(axis=1).sum()
     both = min(ways) > LEAST_BACK_ROWS
@@ -436,8 +422,7 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     driving = float(np.nanmedian(np.abs(evidence.torque[evidence.moving])))
     if zeros is None:
         if rest.sum() < LEAST_MOVING_ROWS:
-            reason = 'torque: neither standstill nor both ways in it; stand still, drive back'
-            return [NotChecked('zero', reason)]
+            return [untold('zero', 'torque_no_rest')]
         # Standing wheels are wound up against each other, otherwise at each stop; only an odd one
         # out is told.
         stops = [np.nanmedian(evidence.torque[i:j], axis=0) for i, j in runs(rest)]

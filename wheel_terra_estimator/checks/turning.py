@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
-from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS, listed
+from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS, listed, untold
 from wheel_terra_estimator.checks.felt_motion import felt_senses, felt_yaw
-from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.finding import Finding, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
@@ -275,9 +275,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts = evidence.facts
     there, rows = _known(evidence)
     if rows.sum() < LEAST_MOVING_ROWS or not there.size:
-        reason = 'the rover hardly moves in it; drive straight, then circles'
         kinds = ('sign', 'swapped_sides', 'exchanged_wheels')
-        return [NotChecked(kind, reason) for kind in kinds], evidence
+        return [untold(kind, 'hardly_moves') for kind in kinds], evidence
     outcomes: list[Outcome] = []
     chosen = _chosen(evidence, there, rows)
     signs, turn, mended = chosen.signs, chosen.track, evidence
@@ -285,10 +284,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         finding, mended = _exchanged(evidence, chosen)
         outcomes.append(finding)
     if not turn:
-        reason = 'no turn in it, or no IMU: left and right not checked; drive a circle both ways'
-        if not facts.known:
-            reason = 'left and right need the places of the wheels: a rover file (wheel-terra init)'
-        outcomes += [NotChecked(kind, reason) for kind in ('swapped_sides', 'exchanged_wheels')]
+        why = 'no_turn' if facts.known else 'no_places'
+        outcomes += [untold(kind, why) for kind in ('swapped_sides', 'exchanged_wheels')]
     told = _told_direction(mended, signs)
     blame = _blame(told, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
     if blame == 'wheels':
@@ -495,7 +492,7 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     ratio = track_ratio(evidence)
     if ratio is None:
-        return [NotChecked('unit', 'gyro: no clear turn in it; drive a circle')], evidence
+        return [untold('unit', 'gyro_no_turn')], evidence
     # Of exchanged wheels the sides turn alike, but not the wheels of a side.
     scaled = GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]
     if not scaled or left_in_turns(evidence) > MOST_SCALED:

@@ -13,8 +13,8 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask, row_medians
-from wheel_terra_estimator.checks.faults import RATE_UNITS, listed
-from wheel_terra_estimator.checks.finding import NotChecked, Outcome
+from wheel_terra_estimator.checks.faults import RATE_UNITS, listed, untold
+from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, hardly_moves
 from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import correlation, lonely, robust_std, runs, step_of
@@ -168,12 +168,11 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return the unit of the rates where speeds or turns tell it is not rad/s."""
     facts = evidence.facts
     if not facts.known:
-        return [NotChecked('unit', 'wheel rates: no radius without a rover file')], evidence
+        return [untold('unit', 'no_radius')], evidence
     ratio, how = _speed_ratio(evidence), 'speed of the reference'
     track = turning.track_ratio(evidence)
     if ratio is None and track is None:
-        reason = 'wheel rates: neither reference nor turn in it; drive a circle'
-        return [NotChecked('unit', reason)], evidence
+        return [untold('unit', 'no_speed')], evidence
     turns = track is not None and abs(track) > LEAST_ROLLING_TRACK  # as rad/s do
     radius, known = float(np.nanmean(facts.radius)), dict(RATE_UNITS)
     if not turns and radius < LARGE_WHEEL:  # else too near to rad/s

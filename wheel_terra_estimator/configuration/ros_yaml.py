@@ -179,10 +179,19 @@ def flatten(parameters: Mapping[str, Any], source: str, prefix: str = '') -> dic
 
 def write(path: Path, values: Mapping[str, Value], comment: str = '') -> None:
     """Write a parameter file for any node name, with a comment on top."""
+    path.write_text(as_text(values, comment), encoding='utf-8')
+
+
+def as_text(
+    values: Mapping[str, Value], comment: str, notes: Mapping[str, str] | None = None
+) -> str:
+    """Return the text of a parameter file; ``notes``: key -> comment above it."""
     lines = [f'# {line}'.rstrip() for line in comment.splitlines()]
     lines += ['/**:', '  ros__parameters:']
-    lines += [f'    {key}: {format_value(value)}' for key, value in values.items()]
-    path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    for key, value in values.items():
+        lines += [f'    # {notes[key]}'] if notes and key in notes else []
+        lines.append(f'    {key}: {format_value(value)}')
+    return '\n'.join(lines) + '\n'
 
 
 def format_value(value: Value) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from wheel_terra_estimator.configuration.parameters import declared
-from wheel_terra_estimator.configuration.ros_yaml import Value, format_value
+from wheel_terra_estimator.configuration.ros_yaml import Value, as_text, format_value
 
 DEFAULT_WIDTH_SHARE = 0.6  # width over radius of a wheel whose width is not known [-]
 CENTRE_HEIGHT = 1.4
@@ -57,19 +57,16 @@ def rover_file(sketch: RoverSketch) -> str:
         values['wheels.steering_joints'] = list(sketch.steering_joints)
     values['wheels.passes'] = passes(sketch.x, sketch.y)
     table = declared()
-    lines = [f'# {sketch.name}: made by `wheel-terra init`', '#']
-    lines += [f'# Source: {sketch.source}.'] if sketch.source else []
-    lines += [
-        '# Next: wheel-terra check RECORDING --config THIS_FILE, then wheel-terra calibrate.',
-        '/**:',
-        '  ros__parameters:',
-    ]
-    for key, value in values.items():
+    comment = f'{sketch.name}: made by `wheel-terra init`\n\n'
+    comment += f'Source: {sketch.source}.\n' if sketch.source else ''
+    comment += 'Next: wheel-terra check RECORDING --config THIS_FILE, then wheel-terra calibrate.'
+    notes = {}
+    for key in values:
         unit = table[key].unit
-        words = f'{table[key].meaning}' + (f' [{unit}]' if unit not in ('', '-') else '')
         mark = 'A GUESS, to be measured: ' if key in sketch.guessed else ''
-        lines += [f'    # {mark}{words}', f'    {key}: {format_value(value)}']
-    lines += ['', '    # Worth stating where known (the values are the defaults):']
+        notes[key] = f'{mark}{table[key].meaning}' + (f' [{unit}]' if unit not in ('', '-') else '')
+    lines = [as_text(values, comment, notes)]
+    lines += ['    # Worth stating where known (the values are the defaults):']
     for key in _WORTH_STATING:
         parameter = table[key]
         default = parameter.default
