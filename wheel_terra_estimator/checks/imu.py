@@ -368,7 +368,8 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     target = force[:, :2] / float(np.median(force[:, 2]))
     along, across = block_fit(design.reshape(-1, 4), target.ravel())[:2]
     facts = evidence.facts
-    floor = math.hypot(FLAT_TURN_STD, facts.sensors.specific_force_bias_std / facts.gravity)
+    open_bias = facts.sensors.specific_force_bias_std if facts.known else 0.0
+    floor = math.hypot(FLAT_TURN_STD, open_bias / facts.gravity)
     turns = np.column_stack([yaw, np.ones(yaw.size)])[turning, : 2 if seen is None else 1]
     tilt = np.array([along.value, across.value])
     # A sensor whose x axis points up by p reads +g sin p on x; one rolled by q reads -g sin q on y.
