@@ -175,6 +175,22 @@ def test_a_report_in_an_output_folder_is_listed(tmp_path):
     assert set(contents(out)) == {'report.json', 'below/picture.png'}
 
 
+def test_only_leftovers_of_what_a_folder_lists_are_removed(tmp_path):
+    run = tmp_path / 'run'
+    with working_folder(run, False, False, ['a/']):
+        (run / 'a').mkdir()
+        (run / 'a' / 'x').write_text('0')
+    for name in 'ab':
+        (run / f'.{name}.wheel-terra-1').mkdir()
+    with working_folder(run, False, True, ['a/']):
+        assert [p.name for p in run.glob('.?.*')] == ['.b.wheel-terra-1']
+    with (
+        pytest.raises(UserError, match='holds nothing that this command can go on with'),
+        working_folder(run, False, True, ['b/']),
+    ):
+        pass
+
+
 def test_a_working_folder_goes_on_or_starts_anew(tmp_path):
     run = tmp_path / 'run'
     entries = ['summary.json', '.work/']
