@@ -82,6 +82,8 @@ def _row(alike: Sequence[Parameter]) -> str:
     quantity = f'{default}, {unit}' if parameter.required and unit else f'{default} {unit}'.strip()
     facts = quantity if allowed in ('number', 'text', 'true/false') else f'{quantity}, {allowed}'
     meaning = parameter.meaning.replace('<', '&lt;')
+    if parameter.aliases:
+        meaning += ' (also ' + ', '.join(f'`{alias}`' for alias in parameter.aliases) + ')'
     keys = ', '.join(f'`{p.key}`' for p in alike)
     return f'- {keys} ({facts}): {meaning}'
 

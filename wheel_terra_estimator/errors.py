@@ -41,7 +41,7 @@ class UserError(Exception):
 
 
 class ConfigurationWarning(UserWarning):
-    """A number that looks as if it were in another unit, or what a contact law does not have."""
+    """A number that looks as if it were in another unit, or a key of an earlier version."""
 
 
 def outside_cause(error: BaseException) -> str | None:

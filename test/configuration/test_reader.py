@@ -16,6 +16,8 @@ import pytest
 from wheel_terra_estimator.configuration import parameters, reader, shipped
 from wheel_terra_estimator.configuration.parameters import (
     DECLARED,
+    RETIRED,
+    by_spelling,
     declared,
 )
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
@@ -49,9 +51,24 @@ def parameter_file(tmp_path, name, body):
 # -- The table ------------------------------------------------------------------------------------
 
 
-def test_keys_are_unique():
+def test_spellings_are_unique():
+    table = declared()
+    assert len(by_spelling(table)) == len(table) + sum(len(p.aliases) for p in table.values())
     stated = Path(parameters.__file__).with_name('parameters.yaml').read_text()
     assert len({p.key for p in DECLARED}) == stated.count('{type: '), 'a key stands twice'
+    assert not set(RETIRED) & set(by_spelling(table))
+
+
+def test_a_retired_key_is_left_out_and_said(tmp_path):
+    with_it = parameter_file(tmp_path, 'old.yaml', 'rover.name: mine\nfilter.demand_walk: 0.02')
+    with pytest.warns(ConfigurationWarning) as said:
+        read = reader.load([with_it], complete=False)
+    assert [str(warning.message) for warning in said] == [
+        f'{with_it}: filter.demand_walk no longer exists and is left out: '
+        'filter.ratio_walk holds on every ground; delete this line'
+    ]
+    assert read.rover.name == 'mine'
+    assert 'filter.demand_walk' not in read.flat()
 
 
 def test_contact_laws_are_those_of_the_physics():
@@ -119,6 +136,25 @@ def test_slip_radius_is_the_tip_unless_the_rim_is_asked_for():
     rim = reader.from_parameters({**lugs, 'slip_radius': 'rim'})
     np.testing.assert_allclose(rim.wheels.slip_radius, [0.1, 0.12])
     np.testing.assert_allclose(rim.wheels.wheel.tip_radius, [0.11, 0.14])
+
+
+@pytest.mark.parametrize(
+    ('alias', 'key', 'value'),
+    [
+        ('wheels.slip_radius', 'slip_radius', 'rim'),
+        ('sensors.wheel_odometry', 'wheel_odometry', 'odom'),
+        ('sensors.reference_odom_max_rate', 'reference_odom_max_rate', 1.0),
+        ('filter.max_lag', 'max_lag', 0.2),
+        ('filter.history', 'history', 1.0),
+        ('filter.rest_speed', 'rest_speed', 0.01),
+    ],
+)
+def test_both_spellings_of_the_bare_names(alias, key, value):
+    c = reader.from_parameters({**ROVER, alias: value})
+    assert getattr(c, key) == value and c.flat()[key] == value
+    assert 'same parameter' in complaint(
+        reader.from_parameters, {**ROVER, alias: value, key: value}
+    )
 
 
 def test_the_soil_has_a_deviation_even_where_none_is_stated():

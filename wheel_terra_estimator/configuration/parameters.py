@@ -5,7 +5,7 @@
 To add a parameter, add an entry to ``parameters.yaml``: the reader then accepts and checks the key,
 the node declares it, ``configuration.<section>.<name>`` has its value, and
 ``python tools/document_parameters.py`` writes it to ``docs/parameters.md``
-(a test says when that was forgotten).
+(a test says when that was forgotten). A key that goes moves to ``retired``, with what became of it.
 
 The keys ``effects.<name>.enabled``, ``effects.<name>.form`` (where there are several),
 ``effects.<name>.<parameter>`` and ``effects.<name>.<parameter>_std`` come from the catalogue of
@@ -15,7 +15,7 @@ effects.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -45,6 +45,7 @@ class Parameter:
     upper: float = inf
     open_lower: bool = False  # whether the lower bound itself is excluded
     choices: tuple[str, ...] = ()  # allowed texts, if not any
+    aliases: tuple[str, ...] = ()  # other spellings that are accepted
     required: bool = False  # whether a complete configuration must state it
     one_for_all: bool = False  # whether a per-wheel list of one entry counts for all wheels
 
@@ -79,13 +80,19 @@ def plain_table(path: Path) -> dict[str, Any]:
     return table
 
 
-def read_table(path: Path) -> tuple[Parameter, ...]:
-    """Read a table of declarations, a YAML file; `parameters.yaml` says what stands in it."""
+def read_table(path: Path) -> tuple[tuple[Parameter, ...], dict[str, str]]:
+    """Read a table of declarations.
+
+    ``path``: YAML file; `parameters.yaml` says what stands in it. Returns the parameters in the
+    order of the file, and retired keys -> what became of them.
+    """
+    table = plain_table(path)
+    retired = table.pop('retired', {})
     found = []
-    for name, entry in plain_table(path).items():
+    for name, entry in table.items():
         inside = {name: entry} if 'type' in entry else {f'{name}.{k}': e for k, e in entry.items()}
         found += [parameter(key, **fields) for key, fields in inside.items()]
-    return tuple(found)
+    return tuple(found), retired
 
 
 def parameter(
@@ -99,6 +106,7 @@ def parameter(
     at_least: float = -inf,
     at_most: float = inf,
     choices: Iterable[str] = (),
+    aliases: Iterable[str] = (),
     **others: Any,
 ) -> Parameter:
     """Declare a parameter in the words of the table; ``others`` are fields of ``Parameter``."""
@@ -113,12 +121,13 @@ def parameter(
         upper=at_most,
         open_lower=above is not None,
         choices=tuple(choices),
+        aliases=tuple(aliases),
         **others,
     )
 
 
-DECLARED = read_table(Path(__file__).with_name('parameters.yaml'))
-"""The parameters, without the effects."""
+DECLARED, RETIRED = read_table(Path(__file__).with_name('parameters.yaml'))
+"""The parameters, without the effects; keys of earlier versions -> what became of them."""
 
 
 def declared() -> dict[str, Parameter]:
@@ -174,6 +183,15 @@ def _lists(prefix: str) -> dict[str, Parameter]:
                   at_least=0.0),
     )  # fmt: skip
     return {item.key: item for item in items}
+
+
+def by_spelling(table: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """Return the parameters by every spelling that is accepted, aliases included."""
+    spellings = dict(table)
+    for item in table.values():
+        for alias in item.aliases:
+            spellings[alias] = item
+    return spellings
 
 
 def nearest(key: str, known: Iterable[str]) -> str:

@@ -17,7 +17,13 @@ from typing import Any
 
 from wheel_terra_estimator.configuration import ros_yaml, shipped
 from wheel_terra_estimator.configuration.configuration import Configuration, law
-from wheel_terra_estimator.configuration.parameters import Parameter, declared, nearest
+from wheel_terra_estimator.configuration.parameters import (
+    RETIRED,
+    Parameter,
+    by_spelling,
+    declared,
+    nearest,
+)
 from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.configuration.soil_units import doubtful_units
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
@@ -128,17 +134,22 @@ def _checked(
 ) -> Configuration:
     _load_effect_file(sourced, allow_effect_files)
     table = declared()
+    spellings = by_spelling(table)
     stated: _Sourced = {}
+    seen: dict[tuple[str, str], str] = {}
     for key, source, value in sourced:
         if key in STANDARD_PARAMETERS or key.startswith(STANDARD_PREFIXES):
             continue
-        if key not in table:
-            close = nearest(key, table)
-            raise UserError(
-                f"{source}: unknown parameter '{key}'; the nearest known one is '{close}' "
-                f'({table[close].allowed})'
-            )
-        stated[key] = (value, source)
+        if key in RETIRED:
+            _warn(f'{source}: {key} no longer exists and is left out: {RETIRED[key]}')
+            continue
+        parameter = spellings.get(key)
+        if parameter is None:
+            raise UserError(_unknown(key, source, spellings))
+        before = seen.setdefault((source, parameter.key), key)
+        if before != key:
+            raise UserError(f'{source}: {before} and {key} are the same parameter; give one')
+        stated[parameter.key] = (value, source)
     sources = ', '.join(dict.fromkeys(source for _, source, _ in sourced)) or 'no configuration'
     if complete:
         _require(table, stated, sources)
@@ -182,6 +193,14 @@ def _load_effect_file(sourced: Sequence[tuple[str, str, Any]], allowed: bool) ->
             except ValueError as error:
                 raise UserError(f'{source}: effect_file: {error}') from None
             return
+
+
+def _unknown(key: str, source: str, spellings: Mapping[str, Parameter]) -> str:
+    close = nearest(key, spellings)
+    return (
+        f"{source}: unknown parameter '{key}'; the nearest known one is '{close}' "
+        f'({spellings[close].allowed})'
+    )
 
 
 def _require(table: Mapping[str, Parameter], stated: _Sourced, sources: str) -> None:

@@ -252,10 +252,10 @@ class TractionLimiter(Node):
         unknown = set(self._parameter_overrides) - set(self.get_parameters_by_prefix(''))
         if not unknown:
             return
-        from wheel_terra_estimator.configuration.parameters import declared, nearest
+        from wheel_terra_estimator.configuration.parameters import by_spelling, declared, nearest
         from wheel_terra_estimator.configuration.reader import STANDARD_PREFIXES
 
-        for key in sorted(unknown - set(declared())):
+        for key in sorted(unknown - set(by_spelling(declared()))):
             if key.startswith(STANDARD_PREFIXES):
                 continue
             raise UserError(
