@@ -109,14 +109,6 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def own_law(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No other contact law is fitted to rows that do not agree: a second for each table."""
-    from wheel_terra_estimator.discrepancy import law_ranking
-
-    monkeypatch.setattr(law_ranking, 'with_other_laws', lambda diagnosis: diagnosis)
-
-
-@pytest.fixture
 def unproposed(monkeypatch: pytest.MonkeyPatch) -> None:
     """No law is sought for what no effect explains: up to a second for each table."""
     from wheel_terra_estimator.discrepancy import decision

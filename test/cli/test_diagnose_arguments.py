@@ -55,7 +55,7 @@ def test_json_is_the_report_and_nothing_else(tmp_path, capsys):
     assert json.loads(said) == json.loads((out / 'report.json').read_text())
 
 
-def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(tmp_path, capsys, own_law):
+def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(tmp_path, capsys):
     """The same friction of the drive in two soils: each table gets its soil."""
     rig = ['--config', 'hit_wh3_lug10']
     for name, soil in (('sand', 'hit_lss1'), ('simulant', 'fjs1_ishigami')):

@@ -10,7 +10,6 @@ import pytest
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy import law_ranking
 from wheel_terra_estimator.terramechanics import effects
 from wheel_terra_lab.studies.campaigns import Plan, make_campaign
 
@@ -49,7 +48,6 @@ def told(rubbing_table):
     """The report of a diagnosis that knows the effect."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(effects, '_registered', dict(effects._registered))
-        patch.setattr(law_ranking, 'with_other_laws', lambda diagnosis: diagnosis)
         return diagnose(rubbing_table[0], 'with', '--effects', str(EXAMPLE))
 
 
@@ -69,7 +67,7 @@ def test_it_is_named_with_its_size_and_the_model_file_works(rubbing_table, told)
     assert model.effects['side_drag']['gain'] == pytest.approx(gain['value'], rel=1e-6)
 
 
-def test_without_it_nobody_claims_to_know(rubbing_table, told, own_law, unproposed):
+def test_without_it_nobody_claims_to_know(rubbing_table, told, unproposed):
     report = diagnose(rubbing_table[0], 'without')
     assert 'side_drag' not in {effect['name'] for effect in report['effects']}
     assert 'side_drag' not in {candidate['name'] for candidate in report['candidates']}

@@ -146,7 +146,7 @@ def test_no_column_of_numbers_is_lost_without_a_word(word, unit, form, case):
         assert header._harmless(title)
 
 
-def test_a_frame_is_read_as_the_file_is(tmp_path, own_law):
+def test_a_frame_is_read_as_the_file_is(tmp_path):
     pandas = pytest.importorskip('pandas')
     table = rows()
     titles = ('Slip [%]', 'Vertical load (kN)', 'Sinkage [mm]', 'DP [N]', 'T [N m]')
@@ -171,7 +171,7 @@ def test_a_frame_is_read_as_the_file_is(tmp_path, own_law):
     np.testing.assert_allclose(found.table.measured, file.measured, rtol=1e-12)
 
 
-def test_a_map_of_columns(tmp_path, capsys, own_law):
+def test_a_map_of_columns(tmp_path, capsys):
     text = HEADER.replace('sinkage', 'z [mm]').replace('torque', 'M').replace('drawbar_pull', 'Fx')
     table = rows()
     body = [

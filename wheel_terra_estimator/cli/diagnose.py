@@ -172,7 +172,6 @@ def run(arguments: argparse.Namespace) -> int:
 def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
     """Return the diagnosis of all data as one table."""
     from wheel_terra_estimator.configuration import reader
-    from wheel_terra_estimator.discrepancy.law_ranking import with_other_laws
     from wheel_terra_estimator.discrepancy.tables.averaging import together
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
@@ -188,7 +187,7 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
         arguments.allowed_error,
         arguments.soil_known_to,
     )
-    diagnosis = with_other_laws(diagnose(table, configuration, reference, options))
+    diagnosis = diagnose(table, configuration, reference, options)
     diagnosis = _with_effect_file(diagnosis, own)
     if not configuration.soil_stated:
         note = 'no soil was stated (--config): the default sand was taken for the model believed in'
@@ -241,13 +240,11 @@ def _folder_names(data: list[str]) -> list[str]:
 def _tell(diagnosis: Diagnosis, output: Path) -> None:
     """Print the verdict, the gaps, what to do next and what was written."""
     from wheel_terra_estimator.discrepancy.numbers import SHOWN, number
-    from wheel_terra_estimator.discrepancy.report.words import law_line, soil_line, worth
+    from wheel_terra_estimator.discrepancy.report.words import soil_line, worth
     from wheel_terra_estimator.discrepancy.result import OPEN
 
     print(diagnosis.sentence)
     print(f'  {soil_line(diagnosis)}')
-    if diagnosis.contact_laws:
-        print(f'  {law_line(diagnosis)}')
     for quantity, gap in diagnosis.gap.items():
         scale, unit = SHOWN[quantity]
         noise = '' if gap.noise is None else f', noise {number(scale * gap.noise)}'

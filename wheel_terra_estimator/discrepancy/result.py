@@ -196,17 +196,6 @@ class SoilShift:
 
 
 @dataclass(frozen=True)
-class OtherLaw:
-    """A contact law against ``bekker_wong_janosi``: soil refitted under each, no effect added.
-
-    ``log_evidence`` is the difference, ``misfit`` the quotient of what the two leave.
-    """
-
-    log_evidence: float
-    misfit: float
-
-
-@dataclass(frozen=True)
 class Curves:
     """(N, 4) model values of the table's rows: sinkage, drawbar pull, torque.
 
@@ -276,7 +265,6 @@ class Diagnosis:
     proposal: Proposal | None = None  # A law for what no listed effect explains, where one helps
     # Effect of the catalogue that was not tried -> why
     not_tried: Mapping[str, str] = field(default_factory=dict)
-    contact_laws: Mapping[str, OtherLaw] = field(default_factory=dict)
     seconds: float = field(default=0.0, metadata=_ASIDE)  # time the diagnosis took
 
     def __repr__(self) -> str:

@@ -19,7 +19,7 @@ from wheel_terra_estimator.discrepancy.numbers import (
 )
 from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
-from wheel_terra_estimator.discrepancy.report.words import FACTORS, in_words, law_line, soil_line
+from wheel_terra_estimator.discrepancy.report.words import FACTORS, in_words, soil_line
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
 from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE
 from wheel_terra_estimator.reporting.html import picture, render
@@ -61,7 +61,6 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         sources=[(plain(name), known[name].source) for name in used if name in known],
         sentence=diagnosis.sentence.replace('+-', '±'),
         soil_line=soil_line(diagnosis),
-        law_line=law_line(diagnosis),
         where=_where(diagnosis),
         soil_words=FACTORS,
         far=LARGEST_Z_SCORE,

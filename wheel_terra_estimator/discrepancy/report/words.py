@@ -142,16 +142,6 @@ def soil_line(diagnosis: Diagnosis) -> str:
     return f'Number that moved most: {moved(farthest)}; deviations of the soil from: {sources}.'
 
 
-def law_line(diagnosis: Diagnosis) -> str:
-    """Return what the other contact laws leave of the table; empty where they were not fitted."""
-    found = [
-        f'{name} leaves {number(law.misfit, 2)} times the misfit '
-        f'({law.log_evidence:+.1f} ln evidence)'
-        for name, law in diagnosis.contact_laws.items()
-    ]
-    return f'Contact law, soil refitted and no effect added: {", ".join(found)}' if found else ''
-
-
 def far(shifts: Iterable[SoilShift]) -> list[str]:
     """Return the numbers that had to move farther than can be believed, in words."""
     return [moved(shift) for shift in shifts if abs(shift.z_score) > LARGEST_Z_SCORE]
