@@ -9,24 +9,16 @@ floor, predicts rows that the fit did not see, and either stands or bars itself 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.discrepancy.assessment.gaps import (
-    channels_off,
-    gaps,
-)
+from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off, gaps
 from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.proposal.find import (
-    closed_by,
-    effects_said,
-    gain_on_top,
-    propose,
-)
+from wheel_terra_estimator.discrepancy.proposal.find import Gap, effects_said, gain_on_top, propose
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
 from wheel_terra_estimator.discrepancy.selection import remainder
@@ -92,53 +84,61 @@ def decide(
 
     ``allowed_error`` is the model error that is no reason for doubt [share of the range].
     """
-    off, tried, doubtful = False, list[int](), tuple[Naming, ...]()
-    everything = frozenset(range(len(findings.selection.explanations)))
-    problem = findings.setting.problem
-    laws = _Laws(table)
-    while True:
-        barred = everything if len(tried) >= _MOST_TRIED else frozenset(tried)
-        verdict = choose(findings.selection, problem, off=off, excluded=barred)
-        decision = _judged(table, both, findings, verdict, allowed_error)
-        if verdict.status == 'agrees' and not off and channels_off(decision.gap):
-            off = True
-            continue
-        if verdict.status != 'named':
-            decision = replace(decision, doubtful=doubtful)
-            return _left_open(table, both, decision, allowed_error, laws)
-        tried.append(verdict.index)
-        names, likely = laws.against(decision, _names(table, decision))
-        if likely:
-            return replace(decision, names=names)
-        doubtful = doubtful or names
+    return _Decider(table, both, findings, allowed_error).decision()
 
 
-class _Laws:
-    """The best law beside each floor: it competes with doubtful names, or is proposed."""
+@dataclass(frozen=True)
+class _Decider:
+    """The loop, and what its rounds share."""
 
-    def __init__(self, table: SteadyTable) -> None:
-        self._table = table
-        self._found: dict[tuple[float, bool], Proposal | None] = {}
+    table: SteadyTable
+    both: SteadyTable
+    findings: Findings
+    allowed_error: float
+    # The best law beside each floor, soil held or not: it competes with doubtful names, or is
+    # proposed
+    laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
 
-    def beside(self, decision: Decision, hold_soil: bool = False) -> Proposal | None:
+    def decision(self) -> Decision:
+        """Go round until an explanation stands."""
+        off, tried, doubtful = False, list[int](), tuple[Naming, ...]()
+        selection, problem = self.findings.selection, self.findings.setting.problem
+        everything = frozenset(range(len(selection.explanations)))
+        while True:
+            barred = everything if len(tried) >= _MOST_TRIED else frozenset(tried)
+            verdict = choose(selection, problem, off=off, excluded=barred)
+            decision = self._judged(verdict)
+            if verdict.status == 'agrees' and not off and channels_off(decision.gap):
+                off = True
+                continue
+            if verdict.status != 'named':
+                return self._left_open(replace(decision, doubtful=doubtful))
+            tried.append(verdict.index)
+            names, likely = self._against_law(decision, _names(self.table, decision))
+            if likely:
+                return replace(decision, names=names)
+            doubtful = doubtful or names
+
+    def _law(self, decision: Decision, hold_soil: bool = False) -> Proposal | None:
         """Return the law for what a decision's refit of the soil leaves."""
-        key = decision.floor, hold_soil
-        if LAW in decision.findings.setting.forward.base_effects:
+        if LAW in self.findings.setting.forward.base_effects:
             return None  # not on top of another law
-        if key not in self._found:
-            where = (self._table, decision.findings, decision.gap, decision.variance)
-            self._found[key] = propose(*where, hold_soil=hold_soil)
-        return self._found[key]
+        key = decision.floor, hold_soil
+        if key not in self.laws:
+            self.laws[key] = propose(self._gap(decision), hold_soil=hold_soil)
+        return self.laws[key]
 
-    def against(
+    def _gap(self, decision: Decision) -> Gap:
+        return Gap(self.table, decision.findings, decision.gap, decision.variance)
+
+    def _against_law(
         self, decision: Decision, names: tuple[Naming, ...]
     ) -> tuple[tuple[Naming, ...], bool]:
         """Return the names, as sure as they are beside a law, and whether they are given."""
         if _least(names) >= _BEYOND_DOUBT:
             return names, True
-        law = self.beside(decision)
-        where = (self._table, decision.findings, decision.gap, decision.variance)
-        ahead = closed_by(*where, decision.after) - (law.closed if law else 0.0)
+        law = self._law(decision)
+        ahead = self._gap(decision).closed_by(decision.after) - (law.closed if law else 0.0)
         same = law is not None and effects_said(law) == {effect_of(n.key) for n in names}
         if law is not None and ahead < -_CLEARLY and not same:
             return names, False
@@ -148,6 +148,52 @@ class _Laws:
         names = tuple(replace(n, confidence=c) for n, c in zip(names, surer, strict=True))
         return names, _least(names, odds) >= _LIKELY
 
+    def _left_open(self, decision: Decision) -> Decision:
+        """Return an open decision with a law, where one helps, and the soil plainly refitted.
+
+        A floor that stands for what is missing keeps the soil from following the rows: at operating
+        points that they do not have, the refit without one is nearer to the truth.
+        """
+        if decision.verdict.status not in OPEN:
+            return decision
+        law = self._law(decision, decision.verdict.left.only_far)
+        setting, nothing = self.findings.setting, decision.findings.nothing
+        # Estimated noise may be next to nothing beside a few smooth rows.
+        exact = 'estimated' not in self.findings.noise.origin.values()
+        variance = setting.problem.variance(0.0 if exact else FIT_FLOOR)
+        # Far from the configured soil, and without a floor, the fit goes along a bent valley.
+        nothing = setting.fit([()], [nothing.u], nothing.angle, variance, _LONG)[0]
+        return replace(decision, proposal=law, **self._predicted([nothing], variance, 0.0))
+
+    def _judged(self, verdict: Verdict) -> Decision:
+        """Refit nothing and the chosen explanation under its own floor, and predict unseen rows."""
+        selection, nothing = self.findings.selection, self.findings.nothing
+        quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
+        place = quiet[int(np.argmax(selection.log_joint[verdict.index][quiet]))]
+        floor, chosen = selection.floors[place], selection.explanations[verdict.index]
+        own = self.findings.setting.problem.variance(floor.amplitude)
+        fits = [nothing, chosen.fitted] if chosen.names else [nothing]
+        found = self._predicted(fits, own, floor.largest)
+        return Decision(verdict=verdict, floor_index=place, **found)
+
+    def _predicted(self, fits: list[Fit], variance: FloatArray, floor: float) -> dict[str, Any]:
+        """Refit nothing and what was chosen (the last), and predict rows that no fit saw."""
+        setting = self.findings.setting
+        fits = [setting.fit([f.names], [f.u], f.angle, variance)[0] for f in fits]
+        findings = replace(self.findings, nothing=fits[0])
+        beside = setting.problem.variance(floor)
+        rows = len(self.table)
+        groups = np.where(np.arange(len(self.both)) < rows, slip_groups(self.both), -1)
+        outs = hold_out(setting, fits, beside, groups)
+        curves = _curves(rows, findings, fits[-1], outs[0], outs[-1], floor)
+        return {
+            'findings': findings,
+            'after': fits[-1],
+            'variance': beside,
+            'curves': curves,
+            'gap': gaps(self.table, findings, curves, self.allowed_error),
+        }
+
 
 def _least(names: tuple[Naming, ...], odds: float = 1.0) -> float:
     """Return the confidence of the least likely set of names.
@@ -155,72 +201,6 @@ def _least(names: tuple[Naming, ...], odds: float = 1.0) -> float:
     What was not tried on purpose makes a name less sure, and is no reason to give none.
     """
     return min(confidences.confidence(name.features, odds=odds).of_set for name in names)
-
-
-def _left_open(
-    table: SteadyTable, both: SteadyTable, decision: Decision, allowed_error: float, laws: _Laws
-) -> Decision:
-    """Return an open decision with a law, where one helps, and the soil plainly refitted.
-
-    A floor that stands for what is missing keeps the soil from following the rows: at operating
-    points that they do not have, the refit without one is nearer to the truth.
-    """
-    findings = decision.findings
-    if decision.verdict.status not in OPEN:
-        return decision
-    law = laws.beside(decision, decision.verdict.left.only_far)
-    # Estimated noise may be next to nothing beside a few smooth rows.
-    setting, exact = findings.setting, 'estimated' not in findings.noise.origin.values()
-    variance = setting.problem.variance(0.0 if exact else FIT_FLOOR)
-    nothing = findings.nothing
-    # Far from the configured soil, and without a floor, the fit goes along a bent valley.
-    nothing = setting.fit([()], [nothing.u], nothing.angle, variance, _LONG)[0]
-    plain = _predicted(table, both, findings, [nothing], variance, 0.0, allowed_error)
-    return replace(decision, proposal=law, **plain)
-
-
-def _judged(
-    table: SteadyTable,
-    both: SteadyTable,
-    findings: Findings,
-    verdict: Verdict,
-    allowed_error: float,
-) -> Decision:
-    """Refit nothing and the chosen explanation under its own floor, and predict unseen rows."""
-    setting, selection = findings.setting, findings.selection
-    quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
-    place = quiet[int(np.argmax(selection.log_joint[verdict.index][quiet]))]
-    floor, chosen = selection.floors[place], selection.explanations[verdict.index]
-    own = setting.problem.variance(floor.amplitude)
-    fits = [findings.nothing, chosen.fitted] if chosen.names else [findings.nothing]
-    found = _predicted(table, both, findings, fits, own, floor.largest, allowed_error)
-    return Decision(verdict=verdict, floor_index=place, **found)
-
-
-def _predicted(
-    table: SteadyTable,
-    both: SteadyTable,
-    findings: Findings,
-    fits: list[Fit],
-    variance: FloatArray,
-    floor: float,
-    allowed_error: float,
-) -> dict[str, Any]:
-    """Refit nothing and what was chosen (the last), and predict rows that the fits did not see."""
-    setting = findings.setting
-    fits = [setting.fit([f.names], [f.u], f.angle, variance)[0] for f in fits]
-    findings = replace(findings, nothing=fits[0])
-    beside = setting.problem.variance(floor)
-    groups = np.where(np.arange(len(both)) < len(table), slip_groups(both), -1)
-    outs = hold_out(setting, fits, beside, groups)
-    curves = _curves(len(table), findings, fits[-1], outs[0], outs[-1], floor)
-    return {
-        'findings': findings,
-        'after': fits[-1],
-        'variance': beside,
-        'curves': curves,
-        'gap': gaps(table, findings, curves, allowed_error),
-    }
 
 
 def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
@@ -247,14 +227,11 @@ def known_alike(name: str, findings: Findings, known: Mapping[str, Effect]) -> t
     """Return effects that are known to look like a name, might be named, and were not tried."""
     on = set(findings.setting.forward.base_effects)
     own = known[effect_of(name)].confounded_with
-    others = (
-        other.base_name for other in known.values() if effect_of(name) in other.confounded_with
-    )
+    others = (o.base_name for o in known.values() if effect_of(name) in o.confounded_with)
 
     def might_be(other: str) -> bool:
-        return other not in known or (
-            known[other].candidate and not known[other].incompatible_with & on
-        )
+        effect = known.get(other)
+        return effect is None or (effect.candidate and not effect.incompatible_with & on)
 
     names = dict.fromkeys((*own, *others))
     return tuple(other for other in names if other not in findings.tried and might_be(other))

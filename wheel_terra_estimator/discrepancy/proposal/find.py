@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -87,21 +88,96 @@ _LEVEL_INPUTS = (
 )
 
 
-def propose(
-    table: SteadyTable,  # the rows under diagnosis (a reference not among them)
-    findings: Findings,
+@dataclass(frozen=True)
+class Gap:
+    """What a decision leaves of a table: laws, or effects, are judged by how much they close."""
+
+    table: SteadyTable  # the rows under diagnosis (a reference not among them)
+    findings: Findings
     # As reported: ``before``, ``noise`` and the range of each quantity are taken from it
-    gap: Mapping[str, QuantityGap],
-    variance: FloatArray,  # (m,) of the rotated axes, for the predictions of what was left out
-    *,
-    # Hold the soil where it can be believed, in the refit as well: where only another soil leaves
-    # no gap, the law has to do without it, or is none
-    hold_soil: bool = False,
-) -> Proposal | None:
-    """Return the law that the rows ask for; None where none predicts what was left out."""
+    reported: Mapping[str, QuantityGap]
+    variance: FloatArray  # (m,) of the rotated axes, for the predictions of what was left out
+
+    def closed_by(self, fitted: Fit) -> float:
+        """Return the share of the refit's gap on left-out levels that a set of effects closes."""
+        setting, nothing = self.findings.setting, self.findings.nothing
+        fits = [setting.fit([f.names], [f.u], f.angle, self.variance)[0] for f in (nothing, fitted)]
+        return self.closed(self.on_levels(setting, fits))
+
+    @cached_property
+    def measured(self) -> FloatArray:
+        """(N, 4) cells that the model has to match; nan where they were rejected."""
+        measured, rows = self.table.measured.copy(), len(self.table)
+        setting, problem = self.findings.setting, self.findings.setting.problem
+        # Where slips are latent the model stands at the most probable one.
+        shift = np.zeros((int(problem.row.max()) + 1, len(QUANTITIES)))
+        shift[problem.row, problem.quantity] = setting.observed - problem.observed
+        measured += shift[:rows]
+        for row, column, _ in self.findings.outliers:
+            if row < rows:
+                measured[row, column] = np.nan
+        return measured
+
+    def error(self, outputs: FloatArray, q: int) -> float:
+        """Root mean square of what (N, 4) outputs leave of a quantity."""
+        mine = np.isfinite(self.measured[:, q])
+        left = (outputs[: len(self.table)] - self.measured)[mine, q]
+        return float(np.sqrt(np.mean(left**2)))
+
+    def left_out(
+        self, setting: Setting, fits: Sequence[Fit], groups: IndexArray
+    ) -> dict[str, LeftOut]:
+        """Return the errors of soil refit and law on groups that their fits did not see."""
+        reference = np.full(len(setting.forward.points) - len(groups), -1)
+        groups = np.concatenate([groups, reference]).astype(np.intp)
+        outputs = hold_out(setting, fits, self.variance, groups)
+        return {
+            quantity: LeftOut(*(self.error(out, q) for out in outputs))
+            for q, quantity in enumerate(QUANTITIES)
+            if np.isfinite(self.measured[:, q]).any()
+        }
+
+    def on_levels(self, setting: Setting, fits: Sequence[Fit]) -> dict[str, dict[str, LeftOut]]:
+        """Return input -> errors on whole levels of it; of the slips where nothing else varies."""
+        varying = set(self.table.varying())
+        found = {}
+        for name in _LEVEL_INPUTS:
+            if name in varying:
+                values = np.round(np.nan_to_num(self.table.columns[name], nan=-1.0), 9)
+                levels = np.unique(values)
+                rank = np.searchsorted(levels, values)
+                groups = rank * min(_LEVELS, len(levels)) // len(levels)
+                found[name] = self.left_out(setting, fits, groups)
+        return found or {'slip': self.left_out(setting, fits, slip_groups(self.table))}
+
+    def closed(self, left_out: Mapping[str, Mapping[str, LeftOut]]) -> float:
+        """Share of the gap on what was left out that a law closes; 0: it worsens a quantity."""
+        open_refit = open_law = lost = gained = 0.0
+        worsened = False
+        for quantities in left_out.values():
+            for name, item in quantities.items():
+                noise = self.reported[name].noise or 1e-9
+                worsened |= item.law > max(_WORSE * item.refit, _FINE * noise)
+                refit, law = (item.refit / noise) ** 2, (item.law / noise) ** 2
+                lost += max(law - refit, 0.0)
+                gained += max(refit - law, 0.0)
+                open_refit += max(refit - 1.0, 0.0)
+                open_law += max(law - 1.0, 0.0)
+        if worsened and gained < _PAYS * lost:
+            return 0.0
+        return 1.0 - math.sqrt(open_law / open_refit) if open_refit > 0.0 else 0.0
+
+
+def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
+    """Return the law that the rows ask for; None where none predicts what was left out.
+
+    ``hold_soil`` where it can be believed, in the refit as well: where only another soil leaves no
+    gap, the law has to do without it, or is none.
+    """
+    findings, variance = gap.findings, gap.variance
     # A large smooth error would take up what the law is to say.
     floors = tuple(floor for floor in findings.setting.floors if floor.largest <= _SMALL_FLOOR)
-    setting = replace(findings.setting, effects=_terms(table), floors=floors)
+    setting = replace(findings.setting, effects=_terms(gap.table), floors=floors)
     plain = setting.fit([()], [findings.nothing.u], findings.nothing.angle)[0]
     for factor in _HOLDS if hold_soil else ():
         if _can_be_believed(plain, findings):
@@ -120,32 +196,18 @@ def propose(
         begun.append(laws[0].names[0])
         for law in laws:
             fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
-            fits = [refit, fitted]
             if hold_soil and not _can_be_believed(fitted, findings):
                 continue
-            judged = _judged(setting, fits, variance, findings, table)
-            closed = _closed(judged, gap)
+            left_out = gap.on_levels(setting, [refit, fitted])
+            closed = gap.closed(left_out)
             if closed > most:
-                best, most = (fits, judged), closed
+                best, most = (fitted, left_out), closed
     if best is None:
         return None
-    found = replace(_proposal(table, findings, setting, *best, gap), closed=most)
+    found = replace(_proposal(gap, setting, refit, *best), closed=most)
     if not hold_soil:
         return found
-    return replace(found, soil_held=True, fit=_widened(best[0][1], findings))
-
-
-def closed_by(
-    table: SteadyTable,
-    findings: Findings,
-    gap: Mapping[str, QuantityGap],
-    variance: FloatArray,
-    fitted: Fit,
-) -> float:
-    """Return the share of the refit's gap on left-out levels that a set of effects closes."""
-    setting, nothing = findings.setting, findings.nothing
-    fits = [setting.fit([f.names], [f.u], f.angle, variance)[0] for f in (nothing, fitted)]
-    return _closed(_judged(setting, fits, variance, findings, table), gap)
+    return replace(found, soil_held=True, fit=_widened(best[0], findings))
 
 
 def effects_said(law: Proposal) -> frozenset[str]:
@@ -246,138 +308,50 @@ def _description_lengths(terms: Iterable[str]) -> dict[str, float]:
     return {name: plain if name in single else plain + second for name in terms}
 
 
-def _groupings(table: SteadyTable, count: int) -> dict[str, IndexArray]:
-    """Return input -> group of each row: its levels; the slips where nothing else varies."""
-    varying = set(table.varying())
-    found = {}
-    for name in _LEVEL_INPUTS:
-        if name in varying:
-            values = np.nan_to_num(table.columns[name], nan=-1.0)
-            levels = np.unique(np.round(values, 9))
-            rank = np.searchsorted(levels, np.round(values, 9))
-            groups = rank * min(_LEVELS, len(levels)) // len(levels)
-            found[name] = np.concatenate([groups, np.full(count - len(groups), -1)])
-    if not found:
-        groups = slip_groups(table)
-        found['slip'] = np.concatenate([groups, np.full(count - len(groups), -1)])
-    return {name: groups.astype(np.intp) for name, groups in found.items()}
-
-
-def _judged(
-    setting: Setting,
-    fits: Sequence[Fit],
-    variance: FloatArray,
-    findings: Findings,
-    table: SteadyTable,
-) -> dict[str, dict[str, LeftOut]]:
-    """Return input -> errors of soil refit and law on whole levels of it."""
-    groupings = _groupings(table, len(setting.forward.points))
-    return {
-        name: _left_out(setting, fits, variance, groups, findings, table)
-        for name, groups in groupings.items()
-    }
-
-
-def _left_out(
-    setting: Setting,
-    fits: Sequence[Fit],
-    variance: FloatArray,
-    groups: IndexArray,
-    findings: Findings,
-    table: SteadyTable,
-) -> dict[str, LeftOut]:
-    """Return the errors of soil refit and law on levels that their fits did not see."""
-    rows = len(table)
-    refit, law = (out[:rows] for out in hold_out(setting, fits, variance, groups))
-    measured = _measured(table, findings)
-    found = {}
-    for q, quantity in enumerate(QUANTITIES):
-        mine = np.isfinite(measured[:, q])
-        if mine.any():
-            errors = [np.sqrt(np.mean((o - measured)[mine, q] ** 2)) for o in (refit, law)]
-            found[quantity] = LeftOut(float(errors[0]), float(errors[1]))
-    return found
-
-
-def _measured(table: SteadyTable, findings: Findings) -> FloatArray:
-    measured = table.measured.copy()
-    problem = findings.setting.problem
-    # Where slips are latent the model stands at the most probable one.
-    shift = np.zeros((int(problem.row.max()) + 1, len(QUANTITIES)))
-    shift[problem.row, problem.quantity] = findings.setting.observed - problem.observed
-    measured += shift[: len(table)]
-    for row, column, _ in findings.outliers:
-        if row < len(table):
-            measured[row, column] = np.nan
-    return measured
-
-
-def _closed(judged: Mapping[str, Mapping[str, LeftOut]], gap: Mapping[str, QuantityGap]) -> float:
-    """Share of the gap on what was left out that a law closes; 0 where it worsens a quantity."""
-    open_refit = open_law = lost = gained = 0.0
-    worsened = False
-    for quantities in judged.values():
-        for name, item in quantities.items():
-            noise = gap[name].noise or 1e-9
-            worsened |= item.law > max(_WORSE * item.refit, _FINE * noise)
-            refit, law = (item.refit / noise) ** 2, (item.law / noise) ** 2
-            lost += max(law - refit, 0.0)
-            gained += max(refit - law, 0.0)
-            open_refit += max(refit - 1.0, 0.0)
-            open_law += max(law - 1.0, 0.0)
-    if worsened and gained < _PAYS * lost:
-        return 0.0
-    return 1.0 - math.sqrt(open_law / open_refit) if open_refit > 0.0 else 0.0
-
-
 def _proposal(
-    table: SteadyTable,
-    findings: Findings,
+    gap: Gap,
     setting: Setting,
-    fits: Sequence[Fit],
-    judged: Mapping[str, Mapping[str, LeftOut]],
-    gap: Mapping[str, QuantityGap],
+    refit: Fit,
+    law: Fit,
+    left_out: Mapping[str, Mapping[str, LeftOut]],
 ) -> Proposal:
-    law = fits[1]
-    rows, count = len(table), len(setting.forward.points)
-    slips = np.concatenate([slip_groups(table), np.full(count - rows, -1)]).astype(np.intp)
-    by_slip = _left_out(setting, fits, fits[1].variance, slips, findings, table)
-    measured = _measured(table, findings)
+    by_slip = gap.left_out(setting, [refit, law], slip_groups(gap.table))
     covariance = law.covariance()
-    names = [c.name for c in law.coordinates if c.owner == NAME]
     places = [k for k, c in enumerate(law.coordinates) if c.owner == NAME]
-    values = [float(law.coordinates[k].value(law.u[k])) for k in places]
-    stds = [
-        law.coordinates[k].deviation(float(law.u[k]), float(np.sqrt(covariance[k, k])))
-        for k in places
-    ]
-    gaps = {}
-    for q, quantity in enumerate(QUANTITIES):
-        if quantity not in by_slip:
-            continue
-        old = gap[quantity]
-        mine = np.isfinite(measured[:, q])
-        fitted = np.sqrt(np.mean((law.outputs[:rows] - measured)[mine, q] ** 2))
-        found = by_slip[quantity]
-        gaps[quantity] = replace(old, refit=found.refit, after=found.law, fitted=float(fitted))
+    terms = [law.coordinates[k] for k in places]
+    names = [c.name for c in terms]
+    values = [float(c.value(law.u[k])) for c, k in zip(terms, places, strict=True)]
+    gaps = {
+        quantity: replace(
+            gap.reported[quantity],
+            refit=by_slip[quantity].refit,
+            after=by_slip[quantity].law,
+            fitted=gap.error(law.outputs, q),
+        )
+        for q, quantity in enumerate(QUANTITIES)
+        if quantity in by_slip
+    }
     return Proposal(
-        law_in_words(names, values, table, setting.forward.points),
+        law_in_words(names, values, gap.table, setting.forward.points),
         tuple(pair_of(name)[0] for name in names),
         tuple(pair_of(name)[1] for name in names),
         tuple(values),
-        tuple(stds),
+        tuple(
+            c.deviation(float(law.u[k]), float(np.sqrt(covariance[k, k])))
+            for c, k in zip(terms, places, strict=True)
+        ),
         gaps,
-        _resembling(findings, fits),
-        limits_of_trust(table),
-        judged,
+        _resembling(gap.findings, refit, law),
+        limits_of_trust(gap.table),
+        left_out,
         fit=law,
     )
 
 
-def _resembling(findings: Findings, fits: Sequence[Fit]) -> tuple[str, ...]:
+def _resembling(findings: Findings, refit: Fit, law: Fit) -> tuple[str, ...]:
     """Return named effects whose signature points the same way, beyond what the soil can do."""
     problem, nothing = findings.setting.problem, findings.nothing
-    own = problem.rotate(problem.flat(fits[1].outputs - fits[0].outputs))
+    own = problem.rotate(problem.flat(law.outputs - refit.outputs))
     weighted = against_soil(nothing, nothing.variance, own)
     size = math.sqrt(max(float(own @ weighted), 1e-30))
     alike: dict[str, float] = {}
@@ -386,6 +360,6 @@ def _resembling(findings: Findings, fits: Sequence[Fit]) -> tuple[str, ...]:
         cosine = float(signature.change @ weighted) / far if far > 0.0 else 0.0
         alike[effect_of(key)] = max(abs(cosine), alike.get(effect_of(key), 0.0))
     order = sorted(alike, key=lambda name: -alike[name])
-    same = [_LIKE[c.name] for c in fits[1].coordinates if c.name in _LIKE]
+    same = [_LIKE[c.name] for c in law.coordinates if c.name in _LIKE]
     found = [*same, *(name for name in order if alike[name] > _ALIKE)]
     return tuple(dict.fromkeys(found))[:_RESEMBLING]
