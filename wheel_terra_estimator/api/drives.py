@@ -114,11 +114,10 @@ def smooth(
     remaps: Mapping[str, str] | None = None,
     as_frame: bool = True,
 ) -> DataFrame | Columns:
-    """Run the fixed-interval smoother over a whole drive.
+    """Run the fixed-interval smoother over a whole drive, with arguments and columns of `estimate`.
 
-    Parameters and columns are those of `estimate`; the numbers are those of ``wheel-terra replay
-    --smooth`` on the same input. What foretells (``stuck``, ``rim_travel_left``, ``pull_margin``)
-    is as it was live.
+    The numbers are those of ``wheel-terra replay --smooth`` on the same input. What foretells
+    (``stuck``, ``rim_travel_left``, ``pull_margin``) is as it was live.
 
     Examples
     --------
@@ -150,14 +149,6 @@ def simulate(
         In place of the scenario's [s].
     output : path, optional
         Folder of a rosbag2 to be written as well, as ``wheel-terra simulate`` does.
-    overwrite : bool
-        Whether an earlier one is replaced.
-
-    Returns
-    -------
-    SimulatedDrive
-        ``arrivals`` (typed measurements in order of arrival), ``truth`` (arrays (k, n) of slip,
-        sinkage, drawbar pull, ... at ``truth.stamp``; ``truth.to_frame()``), ``configuration``.
 
     Examples
     --------
@@ -185,18 +176,7 @@ def taught(
     parameters: Sequence[str] = (),
     remaps: Mapping[str, str] | None = None,
 ) -> tuple[Taught, ...]:
-    """Run the estimator over a drive and return what that taught of soil and sensors.
-
-    Parameters
-    ----------
-    drive, rover, parameters, remaps
-        As of `estimate`.
-
-    Returns
-    -------
-    tuple of Taught
-        ``name``, ``unit`` of the deviations, ``prior_std``, ``std``, ``bits`` gained, ``verdict``
-        ('learned', 'assumed', 'confounded'), ``confounded_with``.
+    """Run the estimator over a drive (as `estimate`); return what that taught of soil and sensors.
 
     Examples
     --------

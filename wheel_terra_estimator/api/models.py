@@ -143,14 +143,8 @@ class Model:
     ) -> Model:
         """Return the model of configuration files, the ``model.yaml`` of a diagnosis included.
 
-        Parameters
-        ----------
-        *files : str or pathlib.Path
-            Paths, or bare names of shipped files; later ones win key by key.
-        parameters : sequence of str
-            ``NAME:=VALUE``, winning over the files.
-        method : str
-            As above.
+        ``files``: paths, or bare names of shipped files; later ones win key by key, and
+        ``parameters``, ``NAME:=VALUE`` each, over all of them.
 
         Examples
         --------
@@ -200,17 +194,14 @@ class Model:
     ) -> Curve:
         """Return sinkage, drawbar pull and torque at steady operating points.
 
+        Raises ValueError for values that are out of range.
+
         Parameters
         ----------
         slip : array_like
             (N,) slip ratio in [-1, 1]; above |0.95| no steady state is known from experiment.
         normal_load, slope, angular_velocity, pass_number : array_like
             (N,) or one number: load [N], slope [rad], wheel rate [rad/s, nan = not needed], pass.
-
-        Raises
-        ------
-        ValueError
-            For values that are out of range.
         """
         points = OperatingPoints(
             slip=np.atleast_1d(np.asarray(slip, dtype=np.float64)),
@@ -242,6 +233,9 @@ class Model:
     ) -> DataFrame | Columns:
         """Return the curves of every combination of operating points and parameters.
 
+        A column per parameter, then those of `Curve`; one row per combination, slip changing
+        fastest. Units are in ``attrs['units']``.
+
         Parameters
         ----------
         slip, normal_load, slope : array_like
@@ -251,12 +245,6 @@ class Model:
             or ``{'soil.friction_angle_deg': [25, 30, 35]}`` [deg].
         as_frame : bool
             True: a DataFrame (needs pandas); False: the same columns as a dict of arrays.
-
-        Returns
-        -------
-        DataFrame or dict
-            A column per parameter, then those of `Curve`; one row per combination, slip changing
-            fastest. Units are in ``attrs['units']``.
 
         Examples
         --------

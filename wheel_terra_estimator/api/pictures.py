@@ -27,19 +27,10 @@ UNKNOWN_CLASS = 255
 def plot_curve(
     curves: Curve | Mapping[str, Curve], axes: NDArray[np.object_] | None = None
 ) -> NDArray[np.object_]:
-    """Draw sinkage, drawbar pull and torque over slip.
+    """Draw sinkage, drawbar pull and torque over slip; return the (3,) axes.
 
-    Parameters
-    ----------
-    curves : Curve, or mapping of str to Curve
-        One curve, or several with their labels.
-    axes : (3,) array of Axes, optional
-        Where to draw; default: a new figure.
-
-    Returns
-    -------
-    numpy.ndarray
-        (3,) matplotlib axes.
+    ``curves``: one, or several by their labels. ``axes``: (3,), where to draw; default: a new
+    figure.
     """
     named = {'': curves} if isinstance(curves, Curve) else dict(curves)
     with picture_style():
@@ -64,19 +55,9 @@ def plot_curve(
 def plot_estimates(estimates: Any, quantity: str = 'slip', axes: Axes | None = None) -> Axes:
     """Draw one estimated quantity of all wheels over time, stuck warnings shaded.
 
-    Parameters
-    ----------
-    estimates : DataFrame or mapping
-        What ``estimate`` returned.
-    quantity : str
-        ``slip``, ``sinkage`` [m], ``drawbar_pull`` [N], ``normal_load`` [N], ...
-    axes : Axes, optional
-        Where to draw; default: a new figure.
-
-    Returns
-    -------
-    Axes
-        Slip of unknown class (at rest, or no input) is left out.
+    ``estimates``: what ``estimate`` returned. ``quantity``: ``slip`` (where its class is known),
+    ``sinkage`` [m], ``drawbar_pull`` [N], ``normal_load`` [N], ... ``axes``: where to draw;
+    default: a new figure.
     """
     wheels = [key.partition('.')[2] for key in estimates if str(key).startswith(f'{quantity}.')]
     if not wheels:
@@ -105,17 +86,8 @@ def plot_estimates(estimates: Any, quantity: str = 'slip', axes: Axes | None = N
 def plot_diagnosis(diagnosis: Diagnosis, axes: Axes | None = None) -> Axes:
     """Draw how the held-out error shrinks: as configured, soil refitted, effect added.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        What ``diagnose`` returned.
-    axes : Axes, optional
-        Where to draw; default: a new figure.
-
-    Returns
-    -------
-    Axes
-        Errors as shares of the error as configured; black marks: noise, where known.
+    Errors are shares of the error as configured; black marks: noise, where known. ``axes``: where
+    to draw; default: a new figure.
     """
     steps = ('before', 'refit', 'after')
     labels = ('as configured', 'soil refitted', 'in the end')

@@ -94,10 +94,7 @@ class Soil(terramechanics_soil.Soil):
     def load(cls, name: str | Path) -> Soil:
         """Return a shipped soil by its bare name, or that of a configuration file.
 
-        Raises
-        ------
-        UserError
-            If no file answers to the name, or it states no soil.
+        Raises UserError if no file answers to the name, or it states no soil.
         """
         configuration = reader.load([name], complete=False)
         if not configuration.soil_stated:
@@ -121,7 +118,9 @@ class Soil(terramechanics_soil.Soil):
 
         A regularised least-squares fit: each number is taken as known to its own value around the
         start, so that what the rows cannot tell (kc apart from kphi on one wheel width, angles
-        without pull or torque) stays near it. Density and pressure law are those of the start.
+        without pull or torque) stays near it. Density and pressure law are those of the start;
+        ``std`` has the deviation of each fitted number. Warns if more is left than noise and a
+        model error of 2 % of the range permit.
 
         Parameters
         ----------
@@ -135,16 +134,6 @@ class Soil(terramechanics_soil.Soil):
             Of the model, as for ``Model``.
         columns, ignore_columns
             As for ``diagnose``.
-
-        Returns
-        -------
-        Soil
-            With the deviation of each fitted number in ``std``.
-
-        Warns
-        -----
-        UserWarning
-            If more is left than noise and a model error of 2 % of the range permit.
 
         Examples
         --------
@@ -180,10 +169,7 @@ class Soil(terramechanics_soil.Soil):
     def replace(self, **changes: Any) -> Soil:
         """Return a soil with other values of some fields, or of ``friction_angle_deg`` [deg].
 
-        Raises
-        ------
-        UserError
-            For a name that is no field, with the nearest one.
+        Raises UserError for a name that is no field, with the nearest one.
         """
         known = [*(f.name for f in fields(self)), _DEGREES]
         for name in changes:
@@ -197,10 +183,7 @@ class Soil(terramechanics_soil.Soil):
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write a parameter file: ``--config`` of the commands, ``--params-file`` of the node.
 
-        Raises
-        ------
-        UserError
-            If the file exists and ``overwrite`` is False, or it cannot be written.
+        Raises UserError if the file exists and ``overwrite`` is False, or it cannot be written.
         """
         target = Path(path)
         check_file(target, overwrite)

@@ -36,6 +36,9 @@ def diagnose(
 ) -> Diagnosis:
     """Find where measurements and a model disagree, and name the effect that is missing.
 
+    ``Diagnosis.to_dict()`` is ``report.json``. Raises UserError for input that cannot be used, with
+    row or column and the remedy.
+
     Parameters
     ----------
     data : DataFrame, mapping or path
@@ -58,16 +61,6 @@ def diagnose(
         or a YAML file of such lines.
     ignore_columns : sequence of str
         Titles of columns of numbers that are left out; ``['all']``: whatever is not understood.
-
-    Returns
-    -------
-    Diagnosis
-        ``verdict``, ``sentence``, ``effects``, ``gap``, ... and ``to_dict()`` as ``report.json``.
-
-    Raises
-    ------
-    UserError
-        For input that cannot be used, with row or column and the remedy.
 
     Examples
     --------
@@ -95,13 +88,9 @@ def diagnose(
 def corrected_model(diagnosis: Diagnosis) -> Model:
     """Return the model after a diagnosis: soil refitted, named effects added.
 
-    The same as ``Model.load`` of the configuration and the written ``model.yaml``.
-
-    Warns
-    -----
-    UserWarning
-        If the verdict is open and a quantity is predicted worse on rows that the fit did not see
-        than by the model as configured: the refit makes up for what is missing.
+    The same as ``Model.load`` of the configuration and the written ``model.yaml``. Warns if the
+    verdict is open and a quantity is predicted worse on rows that the fit did not see than by the
+    model as configured: the refit makes up for what is missing.
     """
     from wheel_terra_estimator.discrepancy.report.model_file import corrected
     from wheel_terra_estimator.discrepancy.result import OPEN

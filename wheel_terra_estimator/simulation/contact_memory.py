@@ -44,16 +44,9 @@ class Shear(NamedTuple):
 
 
 class ContactMemory:
-    """States of the contacts of n wheels.
+    """States of the contacts of n wheels; ``slip_radius``: (n,) [m].
 
-    Parameters
-    ----------
-    wheel : Wheel
-        (n,) geometry.
-    slip_radius : numpy.ndarray
-        (n,) [m].
-    dig_efficiency : float
-        Share of the soil between passing lugs that a spinning wheel throws out [-].
+    ``dig_efficiency``: share of the soil between passing lugs that a spinning wheel throws out [-].
     """
 
     def __init__(self, wheel: Wheel, slip_radius: FloatArray, dig_efficiency: float) -> None:
@@ -78,12 +71,7 @@ class ContactMemory:
     ) -> tuple[Shear, Shear]:
         """Return the shear after a step with these hub speeds [m/s] and wheel rates [rad/s].
 
-        Returns
-        -------
-        Shear
-            The state.
-        Shear
-            What the stress follows: the state and a part of its rate, at most the slip itself.
+        Beside it, what the stress follows: it and a part of its rate, at most the slip itself.
         """
         rim = rate * self._slip_radius
         speed = np.maximum(np.abs(rim), np.sqrt(forward * forward + lateral * lateral))

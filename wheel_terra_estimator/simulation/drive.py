@@ -26,24 +26,12 @@ DEFAULT_TORQUE_RATIO = 1.5
 
 @dataclass(frozen=True)
 class SimulatedDrive:
-    """What a drive gave.
-
-    Attributes
-    ----------
-    scenario : Scenario
-        The scenario; ``scenario.configuration`` is what an estimator may know.
-    seed : int
-        The seed.
-    arrivals : list of Arrival
-        Measurements in the order of their arrival.
-    truth : TruthTable
-        One row per stamp of the wheel odometry.
-    """
+    """What a drive gave."""
 
     scenario: Scenario
     seed: int
-    arrivals: list[Arrival]
-    truth: TruthTable
+    arrivals: list[Arrival]  # measurements in the order of their arrival
+    truth: TruthTable  # (k, n) arrays of slip, sinkage, pull, ... by stamps of the wheel odometry
 
     @property
     def configuration(self) -> Configuration:

@@ -16,20 +16,13 @@ SETTLING_TIME = 0.003
 
 
 class Drives:
-    """Speed control of n wheels: proportional and integral, limited torque, limited acceleration.
-
-    Parameters
-    ----------
-    torque_limit : numpy.ndarray
-        (n,) greatest torque at the wheel [N m].
-    working_rate : numpy.ndarray
-        (n,) wheel rate for which the control is made [rad/s].
-    acceleration : float
-        Greatest change of the commanded rate [rad/s^2].
-    """
+    """Speed control of n wheels: proportional and integral, with limits of torque and change."""
 
     def __init__(
-        self, torque_limit: FloatArray, working_rate: FloatArray, acceleration: FloatArray
+        self,
+        torque_limit: FloatArray,  # (n,) greatest torque at the wheel [N m]
+        working_rate: FloatArray,  # (n,) wheel rate for which the control is made [rad/s]
+        acceleration: FloatArray,  # greatest change of the commanded rate [rad/s^2]
     ) -> None:
         self._limit = torque_limit
         self._gain = torque_limit / (CONTROL_BAND * working_rate)

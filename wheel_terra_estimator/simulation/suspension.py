@@ -65,16 +65,9 @@ class Suspension:
         frame on ground that yields evenly. Returns (n,) loads [N], none below ``LEAST_LOAD_SHARE``
         of their mean.
 
-        Parameters
-        ----------
-        mass : float
-            Mass of the rover [kg].
-        specific_force : numpy.ndarray
-            (3,) forward, left, up in the frame of the ground below the rover [m/s^2].
-        pull : numpy.ndarray
-            (n,) longitudinal force of the soil [N].
-        load_moment : numpy.ndarray
-            (n,) moment of the load about the hub, positive where it acts ahead of it [N m].
+        ``specific_force``: (3,) forward, left, up in the frame of the ground below the rover
+        [m/s^2]. ``pull``: (n,) longitudinal force of the soil [N]. ``load_moment``: (n,) moment of
+        the load about the hub, positive where it acts ahead of it [N m].
         """
         forward, left, up = specific_force
         total = mass * up

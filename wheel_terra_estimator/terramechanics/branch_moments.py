@@ -37,20 +37,9 @@ _NODES = tuple(
 def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Any, Any, Any]:
     """Area, centroid and spread of the stress on one side of its peak, as shares.
 
-    For small angles the stress is [v (1 + q (1 - v))]^N of its peak, with v = 0 at the edge of
-    the contact, 1 at the peak, and q = (t1 - tm)/(t1 + tm); its moments, as a series in q
-    (exact for N = 1).
-
-    ``exponent``, ``skew``: N and q.
-
-    Returns
-    -------
-    area : float or numpy.ndarray
-        Integral over v.
-    centroid : float or numpy.ndarray
-        Mean v; 2/3 for a triangle.
-    spread : float or numpy.ndarray
-        Variance of v, without skew: (N + 1)/((N + 2)^2 (N + 3)).
+    For small angles the stress is [v (1 + q (1 - v))]^N of its peak, with v = 0 at the edge of the
+    contact, 1 at the peak, and the skew q = (t1 - tm)/(t1 + tm). Its integral over v, the mean of v
+    (2/3 for a triangle) as series in q (exact for N = 1), and the variance of v without skew.
     """
     n, q = exponent, skew
     area = (1.0 + n * q / (n + 2.0) * (1.0 + (n - 1.0) * q / (n + 3.0))) / (n + 1.0)

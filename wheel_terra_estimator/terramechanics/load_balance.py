@@ -21,9 +21,7 @@ from wheel_terra_estimator.terramechanics.quantity import Quantity
 LARGEST_ANGLE = np.pi / 2
 SMALLEST_ANGLE = 1e-5
 _STEP = 1e-6
-_TOLERANCE = 1e-10  # of the load
-# Of the load; what interpolation leaves.
-_REST = 1e-10
+_TOLERANCE = _REST = 1e-10  # of the load: of Newton, and what interpolation may leave
 
 
 def explicit_entrance_angle(contact: Contact[Quantity]) -> FloatArray:
@@ -94,14 +92,8 @@ def solve_entrance_angle(
     the rest. Points where it fails are scanned for their first crossing.
 
     ``carried``: (2, N) angles -> (2, N) vertical force [N]. ``load``, ``start``: (N,) load [N] and
-    first guess [rad].
-
-    Returns
-    -------
-    numpy.ndarray
-        (N,) entrance angle [rad]; `LARGEST_ANGLE` where the soil cannot carry the load.
-    numpy.ndarray
-        (N,) True where it can.
+    first guess [rad]. Returns (N,) entrance angle [rad], `LARGEST_ANGLE` where the soil cannot
+    carry the load, and whether it can.
     """
     load = np.asarray(load, float)
     angle = np.broadcast_to(np.asarray(start, float), load.shape).copy()

@@ -59,14 +59,9 @@ def deviations(
 ) -> dict[str, Deviation]:
     """Return the deviation of each soil number that a diagnosis refits.
 
-    Parameters
-    ----------
-    stated : mapping
-        Field of ``Soil`` -> standard deviation that the configuration states explicitly [SI].
-    source : str
-        Class of the source of the rest (``soil.source``).
-    known_to : float, optional
-        Share of its value to which every number is known (``--soil-known-to``); goes before all.
+    ``stated``: field of ``Soil`` -> deviation that the configuration states [SI]; ``source``: class
+    of the source of the rest (``soil.source``). ``known_to``, the share of its value to which every
+    number is known (``--soil-known-to``), goes before all.
     """
     found = {}
     for name, usual in _BY_SOURCE[source].items():

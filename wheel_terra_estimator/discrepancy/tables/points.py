@@ -35,18 +35,10 @@ def operating_points(
 ) -> OperatingPoints:
     """Return rows as operating points.
 
-    Raises UserError if neither rows nor configuration state the wheel, or a value is out of range.
-
-    Parameters
-    ----------
-    columns : mapping
-        Input column -> (N,) values [SI], nan = not stated; slip and normal load at least.
-    configuration : Configuration
-        Wheel and gravity where the rows do not state them, and the radius that slip refers to.
-    source : str
-        What an error names.
-    wheel : int
-        Which wheel of the rover.
+    ``columns``: input column -> (N,) values [SI], nan = not stated; slip and normal load at least.
+    Wheel (number ``wheel`` of the rover) and gravity that they do not state are those of the
+    configuration. Raises UserError if neither states the wheel, or a value is out of range; it
+    names ``source``.
     """
     count, wheels = len(columns['slip']), configuration.wheels
 
