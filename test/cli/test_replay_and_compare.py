@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 from recordings import changed
 
-from wheel_terra_estimator import __version__
 from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
-from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 from wheel_terra_estimator.simulation import scenario
 from wheel_terra_estimator.simulation.drive import simulate
@@ -117,15 +115,9 @@ def test_compare(drive, live, tmp_path, capsys, undrawn):
     told = json.loads(capsys.readouterr().out)
     assert told['differences']['drawbar_pull']['rms'] > 0.0
     assert told['errors']['a']['quantities']['slip']['rms'] > 0.0
-    assert told['settings']['soil.cohesion'] == {
-        'a': reader.load(['generic_six_wheel', 'test_sand']).flat()['soil.cohesion'],
-        'b': 900.0,
-    }
-    assert set(told['settings']) == {'soil.cohesion'}
-    assert told['versions'] == {'a': __version__, 'b': __version__}
-    (tmp_path / 'b' / 'metadata.yaml').unlink()  # as a bag that somebody else wrote
+    assert '"soil.cohesion":900.0' in (tmp_path / 'b' / 'metadata.yaml').read_text()
     assert main(['compare', *pair]) == 0
-    assert 'settings: not stated in both' in capsys.readouterr().out
+    assert 'same slip class in' in capsys.readouterr().out
     assert main(['compare', pair[0], str(drive)]) == 2
 
 

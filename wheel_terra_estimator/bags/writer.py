@@ -6,12 +6,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.bags import bag_metadata
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
@@ -33,33 +30,6 @@ TOPICS = {
 _VERSION, _SETTINGS, _RECORDING = (
     f'{diagnostics.NODE}.{key}' for key in ('version', 'settings', 'recording')
 )
-
-
-@dataclass(frozen=True)
-class Origin:
-    """How estimates were made."""
-
-    version: str = ''  # version of the package; empty: not stated
-    # Configuration key -> value, defaults included
-    settings: dict[str, Any] = field(default_factory=dict)
-    recording: str = ''
-
-
-def read_origin(path: Path) -> Origin:
-    """Return how the estimates of a bag (folder or file in it) were made, as far as it says."""
-    metadata = bag_metadata.read(path if path.is_dir() else path.parent)
-    if not path.is_dir() and path.name not in metadata.files:
-        return Origin()
-    notes = metadata.notes
-    try:
-        settings = json.loads(notes.get(_SETTINGS, '{}'))
-    except (ValueError, RecursionError):
-        settings = {}
-    return Origin(
-        notes.get(_VERSION, ''),
-        settings if isinstance(settings, dict) else {},
-        notes.get(_RECORDING, ''),
-    )
 
 
 class EstimateBagWriter(BagFile):

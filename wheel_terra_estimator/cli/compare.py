@@ -27,7 +27,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.history import read_estimates
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_simulated_truth
-    from wheel_terra_estimator.bags.writer import read_origin
     from wheel_terra_estimator.errors import UserError
     from wheel_terra_estimator.reporting.comparison import (
         as_dict,
@@ -52,9 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
                 f'{arguments.truth}: no truth in it: neither /ground_truth/twist nor '
                 '/truth/odometry'
             )
-    origins = read_origin(inputs[0]), read_origin(inputs[1])
     names = [str(path) for path in inputs]
-    comparison = compare(histories[0], histories[1], names, truth, origins)
+    comparison = compare(histories[0], histories[1], names, truth)
     if arguments.json:
         print(json.dumps({**as_dict(comparison), 'notes': notes}, indent=2))
     else:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,6 @@ import numpy as np
 from wheel_terra_estimator.arrays import IndexArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth
-from wheel_terra_estimator.bags.writer import Origin
 from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
@@ -46,17 +44,6 @@ class Comparison:
     same_class: float
     warnings: tuple[tuple[float, ...], ...]  # starts [s], of A and of B
     errors: tuple[truth_scores.TruthErrors | None, ...]
-    origins: tuple[Origin, Origin] = (Origin(), Origin())
-
-    @property
-    def unlike_settings(self) -> dict[str, tuple[Any, Any]]:
-        """Configuration key -> its values in A and B where they differ; None: not stated."""
-        first, second = (origin.settings for origin in self.origins)
-        if not first or not second:
-            return {}
-        keys = sorted(first.keys() | second.keys())
-        pairs = {key: (first.get(key), second.get(key)) for key in keys}
-        return {key: (a, b) for key, (a, b) in pairs.items() if a != b}
 
 
 def compare(
@@ -64,7 +51,6 @@ def compare(
     second: EstimateHistory,
     names: Sequence[str],
     truth: Truth | None,
-    origins: tuple[Origin, Origin] = (Origin(), Origin()),
 ) -> Comparison:
     """Compare two runs over the same drive.
 
@@ -97,7 +83,6 @@ def compare(
         errors=tuple(
             truth_scores.truth_errors(run, truth, thresholds) if truth else None for run in runs
         ),
-        origins=origins,
     )
 
 
@@ -131,7 +116,6 @@ def as_text(comparison: Comparison) -> str:
     for letter, starts in zip('AB', c.warnings, strict=True):
         told = ', '.join(f'{start:.1f} s' for start in starts) or 'none'
         lines.append(f'stuck warnings of {letter}: {told}')
-    lines += _origin_lines(c)
     lines += ['', f'  {"B minus A":24}{"mean":>11}{"rms":>11}{"greatest":>11}   where']
     for d in c.differences:
         label = f'{d.name} [{d.unit}]'
@@ -140,22 +124,6 @@ def as_text(comparison: Comparison) -> str:
         if errors:
             lines += ['', f'{letter}:', *truth_scores.as_lines(errors)]
     return '\n'.join(lines)
-
-
-def _origin_lines(comparison: Comparison) -> list[str]:
-    versions = [origin.version or 'not stated' for origin in comparison.origins]
-    lines = [f'version of A: {versions[0]}, of B: {versions[1]}']
-    if not all(origin.settings for origin in comparison.origins):
-        return [*lines, 'settings: not stated in both (a bag that was not written by replay)']
-    unlike = comparison.unlike_settings
-    lines.append(f'settings that differ: {len(unlike) or "none"}')
-    return lines + [
-        f'  {key}: A {_shown_value(a)}, B {_shown_value(b)}' for key, (a, b) in unlike.items()
-    ]
-
-
-def _shown_value(value: Any) -> str:
-    return 'not stated' if value is None else json.dumps(value)
 
 
 def as_dict(comparison: Comparison) -> dict[str, Any]:
@@ -167,10 +135,6 @@ def as_dict(comparison: Comparison) -> dict[str, Any]:
         'sets': list(c.sets),
         'common': c.common,
         'same_class': c.same_class,
-        'versions': {letter: o.version for letter, o in zip('ab', c.origins, strict=True)},
-        'settings': {key: {'a': a, 'b': b} for key, (a, b) in c.unlike_settings.items()}
-        if all(origin.settings for origin in c.origins)
-        else None,
         'stuck_warnings': {'a': list(c.warnings[0]), 'b': list(c.warnings[1])},
         'differences': {
             d.name: {k: v for k, v in vars(d).items() if k != 'name'} for d in c.differences
