@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
-from operator import attrgetter
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,7 +43,7 @@ def propose(
     found: list[NextMeasurement] = []
     competitors = competitors[:2]
     menu = _menu(setting) if competitors else []
-    predicted = _predicted(setting, [chosen, *competitors], [points for _, points in menu])
+    predicted = _predicted(setting, [chosen, *competitors], menu)
     for place, competitor in enumerate(competitors, 1):
         names = (joined(chosen.names), joined(competitor.names))
         if names[0] == names[1]:  # two forms of the same
@@ -56,97 +54,84 @@ def propose(
             if name in ZERO_CHECKS and (name in ours) != (name in theirs):
                 found.append(NextMeasurement(ZERO_CHECKS[name], names, now, np.inf))
         blocks = []
-        for (what, points), (values, sensitivity) in zip(menu, predicted, strict=True):
+        for (what, rows), (values, sensitivity) in zip(menu, predicted, strict=True):
             outputs = values[[0, place]]
             then = _with_rows(setting, chosen, competitor, outputs, sensitivity[place], std)
             depth = outputs[..., 0].max()
             worth = np.isfinite(then) and then > max(_WORTH, _MORE * now)
-            if worth and depth < _DEEPEST * np.min(points.wheel.radius):
-                blocks.append(NextMeasurement(what, names, now, then, _columns(points)))
+            if worth and depth < _DEEPEST * rows['wheel_radius'][0]:
+                stated = {key: column for key, column in rows.items() if np.isfinite(column).all()}
+                blocks.append(NextMeasurement(what, names, now, then, stated))
         blocks.sort(key=lambda block: -block.distance_then)
         found.extend(blocks[:_KEPT])
     return tuple(found)
 
 
-def _menu(setting: Setting) -> list[tuple[str, OperatingPoints]]:
-    """Return the blocks of rows that a laboratory could add."""
-    old = setting.forward.points
-    wheel = Wheel(
-        float(np.median(old.wheel.radius)),
-        float(np.median(old.wheel.width)),
-        float(np.max(old.wheel.lug_height)),
-        float(np.median(old.wheel.lug_count)),
-        float(np.median(old.wheel.lug_thickness)),
-    )
+def _menu(setting: Setting) -> list[tuple[str, dict[str, FloatArray]]]:
+    """Return the blocks of rows that a laboratory could add: input column -> (8,) values."""
+    old, wheel = setting.forward.points, setting.forward.points.wheel
     rate = np.asarray(old.angular_velocity, dtype=float)
     speed = float(np.nanmedian(rate)) if np.isfinite(rate).any() else np.nan
-    base = OperatingPoints(
-        _SLIPS,
-        float(np.median(old.normal_load)),
-        wheel,
-        0.0,
-        old.slip_radius,
-        float(np.median(old.gravity)),
-        speed,
-        float(np.min(old.pass_number)),
-    )
-    load, radius = base.normal_load, wheel.radius
-    high = np.linspace(0.82, 0.94, 8)
-    menu = [
-        ('braking rows, slip -0.3 to -0.02', replace(base, slip=-np.linspace(0.02, 0.3, 8))),
-        ('slip 0.82 to 0.94', replace(base, slip=high)),
-        ('three times the load', replace(base, normal_load=3.0 * load)),
-        ('a third of the load', replace(base, normal_load=load / 3.0)),
-        (
-            'a wheel of 0.6 times the radius',
-            replace(base, wheel=replace(wheel, radius=0.6 * radius)),
-        ),
-        (
-            'a wheel of twice the width',
-            replace(base, wheel=replace(wheel, width=2.0 * wheel.width)),
-        ),
-        ('a slope of 12 degrees', replace(base, slope=np.radians(12.0))),
-        ('the same rows again', base),
+    load, lugs = float(np.median(old.normal_load)), float(np.max(wheel.lug_height))
+    radius, width = float(np.median(wheel.radius)), float(np.median(wheel.width))
+    passes = float(np.min(old.pass_number))
+    base = {
+        'slip': _SLIPS,
+        'normal_load': load,
+        'slope': 0.0,
+        'wheel_radius': radius,
+        'wheel_width': width,
+        'lug_height': lugs,
+        'angular_velocity': speed,
+        'pass_number': passes,
+    }
+    changes: list[tuple[str, dict[str, Any]]] = [
+        ('braking rows, slip -0.3 to -0.02', {'slip': -np.linspace(0.02, 0.3, len(_SLIPS))}),
+        ('slip 0.82 to 0.94', {'slip': np.linspace(0.82, 0.94, len(_SLIPS))}),
+        ('three times the load', {'normal_load': 3.0 * load}),
+        ('a third of the load', {'normal_load': load / 3.0}),
+        ('a wheel of 0.6 times the radius', {'wheel_radius': 0.6 * radius}),
+        ('a wheel of twice the width', {'wheel_width': 2.0 * width}),
+        ('a slope of 12 degrees', {'slope': np.radians(12.0)}),
+        ('the same rows again', {}),
     ]
-    if wheel.lug_height > 0.0:
-        taller = replace(wheel, lug_height=1.6 * wheel.lug_height)
-        menu.append(('the wheel without lugs', replace(base, wheel=replace(wheel, lug_height=0.0))))
-        menu.append(('lugs 1.6 times as high', replace(base, wheel=taller)))
+    if lugs > 0.0:
+        changes.append(('the wheel without lugs', {'lug_height': 0.0}))
+        changes.append(('lugs 1.6 times as high', {'lug_height': 1.6 * lugs}))
     if np.isfinite(speed):
-        menu.append(('five times the speed', replace(base, angular_velocity=5.0 * speed)))
-    menu.append(('a second pass in the same rut', replace(base, pass_number=base.pass_number + 1)))
-    return menu
+        changes.append(('five times the speed', {'angular_velocity': 5.0 * speed}))
+    changes.append(('a second pass in the same rut', {'pass_number': passes + 1.0}))
+    return [
+        (what, {key: np.full(len(_SLIPS), value) for key, value in {**base, **change}.items()})
+        for what, change in changes
+    ]
 
 
 def _predicted(
-    setting: Setting, fits: Sequence[Fit], blocks: Sequence[OperatingPoints]
+    setting: Setting, fits: Sequence[Fit], menu: Sequence[tuple[str, Mapping[str, FloatArray]]]
 ) -> list[tuple[FloatArray, list[FloatArray]]]:
     """Return outputs (B, n, 4) and Jacobians of every block of rows, all solved at once."""
-    if not blocks:
+    if not menu:
         return []
-    state = setting.forward.at(_joined(blocks), other_rows=True).solve(
+    old = setting.forward.points
+    columns = {key: np.concatenate([rows[key] for _, rows in menu]) for key in menu[0][1]}
+    wheel = Wheel(
+        *(columns.pop(key) for key in ('wheel_radius', 'wheel_width', 'lug_height')),
+        *(float(np.median(part)) for part in (old.wheel.lug_count, old.wheel.lug_thickness)),
+    )
+    points = OperatingPoints(
+        wheel=wheel,
+        slip_radius=old.slip_radius,
+        gravity=float(np.median(old.gravity)),
+        **columns,
+    )
+    state = setting.forward.at(points, other_rows=True).solve(
         [f.coordinates for f in fits],
         [f.u for f in fits],
         by=[[], *(range(len(f.u)) for f in fits[1:])],
     )
-    ends = np.cumsum([len(points) for points in blocks])
-    rows = [slice(end - len(points), end) for end, points in zip(ends, blocks, strict=True)]
-    return [(state.outputs[:, part], [j[part] for j in state.jacobian]) for part in rows]
-
-
-def _joined(blocks: Sequence[OperatingPoints]) -> OperatingPoints:
-    """Return the rows of all blocks as one."""
-
-    def stacked(of: Callable[[OperatingPoints], Any]) -> FloatArray:
-        return np.concatenate([np.broadcast_to(of(points), len(points)) for points in blocks])
-
-    wheel = {f.name: stacked(attrgetter(f'wheel.{f.name}')) for f in fields(Wheel)}
-    rest = {
-        f.name: stacked(attrgetter(f.name))
-        for f in fields(OperatingPoints)
-        if f.name not in ('wheel', 'slip_radius')
-    }
-    return OperatingPoints(wheel=Wheel(**wheel), slip_radius=blocks[0].slip_radius, **rest)
+    parts = [slice(k * len(_SLIPS), (k + 1) * len(_SLIPS)) for k in range(len(menu))]
+    return [(state.outputs[:, part], [j[part] for j in state.jacobian]) for part in parts]
 
 
 def _with_rows(
@@ -181,22 +166,3 @@ def _distance(
     precision = jacobian.T @ jacobian + np.diag(competitor.prior)
     step = np.linalg.solve(precision, jacobian.T @ difference)
     return float(np.linalg.norm(difference - jacobian @ step))
-
-
-def _columns(points: OperatingPoints) -> dict[str, FloatArray]:
-    count = len(points)
-    values = {
-        'slip': points.slip,
-        'normal_load': points.normal_load,
-        'slope': points.slope,
-        'wheel_radius': points.wheel.radius,
-        'wheel_width': points.wheel.width,
-        'lug_height': points.wheel.lug_height,
-        'angular_velocity': points.angular_velocity,
-        'pass_number': points.pass_number,
-    }
-    return {
-        key: np.array(np.broadcast_to(np.asarray(value, dtype=float), (count,)))
-        for key, value in values.items()
-        if np.isfinite(np.asarray(value, dtype=float)).all()
-    }

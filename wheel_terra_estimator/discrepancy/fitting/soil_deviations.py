@@ -19,24 +19,16 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 
 # Deviations in the space of the coordinates: of logarithms (stiffness, tan phi, K), else absolute;
 # of cohesion a share of its value, beside a part that does not vanish with it.
-_TESTS = {
-    'stiffness': 0.10,
-    'sinkage_exponent': 0.05,
-    'tan_friction': 0.05,
-    'shear_modulus': 0.10,
-    'cohesion': 0.20,
-    'peak_stress_ratio': 0.03,
-    'leaving_angle_ratio': 0.03,
+_CLASSES = {  # soil tests, published
+    'stiffness': (0.10, 0.40),
+    'sinkage_exponent': (0.05, 0.20),
+    'tan_friction': (0.05, 0.25),
+    'shear_modulus': (0.10, 0.80),
+    'cohesion': (0.20, 0.50),
+    'peak_stress_ratio': (0.03, 0.10),
+    'leaving_angle_ratio': (0.03, 0.25),
 }
-_PUBLISHED = {
-    'stiffness': 0.40,
-    'sinkage_exponent': 0.20,
-    'tan_friction': 0.25,
-    'shear_modulus': 0.80,
-    'cohesion': 0.50,
-    'peak_stress_ratio': 0.10,
-    'leaving_angle_ratio': 0.25,
-}
+_TESTS, _PUBLISHED = ({key: both[k] for key, both in _CLASSES.items()} for k in (0, 1))
 _PROXY = _PUBLISHED | {'stiffness': 0.60, 'sinkage_exponent': 0.40, 'shear_modulus': 1.0}
 _COHESION_FLOOR = {'': 10.0, 'published': 50.0, 'proxy': 50.0}  # [Pa], beside the share
 _BY_SOURCE = {'': _TESTS, 'published': _PUBLISHED, 'proxy': _PROXY}

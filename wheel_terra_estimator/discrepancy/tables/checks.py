@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
@@ -18,14 +17,12 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     ONE_OF,
     ORDER_COLUMNS,
     QUANTITIES,
-    STD_COLUMNS,
     UNITS,
     SteadyTable,
 )
 from wheel_terra_estimator.errors import UserError
 
 Mask = BoolArray
-_Refuse: TypeAlias = Callable[[Mask, str, str], None]
 
 MINIMUM_ROWS = 6
 MINIMUM_SLIP_SPAN = 0.1
@@ -142,15 +139,27 @@ _RANGES: tuple[tuple[str, float, float, str], ...] = (
 )
 
 
+def _refuse(
+    name: str,
+    lines: IndexArray,
+    column: str,
+    values: FloatArray,
+    bad: Mask,
+    why: str | Callable[[int], str],
+) -> None:
+    """Raise where rows are bad: the first of them, its value, and why (of that row)."""
+    if bad.any():
+        row = int(np.flatnonzero(bad)[0])
+        shown = 'the number' if np.isnan(values[row]) else f'{values[row]:g}'
+        said = why if isinstance(why, str) else why(row)
+        raise UserError(f'{name}, line {lines[row]}, column {column}: {shown} {said}')
+
+
 def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray) -> None:
     """Raise where a value is impossible, with the unit that it looks like."""
 
     def refuse(bad: Mask, column: str, why: str) -> None:
-        if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            value = arrays[column][row]
-            shown = 'the number' if np.isnan(value) else f'{value:g}'
-            raise UserError(f'{name}, line {lines[row]}, column {column}: {shown} {why}')
+        _refuse(name, lines, column, arrays[column], bad, why)
 
     if not arrays['slip'].size:
         raise UserError(f'{name}, line 2: no rows below the column names; add one per steady point')
@@ -161,50 +170,38 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray
     for column, least, greatest, why in _RANGES:
         if column in arrays:
             refuse((arrays[column] < least) | (arrays[column] > greatest), column, why)
-    refuse(np.full(lines.shape, arrays['normal_load'].max() < _NO_LOAD), 'normal_load', _KILONEWTON)
+    load = arrays['normal_load']
+    refuse(np.full(lines.shape, load.max() < _NO_LOAD), 'normal_load', _KILONEWTON)
     if 'wheel_radius' in arrays and 'lug_height' in arrays:
         high = arrays['lug_height'] > arrays['wheel_radius']
         refuse(high, 'lug_height', 'is more than the wheel radius; check both, in m')
     for column, most in (('drawbar_pull', 'three'), ('lateral_force', 'five')):
         if column in arrays:
-            _check_size_of_force(refuse, column, arrays, most)
-    for column in STD_COLUMNS:
-        if column in arrays:
-            _check_size_of_deviation(refuse, arrays, column)
-
-
-def _check_size_of_force(
-    refuse: _Refuse, column: str, arrays: Mapping[str, FloatArray], most: str
-) -> None:
-    """Refuse forces that are far more than the load, or nothing beside it."""
-    force, load = arrays[column], arrays['normal_load']
-    refuse(
-        abs(force) > _TIMES_LOAD[most] * load,
-        column,
-        f'is over {most} times the normal load; check both units (N, not kg or kN)',
-    )
-    measured = np.isfinite(force)
-    if measured.sum() > 2 and 0.0 < abs(force[measured]).max() < _NO_FORCE * load.max():
-        refuse(measured, column, _KILONEWTON)
-
-
-def _check_size_of_deviation(
-    refuse: _Refuse, arrays: Mapping[str, FloatArray], column: str
-) -> None:
-    """Refuse a deviation beside which its whole column is nothing: its unit is another one."""
-    quantity = column.removesuffix('_std')
-    if quantity in QUANTITIES and quantity in arrays:
-        values = np.abs(arrays[quantity][np.isfinite(arrays[quantity])])
-        if values.size and np.nanmin(arrays[column], initial=np.inf) > 10.0 * values.max() > 0.0:
-            refuse(
-                np.isfinite(arrays[column]),
-                column,
-                f'is over ten times the largest {quantity}; give both in {UNITS[quantity]}',
-            )
+            force, far = arrays[column], f'is over {most} times the normal load; check both units'
+            refuse(abs(force) > _TIMES_LOAD[most] * load, column, f'{far} (N, not kg or kN)')
+            measured = np.isfinite(force)
+            if measured.sum() > 2 and 0.0 < abs(force[measured]).max() < _NO_FORCE * load.max():
+                refuse(measured, column, _KILONEWTON)
+    for quantity, unit in UNITS.items():
+        if quantity in arrays and f'{quantity}_std' in arrays:
+            std, values = arrays[f'{quantity}_std'], np.abs(arrays[quantity])
+            greatest = values[np.isfinite(values)].max(initial=0.0)
+            # A deviation beside which its whole column is nothing has another unit.
+            if np.nanmin(std, initial=np.inf) > 10.0 * greatest > 0.0:
+                far = f'is over ten times the largest {quantity}; give both in {unit}'
+                refuse(np.isfinite(std), f'{quantity}_std', far)
 
 
 def _check_signs(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray) -> None:
     """Raise where torque works against the slip, or where most sinkages are negative."""
+
+    def refuse_most(
+        column: str, wrong: Mask, clear: Mask, why: str | Callable[[int], str], least: int = 1
+    ) -> None:
+        """Refuse what is wrong in most of the rows that are clear."""
+        if wrong.sum() >= least and wrong.sum() > 0.8 * clear.sum():
+            _refuse(name, lines, column, arrays[column], wrong, why)
+
     direction = np.where(arrays.get('angular_velocity', np.ones(len(lines))) < 0.0, -1.0, 1.0)
     if 'torque' in arrays:
         slip, torque = arrays['slip'], direction * arrays['torque']
@@ -212,42 +209,43 @@ def _check_signs(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray)
         clear = (np.abs(slip) > CLEAR_SLIP) & np.isfinite(torque)
         # A driven wheel takes torque; a skidding one may too (friction), but it does not pull.
         wrong = clear & (torque * np.sign(slip) < 0.0) & ((slip > 0.0) | (pull > 0.0))
-        if wrong.sum() >= 3 and wrong.sum() > 0.8 * clear.sum():
-            row = int(np.flatnonzero(wrong)[0])
-            raise UserError(
-                f'{name}, line {lines[row]}, column torque: {arrays["torque"][row]:g} N m at slip '
-                f'{slip[row]:g} has the wrong sign, as in most rows; torque that drives the wheel '
-                'forward and the slip of a driven wheel are positive (angular_velocity < 0: '
-                'reverse)'
-            )
-    if 'lateral_force' in arrays and 'slip_angle' in arrays:
-        aside, force = np.sin(arrays['slip_angle']), arrays['lateral_force']
-        clear = (np.abs(aside) > CLEAR_SLIP_ANGLE) & np.isfinite(force)
-        wrong = clear & (aside * force > 0.0)
-        if wrong.sum() >= 3 and wrong.sum() > 0.8 * clear.sum():
-            row = int(np.flatnonzero(wrong)[0])
-            raise UserError(
-                f'{name}, line {lines[row]}, column lateral_force: {force[row]:g} N at a slip '
-                f'angle of {arrays["slip_angle"][row]:g} rad has the wrong sign, as in most rows; '
-                'both are positive to the left, and the soil pushes against the sliding: multiply '
-                'the column by -1'
-            )
-    angle = arrays.get('leaving_angle', np.full(1, np.nan))
-    angle = angle[np.isfinite(angle)]
-    if angle.size and np.mean(angle > 0.0) > 0.8:
-        raise UserError(
-            f'{name}, line {lines[0]}, column leaving_angle: {angle[0]:g} rad and most others are '
-            'positive; an angle behind the hub is negative'
+        refuse_most(
+            'torque',
+            wrong,
+            clear,
+            lambda row: (
+                f'N m at slip {slip[row]:g} has the wrong sign, as in most rows; torque '
+                'that drives the wheel forward and the slip of a driven wheel are positive '
+                '(angular_velocity < 0: reverse)'
+            ),
+            3,
         )
-    if 'sinkage' in arrays:
-        depth = arrays['sinkage'][np.isfinite(arrays['sinkage'])]
-        if depth.size and np.mean(depth < 0.0) > 0.8:
-            row = int(np.flatnonzero(arrays['sinkage'] < 0.0)[0])
-            raise UserError(
-                f'{name}, line {lines[row]}, column sinkage: {arrays["sinkage"][row]:g} m and most '
-                'others are negative; sinkage is positive where the rim runs below the undisturbed '
-                'surface: multiply the column by -1'
-            )
+    if 'lateral_force' in arrays and 'slip_angle' in arrays:
+        angle, force = arrays['slip_angle'], arrays['lateral_force']
+        clear = (np.abs(np.sin(angle)) > CLEAR_SLIP_ANGLE) & np.isfinite(force)
+        refuse_most(
+            'lateral_force',
+            clear & (np.sin(angle) * force > 0.0),
+            clear,
+            lambda row: (
+                f'N at a slip angle of {angle[row]:g} rad has the wrong sign, as in most '
+                'rows; both are positive to the left, and the soil pushes against the sliding: '
+                'multiply the column by -1'
+            ),
+            3,
+        )
+    for column, sign, why in (
+        ('leaving_angle', 1.0, 'rad and most others are positive; one behind the hub is negative'),
+        (
+            'sinkage',
+            -1.0,
+            'm and most others are negative; sinkage is positive where the rim runs below the '
+            'undisturbed surface: multiply the column by -1',
+        ),
+    ):
+        if column in arrays:
+            values = sign * arrays[column]
+            refuse_most(column, values > 0.0, np.isfinite(values), why)
 
 
 def _check_dead_columns(table: SteadyTable, remarks: list[str]) -> None:
@@ -279,41 +277,29 @@ def check_wheel_of_model(
             continue
         values = table.columns[column]
         ratio = np.abs(np.log(values[:, None] / np.asarray(stated, dtype=float)[None, :]))
-        if not (ratio < np.log(LIKE_WHEEL)).any() and np.isfinite(values).any():
-            row = int(np.flatnonzero(np.isfinite(values))[0])
+        if not (ratio < np.log(LIKE_WHEEL)).any():
             key = f'wheels.{column.removeprefix("wheel_")}'
-            raise UserError(
-                f'{table.name}, line {table.lines[row]}, column {column}: {values[row]:g} m, but '
-                f'the model file states {stated[0]:g} m ({key}); give the --config of this wheel, '
-                'or mend the column'
+            other = (
+                f'm, but the model file states {stated[0]:g} m ({key}); give the --config of this '
+                'wheel, or mend the column'
             )
+            _refuse(table.name, table.lines, column, values, np.isfinite(values), other)
 
 
 def check_against_wheel(table: SteadyTable, radius: FloatArray) -> None:
     """Raise where a row cannot belong to the wheel: sinkage or torque out of proportion."""
     sinkage, torque = table.measured[:, 0], table.measured[:, 2]
-    load = table.columns['normal_load']
-    deep = abs(sinkage) > radius
-    if deep.any():
-        row = int(np.flatnonzero(deep)[0])
-        millimetres = abs(np.nanmedian(sinkage)) > np.median(radius)
-        remedy = (
-            'it looks like millimetres, divide the column by 1000'
-            if millimetres
-            else 'check the unit, and that --config states the wheel of the table'
-        )
-        raise UserError(
-            f'{table.name}, line {table.lines[row]}, column sinkage: {sinkage[row]:g} m is deeper '
-            f'than the wheel radius {radius[row]:g} m; {remedy}'
-        )
-    strong = abs(torque) > 5.0 * load * radius
-    if strong.any():
-        row = int(np.flatnonzero(strong)[0])
-        raise UserError(
-            f'{table.name}, line {table.lines[row]}, column torque: {torque[row]:g} N m is over '
-            f'five times load times radius; check its unit (N m), and that --config states the '
-            'wheel of the table'
-        )
+
+    def too_deep(row: int) -> str:
+        remedy = 'check the unit, and that --config states the wheel of the table'
+        if abs(np.nanmedian(sinkage)) > np.median(radius):
+            remedy = 'it looks like millimetres, divide the column by 1000'
+        return f'm is deeper than the wheel radius {radius[row]:g} m; {remedy}'
+
+    _refuse(table.name, table.lines, 'sinkage', sinkage, abs(sinkage) > radius, too_deep)
+    strong = abs(torque) > 5.0 * table.columns['normal_load'] * radius
+    why = 'N m is over five times load times radius; check its unit (N m), and that --config states'
+    _refuse(table.name, table.lines, 'torque', torque, strong, f'{why} the wheel of the table')
 
 
 def check_pull_against_model(table: SteadyTable, predicted: FloatArray) -> None:
