@@ -23,8 +23,8 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.terramechanics import effects as effect_catalogue
 from wheel_terra_estimator.terramechanics.conditioned import contacts_as_built
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement, speed_ratio
+from wheel_terra_estimator.terramechanics.quadrature import stressed
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.stresses import front_stress
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
@@ -72,10 +72,6 @@ class ContactModel:
         self._tan_friction = float(np.tan(soil.friction_angle))
         self._slip_radius = slip_radius
         self._terms = Terms(effect_catalogue.check_settings(effects))
-        # Squared towards the ends of the contact, where the stress starts like a root.
-        nodes, weights = np.polynomial.legendre.leggauss(NODES)
-        nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
-        self._nodes, self._weights = nodes * nodes, 2.0 * nodes * weights
 
     def forces(
         self,
@@ -112,17 +108,8 @@ class ContactModel:
         set_angles(contact, entrance, None, self._terms)
         t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
         shape = np.broadcast_shapes(np.shape(t1), np.shape(tm), np.shape(t2), np.shape(slip))
-        front, rear = np.broadcast_to(t1 - tm, shape), np.broadcast_to(tm - t2, shape)
-        node = self._nodes.reshape(-1, *(1,) * len(shape))
-        weight = self._weights.reshape(node.shape)
-        entry_side = t1 - front * node
-        # The rear branch mirrors the front one (Wong and Reece), so both share the same stress.
-        stress = front_stress(contact, entry_side)
-        contact.angle = angle = np.concatenate([entry_side, t2 + rear * node])
-        contact.normal_stress = np.concatenate([stress, stress])
-        self._terms.apply('on_normal_stress', contact)
-        weights = np.concatenate([front * weight, rear * weight])
-
+        weights, cosine, sine = map(np.asarray, stressed(contact, self._terms, NODES))
+        angle = contact.angle
         shear_radius = contact.shear_radius
         along = shear_displacement(angle, t1, shear_radius, contact.velocity_ratio)
         # The rim turns by (t1 - t) while the hub moves sideways.
@@ -130,7 +117,6 @@ class ContactModel:
         sheared = np.sqrt(along * along + across * across) + 1e-12
         mobilised = weights * -np.expm1(-sheared / contact.shear_modulus) / sheared
         mobilised_along = mobilised * along
-        sine, cosine = np.sin(angle), np.cos(angle)
         normal = contact.normal_stress
         frictional = contact.tan_friction * normal
 
@@ -158,7 +144,7 @@ class ContactModel:
             torque=contact.torque,
             support_ratio=support,
             sinkage_exponent=np.broadcast_to(contact.sinkage_exponent, shape),
-            contact_angle=front + rear,
+            contact_angle=np.broadcast_to((t1 - tm) + (tm - t2), shape),
             leaving_angle=np.broadcast_to(t2, shape),
             lug_sinkage=np.broadcast_to(contact.sinkage - depth, shape),
         )

@@ -38,7 +38,7 @@ def forces(
     R^2 Int tau. Returns W [N], F [N] in the direction of motion, T [N m], in the common shape of
     the contact; ``nodes``: other than `NODES`.
     """
-    weight, cosine, sine = _stressed(contact, terms, nodes)
+    weight, cosine, sine = stressed(contact, terms, nodes)
     angle, normal = contact.angle, contact.normal_stress
     shear = stresses.shear_stress(contact, angle, normal, sine=sine)
     shear *= weight * contact.shear_radius
@@ -56,13 +56,13 @@ def lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
     """
     if contact.straight:
         return 0.0 * contact.entrance_angle
-    weight, _, sine = _stressed(contact, terms)
+    weight, _, sine = stressed(contact, terms)
     strength = contact.cohesion + contact.normal_stress * contact.tan_friction
     across = strength * stresses.mobilised_shares(contact, contact.angle, sine=sine)[1]
     return contact.width * contact.shear_radius * np.add.reduce(across * weight)
 
 
-def _stressed(
+def stressed(
     contact: Contact[Quantity], terms: Terms, nodes: int | None = None
 ) -> tuple[Quantity, Quantity, Quantity]:
     """Set angle and normal stress of the nodes; return their weights [rad], cosines and sines."""

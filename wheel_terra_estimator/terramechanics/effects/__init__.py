@@ -1,9 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The catalogue of effects: modules of this folder, one per effect, found by themselves.
+"""The catalogue of effects: those of the modules of this folder, found by themselves.
 
-To add one, put a module with an ``EFFECT`` here (several: ``EFFECTS``), or keep it outside the
-package and call ``register`` or ``load_file``.
+To add one, put an ``Effect`` into a module here, at its top level, or keep it outside the package
+and call ``register`` or ``load_file``.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from numbers import Real
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from wheel_terra_estimator.errors import EFFECT_FILE_MODULE
@@ -50,9 +51,14 @@ def _built_in() -> Catalogue:
     found: dict[str, Effect] = {}
     for listed in pkgutil.iter_modules(__path__):
         module = importlib.import_module(f'{__name__}.{listed.name}')
-        effects = (getattr(module, 'EFFECT', None), *getattr(module, 'EFFECTS', ()))
-        found |= {effect.name: effect for effect in effects if isinstance(effect, Effect)}
+        found |= {effect.name: effect for effect in _effects_in(module)}
     return Catalogue(dict(sorted(found.items())))
+
+
+def _effects_in(module: ModuleType) -> list[Effect]:
+    """Return the effects at the top level of a module, those in tuples with them."""
+    values = (v if isinstance(v, tuple) else (v,) for v in vars(module).values())
+    return [effect for group in values for effect in group if isinstance(effect, Effect)]
 
 
 class Catalogue(Mapping[str, Effect]):
@@ -123,7 +129,7 @@ def load_file(path: str | Path) -> list[Effect]:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         raise ValueError(f'{path}: {type(error).__name__}: {error}') from error
-    effects = [value for value in vars(module).values() if isinstance(value, Effect)]
+    effects = _effects_in(module)
     if not effects:
         raise ValueError(f'{path}: defines no Effect')
     for effect in effects:

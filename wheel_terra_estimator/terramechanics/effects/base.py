@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, TypeAlias
@@ -210,18 +210,7 @@ def relative_pressure(contact: Contact[Quantity]) -> Quantity:
 
 def _variant(first: Effect, form: Form) -> Effect:
     """Return the effect in another form; its key is ``name:form``."""
-    return replace(
-        first,
-        name=f'{first.name}{FORM_MARK}{form.name}',
-        form=form.name,
-        claim=form.claim,
-        symbol=form.symbol,
-        parameters=form.parameters,
-        validity=form.validity,
-        source=form.source,
-        touches=first.touches if form.touches is None else form.touches,
-        needs=first.needs if form.needs is None else form.needs,
-        candidate=first.candidate if form.candidate is None else form.candidate,
-        why_aside=form.why_aside,
-        **{stage: getattr(form, stage) for stage in STAGES},
-    )
+    own = {f.name: getattr(form, f.name) for f in fields(form)}
+    stated = {key: value for key, value in own.items() if value is not None or key in STAGES}
+    names = {'name': f'{first.name}{FORM_MARK}{form.name}', 'form': form.name}
+    return replace(first, **{**stated, **names})

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Soil pushed ahead of the wheel resists."""
+"""Soil that the wheel pushes ahead, or aside with its flank, resists."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 from wheel_terra_estimator.terramechanics.quantity import Quantity
+from wheel_terra_estimator.terramechanics.stresses import mobilised_share
 
 _LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it
 
@@ -68,7 +69,7 @@ _KB = EffectParameter(
     'kb', '-', 0.5, 0.0, 5.0, 0.5, 'half_normal', 'share of the full passive resistance'
 )
 
-EFFECT = Effect(
+BULLDOZING = Effect(
     name='bulldozing',
     claim='soil is pushed ahead of the wheel',
     form='wedge',
@@ -94,6 +95,95 @@ EFFECT = Effect(
             'no DOI) and the passive resistance of Hettiaratchi and Reece 1974 '
             '(doi 10.1680/geot.1974.24.3.289); Ng by the usual approximation',
             on_outputs=_earth_pressure,
+        ),
+    ),
+)
+
+
+# Gauss's nodes and weights on (0, 1), over the flank in the soil.
+_NODES = tuple(
+    (0.5 * (x + 1.0), 0.5 * w)
+    for x, w in zip(*(part.tolist() for part in np.polynomial.legendre.leggauss(8)), strict=True)
+)
+_CENTRE = 2.0 / 3.0  # distance from the hub at which soil rubs on the flank, share of the radius
+
+
+def _push_aside(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    if contact.straight:
+        return
+    t1, r = contact.entrance_angle, contact.radius
+    span, edge = t1 - contact.leaving_angle, np.cos(t1)
+    force = 0.0
+    for place, weight in _NODES:
+        behind_entry = place * span
+        cosine = np.cos(t1 - behind_entry)
+        depth = np.maximum(r * (cosine - edge), 0.0)
+        moved = mobilised_share(contact.lateral_ratio * behind_entry, contact.shear_modulus)
+        force = force + weight * moved * wedge_resistance(contact, depth) * (r - depth * cosine)
+    contact.lateral_force = contact.lateral_force - p.ks * span * force
+
+
+def _plate(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    if contact.straight:
+        return
+    t1, t2, r = contact.entrance_angle, contact.leaving_angle, contact.radius
+    cosine, sine = contact.heading()
+    along = np.maximum(cosine, 1e-9)
+    span = t1 - t2
+    # Soil surface along the flank: straight from where the rim goes in to where it leaves.
+    fall = (np.cos(t2) - np.cos(t1)) / (np.sin(t1) - np.sin(t2))
+    force = 0.0
+    for place, weight in _NODES:
+        angle = t1 - place * span
+        behind = r * (np.sin(t1) - np.sin(angle))
+        depth = np.maximum(r * (np.cos(angle) - np.cos(t1)) - fall * behind, 0.0)
+        moved = mobilised_share(behind * sine, contact.shear_modulus * along)
+        width = r * np.cos(angle)
+        force = force + weight * width * moved * wedge_resistance(contact, depth)
+    push = p.ks * span * force
+    contact.lateral_force = contact.lateral_force - push
+    # The flank slides past the wedge: backwards as the wheel turns, down as the wedge rises.
+    back = _CENTRE * r - contact.velocity_ratio
+    wedge = 0.25 * np.pi - 0.5 * np.arctan(contact.soil_friction)
+    rise = np.tan(wedge) * contact.lateral_ratio
+    slide = np.maximum(np.sqrt(back * back + rise * rise), 1e-12)
+    rub = contact.tan_friction * np.abs(push) * back / slide
+    contact.drawbar_pull = contact.drawbar_pull + contact.direction * rub
+    contact.torque = contact.torque + contact.direction * _CENTRE * r * rub
+
+
+_KS = EffectParameter(
+    'ks', '-', 1.0, 0.0, 5.0, 0.5, 'half_normal', 'share of the full passive resistance'
+)
+
+SIDE_BULLDOZING = Effect(
+    name='side_bulldozing',
+    form='ishigami',
+    claim='a wheel that slides sideways pushes soil aside with its flank',
+    symbol='F_y -= ks Int D1 (c h + D2 rho g h^2/2) (1 - exp(-|j_y|/K)) (r - h cos t) dt, '
+    'h = r (cos t - cos t_1), j_y = (v_y/w)(t_1 - t); D1, D2 as in bulldozing',
+    parameters=(_KS,),
+    touches=frozenset({'lateral_force'}),
+    needs=('slip_angle',),
+    validity='flank smooth and upright, sinkage below half the radius; mobilised like shear',
+    source='Ishigami et al. 2007 eq. 9 and 11 (doi 10.1002/rob.20187), resistance of '
+    'Hegedus 1960 (report, no DOI)',
+    on_outputs=_push_aside,
+    other_forms=(
+        Form(
+            name='plate',
+            claim='the flank is a plate pushed sideways, and soil rubs along it',
+            symbol='F_y -= P, P = ks Int D1 (c h + D2 rho g h^2/2) (1 - exp(-|j_f|/K)) r cos t dt, '
+            'h below the line from entry to exit, j_f = (v_y/v) r (sin t_1 - sin t); '
+            'F += P tan(phi) u/|(u, v_y tan X)|, T += 2/3 r times that, u = 2/3 r w - v',
+            parameters=(_KS,),
+            touches=frozenset({'lateral_force', 'drawbar_pull', 'torque'}),
+            needs=('slip_angle',),
+            validity='slip angles to 90 degrees, sinkage below one radius; what friction on '
+            'the flank carries of the load is left out',
+            source='own form: resistance of Hegedus 1960 (report, no DOI) on the outline of the '
+            'flank, and its friction (docs/models/sideways.md)',
+            on_outputs=_plate,
         ),
     ),
 )

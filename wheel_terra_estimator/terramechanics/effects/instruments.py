@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Errors of the readings: y (1 + gain), y + offset, and W sin(bias) in the pull by attitude."""
+"""Errors of the readings: gains, zeros, attitude, lost torque, a misread slip, a weight as load."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio, speed_ratio
 from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
@@ -127,4 +128,140 @@ EFFECTS = (
         source='statics',
         on_outputs=_tilt,
     ),
+)
+
+
+def _friction(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    contact.torque = contact.torque + contact.direction * p.torque
+
+
+def _in_proportion(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    lost = p.share * np.abs(contact.torque)
+    contact.torque = contact.torque + contact.direction * lost
+
+
+def _viscous(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    known = contact.rim_speed > 0.0  # not where it is nan
+    rate = np.where(known, contact.rim_speed, 0.0) / contact.rim_radius
+    contact.torque = contact.torque + contact.direction * p.damping * rate
+
+
+DRIVETRAIN_FRICTION = Effect(
+    name='drivetrain_friction',
+    claim='torque is lost before the wheel: the reading is higher by a constant',
+    form='constant',
+    symbol='T += torque sgn(w)',
+    parameters=(
+        EffectParameter(
+            'torque', 'N m', 0.3, 0.0, 20.0, 0.5, 'half_normal', 'friction torque of the drive'
+        ),
+    ),
+    touches=frozenset({'torque'}),
+    instrument=True,
+    confounded_with={'lug_shear_radius': 'torque of the wheel in the air; pull'},
+    validity='a turning wheel',
+    source='Coulomb friction of a drive',
+    on_outputs=_friction,
+    other_forms=(
+        Form(
+            name='proportional',
+            claim='torque is lost before the wheel in proportion to what the wheel takes',
+            symbol='T += share |T| sgn(w)',
+            parameters=(
+                EffectParameter(
+                    'share', '-', 0.1, 0.0, 2.0, 0.15, 'half_normal', 'torque lost over torque used'
+                ),
+            ),
+            validity='a turning wheel; one gear stage loses a few per cent, a worm drive half',
+            source='efficiency of a gear, 1/(1 + share) while the motor drives',
+            on_outputs=_in_proportion,
+        ),
+        Form(
+            name='viscous',
+            claim='torque is lost before the wheel in proportion to its rate',
+            symbol='T += damping w',
+            parameters=(
+                EffectParameter(
+                    'damping', 'N m s/rad', 0.5, 0.0, 100.0, 0.5, 'half_normal', 'viscous friction'
+                ),
+            ),
+            needs=('angular_velocity',),
+            validity='a turning wheel; nothing where the rate is not recorded',
+            source='viscous friction of bearings and grease',
+            on_outputs=_viscous,
+        ),
+    ),
+)
+
+
+def _bias(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    scale = 1.0 + p.bias
+    contact.velocity_ratio = contact.velocity_ratio / scale
+    ratio = speed_ratio(contact.slip) / scale
+    contact.slip = slip_of_speed_ratio(ratio)
+
+
+WHEEL_RADIUS_BIAS = Effect(
+    name='wheel_radius_bias',
+    claim='the effective rolling radius differs from the configured one, so slip is misread',
+    symbol='1 - s_true = (1 - s_recorded)/(1 + bias)',
+    parameters=(
+        EffectParameter(
+            'bias',
+            '-',
+            0.03,
+            -0.3,
+            0.3,
+            0.04,
+            'normal',
+            'effective over configured radius, minus one',
+        ),
+    ),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    instrument=True,
+    needs=('slip',),
+    confounded_with={
+        'lug_shear_radius': 'rows with other lugs or none; roll-out on a hard floor',
+    },
+    validity='biases of up to some 10 %; the contact geometry keeps the configured radius',
+    source='definition of the slip ratio; Ding et al. 2010 eq. 1 leaves the radius open',
+    on_inputs=_bias,
+)
+
+
+def _load(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    lost = contact.stated_load * (1.0 - np.cos(contact.slope))
+    contact.normal_load = contact.normal_load - p.share * lost
+
+
+def _pull(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    down_hill = contact.stated_load * np.sin(contact.slope)
+    contact.drawbar_pull = contact.drawbar_pull - p.share * down_hill
+
+
+SLOPE_GRAVITY = Effect(
+    name='slope_gravity',
+    claim='the stated load is a weight: on a slope the soil carries W cos(slope) and the pull '
+    'left at the hitch is smaller by W sin(slope)',
+    symbol='W_n = W - share W (1 - cos a);  F -= share W sin a',
+    parameters=(
+        EffectParameter(
+            'share',
+            '-',
+            1.0,
+            0.0,
+            1.5,
+            0.15,
+            'normal',
+            'share of the weight that tilts with the slope (1: all of it)',
+            prior_mean=1.0,
+        ),
+    ),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    needs=('slope',),
+    confounded_with={'pitch_bias': 'level rows, or the same slope driven both ways'},
+    validity='any slope that the soil holds',
+    source='statics; Nakashima et al. 2010 (slope runs with Px/W = sin a)',
+    on_inputs=_load,
+    on_outputs=_pull,
 )

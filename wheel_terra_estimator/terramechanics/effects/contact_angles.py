@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""At high slip soil piles up behind the wheel and moves the leaving angle."""
+"""What moves the angles of the contact with slip: a mound behind it, the peak of the stress."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _KAPPA = EffectParameter(
     'height of the mound at s = 1 over the sinkage',
 )
 
-EFFECT = Effect(
+SOIL_MOUND = Effect(
     name='soil_mound',
     form='onset',
     claim='at high slip, soil piles up behind the wheel and moves the leaving angle back',
@@ -100,6 +100,64 @@ EFFECT = Effect(
             candidate=False,
             why_aside='no table with two lug heights at slips above 0.6 has been seen',
             on_contact=_conveyed,
+        ),
+    ),
+)
+
+
+def _shift(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    skid = np.maximum(-contact.slip, 0.0)
+    contact.peak_ratio = contact.peak_ratio + p.c2 * contact.slip + p.skid * skid
+
+
+def _retreat(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    contact.peak_ratio = contact.peak_ratio - p.retreat * contact.slip
+
+
+STRESS_PEAK_SHIFT = Effect(
+    name='stress_peak_shift',
+    claim='the angle of greatest stress moves forward with slip',
+    form='forward',
+    symbol='t_m = (c1 + c2 s) t_1 (+ skid |s| t_1 where s < 0)',
+    parameters=(
+        EffectParameter('c2', '-', 0.2, -0.5, 0.8, 0.2, 'half_normal', 'shift at s = 1'),
+        EffectParameter(
+            'skid',
+            '-',
+            0.0,
+            -1.0,
+            1.0,
+            0.2,
+            'normal',
+            'shift forward of a skidding wheel, beyond c2',
+            free=False,
+        ),
+    ),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    needs=('slip',),
+    confounded_with={
+        'soil_mound': 'a rear camera: measured leaving angle',
+        'slip_sinkage_exponent': 'high load, braking rows, slip near 0.9; stress cells in the rim',
+    },
+    validity='c1 + c2 s between 0 and 1; clamped inside the contact',
+    source='Wong and Reece 1967 (doi 10.1016/0022-4898(67)90105-X); '
+    'Ding et al. 2010 section 3.1.1 (doi 10.1007/s11771-010-0021-7); '
+    'skid: measured rows of a single wheel that brakes (docs/models/validation.md)',
+    on_inputs=_shift,
+    other_forms=(
+        Form(
+            name='backward',
+            claim='the angle of greatest stress moves backward with slip',
+            symbol='t_m = (c1 - retreat s) t_1',
+            parameters=(
+                EffectParameter(
+                    'retreat', '-', 0.1, 0.0, 0.8, 0.2, 'half_normal', 'shift back at s = 1'
+                ),
+            ),
+            validity='c1 - retreat s between 0 and 1; clamped inside the contact',
+            source='the same law with the other sign, as fits to small wheels give it '
+            '(docs/models/validation.md)',
+            on_inputs=_retreat,
         ),
     ),
 )

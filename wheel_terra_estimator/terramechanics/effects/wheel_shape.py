@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The wheel flattens under its load."""
+"""The wheel is not the rigid, clean cylinder as configured."""
 
 from __future__ import annotations
 
@@ -12,6 +12,38 @@ from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.stresses import rolling_sinkage
+
+
+def _layer(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    contact.radius = contact.radius + p.thickness
+    contact.shear_radius = contact.shear_radius + p.thickness
+
+
+def _below_the_rim(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    contact.sinkage = contact.sinkage - p.thickness
+
+
+SOIL_ADHESION = Effect(
+    name='soil_adhesion',
+    claim='soil sticks to the rim: a layer of it rolls with the wheel',
+    symbol='r, R += thickness for the soil; z, at the rim, -= thickness',
+    parameters=(
+        EffectParameter(
+            'thickness', 'm', 0.002, 0.0, 0.05, 0.003, 'half_normal', 'thickness of the layer'
+        ),
+    ),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    confounded_with={
+        'wheel_radius_bias': 'sinkage, which a misread slip changes less; a look at the rim',
+        'lug_shear_radius': 'rows with other lugs or none; sinkage',
+        'sinkage_offset': 'pull and torque; the zero reading on a hard floor',
+    },
+    validity='an even layer; the recorded slip keeps the configured radius',
+    source='geometry of a coated wheel; sticking soil: Bekker 1969 (book, no DOI)',
+    on_inputs=_layer,
+    on_outputs=_below_the_rim,
+)
+
 
 _LEAST = 1e-9  # keeps a wheel without load free of divisions by zero [m]
 
@@ -45,7 +77,7 @@ def _arm(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.torque = contact.torque / _widening(contact, p)
 
 
-EFFECT = Effect(
+WHEEL_FLEXIBILITY = Effect(
     name='wheel_flexibility',
     claim='the wheel flattens under its load: it bears on the soil like a larger rigid one',
     symbol='r* = r (1 + compliance W/z0), z0 = [3 W/((3 - N) b k sqrt(2 r))]^(2/(2N+1));'
