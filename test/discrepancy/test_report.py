@@ -17,7 +17,7 @@ import pytest
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision
-from wheel_terra_estimator.discrepancy.assessment.gaps import _cell_noise
+from wheel_terra_estimator.discrepancy.assessment.held_out import _cell_noise
 from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model

@@ -14,7 +14,7 @@ from wheel_terra_estimator.discrepancy import decision
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
-from wheel_terra_estimator.discrepancy.tables.points import operating_points
+from wheel_terra_estimator.discrepancy.tables.steady_table import operating_points
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue

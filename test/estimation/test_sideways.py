@@ -15,8 +15,8 @@ from wheel_terra_estimator.estimation.sideways import (
     SidewaysMotion,
 )
 from wheel_terra_estimator.simulation import scenario as scenarios
-from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.drive import START, Drive
+from wheel_terra_estimator.simulation.drives import Command
 
 X, Y = (0.4, 0.4, -0.4, -0.4), (0.3, -0.3, 0.3, -0.3)
 ROVER = SimpleNamespace(

@@ -15,7 +15,7 @@ from wheel_terra_estimator.bags.track import COLUMNS, TrackRecorder
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.estimation.measurements import InertialReading
 from wheel_terra_estimator.reporting.drive_figure import way_figure
-from wheel_terra_estimator.reporting.track_table import write_track
+from wheel_terra_estimator.reporting.estimates_table import write_track
 
 SPEED, YAW_RATE, STEP = 0.1, 0.05, 50_000_000
 START = 1_000_000_000

@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.simulation.contact import ContactModel, SoilForces
-from wheel_terra_estimator.simulation.contact_laws import contact_of
+from wheel_terra_estimator.simulation.contact import ContactModel, SoilForces, contact_of
 from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES
 from wheel_terra_estimator.terramechanics.contact_law import LAWS, contact_law
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel

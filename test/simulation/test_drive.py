@@ -15,8 +15,8 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
-from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.drive import Drive, SimulatedDrive, simulate
+from wheel_terra_estimator.simulation.drives import Command
 from wheel_terra_estimator.simulation.scenario import load
 from wheel_terra_estimator.simulation.sensors import START
 from wheel_terra_estimator.simulation.truth import entrapped, slip_classes

@@ -11,7 +11,7 @@ from simulated_ground import drives, ground, rover
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation import plant as plant_module
-from wheel_terra_estimator.simulation.commands import Command
+from wheel_terra_estimator.simulation.drives import Command
 from wheel_terra_estimator.simulation.plant import RoverPlant
 from wheel_terra_estimator.simulation.truth import Truth
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel

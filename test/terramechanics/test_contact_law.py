@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.estimation.contacts.resistive_table import rim_forces
-from wheel_terra_estimator.terramechanics.contact_law import contact_law, plate_scale
+from wheel_terra_estimator.terramechanics.contact_law import (
+    ResistiveForce,
+    contact_law,
+    plate_scale,
+    stress_maps,
+)
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 from wheel_terra_estimator.terramechanics.model import OUTSIDE_VALIDITY, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-from wheel_terra_estimator.terramechanics.resistive_force import ResistiveForce, stress_maps
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 

@@ -268,8 +268,7 @@ def _nearest(
     rest: tuple[EffectSettings, str, float],
 ) -> Soil:
     """Return the soil of Bekker's law whose plain model is nearest to the measured rows."""
-    from wheel_terra_estimator.discrepancy.tables.points import operating_points
-    from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
+    from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, operating_points
 
     def distance(soil: Soil) -> float:
         effects, slip_radius, gravity = rest

@@ -7,8 +7,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wheel_terra_estimator.cli import bag_arguments
-from wheel_terra_estimator.cli.outputs import add_output
+from wheel_terra_estimator.cli.outputs import add_output, add_remaps
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 EXAMPLES = (
@@ -28,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     configuration_reader.add_arguments(parser)
     add_output(parser, 'rover file to be written', 'F', required=True)
-    bag_arguments.add_arguments(parser)
+    add_remaps(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 
 

@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wheel_terra_estimator.cli import bag_arguments
+from wheel_terra_estimator.cli.outputs import add_remaps
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'bag', type=Path, metavar='BAG', help='rosbag2 folder, or a single .mcap or .db3 file'
     )
     configuration_reader.add_arguments(parser)
-    bag_arguments.add_arguments(parser)
+    add_remaps(parser)
     parser.add_argument('--json', action='store_true', help='print findings and figures as JSON')
 
 

@@ -10,8 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wheel_terra_estimator.cli import bag_arguments
-from wheel_terra_estimator.cli.outputs import Output, file_or_entry
+from wheel_terra_estimator.cli.outputs import Output, add_remaps, file_or_entry
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 from wheel_terra_estimator.scheduler import add_jobs_argument, finished
@@ -116,7 +115,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='share of its value to which every soil number is known (default: as configured, else '
         'by the class of its source)',
     )
-    bag_arguments.add_arguments(parser, 'for a bag: ')
+    add_remaps(parser, 'for a bag: ')
     parser.add_argument(
         '--smooth',
         action='store_true',

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a command line reads is never written to: told by the options themselves, for all commands.
+"""Options of several commands: what is written, never to what is read, and ``--remap``.
 
 An option that names what is written has ``action=Output``; one that names what is read has
 ``type=Path``, or ``type=FileName`` where the bare name of a shipped file will do.
@@ -76,3 +76,15 @@ def _inputs(arguments: argparse.Namespace, outputs: dict[str, Path]) -> Iterator
                 yield from reader.files_behind(item)
             elif isinstance(item, Path):
                 yield item
+
+
+def add_remaps(parser: argparse.ArgumentParser, condition: str = '') -> None:
+    """Declare ``--remap``; ``condition`` says when it counts, such as 'for a bag: '."""
+    parser.add_argument(
+        '--remap',
+        action='append',
+        default=[],
+        metavar='FROM:=TO',
+        help=f"{condition}the estimator's topic, then the bag's "
+        '(reference_odom:=/truth/odometry); may be given several times',
+    )

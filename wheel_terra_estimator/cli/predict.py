@@ -20,8 +20,11 @@ from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label
-from wheel_terra_estimator.discrepancy.tables.points import WHEEL, operating_points
-from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    INPUT_UNITS,
+    WHEEL,
+    operating_points,
+)
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.output_folder import check_file, new_file

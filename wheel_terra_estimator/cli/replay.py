@@ -11,8 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wheel_terra_estimator.cli import bag_arguments
-from wheel_terra_estimator.cli.outputs import Output, add_output
+from wheel_terra_estimator.cli.outputs import Output, add_output, add_remaps
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.errors import UserError
@@ -82,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_jobs_argument(parser, words='recordings at a time')
     add_scheduler_argument(parser, what='recordings')
     configuration_reader.add_arguments(parser)
-    bag_arguments.add_arguments(parser)
+    add_remaps(parser)
     parser.add_argument(
         '--arrival',
         type=Path,
@@ -145,13 +144,13 @@ def _options(arguments: argparse.Namespace) -> Options:
 
 def _check_kinds(arguments: argparse.Namespace) -> list[Path]:
     """Refuse files whose names promise another format; return all that are to be written."""
-    from wheel_terra_estimator.reporting import estimates_table, track_table
+    from wheel_terra_estimator.reporting import estimates_table
     from wheel_terra_estimator.reporting.html import check_page
 
     kinds: tuple[tuple[Path | None, Callable[[Path], None]], ...] = (
         (arguments.report, check_page),
         (arguments.table, estimates_table.check_table),
-        (arguments.track, track_table.check_track),
+        (arguments.track, estimates_table.check_track),
     )
     for path, check in kinds:
         if path:

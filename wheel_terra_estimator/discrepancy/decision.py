@@ -15,17 +15,21 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off, gaps
-from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
+from wheel_terra_estimator.discrepancy.assessment.held_out import (
+    channels_off,
+    gaps,
+    hold_out,
+    slip_groups,
+)
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal.find import Gap, effects_said, gain_on_top, propose
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
 from wheel_terra_estimator.discrepancy.selection import remainder
-from wheel_terra_estimator.discrepancy.selection.candidates import FIT_FLOOR
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, choose
+from wheel_terra_estimator.discrepancy.selection.weights import FIT_FLOOR
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of

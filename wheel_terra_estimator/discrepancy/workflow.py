@@ -31,8 +31,7 @@ from wheel_terra_estimator.discrepancy.tables.checks import (
     check_pull_against_model,
     check_wheel_of_model,
 )
-from wheel_terra_estimator.discrepancy.tables.points import operating_points
-from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable, operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of

@@ -16,12 +16,7 @@ from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, CheckReport, sh
 from wheel_terra_estimator.checks.run import check_recording, run_apart
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.output_folder import new_file
-from wheel_terra_estimator.reporting import (
-    drive_summary,
-    estimates_table,
-    track_table,
-    truth_scores,
-)
+from wheel_terra_estimator.reporting import drive_summary, estimates_table, truth_scores
 from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
@@ -59,7 +54,7 @@ class Drive:
         """Write the track as a table."""
         assert self.result.track is not None
         with new_file(path, overwrite) as fresh:
-            track_table.write_track(self.result.track, fresh)
+            estimates_table.write_track(self.result.track, fresh)
 
     def write_report(self, path: Path, overwrite: bool) -> None:
         """Write the page with pictures."""

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates of a drive as a table, a row per set and wheel."""
+"""Estimates of a drive as a table, a row per set and wheel; its map as one (CSV)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory
+from wheel_terra_estimator.bags.track import COLUMNS, Track
 from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
@@ -60,3 +61,25 @@ def _pandas(path: Path) -> Any:
             'pip install pandas pyarrow, or write a .csv'
         ) from None
     return pandas
+
+
+WHOLE = ('slip_class', 'stuck')  # columns of whole numbers
+DIGITS = 6  # significant ones in a table
+
+
+def check_track(path: Path) -> None:
+    """Refuse, before anything is computed, a map that cannot be written."""
+    if path.suffix != '.csv':
+        raise UserError(f'{path}: a track ends in .csv')
+
+
+def write_track(track: Track, path: Path) -> None:
+    """Write a track."""
+    heads = [f'{name} [{unit}]' if unit else name for name, unit in COLUMNS.items()]
+    columns = [
+        [int(v) for v in track.values[name]]
+        if name in WHOLE
+        else [f'{v:.{DIGITS}g}' for v in track.values[name]]
+        for name in COLUMNS
+    ]
+    write_csv(path, ['stamp [ns]', *heads], zip(track.stamp.tolist(), *columns, strict=True))

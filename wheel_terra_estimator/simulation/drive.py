@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.simulation.commands import Command
-from wheel_terra_estimator.simulation.drives import Drives
+from wheel_terra_estimator.simulation.drives import Command, Drives
 from wheel_terra_estimator.simulation.plant import RoverPlant
 from wheel_terra_estimator.simulation.scenario import SENSOR_FAULTS, Fault, Scenario
 from wheel_terra_estimator.simulation.sensors import START, Arrival, SensorSuite

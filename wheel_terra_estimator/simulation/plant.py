@@ -16,12 +16,9 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.simulation.commands import Command
-from wheel_terra_estimator.simulation.contact import SoilForces
-from wheel_terra_estimator.simulation.contact_laws import contact_of
+from wheel_terra_estimator.simulation.contact import SoilForces, contact_of
 from wheel_terra_estimator.simulation.contact_memory import ContactMemory, Shear
-from wheel_terra_estimator.simulation.drives import Drives
-from wheel_terra_estimator.simulation.steering import SteeringDrives
+from wheel_terra_estimator.simulation.drives import Command, Drives, SteeringDrives
 from wheel_terra_estimator.simulation.suspension import Suspension, suspension_of
 from wheel_terra_estimator.simulation.terrain import Terrain
 from wheel_terra_estimator.simulation.truth import Truth

@@ -20,7 +20,7 @@ from wheel_terra_estimator.configuration import reader, ros_yaml, shipped
 from wheel_terra_estimator.configuration.configuration import Configuration, Section
 from wheel_terra_estimator.configuration.parameters import nearest, read_table
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.simulation.commands import DriveProfile
+from wheel_terra_estimator.simulation.drives import DriveProfile
 from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Patch
 
 DEFAULT = 'climb_soft_patch'

@@ -26,8 +26,8 @@ from wheel_terra_estimator.estimation.traction_limiter import (
     after_stuck,
 )
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
-from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.drive import Drive
+from wheel_terra_estimator.simulation.drives import Command
 from wheel_terra_estimator.simulation.scenario import Scenario, load
 from wheel_terra_estimator.simulation.sensors import START, Arrival
 from wheel_terra_lab.evaluation.kinds import LIMITER

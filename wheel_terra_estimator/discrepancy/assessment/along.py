@@ -12,7 +12,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.outliers import inverse_covariance
 from wheel_terra_estimator.discrepancy.numbers import number
-from wheel_terra_estimator.discrepancy.selection.candidates import Setting
+from wheel_terra_estimator.discrepancy.selection.weights import Setting
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 
 # What differs most between stretches of ground; prior deviations of the difference (widened ones).

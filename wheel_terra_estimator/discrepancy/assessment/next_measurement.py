@@ -13,7 +13,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.numbers import joined
 from wheel_terra_estimator.discrepancy.result import NextMeasurement
-from wheel_terra_estimator.discrepancy.selection.candidates import Setting
+from wheel_terra_estimator.discrepancy.selection.weights import Setting
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel

@@ -24,15 +24,15 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import AS_THEY_ARE, n
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal.words import law_in_words, limits_of_trust
 from wheel_terra_estimator.discrepancy.result import LeftOut, Proposal, QuantityGap
-from wheel_terra_estimator.discrepancy.selection.candidates import (
-    Explanation,
-    Setting,
-    linear_starts,
-)
 from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE, largest_z_score
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
-from wheel_terra_estimator.discrepancy.selection.weights import explain_fewer
+from wheel_terra_estimator.discrepancy.selection.weights import (
+    Explanation,
+    Setting,
+    explain_fewer,
+    linear_starts,
+)
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (

@@ -11,7 +11,7 @@ from scipy.special import chdtrc
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
-from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
+from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.numbers import (

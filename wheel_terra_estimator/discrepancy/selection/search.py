@@ -23,7 +23,6 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
     slip_features,
 )
 from wheel_terra_estimator.discrepancy.result import Noise
-from wheel_terra_estimator.discrepancy.selection.candidates import FIT_FLOOR, Explanation, Setting
 from wheel_terra_estimator.discrepancy.selection.signatures import (
     SEEN,
     Signature,
@@ -31,9 +30,12 @@ from wheel_terra_estimator.discrepancy.selection.signatures import (
     unavailable,
 )
 from wheel_terra_estimator.discrepancy.selection.weights import (
+    FIT_FLOOR,
     MISFIT,
     MOST_EFFECTS,
+    Explanation,
     Selection,
+    Setting,
     explain_more,
     explain_singles,
     explain_swaps,

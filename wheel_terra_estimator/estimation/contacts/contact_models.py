@@ -18,6 +18,7 @@ from wheel_terra_estimator.estimation.contacts.wheel_models import (
 )
 from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE
 from wheel_terra_estimator.terramechanics.contact_law import (
+    PER_CUBIC_METRE,
     RESISTIVE_FORCE,
     WONG_REECE,
     plate_scale,
@@ -25,7 +26,6 @@ from wheel_terra_estimator.terramechanics.contact_law import (
     reece_soil,
 )
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
-from wheel_terra_estimator.terramechanics.resistive_force import PER_CUBIC_METRE
 
 _LUG_EFFECTS = frozenset({'lug_shear_radius', 'grouser_thrust'})
 _SHEARED_LUGS = {'lug_shear_radius': {'lam': 0.5}}
