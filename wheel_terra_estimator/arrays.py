@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Types of arrays by what they hold, for annotations."""
 
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,3 +11,4 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
+Quantity: TypeAlias = 'float | NDArray[np.float64]'  # a number, or an array of a common shape

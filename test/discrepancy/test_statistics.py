@@ -40,7 +40,7 @@ from wheel_terra_estimator.discrepancy.fitting.soil_deviations import deviations
 from wheel_terra_estimator.discrepancy.report.words import _repeatability
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import confidence
-from wheel_terra_estimator.discrepancy.selection import remainder as gap_test
+from wheel_terra_estimator.discrepancy.selection import verdict as gap_test
 from wheel_terra_estimator.discrepancy.selection.verdict import _competitors
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors
 from wheel_terra_estimator.discrepancy.tables.checks import check_table

@@ -25,10 +25,14 @@ from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal.find import Gap, effects_said, gain_on_top, propose
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
-from wheel_terra_estimator.discrepancy.selection import remainder
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
 from wheel_terra_estimator.discrepancy.selection.search import Findings
-from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, choose
+from wheel_terra_estimator.discrepancy.selection.verdict import (
+    Verdict,
+    chi_square_p_value,
+    choose,
+    largest_z_score,
+)
 from wheel_terra_estimator.discrepancy.selection.weights import FIT_FLOOR
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
@@ -259,9 +263,9 @@ def _what_rows_show(
         square = float(np.nanmean(change[:, q] ** 2)) / item.noise**2
         total += square
         idle += square if item.refit < _AT_NOISE * item.noise else 0.0
-    misfit = remainder.chi_square_p_value(fitted, fitted.variance)
+    misfit = chi_square_p_value(fitted, fitted.variance)
     alone = findings.setting.forward.active is None  # a reference's structural error pulls as well
-    largest = remainder.largest_z_score(fitted) if alone else 0.0
+    largest = largest_z_score(fitted) if alone else 0.0
     return {
         'worse': float(np.tanh(worse)),
         'idle': idle / total,

@@ -29,9 +29,9 @@ from wheel_terra_estimator.discrepancy.result import (
     Proposal,
     SoilShift,
 )
-from wheel_terra_estimator.discrepancy.selection.remainder import chi_square_p_value
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import CLEAR
+from wheel_terra_estimator.discrepancy.selection.verdict import chi_square_p_value
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of

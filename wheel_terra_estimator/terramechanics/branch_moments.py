@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 # Skid beyond pure rolling, v/(w R) - 1, from which and over which the nodes take over from the
 # centroid; below the first, one place per side is within 1.3 % of the load.

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms
 
 # Stress that effects add (a hard layer) is integrated with Gauss's four points per side.

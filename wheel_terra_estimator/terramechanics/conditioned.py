@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, check_settings
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS, Terms, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from wheel_terra_estimator.terramechanics.quantity import Quantity
+from wheel_terra_estimator.arrays import Quantity
 
 Q = TypeVar('Q')
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.checks import check_range
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 # Below the first slip nothing is dug beyond the steady sinkage, at the second all of it.

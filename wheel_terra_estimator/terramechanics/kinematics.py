@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.terramechanics.quantity import Quantity
+from wheel_terra_estimator.arrays import Quantity
 
 # A locked wheel (s = -1) has v/w without bound; this floor on 1 + s keeps it finite, with a shear
 # that is saturated long before.

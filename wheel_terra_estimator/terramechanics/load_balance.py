@@ -12,10 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, Quantity
 from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 # Sinkage equal to the radius: the stress laws end here.
 LARGEST_ANGLE = np.pi / 2

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, Quantity
 from wheel_terra_estimator.terramechanics import closed_form, quadrature
 from wheel_terra_estimator.terramechanics.checks import check_range, common_length
 from wheel_terra_estimator.terramechanics.contact import Contact
@@ -22,7 +22,6 @@ from wheel_terra_estimator.terramechanics.load_balance import (
     solve_entrance_angle,
 )
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import (
     SOIL_NUMBERS,

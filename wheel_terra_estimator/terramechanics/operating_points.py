@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.checks import check_range, common_length, numbers
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2]

@@ -9,9 +9,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.terms import Terms
 
 # Nodes per side. Worst of 20,000 contacts: below 1e-4 of the load driving, 1.3e-3 skidding, where a

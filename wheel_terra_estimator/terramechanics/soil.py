@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.checks import check_range
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.stresses import bearing_law
 
 PRESSURE_LAWS = ('bekker', 'reece')

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 _NO_DISPLACEMENT = 1e-300  # [m]; keeps the direction of none finite
 

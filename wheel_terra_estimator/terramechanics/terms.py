@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import by_variant, catalogue
@@ -22,7 +23,6 @@ from wheel_terra_estimator.terramechanics.effects.base import (
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.soil import Soil
 
 SOIL_NUMBERS = tuple(f.name for f in fields(Soil) if f.name != 'pressure_law')

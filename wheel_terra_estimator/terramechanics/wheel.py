@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.checks import check_range
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
 @dataclass(frozen=True)

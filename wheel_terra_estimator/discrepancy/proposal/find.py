@@ -24,9 +24,9 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import AS_THEY_ARE, n
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal.words import law_in_words, limits_of_trust
 from wheel_terra_estimator.discrepancy.result import LeftOut, Proposal, QuantityGap
-from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE, largest_z_score
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
+from wheel_terra_estimator.discrepancy.selection.verdict import LARGEST_Z_SCORE, largest_z_score
 from wheel_terra_estimator.discrepancy.selection.weights import (
     Explanation,
     Setting,

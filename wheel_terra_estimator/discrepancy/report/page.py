@@ -21,7 +21,7 @@ from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
 from wheel_terra_estimator.discrepancy.report.words import FACTORS, in_words, soil_line
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
-from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE
+from wheel_terra_estimator.discrepancy.selection.verdict import LARGEST_Z_SCORE
 from wheel_terra_estimator.reporting.html import picture, render
 from wheel_terra_estimator.terramechanics.effects import catalogue
 

@@ -32,9 +32,8 @@ from wheel_terra_estimator.discrepancy.result import (
     QuantityGap,
     SoilShift,
 )
-from wheel_terra_estimator.discrepancy.selection.remainder import LARGEST_Z_SCORE
 from wheel_terra_estimator.discrepancy.selection.search import Findings
-from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
+from wheel_terra_estimator.discrepancy.selection.verdict import LARGEST_Z_SCORE, Verdict
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of

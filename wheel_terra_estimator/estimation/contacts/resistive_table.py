@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Quantity
 from wheel_terra_estimator.terramechanics.contact_law import rim_integrals
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 if TYPE_CHECKING:
     from scipy.interpolate import RectBivariateSpline

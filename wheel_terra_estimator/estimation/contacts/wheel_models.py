@@ -17,7 +17,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Quantity
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.terramechanics.closed_form import coefficients, peak_stresses
 from wheel_terra_estimator.terramechanics.conditioned import (
@@ -28,7 +28,6 @@ from wheel_terra_estimator.terramechanics.conditioned import (
 )
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 

@@ -10,8 +10,8 @@ from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
 TOUCHABLE = (*OUTPUTS, 'lateral_force')

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
@@ -16,7 +17,6 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     relative_pressure,
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 _BLEND = 0.001  # [m]; the layer comes in over a millimetre, so that derivatives exist
 

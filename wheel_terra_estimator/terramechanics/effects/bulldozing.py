@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.stresses import mobilised_share
 
 _LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it

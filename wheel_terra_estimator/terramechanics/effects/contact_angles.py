@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 SMALLEST_ROOM = 1e-12
 """Height left below the hub over r [-]; contact that leaves above the hub has none."""

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio, speed_ratio
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
 def _gain(quantity: str, contact: Contact[Quantity], p: SimpleNamespace) -> None:

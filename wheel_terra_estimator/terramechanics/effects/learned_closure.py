@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS, Effect, EffectParameter
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 NAME = 'learned_closure'
 REFERENCE_SPEED = 0.05  # rim speed at which the feature rim_speed is 0 [m/s]

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 _STEADY = 0.95  # slip above which a steady state is not known; the term grows no further there
 

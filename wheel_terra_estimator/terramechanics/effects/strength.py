@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
@@ -15,7 +16,6 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Form,
     relative_pressure,
 )
-from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
 def _cohesion(contact: Contact[Quantity], p: SimpleNamespace) -> None:
