@@ -230,14 +230,8 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
             named = verdict.status == 'named'
             wanted = [f for f in best if f.names != after.names and (f.names or named)]
             competitors = [f for f in wanted if not set(after.names) < set(f.names)][:1]
-    noise = np.array(
-        [
-            float(np.nanmedian(findings.noise.std[:, q]))
-            if np.isfinite(findings.noise.std[:, q]).any()
-            else np.inf
-            for q in range(len(QUANTITIES))
-        ]
-    )
+    known = [column[np.isfinite(column)] for column in findings.noise.std.T]
+    noise = np.array([np.median(column) if column.size else np.inf for column in known])
     return next_measurement.propose(findings.setting, after, competitors, noise)
 
 

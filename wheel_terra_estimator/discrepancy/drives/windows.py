@@ -44,7 +44,7 @@ from wheel_terra_estimator.discrepancy.drives.series import (
     collect,
 )
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
-from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import WHEEL, SteadyTable
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.rover import Rover
@@ -448,6 +448,11 @@ def _columns(
         np.ptp(values) <= 1e-6 * np.max(np.abs(values))
         for values in (wheels.radius, wheels.width, wheels.lug_height + 1.0)
     )
+    fields = {**WHEEL, 'pass_number': 'passes'}.items()
+    sizes = [
+        {column: float(getattr(wheels, name)[i]) for column, name in fields}
+        for i in range(wheels.count)
+    ]
     rows: list[dict[str, float]] = []
     left_out = 0
     for window in windows:
@@ -456,10 +461,10 @@ def _columns(
             'slope': window.slope,
             'gravity': float(configuration.rover.gravity),
         }
-        for i in range(wheels.count):
+        for i, size in enumerate(sizes):
             if np.isnan([window.torque[i], window.sinkage[i]]).all() or window.normal_load[i] <= 0:
                 continue
-            row = {**constant, **_wheel(wheels, i), 'normal_load': window.normal_load[i]}
+            row = {**constant, **size, 'normal_load': window.normal_load[i]}
             row['angular_velocity'] = window.rate[i]
             for name in ('slip', 'torque', 'sinkage'):
                 row[name] = getattr(window, name)[i]
@@ -471,7 +476,7 @@ def _columns(
         rows.append(
             {
                 **constant,
-                **_wheel(wheels, 0),
+                **sizes[0],
                 'pass_number': float(np.mean(wheels.passes)),
                 'slip': float(np.mean(window.slip)),
                 'slip_std': float(np.mean(window.std['slip'])),
@@ -497,30 +502,15 @@ def _add_shared_errors(
     """Widen deviations by what all rows of a sensor share, see the module's text."""
     sensors, rover = configuration.sensors, configuration.rover
     bias = float(sensors.specific_force_bias_std) * float(rover.mass) / configuration.wheels.count
-    shared = {
-        'torque': lambda values: np.hypot(
-            float(sensors.torque_zero_std), float(sensors.torque_gain_std) * np.abs(values)
-        ),
-        'sinkage': lambda values: np.full(len(values), float(sensors.sinkage_zero_std)),
-        'drawbar_pull': lambda values: np.full(len(values), bias),
+    shared = {  # zero and gain
+        'torque': (float(sensors.torque_zero_std), float(sensors.torque_gain_std)),
+        'sinkage': (float(sensors.sinkage_zero_std), 0.0),
+        'drawbar_pull': (bias, 0.0),
     }
-    for quantity, error in shared.items():
+    for quantity, (zero, gain) in shared.items():
         if quantity in columns:
-            std = columns[f'{quantity}_std']
-            columns[f'{quantity}_std'] = np.hypot(std, windows**0.5 * error(columns[quantity]))
-
-
-def _wheel(wheels: object, i: int) -> dict[str, float]:
-    return {
-        column: float(getattr(wheels, name)[i])
-        for column, name in (
-            ('wheel_radius', 'radius'),
-            ('wheel_width', 'width'),
-            ('lug_height', 'lug_height'),
-            ('lug_count', 'lug_count'),
-            ('pass_number', 'passes'),
-        )
-    }
+            error = windows**0.5 * np.hypot(zero, gain * np.abs(columns[quantity]))
+            columns[f'{quantity}_std'] = np.hypot(columns[f'{quantity}_std'], error)
 
 
 def _notes(finder: _WindowFinder, windows: list[Window], left_out: int) -> tuple[str, ...]:
@@ -531,25 +521,20 @@ def _notes(finder: _WindowFinder, windows: list[Window], left_out: int) -> tuple
     if max(passages):
         kind = f'{min(passages)} to {max(passages)} lug passages each'
     slips = [float(np.mean(w.slip)) for w in windows]
-    notes = [
-        f'{len(windows)} steady windows ({kind}), {used:.0f} of {total:.0f} s used, mean slip '
-        f'{min(slips):.2f} to {max(slips):.2f} with a standard deviation of '
-        f'{np.median([np.median(w.std["slip"]) for w in windows]):.3f}'
-    ]
     rest = [
         f'{key} {finder.seconds[key]:.0f} s'
         for key in QUALITIES
         if key != GOOD and finder.seconds.get(key, 0.0) >= 0.5
     ]
-    if rest:
-        notes.append('not used: ' + ', '.join(rest))
-    if finder.series.smoothed is not None:
-        notes.append(SMOOTHED)
-    notes.append(
-        'pull: mean over the wheels (the accelerometer gives no more), in rows of their own'
+    notes = (
+        f'{len(windows)} steady windows ({kind}), {used:.0f} of {total:.0f} s used, mean slip '
+        f'{min(slips):.2f} to {max(slips):.2f} with a standard deviation of '
+        f'{np.median([np.median(w.std["slip"]) for w in windows]):.3f}',
+        f'not used: {", ".join(rest)}' if rest else '',
+        SMOOTHED if finder.series.smoothed is not None else '',
+        'pull: mean over the wheels (the accelerometer gives no more), in rows of their own',
+        f'{left_out} windows give no pull: the wheels differ too much for a mean wheel'
+        if left_out
+        else '',
     )
-    if left_out:
-        notes.append(
-            f'{left_out} windows give no pull: the wheels differ too much for a mean wheel'
-        )
-    return tuple(notes)
+    return tuple(filter(None, notes))

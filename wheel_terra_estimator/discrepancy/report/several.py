@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
 
+from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 
@@ -53,23 +53,12 @@ def write_summary(found: Mapping[str, Diagnosis], path: Path) -> None:
     """Write one row per table: verdict, names, confidence, and the gap of each quantity [SI]."""
     quantities = dict.fromkeys(q for diagnosis in found.values() for q in diagnosis.gap)
     parts = ('before', 'refit', 'after', 'noise')
-    with path.open('w', encoding='utf-8', newline='') as stream:
-        writer = csv.writer(stream, lineterminator='\n')
-        writer.writerow(
-            [
-                'table',
-                'verdict',
-                'effects',
-                'confidence',
-                *(f'{q}_{p}' for q in quantities for p in parts),
-            ]
-        )
-        for name, diagnosis in found.items():
-            effects = ' + '.join(effect.name for effect in diagnosis.effects)
-            sure = f'{diagnosis.effects[0].confidence:.3g}' if diagnosis.effects else ''
-            gaps = [
-                '' if (value := getattr(diagnosis.gap.get(q), p, None)) is None else f'{value:.6g}'
-                for q in quantities
-                for p in parts
-            ]
-            writer.writerow([name, diagnosis.verdict, effects, sure, *gaps])
+    rows = []
+    for name, diagnosis in found.items():
+        effects = ' + '.join(effect.name for effect in diagnosis.effects)
+        sure = f'{diagnosis.effects[0].confidence:.3g}' if diagnosis.effects else ''
+        values = (getattr(diagnosis.gap.get(q), p, None) for q in quantities for p in parts)
+        gaps = ['' if value is None else f'{value:.6g}' for value in values]
+        rows.append([name, diagnosis.verdict, effects, sure, *gaps])
+    header = ['table', 'verdict', 'effects', 'confidence']
+    write_csv(path, [*header, *(f'{q}_{p}' for q in quantities for p in parts)], rows)
