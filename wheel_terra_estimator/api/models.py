@@ -24,10 +24,7 @@ from wheel_terra_estimator.terramechanics import soil as terramechanics_soil
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
 from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
 from wheel_terra_estimator.terramechanics.model import OVERLOADED, WheelSoilModel
-from wheel_terra_estimator.terramechanics.operating_points import (
-    STANDARD_GRAVITY,
-    OperatingPoints,
-)
+from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY, OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 if TYPE_CHECKING:
@@ -136,10 +133,7 @@ class Model:
 
     @classmethod
     def load(
-        cls,
-        *files: str | Path,
-        parameters: Sequence[str] = (),
-        method: str = 'quadrature',
+        cls, *files: str | Path, parameters: Sequence[str] = (), method: str = 'quadrature'
     ) -> Model:
         """Return the model of configuration files, the ``model.yaml`` of a diagnosis included.
 

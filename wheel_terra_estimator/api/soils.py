@@ -262,10 +262,7 @@ def configuration_of(
 
 
 def _nearest(
-    table: SteadyTable,
-    wheel: Wheel,
-    soils: Iterable[Soil],
-    rest: tuple[EffectSettings, str, float],
+    table: SteadyTable, wheel: Wheel, soils: Iterable[Soil], rest: tuple[EffectSettings, str, float]
 ) -> Soil:
     """Return the soil of Bekker's law whose plain model is nearest to the measured rows."""
     from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, operating_points

@@ -28,11 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_simulated_truth
     from wheel_terra_estimator.errors import UserError
-    from wheel_terra_estimator.reporting.comparison import (
-        as_dict,
-        as_text,
-        compare,
-    )
+    from wheel_terra_estimator.reporting.comparison import as_dict, as_text, compare
 
     inputs = [arguments.first, arguments.second]
     histories = []

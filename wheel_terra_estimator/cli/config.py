@@ -7,10 +7,7 @@ from __future__ import annotations
 import argparse
 import re
 
-EXAMPLES = (
-    'wheel-terra config list rovers',
-    'wheel-terra config show frostyboy',
-)
+EXAMPLES = ('wheel-terra config list rovers', 'wheel-terra config show frostyboy')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -39,12 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='CSV table of steady rows, or a rosbag2; several: see --soil',
     )
     parser.add_argument(
-        '-o',
-        '--output',
-        action=Output,
-        required=True,
-        metavar='DIR',
-        help='folder to be written',
+        '-o', '--output', action=Output, required=True, metavar='DIR', help='folder to be written'
     )
     parser.add_argument(
         '--soil',
@@ -197,10 +192,7 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
 def _each_with_its_soil(arguments: argparse.Namespace) -> int:
     """Diagnose each table with a soil of its own, side by side, and sum up what they favour."""
     from wheel_terra_estimator.discrepancy.report.model_file import write_files
-    from wheel_terra_estimator.discrepancy.report.several import (
-        over_all,
-        write_summary,
-    )
+    from wheel_terra_estimator.discrepancy.report.several import over_all, write_summary
 
     names = _folder_names(arguments.data)
     plain = {key: value for key, value in vars(arguments).items() if key != 'run'}

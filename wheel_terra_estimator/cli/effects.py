@@ -23,10 +23,7 @@ from wheel_terra_estimator.terramechanics.effects import (
 from wheel_terra_estimator.terramechanics.effects import learned_closure as law
 from wheel_terra_estimator.terramechanics.effects.base import TOUCHABLE
 
-EXAMPLES = (
-    'wheel-terra effects',
-    'wheel-terra effects lug_digging multipass',
-)
+EXAMPLES = ('wheel-terra effects', 'wheel-terra effects lug_digging multipass')
 
 _PARAMETER_FIELDS = (
     'name', 'unit', 'meaning', 'default', 'lower', 'upper', 'neutral', 'prior', 'prior_mean',

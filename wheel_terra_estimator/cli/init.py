@@ -24,12 +24,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    add_output(
-        parser,
-        'rover file to be written',
-        'F',
-        required=True,
-    )
+    add_output(parser, 'rover file to be written', 'F', required=True)
     source = parser.add_mutually_exclusive_group()
     source.add_argument('--urdf', type=Path, metavar='F', help='robot description (URDF)')
     source.add_argument(

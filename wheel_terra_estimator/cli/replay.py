@@ -72,12 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='estimates of the fixed-interval smoother; warnings stay as they were given live',
     )
     parser.add_argument('--json', action='store_true', help='print the summary as JSON')
-    parser.add_argument(
-        '--report',
-        action=Output,
-        metavar='F.html',
-        help='report with pictures',
-    )
+    parser.add_argument('--report', action=Output, metavar='F.html', help='report with pictures')
     add_jobs_argument(parser, words='recordings at a time')
     add_scheduler_argument(parser, what='recordings')
     configuration_reader.add_arguments(parser)
@@ -113,12 +108,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
     remaps = parse_remaps(arguments.remap)
     _check_outputs(arguments)
     drive = replay_drive(
-        bag,
-        configuration,
-        remaps,
-        arguments.output,
-        _options(arguments),
-        print_findings,
+        bag, configuration, remaps, arguments.output, _options(arguments), print_findings
     )
     if arguments.json:
         print(json.dumps(_as_dict(drive), indent=2))
@@ -210,10 +200,7 @@ def _run_several(arguments: argparse.Namespace) -> int:
 
     if not arguments.output:
         raise UserError('several recordings need a folder for their outputs: add -o DIR')
-    for option, given in (
-        ('--arrival', arguments.arrival),
-        ('--save-soil', arguments.save_soil),
-    ):
+    for option, given in (('--arrival', arguments.arrival), ('--save-soil', arguments.save_soil)):
         if given:
             raise UserError(f'{option}: belongs to one recording; replay that one by itself')
     _check_kinds(arguments)

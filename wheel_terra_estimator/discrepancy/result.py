@@ -303,10 +303,7 @@ class Diagnosis:
                 {'line': int(self.table.lines[row]), 'quantity': quantity, 'deviation': size}
                 for row, quantity, size in self.outliers
             ],
-            'remainder': {
-                'p_value': self.remainder_p_value,
-                'amplitude': self.remainder_amplitude,
-            },
+            'remainder': {'p_value': self.remainder_p_value, 'amplitude': self.remainder_amplitude},
             'rows': len(self.table.lines),
             'table': self.table.name,
         }

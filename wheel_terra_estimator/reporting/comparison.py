@@ -47,10 +47,7 @@ class Comparison:
 
 
 def compare(
-    first: EstimateHistory,
-    second: EstimateHistory,
-    names: Sequence[str],
-    truth: Truth | None,
+    first: EstimateHistory, second: EstimateHistory, names: Sequence[str], truth: Truth | None
 ) -> Comparison:
     """Compare two runs over the same drive.
 
@@ -87,11 +84,7 @@ def compare(
 
 
 def _difference(
-    name: str,
-    first: EstimateHistory,
-    second: EstimateHistory,
-    a: IndexArray,
-    b: IndexArray,
+    name: str, first: EstimateHistory, second: EstimateHistory, a: IndexArray, b: IndexArray
 ) -> Difference:
     change = second.values[name][b] - first.values[name][a]
     row, wheel = np.unravel_index(int(np.argmax(np.abs(change))), change.shape)

@@ -34,11 +34,7 @@ QUANTITIES = ((SLIP, 'slip', 1.0), (SINKAGE, 'sinkage', 1e3), (PULL, 'drawbar_pu
 """Panel, quantity, its factor from SI to the panel."""
 
 
-def drive_figure(
-    history: EstimateHistory,
-    truth: Truth | None,
-    border: Border,
-) -> TimeFigure:
+def drive_figure(history: EstimateHistory, truth: Truth | None, border: Border) -> TimeFigure:
     """Return the figure of a drive."""
     names = short_names(history.names)
     slip = known(history, 'slip', border)

@@ -106,10 +106,7 @@ class Drive:
             ground,
         )
         self.plant = RoverPlant(
-            self.configuration,
-            terrain,
-            self._drives(max(fastest, 0.01)),
-            scenario.dig_efficiency,
+            self.configuration, terrain, self._drives(max(fastest, 0.01)), scenario.dig_efficiency
         )
         self.faults = (*scenario.faults, *_random_faults(scenario, noise))
         self.sensors = SensorSuite(scenario, noise, self.faults)

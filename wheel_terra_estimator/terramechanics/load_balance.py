@@ -81,9 +81,7 @@ def _inverse(step: FloatArray) -> FloatArray:
 
 
 def solve_entrance_angle(
-    carried: Callable[[FloatArray], FloatArray],
-    load: FloatArray,
-    start: FloatArray,
+    carried: Callable[[FloatArray], FloatArray], load: FloatArray, start: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
     """Solve carried(t1) = load for each point.
 

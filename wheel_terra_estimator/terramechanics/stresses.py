@@ -49,11 +49,7 @@ def bearing_law(
 
 
 def rolling_sinkage(
-    load: Quantity,
-    radius: Quantity,
-    width: Quantity,
-    modulus: Quantity,
-    exponent: Quantity,
+    load: Quantity, radius: Quantity, width: Quantity, modulus: Quantity, exponent: Quantity
 ) -> Quantity:
     """Sinkage of a towed rigid wheel without slip [m] (Bekker 1969).
 

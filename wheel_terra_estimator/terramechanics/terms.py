@@ -15,12 +15,7 @@ from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import by_variant, catalogue
-from wheel_terra_estimator.terramechanics.effects.base import (
-    STAGES,
-    Effect,
-    EffectSettings,
-    Term,
-)
+from wheel_terra_estimator.terramechanics.effects.base import STAGES, Effect, EffectSettings, Term
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -127,10 +122,7 @@ def _lateral_ratio(points: OperatingPoints, contact: Contact[Quantity]) -> Quant
 
 
 def set_angles(
-    contact: Contact[Any],
-    entrance_angle: Quantity,
-    measured_leaving: Quantity | None,
-    terms: Terms,
+    contact: Contact[Any], entrance_angle: Quantity, measured_leaving: Quantity | None, terms: Terms
 ) -> None:
     """Set entrance, leaving and peak angle; a measured leaving angle overrides the law."""
     contact.entrance_angle = entrance_angle

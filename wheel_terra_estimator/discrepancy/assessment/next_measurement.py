@@ -120,10 +120,7 @@ def _predicted(
         *(float(np.median(part)) for part in (old.wheel.lug_count, old.wheel.lug_thickness)),
     )
     points = OperatingPoints(
-        wheel=wheel,
-        slip_radius=old.slip_radius,
-        gravity=float(np.median(old.gravity)),
-        **columns,
+        wheel=wheel, slip_radius=old.slip_radius, gravity=float(np.median(old.gravity)), **columns
     )
     state = setting.forward.at(points, other_rows=True).solve(
         [f.coordinates for f in fits],
@@ -150,10 +147,7 @@ def _with_rows(
 
 
 def _distance(
-    setting: Setting,
-    chosen: Fit,
-    competitor: Fit,
-    new: tuple[FloatArray, FloatArray] | None = None,
+    setting: Setting, chosen: Fit, competitor: Fit, new: tuple[FloatArray, FloatArray] | None = None
 ) -> float:
     """Distance d' of the chosen prediction from the competitor's best refit to it (linear)."""
     problem = setting.problem

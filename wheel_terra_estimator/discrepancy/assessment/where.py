@@ -76,15 +76,7 @@ def locate(
     quantity, sentence = QUANTITIES[worst], 'no region stands out from the noise'
     if p_value < _SURE or excess[worst] > 3.0 * np.sqrt(2.0 * mine.sum()):
         sentence = _sentence(quantity, box, mean, size, noise)
-    return Where(
-        sentence,
-        quantity,
-        shares,
-        box,
-        np.flatnonzero(inside),
-        share_inside,
-        p_value,
-    )
+    return Where(sentence, quantity, shares, box, np.flatnonzero(inside), share_inside, p_value)
 
 
 def _boxes(table: SteadyTable, names: list[str]) -> tuple[FloatArray, list[tuple[InputRange, ...]]]:

@@ -170,11 +170,7 @@ def rows_from_measurements(
     columns, left_out = _columns(windows, configuration)
     _add_shared_errors(columns, configuration, len(windows))
     return DriveRows(
-        name,
-        columns,
-        tuple(windows),
-        dict(finder.seconds),
-        _notes(finder, windows, left_out),
+        name, columns, tuple(windows), dict(finder.seconds), _notes(finder, windows, left_out)
     )
 
 

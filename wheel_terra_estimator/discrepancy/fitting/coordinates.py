@@ -186,7 +186,4 @@ def loose_precision(coordinates: Sequence[Coordinate]) -> FloatArray:
 
 def bounds(coordinates: Sequence[Coordinate]) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds of u as arrays."""
-    return (
-        np.array([c.lower for c in coordinates]),
-        np.array([c.upper for c in coordinates]),
-    )
+    return (np.array([c.lower for c in coordinates]), np.array([c.upper for c in coordinates]))

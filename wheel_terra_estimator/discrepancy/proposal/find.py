@@ -309,11 +309,7 @@ def _description_lengths(terms: Iterable[str]) -> dict[str, float]:
 
 
 def _proposal(
-    gap: Gap,
-    setting: Setting,
-    refit: Fit,
-    law: Fit,
-    left_out: Mapping[str, Mapping[str, LeftOut]],
+    gap: Gap, setting: Setting, refit: Fit, law: Fit, left_out: Mapping[str, Mapping[str, LeftOut]]
 ) -> Proposal:
     by_slip = gap.left_out(setting, [refit, law], slip_groups(gap.table))
     covariance = law.covariance()

@@ -46,10 +46,7 @@ _PER = {
 
 
 def law_in_words(
-    names: Sequence[str],
-    coefficients: Sequence[float],
-    table: SteadyTable,
-    points: OperatingPoints,
+    names: Sequence[str], coefficients: Sequence[float], table: SteadyTable, points: OperatingPoints
 ) -> str:
     """Return the terms in words: "torque grows by 0.1 N m (4 % of its mean) per decade of ..."."""
     parts = []

@@ -18,12 +18,7 @@ import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.numbers import percent
-from wheel_terra_estimator.discrepancy.result import (
-    Diagnosis,
-    FittedParameter,
-    Proposal,
-    SoilShift,
-)
+from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, Proposal, SoilShift
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -74,9 +69,7 @@ def proposed(diagnosis: Diagnosis, proposal: Proposal) -> tuple[Configuration, l
 
 
 def _refitted(
-    diagnosis: Diagnosis,
-    soil: Iterable[SoilShift],
-    refitted: Mapping[str, FittedParameter],
+    diagnosis: Diagnosis, soil: Iterable[SoilShift], refitted: Mapping[str, FittedParameter]
 ) -> dict[str, object]:
     """Return the keys of soil and of effects that were on already, at their fitted values."""
     changes: dict[str, object] = {}

@@ -121,10 +121,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     The grey band is two standard deviations of noise and floor.
     """
     curves, table = diagnosis.curves, diagnosis.table
-    stages = [
-        ('as configured', curves.before),
-        ('soil refitted', curves.refit),
-    ]
+    stages = [('as configured', curves.before), ('soil refitted', curves.refit)]
     if diagnosis.effects:
         stages.append((_last(diagnosis), curves.after))
     factor, unit = shown_input(colour_by)
@@ -133,12 +130,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     discrete = len(few) <= 5
     texts = [with_unit(f'{plain(colour_by)} {value:.3g}', unit) for value in few]
     with picture_style():
-        figure, axes = _panels(
-            len(table.quantities),
-            stages,
-            height=1.95,
-            shared=True,
-        )
+        figure, axes = _panels(len(table.quantities), stages, height=1.95, shared=True)
         drawn = None
         for row, name in zip(axes, table.quantities, strict=True):
             q, scale = QUANTITIES.index(name), SHOWN[name][0]

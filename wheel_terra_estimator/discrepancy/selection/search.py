@@ -111,15 +111,7 @@ def search(
         deepest = float(np.max(rim))
         found = signatures(builder.forward, problem, nothing, possible, deepest)
         visible = {name: possible[name] for name, s in found.items() if s.greatest >= SEEN}
-        setting = Setting(
-            builder.forward,
-            problem,
-            observed,
-            nuisance,
-            visible,
-            floors,
-            deepest,
-        )
+        setting = Setting(builder.forward, problem, observed, nuisance, visible, floors, deepest)
         selection = _select(setting, nothing)
         findings = Findings(
             setting,

@@ -82,11 +82,7 @@ def unavailable(effect: Effect, table: SteadyTable, lug_height: FloatArray) -> s
 
 
 def signatures(
-    forward: Forward,
-    problem: Problem,
-    nothing: Fit,
-    effects: Mapping[str, Effect],
-    deepest: float,
+    forward: Forward, problem: Problem, nothing: Fit, effects: Mapping[str, Effect], deepest: float
 ) -> dict[str, Signature]:
     """Return the signature of each effect around the soil-only fit.
 

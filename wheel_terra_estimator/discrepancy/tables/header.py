@@ -245,11 +245,7 @@ class Header:
     """
 
     def __init__(
-        self,
-        source: str,
-        titles: Sequence[str],
-        choice: Choice,
-        wanted: Sequence[str] = COLUMNS,
+        self, source: str, titles: Sequence[str], choice: Choice, wanted: Sequence[str] = COLUMNS
     ) -> None:
         self.source, self.titles = source, titles
         self.columns: list[Column] = []

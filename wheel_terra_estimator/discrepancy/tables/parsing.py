@@ -52,10 +52,7 @@ def read_table(path: str | Path, choice: Choice | None = None) -> SteadyTable:
 
 
 def read_columns(
-    path: Path,
-    choice: Choice,
-    wanted: Sequence[str] = COLUMNS,
-    one_of: Sequence[str] = (),
+    path: Path, choice: Choice, wanted: Sequence[str] = COLUMNS, one_of: Sequence[str] = ()
 ) -> tuple[IndexArray, dict[str, FloatArray], list[str]]:
     """Return the lines of the rows, the wanted columns of a CSV file in SI, and notes.
 

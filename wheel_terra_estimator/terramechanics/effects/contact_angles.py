@@ -44,14 +44,7 @@ def _raise(contact: Contact[Quantity], rise: Quantity) -> None:
 
 
 _KAPPA = EffectParameter(
-    'kappa',
-    '-',
-    1.0,
-    0.0,
-    8.0,
-    1.0,
-    'half_normal',
-    'height of the mound at s = 1 over the sinkage',
+    'kappa', '-', 1.0, 0.0, 8.0, 1.0, 'half_normal', 'height of the mound at s = 1 over the sinkage'
 )
 
 SOIL_MOUND = Effect(

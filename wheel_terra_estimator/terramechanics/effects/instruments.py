@@ -220,9 +220,7 @@ WHEEL_RADIUS_BIAS = Effect(
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     instrument=True,
     needs=('slip',),
-    confounded_with={
-        'lug_shear_radius': 'rows with other lugs or none; roll-out on a hard floor',
-    },
+    confounded_with={'lug_shear_radius': 'rows with other lugs or none; roll-out on a hard floor'},
     validity='biases of up to some 10 %; the contact geometry keeps the configured radius',
     source='definition of the slip ratio; Ding et al. 2010 eq. 1 leaves the radius open',
     on_inputs=_bias,

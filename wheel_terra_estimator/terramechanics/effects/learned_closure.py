@@ -124,7 +124,7 @@ BANDS: Mapping[str, Feature] = {
 BENT_READING: Mapping[str, Feature] = {
     'torque_squared': Feature(
         _torque_squared, 0.15, ('slip', 'normal_load'), 'T |T| / (W r * rho g b r^3)', ('torque',)
-    ),
+    )
 }
 
 _SINGLE: Mapping[str, Feature] = {

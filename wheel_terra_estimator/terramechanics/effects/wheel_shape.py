@@ -54,11 +54,7 @@ def _widening(contact: Contact[Quantity], p: SimpleNamespace) -> Quantity:
         contact.reference_depth**contact.sinkage_exponent
     )
     sinkage = rolling_sinkage(
-        contact.normal_load,
-        contact.rim_radius,
-        contact.width,
-        modulus,
-        contact.sinkage_exponent,
+        contact.normal_load, contact.rim_radius, contact.width, modulus, contact.sinkage_exponent
     )
     return 1.0 + p.compliance * contact.normal_load / np.maximum(sinkage, _LEAST)
 
