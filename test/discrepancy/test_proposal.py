@@ -13,7 +13,7 @@ from test_workflow import make, run
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.proposal import find, words
-from wheel_terra_estimator.discrepancy.report.model_file import write_proposal
+from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.result import LeftOut, as_json
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
@@ -81,7 +81,7 @@ def test_what_acts_only_where_two_things_meet_is_a_product():
 def test_the_file_of_the_law_gives_the_reported_gap(speedy, tmp_path):
     table, values, found = speedy
     configuration = reader.from_parameters(values, complete=False)
-    write_proposal(found, found.proposal, tmp_path / 'proposal.yaml')
+    write_model(found, tmp_path / 'proposal.yaml', found.proposal)
     rows = predicted(table, configuration, tmp_path, 'proposal.yaml')
     for q, quantity in enumerate(QUANTITIES):
         error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
@@ -154,7 +154,7 @@ def test_where_only_an_unbelievable_soil_fits_the_law_leaves_one_that_can_be_bel
         assert gap.after < 0.9 * gap.refit
         assert gap.after < 1.6 * gap.noise
     configuration = reader.from_parameters(campaign.settings(), complete=False)
-    write_proposal(found, law, tmp_path / 'proposal.yaml')
+    write_model(found, tmp_path / 'proposal.yaml', law)
     rows = predicted(found.table.columns, configuration, tmp_path, 'proposal.yaml')
     for q, quantity in enumerate(QUANTITIES):
         error = np.sqrt(np.nanmean((rows[:, q] - found.table.measured[:, q]) ** 2))

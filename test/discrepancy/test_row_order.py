@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from test_workflow import make, run
 
-from wheel_terra_estimator.discrepancy.assessment import order
-from wheel_terra_estimator.discrepancy.assessment.order import changes_along_rows
+from wheel_terra_estimator.discrepancy.assessment import along as order
+from wheel_terra_estimator.discrepancy.assessment.along import changes_along_rows
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 

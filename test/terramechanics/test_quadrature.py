@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from terra_tools import SAND, WHEEL, points, random_cases, second_model, state
 
-from wheel_terra_estimator.terramechanics import quadrature, stresses
+from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.model import (
     OUTSIDE_VALIDITY,
     OVERLOADED,
@@ -48,7 +48,7 @@ def test_frictionless_soil_gives_minus_the_compaction_resistance():
         SAND, cohesion=0.0, friction_angle=0.0, peak_stress_ratio=0.0, leaving_angle_ratio=0.0
     )
     answer = state([0.3], soil=soil)
-    modulus = stresses.bekker_modulus(soil.cohesive_modulus, soil.frictional_modulus, WHEEL.width)
+    modulus, _ = soil.bearing(WHEEL.width, 9.81)
     power = soil.sinkage_exponent + 1.0  # Bekker 1969: b k z^(n+1)/(n+1)
     resistance = WHEEL.width * modulus * answer.sinkage**power / power
     assert answer.torque == pytest.approx(0.0, abs=1e-12)

@@ -191,8 +191,11 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
 
 def _each_with_its_soil(arguments: argparse.Namespace) -> int:
     """Diagnose each table with a soil of its own, side by side, and sum up what they favour."""
-    from wheel_terra_estimator.discrepancy.report.model_file import write_files
-    from wheel_terra_estimator.discrepancy.report.several import over_all, write_summary
+    from wheel_terra_estimator.discrepancy.report.model_file import (
+        over_all,
+        write_files,
+        write_summary,
+    )
 
     names = _folder_names(arguments.data)
     plain = {key: value for key, value in vars(arguments).items() if key != 'run'}

@@ -13,8 +13,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
-from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
-from wheel_terra_estimator.discrepancy.assessment.order import changes_along_rows
+from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch, changes_along_rows
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import Decision, known_alike
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit

@@ -18,7 +18,7 @@ from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK, effect_
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration
-    from wheel_terra_estimator.discrepancy.assessment.order import Change
+    from wheel_terra_estimator.discrepancy.assessment.along import Change
     from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
 _ASIDE: Mapping[str, Any] = {'json': False}  # metadata of a field that is no part of report.json

@@ -18,22 +18,6 @@ from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
 _NO_DISPLACEMENT = 1e-300  # [m]; keeps the direction of none finite
 
 
-def bekker_modulus(cohesive: Quantity, frictional: Quantity, width: Quantity) -> Quantity:
-    """Pressure at 1 m depth, kc/b + kphi [Pa], for p = (kc/b + kphi) (z/1 m)^n (Bekker 1969)."""
-    return cohesive / width + frictional
-
-
-def reece_modulus(
-    cohesive: Quantity,
-    frictional: Quantity,
-    width: Quantity,
-    cohesion: Quantity,
-    weight_density: Quantity,
-) -> Quantity:
-    """Pressure at a depth of one width, c kc' + rho g b kphi' [Pa], for p = k (z/b)^n (Reece)."""
-    return cohesion * cohesive + weight_density * width * frictional
-
-
 def bearing_law(
     pressure_law: str,
     cohesive: Quantity,
@@ -42,10 +26,13 @@ def bearing_law(
     cohesion: Quantity,
     weight_density: Quantity,
 ) -> tuple[Any, Any]:
-    """Pressure at the reference depth [Pa], and that depth [m], of a law of ``Soil``."""
+    """Pressure at the reference depth [Pa], and that depth [m], of a law of ``Soil``.
+
+    Reece: c kc' + rho g b kphi' at one width, p = k (z/b)^n; Bekker 1969: kc/b + kphi at 1 m.
+    """
     if pressure_law == 'reece':
-        return reece_modulus(cohesive, frictional, width, cohesion, weight_density), width
-    return bekker_modulus(cohesive, frictional, width), 1.0
+        return cohesion * cohesive + weight_density * width * frictional, width
+    return cohesive / width + frictional, 1.0
 
 
 def rolling_sinkage(

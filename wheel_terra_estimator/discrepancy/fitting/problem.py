@@ -92,17 +92,6 @@ def kernel(inputs: FloatArray) -> FloatArray:
     return np.mean([np.exp(-0.5 * square / length**2) for length in _LENGTHS], axis=0)
 
 
-def _floor_covariance(
-    correlation: FloatArray, row: IndexArray, quantity: IndexArray, scale: FloatArray
-) -> FloatArray:
-    """(m, m) covariance of the floor between cells at amplitude 1; quantities are independent."""
-    return np.where(
-        quantity[:, None] == quantity[None, :],
-        correlation[np.ix_(row, row)] * np.outer(scale[quantity], scale[quantity]),
-        0.0,
-    )
-
-
 def slip_features(inputs: FloatArray, slip: int | None) -> FloatArray:
     """(N, N) correlation of a misfit that is narrow in slip and shared along all other inputs.
 
@@ -160,7 +149,10 @@ def build_problem(
             together = error.group[row][:, None] == error.group[row][None, :]
             noise += np.where(together, np.outer(size, size), 0.0)
         lower = np.linalg.cholesky(noise)
-        smooth = _floor_covariance(correlation, row, quantity, scale)
+        # Structural errors of the quantities are independent.
+        alike = quantity[:, None] == quantity[None, :]
+        sizes = np.outer(scale[quantity], scale[quantity])
+        smooth = np.where(alike, correlation[np.ix_(row, row)] * sizes, 0.0)
         whitening = np.linalg.inv(lower)
         values, vectors = np.linalg.eigh(whitening @ smooth @ whitening.T)
         rotation, roughness = vectors.T @ whitening, np.maximum(values, 0.0)
