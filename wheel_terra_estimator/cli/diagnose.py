@@ -132,16 +132,15 @@ def run(arguments: argparse.Namespace) -> int:
 
     output: Path = arguments.output
     check_folder(output, arguments.overwrite)
-    if arguments.floor is not None and not 0.0 <= arguments.floor <= 0.2:
-        raise UserError(f'--floor {arguments.floor:g}: must be a share between 0 and 0.2')
-    if not 0.0 <= arguments.allowed_error <= 0.5:
-        raise UserError(
-            f'--allowed-error {arguments.allowed_error:g}: must be a share between 0 and 0.5'
-        )
-    if arguments.soil_known_to is not None and not 0.0 < arguments.soil_known_to <= 2.0:
-        raise UserError(
-            f'--soil-known-to {arguments.soil_known_to:g}: must be a share above 0, at most 2'
-        )
+    for option, least, most in (
+        ('floor', 0.0, 0.2),
+        ('allowed_error', 0.0, 0.5),
+        ('soil_known_to', 1e-6, 2.0),
+    ):
+        share = getattr(arguments, option)
+        if share is not None and not least <= share <= most:
+            name = option.replace('_', '-')
+            raise UserError(f'--{name} {share:g}: must be a share between {least:g} and {most:g}')
     given = [*arguments.data, *([arguments.reference] if arguments.reference else [])]
     if not any(map(is_bag, given)):
         if arguments.remap:

@@ -25,12 +25,15 @@ DEFAULT_TORQUE_RATIO = 1.5
 
 @dataclass(frozen=True)
 class SimulatedDrive:
-    """What a drive gave."""
+    """What a drive gave: ``arrivals`` (typed measurements in the order of their arrival), ``truth``.
+
+    ``configuration`` is what an estimator may know of it.
+    """
 
     scenario: Scenario
     seed: int
-    arrivals: list[Arrival]  # measurements in the order of their arrival
-    truth: TruthTable  # (k, n) arrays of slip, sinkage, pull, ... by stamps of the wheel odometry
+    arrivals: list[Arrival]
+    truth: TruthTable
 
     @property
     def configuration(self) -> Configuration:

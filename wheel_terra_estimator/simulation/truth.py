@@ -56,24 +56,12 @@ class Truth:
 class TruthTable:
     """Truth of a whole drive, one row per stamp of the wheel odometry.
 
-    Attributes
-    ----------
-    stamp : numpy.ndarray
-        (k,) [ns].
-    slip, slip_velocity, drawbar_pull, normal_load, sinkage, sinkage_rate, torque, wheel_rate
-    slip_angle, lateral_force
-        (k, n), as in ``Truth``; ``slip`` is nan at rest.
-    slip_class : numpy.ndarray
-        (k, n) slip class without hysteresis, 255 at rest.
-    stuck : numpy.ndarray
-        (k,) bool: median abs(slip) of the turning wheels above 0.9 for 1 s; clears after 3 s below
-        0.6.
-    forward_velocity, lateral_velocity, yaw_rate, slope : numpy.ndarray
-        (k,).
-    position : numpy.ndarray
-        (k, 3) x, y, heading.
-    wheels : tuple of str
-        Names of the n wheels.
+    (k, n) as in ``Truth``, in SI units: ``slip`` (nan at rest), ``slip_velocity``,
+    ``drawbar_pull``, ``normal_load``, ``sinkage``, ``sinkage_rate``, ``torque``, ``wheel_rate``,
+    ``slip_angle``, ``lateral_force``; ``slip_class`` (without hysteresis, 255 at rest). (k,):
+    ``stamp`` [ns], ``stuck`` (median abs(slip) of the turning wheels above 0.9 for 1 s; clears
+    after 3 s below 0.6), ``forward_velocity``, ``lateral_velocity``, ``yaw_rate``, ``slope``; (k,
+    3): ``position`` (x, y, heading). ``wheels``: names of the n wheels.
     """
 
     stamp: IntArray

@@ -41,11 +41,6 @@ def shown_input(name: str) -> tuple[float, str]:
     return SHOWN_INPUT.get(name, (1.0, INPUT_UNITS.get(name, '-')))
 
 
-def label(name: str, unit: str) -> str:
-    """Axis label."""
-    return plain(name) if unit == '-' else f'{plain(name)} [{unit}]'
-
-
 def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
     """Draw measurement and model over slip, one curve for each setting of the other inputs.
 
@@ -80,10 +75,7 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
                 )
         from matplotlib.lines import Line2D
 
-        marks = [
-            Line2D([], [], marker=shape, ms=5, ls='', color=colour)
-            for _, colour, shape in zip(groups, _DISCRETE, _SHAPES, strict=False)
-        ]
+        marks = _marks(len(groups))
         lines = [Line2D([], [], ls=style, color=INK, lw=1.2) for style in (':', '-')]
         if others:
             marks = [Line2D([], [], ls=''), *marks]
@@ -131,7 +123,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     texts = [with_unit(f'{plain(colour_by)} {value:.3g}', unit) for value in few]
     with picture_style():
         figure, axes = _panels(len(table.quantities), stages, height=1.95, shared=True)
-        drawn = None
+        drawn: Any = None
         for row, name in zip(axes, table.quantities, strict=True):
             q, scale = QUANTITIES.index(name), SHOWN[name][0]
             outside = _rejected_cells(diagnosis, q)
@@ -162,15 +154,12 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
                     axis.set_ylabel(axis_label(name))
             row[0].set_ylim(-reach, reach)
         if discrete:
-            from matplotlib.lines import Line2D
-
-            handles = [
-                Line2D([], [], marker=shape, ms=5, ls='', color=c)
-                for c, shape in zip(_DISCRETE, _SHAPES, strict=True)
-            ]
-            _legend(figure, handles[: len(few)], texts)
+            _legend(figure, _marks(len(few)), texts)
         else:
-            _colour_bar(figure, axes, drawn, label(colour_by, unit))
+            text = plain(colour_by) if unit == '-' else f'{plain(colour_by)} [{unit}]'
+            bar = figure.colorbar(drawn, ax=axes, label=text, pad=0.01, aspect=25)
+            bar.outline.set_visible(False)
+            bar.ax.grid(visible=False)
     return figure
 
 
@@ -199,10 +188,11 @@ def _panels(
     return figure, axes
 
 
-def _colour_bar(figure: Figure, axes: Any, drawn: Any, text: str) -> None:
-    bar = figure.colorbar(drawn, ax=axes, label=text, pad=0.01, aspect=25)
-    bar.outline.set_visible(False)
-    bar.ax.grid(visible=False)
+def _marks(count: int) -> list[Any]:
+    from matplotlib.lines import Line2D
+
+    kinds = list(zip(_DISCRETE, _SHAPES, strict=True))[:count]
+    return [Line2D([], [], marker=shape, ms=5, ls='', color=colour) for colour, shape in kinds]
 
 
 def _legend(figure: Figure, handles: Any, labels: Any, place: Any = 'upper left') -> None:
