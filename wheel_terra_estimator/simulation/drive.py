@@ -25,7 +25,7 @@ DEFAULT_TORQUE_RATIO = 1.5
 
 @dataclass(frozen=True)
 class SimulatedDrive:
-    """What a drive gave: ``arrivals`` (typed measurements in the order of their arrival), ``truth``.
+    """What a drive gave: ``arrivals`` (measurements in the order of their arrival), ``truth``.
 
     ``configuration`` is what an estimator may know of it.
     """

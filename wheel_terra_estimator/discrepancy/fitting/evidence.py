@@ -47,7 +47,6 @@ class Posterior:
     """Linear posterior of one hypothesis for every floor."""
 
     log_joint: FloatArray  # (F,) of evidence and prior of the floor
-    mean: FloatArray  # (F, P) of u
     covariance: FloatArray  # (F, P, P)
 
 
@@ -100,7 +99,6 @@ def evidence(
     rows = np.arange(len(floors))
     return Posterior(
         log_sum(value + np.log(weights)[:, None], axis=0) + [f.log_prior for f in floors],
-        mean[best, rows],
         covariance[best, rows],
     )
 

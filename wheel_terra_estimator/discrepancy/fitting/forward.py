@@ -42,11 +42,10 @@ _TOLERANCE, _ITERATIONS = 1e-6, 60  # relative to the load
 class State:
     """Solutions of B hypotheses at N rows.
 
-    ``u`` are their coordinates, ``angle`` (B, N) entrance angles, ``outputs`` (B, N, 4), `jacobian`
-    one (N, 4, P_b) array per hypothesis (derivative by u).
+    ``angle`` (B, N) entrance angles, ``outputs`` (B, N, 4), ``jacobian`` one (N, 4, P_b) array per
+    hypothesis (derivative by u).
     """
 
-    u: list[FloatArray]
     angle: FloatArray
     outputs: FloatArray
     jacobian: list[FloatArray]
@@ -180,7 +179,7 @@ class Forward:
         ]
         angle, outputs = self._balance(hypotheses, columns, start)
         if not jacobian:
-            return State([np.asarray(x) for x in u], angle, outputs, [], [])
+            return State(angle, outputs, [], [])
         return self._differences(hypotheses, u, by, columns, angle, outputs)
 
     def _differences(
@@ -220,7 +219,7 @@ class Forward:
             jacobians.append(np.moveaxis(total, 0, -1))
             slopes.append(angle_by_u.T)
             at += count
-        return State([np.asarray(x) for x in u], angle, outputs, jacobians, slopes)
+        return State(angle, outputs, jacobians, slopes)
 
     @staticmethod
     def _step(coordinate: Coordinate, x: float) -> float:

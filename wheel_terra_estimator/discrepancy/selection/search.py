@@ -82,11 +82,11 @@ def search(
     """Find noise, outliers and the weights of all explanations by effects that may be named."""
     scale = _ranges(table)
     noise = noises.stated_noise(table, scale)
-    builder = _Builder(table, forward, scale, noise.std)
+    builder = _Builder(table, forward, scale)
     problem, observed = builder.build(noise.std, ())
     nothing = _fit_nothing(forward, problem, observed, nuisance, None)
     if builder.latent:
-        builder.linearise(nothing)
+        builder.linearise(nothing, noise.std)
         problem, observed = builder.build(noise.std, ())
         nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
     builder.read_leaving_angles(nothing)
@@ -277,13 +277,10 @@ def _slip_groups(table: SteadyTable) -> IndexArray:
 class _Builder:
     """Makes problems of one table, with the recorded slip as a latent variable where needed."""
 
-    def __init__(
-        self, table: SteadyTable, forward: Forward, scale: FloatArray, noise_std: FloatArray
-    ) -> None:
+    def __init__(self, table: SteadyTable, forward: Forward, scale: FloatArray) -> None:
         self.table = table
         self.forward = forward
         self.scale = scale
-        self.noise_std = noise_std
         self.inputs = table.scaled_inputs()
         names = table.varying()
         self.narrow = slip_features(self.inputs, names.index('slip') if 'slip' in names else None)
@@ -309,14 +306,14 @@ class _Builder:
             found.append(CommonError(self._by_angle, self.table.leaving_angle_std, rows))
         return found
 
-    def linearise(self, nothing: Fit) -> None:
+    def linearise(self, nothing: Fit, noise_std: FloatArray) -> None:
         """Linearise the slip errors around the most probable slips, given all quantities.
 
         Where the curves bend within an error of the slip, a tangent at the reading is not enough.
         """
         slip, std = self.table.columns['slip'], self.table.slip_std
         self._by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, nothing.angle)
-        problem, observed = self.build(self.noise_std, ())
+        problem, observed = self.build(noise_std, ())
         here = nothing.within(problem, observed)
         inverse = problem.rotation.T @ inverse_covariance(
             problem.variance(_LATENT_FLOOR), here.jacobian
@@ -338,7 +335,7 @@ class _Builder:
         self, std: FloatArray, outliers: list[tuple[int, int, float]] | tuple[()]
     ) -> tuple[Problem, FloatArray]:
         """Return the problem and the cells that the model has to match."""
-        self.last = build_problem(
+        problem = build_problem(
             self.table.measured,
             std,
             self.inputs,
@@ -346,11 +343,11 @@ class _Builder:
             [(row, quantity) for row, quantity, _ in outliers],
             self._common_errors(),
         )
-        observed = self.last.observed
+        observed = problem.observed
         if self._by_slip is not None:
             # The reading lies off the point of linearisation: the tangent takes the cells along.
-            observed = observed + self.last.flat(self._by_slip * self._moved[:, None])
-        return self.last, observed
+            observed = observed + problem.flat(self._by_slip * self._moved[:, None])
+        return problem, observed
 
     def estimate(
         self, noise: Noise, fitted: Fit, outliers: list[tuple[int, int, float]] | tuple[()]

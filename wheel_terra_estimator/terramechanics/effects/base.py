@@ -65,13 +65,13 @@ class Form:
     """Another law for the same effect, beside the one that the effect itself states."""
 
     name: str  # value of the configuration key ``effects.<effect>.form``
-    # ``claim``, ``symbol``, ``parameters``, ``validity``, ``source``: as for the effect
+    # ``claim``, ``symbol``, ``parameters``, ``source``: as for the effect
     claim: str
     symbol: str
     parameters: tuple[EffectParameter, ...]
-    validity: str
     source: str
-    # ``touches``, ``needs``, ``candidate``: None for those of the effect
+    # ``validity``, ``touches``, ``needs``, ``candidate``: None for those of the effect
+    validity: str | None = None
     touches: frozenset[str] | None = None
     needs: tuple[str, ...] | None = None
     candidate: bool | None = None
@@ -97,11 +97,11 @@ class Effect:
     claim: str  # one line: what it stands for
     symbol: str  # the term as a formula
     parameters: tuple[EffectParameter, ...]  # at least one; `on_*` receives their values by name
-    # Which of `TOUCHABLE` it is seen by (soil and rim change the lateral force as they do pull)
-    touches: frozenset[str]
     # ``validity``, ``source``: where it holds; paper and equation
     validity: str
     source: str
+    # Which of `TOUCHABLE` it is seen by (soil and rim change the lateral force as they do pull)
+    touches: frozenset[str] = frozenset(OUTPUTS)
     instrument: bool = False  # True for an error of the measurement, False for physics of the soil
     # Columns of a table that must be there, and vary, for the effect to be seen
     needs: tuple[str, ...] = ()

@@ -56,7 +56,6 @@ HARD_LAYER = Effect(
     symbol='sigma += stiffness <z(t) - depth>, z(t) = r (cos t - cos t_1); <x> = x^2/(2 mm) up to '
     'x = 1 mm, x - 0.5 mm beyond',
     parameters=_PARAMETERS,
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('sinkage',),
     confounded_with={
         'multipass': 'virgin soil beside the rut',
@@ -72,7 +71,6 @@ HARD_LAYER = Effect(
             claim='the pressure-sinkage curve stiffens below some depth, as plates show',
             symbol='p(z) = k z^N + stiffness <z - depth>, behind the peak at the mirrored angle',
             parameters=_PARAMETERS,
-            validity='top of the layer not shallower than a few millimetres',
             source='Wong and Reece 1967 (doi 10.1016/0022-4898(67)90105-X) with the '
             'pressure-sinkage curve of layered ground',
             on_normal_stress=_bearing,
@@ -114,7 +112,6 @@ MULTIPASS = Effect(
             'stiffening', '-', 0.5, -0.3, 5.0, 0.5, 'half_normal', 'gain of stiffness of pass 2'
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('pass_number',),
     confounded_with={
         'rate_dependence': 'the same pass at another speed',
@@ -215,7 +212,6 @@ SLIP_SINKAGE_EXPONENT = Effect(
             free=False,
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('slip',),
     confounded_with={
         'stress_peak_shift': 'pull lost per millimetre of sinkage; slip near 0.9; high load',

@@ -178,7 +178,6 @@ SIDE_BULLDOZING = Effect(
             'F += P tan(phi) u/|(u, v_y tan X)|, T += 2/3 r times that, u = 2/3 r w - v',
             parameters=(_KS,),
             touches=frozenset({'lateral_force', 'drawbar_pull', 'torque'}),
-            needs=('slip_angle',),
             validity='slip angles to 90 degrees, sinkage below one radius; what friction on '
             'the flank carries of the load is left out',
             source='own form: resistance of Hegedus 1960 (report, no DOI) on the outline of the '

@@ -59,7 +59,6 @@ SOIL_MOUND = Effect(
             'onset', '-', 0.4, 0.0, 0.9, 0.15, 'normal', 'slip at which it starts', prior_mean=0.4
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('slip',),
     confounded_with={'stress_peak_shift': 'a rear camera: measured leaving angle'},
     validity='slip up to 0.95; a measured leaving angle overrides it',
@@ -88,7 +87,6 @@ SOIL_MOUND = Effect(
                 ),
             ),
             needs=('slip', 'lug_height'),
-            validity='slip up to 0.95; a measured leaving angle overrides it',
             source='own form: volume carried back per unit of advance against that of the rut',
             candidate=False,
             why_aside='no table with two lug heights at slips above 0.6 has been seen',
@@ -126,7 +124,6 @@ STRESS_PEAK_SHIFT = Effect(
             free=False,
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('slip',),
     confounded_with={
         'soil_mound': 'a rear camera: measured leaving angle',

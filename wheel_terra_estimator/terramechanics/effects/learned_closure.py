@@ -294,7 +294,6 @@ EFFECT = Effect(
         for feature in FEATURES
         if allowed(target, feature)
     ),
-    touches=frozenset(OUTPUTS),
     validity='inside the range of the rows that it was found from, for the same wheel and soil',
     source='sparse terms in the closures of a known model, after the idea of Brunton, Proctor and '
     'Kutz 2016 (doi 10.1073/pnas.1517384113); chosen by evidence instead of thresholds',

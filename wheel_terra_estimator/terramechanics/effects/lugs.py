@@ -96,7 +96,6 @@ LUG_SHEAR_RADIUS = Effect(
             'lam', '-', 0.5, 0.0, 1.0, 0.5, 'half_normal', 'share of the lug height, lambda'
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('lug_height',),
     confounded_with={
         'wheel_radius_bias': 'rows with other lugs or none; roll-out on a hard floor',
@@ -227,8 +226,6 @@ GROUSER_THRUST = Effect(
             claim='lugs push against the soil like blades under the whole load of the contact',
             symbol='F += share b n_e [rho g h^2 Np/2 + q h Np + 2 c h sqrt(Np)] (1 - exp(-s L/K))',
             parameters=(_SHARE,),
-            validity='lugs far apart; counts the same thrust as a larger shear radius, hence not '
-            'with it',
             source='Bekker 1969 and Wong, Theory of Ground Vehicles (books, no DOI): Rankine '
             'passive pressure with surcharge q; n_e lugs in the contact of length L',
             on_outputs=_textbook,

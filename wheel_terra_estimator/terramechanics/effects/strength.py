@@ -38,7 +38,6 @@ COHESION = Effect(
             'cohesion added to soil.cohesion',
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     confounded_with={
         'bulldozing': 'a load series',
         'grouser_thrust': 'other lugs or none; a load series',
@@ -76,7 +75,6 @@ RATE_DEPENDENCE = Effect(
             'shear', '-', 0.0, -0.4, 0.4, 0.05, 'normal', 'exponent of the shear strength'
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('angular_velocity',),
     confounded_with={'multipass': 'the same speed on virgin soil and in the rut'},
     validity='rim speed 1 mm/s to 1 m/s; no influence where the speed is not recorded',
@@ -112,7 +110,6 @@ RIM_FRICTION = Effect(
             free=False,
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('lug_height',),
     confounded_with={'cohesion': 'a load series; a lugged wheel'},
     validity='metal rims in dry sand, with the friction of soil on soil as '
@@ -143,7 +140,6 @@ SHEAR_DEFORMATION = Effect(
             'log_factor', '-', 0.3, -3.0, 3.0, 0.3, 'normal', 'logarithm of the factor on K'
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('slip',),
     confounded_with={
         'wheel_radius_bias': 'sinkage; visual odometry on hard ground',

@@ -32,7 +32,6 @@ SOIL_ADHESION = Effect(
             'thickness', 'm', 0.002, 0.0, 0.05, 0.003, 'half_normal', 'thickness of the layer'
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     confounded_with={
         'wheel_radius_bias': 'sinkage, which a misread slip changes less; a look at the rim',
         'lug_shear_radius': 'rows with other lugs or none; sinkage',
@@ -83,7 +82,6 @@ WHEEL_FLEXIBILITY = Effect(
             'compliance', 'm/N', 2e-5, 0.0, 1e-3, 5e-5, 'half_normal', 'flattening per load'
         ),
     ),
-    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     confounded_with={
         'multipass': 'deflection on a hard floor; a load series',
         'hard_layer': 'deflection on a hard floor; a penetrometer',
