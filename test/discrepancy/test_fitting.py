@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from wheel_terra_estimator.discrepancy.fitting import outliers
+from wheel_terra_estimator.discrepancy.fitting import noise as outliers
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
 

@@ -16,7 +16,7 @@ from wheel_terra_estimator.discrepancy.assessment import held_out
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import _strength
-from wheel_terra_estimator.discrepancy.fitting import noise, outliers
+from wheel_terra_estimator.discrepancy.fitting import noise
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     EFFECT_SCALES,
     EFFECT_SHARES,
@@ -275,7 +275,7 @@ def test_a_cell_that_the_model_takes_whole_is_no_outlier(setting):
     target = np.zeros(problem.size)
     target[3] = 9.0 * problem.std[3]
     with np.errstate(all='raise'):
-        _, found = outliers._rejected_cells(problem, inverse, target)
+        _, found = noise._rejected_cells(problem, inverse, target)
     assert [cell[:2] for cell in found] == [(problem.row[3], problem.quantity[3])]
 
 
@@ -290,7 +290,7 @@ def test_outliers_are_found_and_a_hump_is_none(forward, setting):
         nothing = fit(
             forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], one[0]
         )[0]
-        found = outliers.find_outliers(problem, nothing, one, problem.observed, narrow)
+        found = noise.find_outliers(problem, nothing, one, problem.observed, narrow)
         return {cell[:2] for cell in found}
 
     clean = truth + std * rng.standard_normal(truth.shape)

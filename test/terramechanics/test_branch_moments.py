@@ -5,7 +5,7 @@
 import pytest
 from scipy.integrate import quad
 
-from wheel_terra_estimator.terramechanics.branch_moments import branch_moments
+from wheel_terra_estimator.terramechanics.closed_form import branch_moments
 
 
 def moment(exponent, skew, power):

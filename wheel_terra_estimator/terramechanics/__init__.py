@@ -5,8 +5,7 @@
 - What is given: ``wheel``, ``soil``, ``operating_points``; ``effects`` is the catalogue.
 - Laws: ``kinematics`` (slip, shear displacement), ``stresses`` (pressure, shear), ``contact`` and
   ``terms`` (one contact with its effects).
-- Forces at given angles: ``quadrature``, ``branch_moments`` (closed form),
-  ``closed_form`` (its use with effects).
+- Forces at given angles: ``quadrature``, ``closed_form``.
 - Load to sinkage, pull, torque: ``model`` (by ``load_balance``); sinkage to torque and pull:
   ``conditioned`` (for the filter).
 - Questions: ``entrapment``.

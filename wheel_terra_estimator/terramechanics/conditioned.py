@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import Quantity
-from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.checks import check_range
+from wheel_terra_estimator.terramechanics.closed_form import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, check_settings
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio

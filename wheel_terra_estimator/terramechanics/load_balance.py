@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, Quantity
-from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
+from wheel_terra_estimator.terramechanics.closed_form import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
 
 # Sinkage equal to the radius: the stress laws end here.

@@ -15,7 +15,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.fitting.outliers import inverse_covariance
+from wheel_terra_estimator.discrepancy.fitting.noise import inverse_covariance
 from wheel_terra_estimator.discrepancy.numbers import number, plain
 from wheel_terra_estimator.discrepancy.selection.weights import Setting
 from wheel_terra_estimator.discrepancy.tables.steady_table import (

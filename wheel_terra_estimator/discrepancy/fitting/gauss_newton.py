@@ -122,7 +122,10 @@ def fit(
             damping[b] = next_damping(damping[b], improved)
             current = best[b]
             assert current is not None
-            step, expected = _step(current, limits[b], damping[b])
+            gradient = current.jacobian.T @ (current.residual / variance) - priors[b] * current.u
+            step, expected = bounded_step(
+                current.precision(), gradient, current.u, priors[b], limits[b], damping[b]
+            )
             if has_settled(expected, gain):
                 continue
             trial[b] = current.u + step
@@ -144,16 +147,6 @@ def next_damping(damping: float, improved: bool) -> float:
 def has_settled(expected: float, gain: float) -> bool:
     """Tell whether the next step would fall by too little, or the last one did (< 0: it rose)."""
     return expected < _CLOSE_ENOUGH or 0.0 <= gain < _CLOSE_ENOUGH
-
-
-def _step(
-    current: Fit, limit: tuple[FloatArray, FloatArray], damping: float
-) -> tuple[FloatArray, float]:
-    """Return a bounded Gauss-Newton step and the fall of the objective that it should bring."""
-    gradient = (
-        current.jacobian.T @ (current.residual / current.variance) - current.prior * current.u
-    )
-    return bounded_step(current.precision(), gradient, current.u, current.prior, limit, damping)
 
 
 def bounded_step(

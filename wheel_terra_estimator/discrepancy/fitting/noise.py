@@ -1,16 +1,23 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Noise of the cells: as stated, from repeated rows, or estimated beside a smooth misfit."""
+"""Noise of the cells: as stated, from repeated rows, or estimated beside a smooth misfit.
+
+And the robust pass: cells that neither model, effect nor a smooth error can explain.
+"""
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import bdtrc
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.fitting.problem import OUTLIER_FACTOR, Problem
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
@@ -126,3 +133,126 @@ def _white_part(
             share = factors[top] ** 2 / variance[top]
             best, chosen = float(score[top]), (float(factors[top]), float((share**2).sum()))
     return chosen[0], max(chosen[1], 2.0)
+
+
+SHARE = 0.02  # prior share of outliers among the cells
+# Sizes of features narrow in slip that rows may share [share of the range].
+NARROW = (0.05, 0.15)
+GREATEST_SHARE = 0.12  # of the cells of a table
+# Cells on one side at one end of a quantity's range, this improbable by chance, are a misfit there
+# (a sensor that saturates) and no outliers.
+_CHANCE = 1e-5
+
+
+def find_outliers(
+    problem: Problem,
+    fitted: Fit,
+    variances: Sequence[FloatArray],
+    observed: FloatArray,
+    narrow: FloatArray,
+) -> list[tuple[int, int, float]]:
+    """Return (row, quantity, deviation) of the cells to be rejected, worst first.
+
+    Each cell is predicted from all others (soil, effects and a smooth error free); one at a time,
+    the cell that gains most from a twelve times larger noise is rejected. A hump or a ripple in
+    slip that all loads share competes with outliers: the evidence says which of the two it is.
+
+    ``problem`` has no cell rejected, and (m,) ``observed`` cells; ``variances``, (m,) each, of the
+    rotated axes are for a structural error that is small and one that is large; ``narrow`` (N, N)
+    comes from `slip_features`.
+    """
+    jacobian = problem.rotate(fitted.sensitivity) / np.sqrt(fitted.prior)
+    target = observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
+    best, found, chosen = -np.inf, [], None
+    for variance in variances:
+        inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
+        score, cells = _rejected_cells(problem, inverse, target)
+        if score > best:
+            best, found, chosen = score, cells, inverse
+    counts = np.bincount([q for _, q, _ in found], minlength=3)
+    if chosen is None or not narrow.any():
+        return _scattered(problem, found)
+    # Several cells of one quantity: outliers, or a feature that they share?
+    plain = np.linalg.inv(chosen)
+    for quantity, amplitude in itertools.product(np.flatnonzero(counts >= 2), NARROW):
+        shared = _shared_features(problem, narrow, amplitude, int(quantity))
+        score, cells = _rejected_cells(
+            problem, np.asarray(np.linalg.inv(plain + shared), dtype=float), target
+        )
+        if score > best:
+            best, found = score, cells
+    return _scattered(problem, found)
+
+
+def _scattered(
+    problem: Problem, found: list[tuple[int, int, float]]
+) -> list[tuple[int, int, float]]:
+    """Return the cells without those of a quantity that lie together at one end of its range.
+
+    Outliers are few, fall on both sides and anywhere: the chance of the count (binomial), of equal
+    signs, and of all of them among the outermost cells are independent.
+    """
+    kept = []
+    for quantity in sorted({cell[1] for cell in found}):
+        mine = [cell for cell in found if cell[1] == quantity]
+        here = problem.quantity == quantity
+        count, total = len(mine), int(here.sum())
+        signs = {cell[2] > 0.0 for cell in mine}
+        if count > 1 and len(signs) == 1:
+            # An outlier moves its own cell to an end of the range: ranks are of what was due.
+            due, rows, std = problem.observed[here], problem.row[here], problem.std[here]
+            for row, _, deviation in mine:
+                due = np.where(rows == row, due - deviation * std, due)
+            places = np.flatnonzero(np.isin(rows[np.argsort(due)], [cell[0] for cell in mine]))
+            outermost = min(int(places.max()) + 1, total - int(places.min()))
+            chance = float(bdtrc(count - 1, total, SHARE)) * 0.5 ** (count - 1)
+            chance *= 2.0 * math.comb(outermost, count) / math.comb(total, count)
+            if chance < _CHANCE:
+                continue
+        kept += mine
+    return [cell for cell in found if cell in kept]
+
+
+def _rejected_cells(
+    problem: Problem, inverse: FloatArray, target: FloatArray
+) -> tuple[float, list[tuple[int, int, float]]]:
+    """Set cells apart greedily; return the log evidence of the result and the cells."""
+    extra = (OUTLIER_FACTOR**2 - 1.0) * problem.std**2
+    price = np.log((1.0 - SHARE) / SHARE)
+    score = 0.5 * (np.linalg.slogdet(inverse)[1] - float(target @ inverse @ target))
+    found: list[tuple[int, int, float]] = []
+    apart = np.zeros(problem.size, dtype=bool)
+    # A cell that a free parameter takes whole tells nothing; rounding may then end below zero.
+    least = 1e-9 / problem.std**2
+    for _ in range(int(GREATEST_SHARE * problem.size)):
+        own = 1.0 / np.maximum(np.diag(inverse), least)
+        error = (inverse @ target) * own
+        gain = 0.5 * error**2 * (1.0 / own - 1.0 / (own + extra))
+        gain -= 0.5 * np.log1p(extra / own)
+        gain[apart] = -np.inf
+        worst = int(np.argmax(gain))
+        if gain[worst] < price:
+            break
+        score += float(gain[worst]) - price
+        apart[worst] = True
+        deviation = float(error[worst] / problem.std[worst])
+        found.append((int(problem.row[worst]), int(problem.quantity[worst]), deviation))
+        column = inverse[:, worst].copy()
+        share = extra[worst] / (1.0 + extra[worst] / own[worst])
+        inverse = inverse - share * np.outer(column, column)
+    return score, found
+
+
+def _shared_features(
+    problem: Problem, narrow: FloatArray, amplitude: float, quantity: int
+) -> FloatArray:
+    """(m, m) covariance of the cells by features of one quantity that are narrow in slip."""
+    scale = np.where(problem.quantity == quantity, amplitude * problem.scale[quantity], 0.0)
+    return narrow[np.ix_(problem.row, problem.row)] * np.outer(scale, scale)
+
+
+def inverse_covariance(variance: FloatArray, jacobian: FloatArray) -> FloatArray:
+    """Invert diag(variance) + J J' for an (m, P) J with few columns (Woodbury)."""
+    weighted = jacobian / variance[:, None]
+    precision = jacobian.T @ weighted + np.eye(jacobian.shape[1])
+    return np.diag(1.0 / variance) - weighted @ np.linalg.solve(precision, weighted.T)

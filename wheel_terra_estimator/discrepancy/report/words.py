@@ -141,11 +141,6 @@ def soil_line(diagnosis: Diagnosis) -> str:
     return f'Number that moved most: {moved(farthest)}; deviations of the soil from: {sources}.'
 
 
-def far(shifts: Iterable[SoilShift]) -> list[str]:
-    """Return the numbers that had to move farther than can be believed, in words."""
-    return [moved(shift) for shift in shifts if abs(shift.z_score) > LARGEST_Z_SCORE]
-
-
 def why_not(
     findings: Findings, verdict: Verdict, index: int, totals: FloatArray, chosen: set[str]
 ) -> str:
@@ -208,7 +203,11 @@ def notes(
         count = len(findings.outliers)
         several = f'{count} cells were rejected as outliers'
         found.append('1 cell was rejected as an outlier' if count == 1 else several)
-    found += [f'{text}: look at it before any effect' for text in far(shifts)]
+    found += [
+        f'{moved(shift)}: look at it before any effect'
+        for shift in shifts
+        if abs(shift.z_score) > LARGEST_Z_SCORE
+    ]
     for c, u in zip(after.coordinates, after.u, strict=True):
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
             found.append(f'{c.key} stands at the end of its range ({number(float(c.value(u)))})')

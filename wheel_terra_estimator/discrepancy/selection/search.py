@@ -15,7 +15,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
-from wheel_terra_estimator.discrepancy.fitting.outliers import find_outliers, inverse_covariance
+from wheel_terra_estimator.discrepancy.fitting.noise import find_outliers, inverse_covariance
 from wheel_terra_estimator.discrepancy.fitting.problem import (
     CommonError,
     Problem,
