@@ -20,11 +20,15 @@ from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import outputs
-from wheel_terra_estimator.cli.parser import UNUSABLE_INPUT, Parser, Printing, complain, suggestion
 from wheel_terra_estimator.cli.terminal import (
+    UNUSABLE_INPUT,
+    Parser,
+    Printing,
+    complain,
     discard_output,
     harmless_output,
     open_closed_streams,
+    suggestion,
     termination_as_interrupt,
 )
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError, outside_cause

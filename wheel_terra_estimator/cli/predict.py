@@ -248,12 +248,11 @@ def _points(arguments: argparse.Namespace, configuration: Configuration) -> Oper
         columns = _read_points(arguments.points)
     else:
         slips = _numbers('--slip', arguments.slip or DEFAULT_SLIP)
-        loads = (
-            _numbers('--load', arguments.load)
-            if arguments.load
-            else _share_of_weight(configuration)
-        )
-        slopes = _numbers('--slope', arguments.slope) if arguments.slope else np.array([0.0])
+        rover = configuration.rover
+        loads = np.array([rover.mass * rover.gravity / configuration.wheels.count])
+        if arguments.load:
+            loads = _numbers('--load', arguments.load)
+        slopes = _numbers('--slope', arguments.slope or '0')
         angles = _numbers('--slip-angle', arguments.slip_angle or '0')
         if (asked := slips.size * loads.size * slopes.size * angles.size) > MOST_POINTS:
             raise UserError(f'{asked} points asked for; at most {MOST_POINTS} are computed')
@@ -278,11 +277,6 @@ def _wheel_index(arguments: argparse.Namespace, configuration: Configuration) ->
     if arguments.wheel not in names:
         raise UserError(f'--wheel {arguments.wheel}: there are {", ".join(names)}')
     return names.index(arguments.wheel)
-
-
-def _share_of_weight(configuration: Configuration) -> FloatArray:
-    rover = configuration.rover
-    return np.array([rover.mass * rover.gravity / configuration.wheels.count])
 
 
 def _numbers(option: str, text: str) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
-from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, with_unit
 from wheel_terra_estimator.discrepancy.result import InputRange, Where
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
@@ -148,6 +148,5 @@ def _sentence(
 
 
 def _text(side: InputRange) -> str:
-    unit = '' if side.unit == '-' else f' {side.unit}'
     ends = dict.fromkeys((number(side.low), number(side.high)))
-    return f'at {side.input} {" to ".join(ends)}{unit}'
+    return with_unit(f'at {side.input} {" to ".join(ends)}', side.unit)

@@ -9,11 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wheel_terra_estimator.discrepancy.numbers import number
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, with_unit
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
     QUANTITIES,
-    UNITS,
     SteadyTable,
 )
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES, TARGETS, pair_of
@@ -89,8 +88,8 @@ def _size(target: str, change: float, table: SteadyTable, points: OperatingPoint
     scale = {'sinkage': radius, 'drawbar_pull': load, 'torque': load * radius}[target]
     size = change * float(np.mean(scale))
     mean = float(np.nanmean(np.abs(table.measured[:, QUANTITIES.index(target)])))
-    shown, unit = (1e3 * size, 'mm') if target == 'sinkage' else (size, UNITS[target])
-    return f'{number(shown, 2)} {unit} ({number(100 * size / mean, 2)} % of its mean)'
+    shown = f'{amount(target, size, 2)} {SHOWN[target][1]}'
+    return f'{shown} ({number(100 * size / mean, 2)} % of its mean)'
 
 
 def limits_of_trust(table: SteadyTable) -> tuple[str, ...]:
@@ -101,8 +100,8 @@ def limits_of_trust(table: SteadyTable) -> tuple[str, ...]:
         if name not in varying:
             continue
         values = table.columns[name][np.isfinite(table.columns[name])]
-        unit = '' if INPUT_UNITS[name] == '-' else f' {INPUT_UNITS[name]}'
-        found.append(f'{name} outside {number(values.min())} to {number(values.max())}{unit}')
+        ends = f'{number(values.min())} to {number(values.max())}'
+        found.append(with_unit(f'{name} outside {ends}', INPUT_UNITS[name]))
     still = [name for name in INPUT_UNITS if name in table.columns and name not in varying]
     if still:
         found.append(f'other values of what did not vary: {", ".join(still)}')

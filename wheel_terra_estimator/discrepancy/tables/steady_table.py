@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -87,14 +86,10 @@ class SteadyTable:
 
     def select(self, rows: IndexArray | BoolArray) -> SteadyTable:
         """Return the table of these rows."""
-        return self.each(lambda values: values[rows])
-
-    def each(self, change: Callable[[Any], Any]) -> SteadyTable:
-        """Return the table with every column changed in the same way."""
         return replace(
             self,
-            columns={name: change(values) for name, values in self.columns.items()},
-            **{name: change(getattr(self, name)) for name in _BY_ROW},
+            columns={name: values[rows] for name, values in self.columns.items()},
+            **{name: getattr(self, name)[rows] for name in _BY_ROW},
         )
 
 
