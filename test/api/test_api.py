@@ -241,6 +241,13 @@ def test_a_soil_is_found_again_without_its_file(name, monkeypatch):
     assert abs(stiffness - wanted) < 3.0 * found.std['frictional_modulus']
 
 
+def test_a_fit_starts_from_the_shipped_soil_nearest_to_the_rows():
+    wheel, true = api.Wheel(0.13, 0.16), api.Soil.load('lete_sand')
+    slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.05, 0.6, 8), [60.0, 90.0]))
+    found = api.Soil.fit(api.Model(wheel, true).curve(slip, load).columns(), wheel)
+    assert found.density == true.density  # which no fit changes
+
+
 def test_a_fit_says_what_the_soil_does_not_explain():
     wheel = api.Wheel(0.13, 0.16, 0.01, 24)
     slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.02, 0.9, 10), [60.0, 90.0]))

@@ -268,13 +268,10 @@ def _nearest(
     from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, operating_points
 
     def distance(soil: Soil) -> float:
-        effects, slip_radius, gravity = rest
-        believed = configuration_of(wheel, soil, effects, slip_radius, gravity)
-        points = operating_points(table.columns, believed, table.name)
-        answer = WheelSoilModel(soil, effects, 'closed_form', strict=False).steady_state(points)
+        points = operating_points(table.columns, configuration_of(wheel, soil, *rest), table.name)
+        answer = WheelSoilModel(soil, rest[0], 'closed_form', strict=False).steady_state(points)
         total = 10.0 * float(np.mean(answer.flags & 1))  # rows that the soil does not carry
-        for quantity in QUANTITIES:
-            measured = table.columns.get(quantity, np.full(len(table), np.nan))
+        for quantity, measured in zip(QUANTITIES, table.measured.T, strict=True):
             if np.isfinite(measured).any():
                 error = np.sqrt(np.nanmean((getattr(answer, quantity) - measured) ** 2))
                 total += float(error / max(np.nanmax(np.abs(measured)), 1e-9))
