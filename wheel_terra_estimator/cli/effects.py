@@ -72,11 +72,11 @@ def as_text(effects: Mapping[str, Effect]) -> str:
             if len(effect.forms) > 1:
                 lines += _wrapped('form ', form.form)
             lines += [*_wrapped('', form.claim), *_wrapped('term: ', form.symbol)]
-            lines += (
-                _law_text()
-                if form.sparse
-                else [line for p in form.parameters for line in _parameter_text(p)]
-            )
+            if form.sparse:  # what it may change, and with what
+                lines += _wrapped('targets: ', ', '.join(law.TARGETS))
+                lines += _wrapped('features: ', ', '.join(law.FEATURES))
+            else:
+                lines += [line for p in form.parameters for line in _parameter_text(p)]
             if form is not effect.forms[0]:
                 lines += [*_wrapped('valid: ', form.validity), *_wrapped('source: ', form.source)]
         kind = 'instrument' if effect.instrument else 'soil'
@@ -120,14 +120,6 @@ def _parameter_text(p: EffectParameter) -> list[str]:
 def as_json(effects: Mapping[str, Effect]) -> str:
     """Return the catalogue for programs."""
     return json.dumps([_record(effect) for effect in effects.values()], indent=2) + '\n'
-
-
-def _law_text() -> list[str]:
-    """Return what a sparse law may change, and with what, for a terminal."""
-    return [
-        *_wrapped('targets: ', ', '.join(law.TARGETS)),
-        *_wrapped('features: ', ', '.join(law.FEATURES)),
-    ]
 
 
 def _record(effect: Effect) -> dict[str, Any]:

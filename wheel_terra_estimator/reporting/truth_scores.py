@@ -97,7 +97,8 @@ def truth_errors(
         if rows.any():
             quantities.append(_error(name, unit, error[rows], std[rows]))
     slip = None if truth.slip is None else at_stamps(truth.slip, history.stamp)
-    entrapped = None if slip is None else _entrapped(history, slip)
+    begins = None if slip is None else entrapments(history.seconds, slip).there
+    entrapped = float(history.seconds[begins[0]]) if begins is not None and begins.size else None
     return TruthErrors(
         source=truth.source,
         quantities=tuple(quantities),
@@ -156,11 +157,6 @@ def _matrix(slip: FloatArray, seen: NDArray[np.uint8], thresholds: FloatArray) -
 
 def _spans(history: EstimateHistory) -> list[Span]:
     return [Span(start, np.inf if end is None else end) for start, end in history.warning_times]
-
-
-def _entrapped(history: EstimateHistory, slip: FloatArray) -> float | None:
-    there = entrapments(history.seconds, slip).there
-    return float(history.seconds[there[0]]) if there.size else None
 
 
 def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[tuple[float, Verdict], ...]:

@@ -216,7 +216,9 @@ class RoverPlant:
     def _advance(self, command: Command, dt: float) -> None:
         wheels = self._wheels
         self._look_at_ground()
-        self._steer(command, dt)
+        if self._steering.any:
+            self._steering.follow(command, dt)
+            self._lever = self._steering.along_wheels(self._body_lever)
         hubs = self._steering.commanded_hubs(command)
         commanded = self._steering.along_wheels(hubs)[0] / wheels.slip_radius
         self._drives.command(commanded * self.faults.rate_factor, self.faults.torque_factor, dt)
@@ -235,11 +237,6 @@ class RoverPlant:
         self._move(dt)
         self._balance(dt)
         self._time += dt
-
-    def _steer(self, command: Command, dt: float) -> None:
-        if self._steering.any:
-            self._steering.follow(command, dt)
-            self._lever = self._steering.along_wheels(self._body_lever)
 
     def _newton_step(
         self, speeds: FloatArray, rate: FloatArray, dt: float

@@ -78,7 +78,7 @@ class Terrain:
         self._patchiness = patchiness * np.stack(
             [smooth_noise(random, slope.size, patchiness_length) for _ in range(2)]
         )
-        self._sin_side = float(np.sin(side_slope))
+        self.sine_of_side_slope = float(np.sin(side_slope))  # along y
         self._patches = patches
         self._border = border
         self._base = np.array([base_factors.get(name, 1.0) for name in SOIL_QUANTITIES])
@@ -87,11 +87,6 @@ class Terrain:
         """Return the sine of the slope along x at ``x``."""
         return np.interp(x, self._x, self._sin_slope)
 
-    @property
-    def sine_of_side_slope(self) -> float:
-        """The sine of the slope along y."""
-        return self._sin_side
-
     def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the height of the surface [m]."""
         beyond = np.where(
@@ -99,7 +94,7 @@ class Terrain:
             (x - self._x[0]) * self._sin_slope[0],
             np.where(x > self._x[-1], (x - self._x[-1]) * self._sin_slope[-1], 0.0),
         )
-        return np.interp(x, self._x, self._height) + beyond + self._sin_side * y
+        return np.interp(x, self._x, self._height) + beyond + self.sine_of_side_slope * y
 
     def soil_factors(self, x: FloatArray, y: FloatArray) -> dict[str, FloatArray]:
         """Return the factor of each of ``SOIL_QUANTITIES`` at the points, shape of ``x``."""

@@ -351,13 +351,11 @@ def lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
     return force
 
 
-def angles_in_proportion(terms: Terms) -> bool:
-    """Return whether no effect moves the angles or adds stress: ``proportional_forces`` holds."""
-    return not (terms.stages['on_contact'] or terms.stages['on_normal_stress'])
-
-
 def proportional_forces(contact: Contact[Quantity]) -> BranchForces:
-    """Forces for all entrance angles at once, peak and leaving angle in proportion to them."""
+    """Forces for all entrance angles at once, peak and leaving angle in proportion to them.
+
+    They are where no effect moves the angles or adds stress.
+    """
     leaving = contact.leaving_ratio
     margin = PEAK_MARGIN * (1.0 - leaving)
     peak = np.minimum(np.maximum(contact.peak_ratio, leaving + margin), 1.0 - margin)

@@ -102,7 +102,7 @@ class WheelSoilModel:
         load = np.broadcast_to(contact.normal_load, (len(points),))
         explicit = (
             self.method == 'closed_form'
-            and closed_form.angles_in_proportion(terms)
+            and not (terms.stages['on_contact'] or terms.stages['on_normal_stress'])
             and bool(np.isnan(points.leaving_angle).all())
         )
         if explicit:

@@ -83,17 +83,14 @@ def search(
     scale = _ranges(table)
     noise = noises.stated_noise(table, scale)
     builder = _Builder(table, forward, scale)
-    problem, observed = builder.build(noise.std, ())
-    nothing = _fit_nothing(forward, problem, observed, nuisance, None)
+    problem, observed, nothing = builder.fit_nothing(noise.std, (), nuisance, None)
     if builder.latent:
         builder.linearise(nothing, noise.std)
-        problem, observed = builder.build(noise.std, ())
-        nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
+        problem, observed, nothing = builder.fit_nothing(noise.std, (), nuisance, nothing)
     builder.read_leaving_angles(nothing)
     noise = builder.estimate(noise, nothing, ())
     # A smooth misfit of any size is allowed here, so that an effect does not look like outliers.
-    problem, observed = builder.build(noise.std, ())
-    nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
+    problem, observed, nothing = builder.fit_nothing(noise.std, (), nuisance, nothing)
     outliers = find_outliers(
         problem, nothing, _variances(problem, _FLEXIBLE), observed, builder.narrow
     )
@@ -105,8 +102,7 @@ def search(
     findings = None
     apart = [{cell[:2] for cell in outliers}]
     for turn in range(_PASSES):
-        problem, observed = builder.build(noise.std, outliers)
-        nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
+        problem, observed, nothing = builder.fit_nothing(noise.std, outliers, nuisance, nothing)
         rim = forward.points.wheel.radius * (1.0 - np.cos(nothing.angle))
         deepest = float(np.max(rim))
         found = signatures(builder.forward, problem, nothing, possible, deepest)
@@ -157,19 +153,6 @@ def _ranges(table: SteadyTable) -> FloatArray:
             span = values[-1 - cut] - values[cut]
             scale[q] = max(span, 1e-3 * np.abs(values).max(), 1e-9)
     return scale
-
-
-def _fit_nothing(
-    forward: Forward,
-    problem: Problem,
-    observed: FloatArray,
-    nuisance: tuple[Coordinate, ...],
-    previous: Fit | None,
-) -> Fit:
-    start = np.zeros(len(nuisance)) if previous is None else previous.u
-    angles = None if previous is None else previous.angle[None]
-    variance = problem.variance(FIT_FLOOR)
-    return fit(forward, problem, observed, [((), nuisance)], [start], variance, angles, 12)[0]
 
 
 def _select(setting: Setting, nothing: Fit) -> Selection:
@@ -348,6 +331,21 @@ class _Builder:
             # The reading lies off the point of linearisation: the tangent takes the cells along.
             observed = observed + problem.flat(self._by_slip * self._moved[:, None])
         return problem, observed
+
+    def fit_nothing(
+        self,
+        std: FloatArray,
+        outliers: list[tuple[int, int, float]] | tuple[()],
+        nuisance: tuple[Coordinate, ...],
+        previous: Fit | None,
+    ) -> tuple[Problem, FloatArray, Fit]:
+        """Return problem, cells, and the fit of the soil alone from a previous one."""
+        problem, observed = self.build(std, outliers)
+        start = np.zeros(len(nuisance)) if previous is None else previous.u
+        angles = None if previous is None else previous.angle[None]
+        variance, one = problem.variance(FIT_FLOOR), [((), nuisance)]
+        found = fit(self.forward, problem, observed, one, [start], variance, angles, 12)[0]
+        return problem, observed, found
 
     def estimate(
         self, noise: Noise, fitted: Fit, outliers: list[tuple[int, int, float]] | tuple[()]
