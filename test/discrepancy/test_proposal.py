@@ -263,4 +263,4 @@ def test_a_law_that_worsens_a_quantity_has_to_gain_five_times_that(lost, closed)
         'drawbar_pull': LeftOut(2.0 * np.sqrt(10.0), 2.0),
         'sinkage': LeftOut(2.0 * np.sqrt(7.0), 2.0 * np.sqrt(7.0 + lost)),
     }
-    assert find._closed({'load': left}, gap) == pytest.approx(closed)
+    assert find.Gap(None, None, gap, None).closed({'load': left}) == pytest.approx(closed)
