@@ -260,8 +260,8 @@ def test_the_gap_is_the_error_on_unseen_rows_and_its_share_above_the_noise(named
 
 def test_how_far_a_name_worsens_a_quantity_is_in_squares_of_its_noise(monkeypatch):
     """Errors of 3 where there were 2, at a noise of 5: (9 - 4) / 25."""
-    monkeypatch.setattr(decision.remainder, 'chi_square_p_value', lambda *_: 1.0)
-    monkeypatch.setattr(decision.remainder, 'largest_z_score', lambda *_: 3.5)
+    monkeypatch.setattr(decision, 'chi_square_p_value', lambda *_: 1.0)
+    monkeypatch.setattr(decision, 'largest_z_score', lambda *_: 3.5)
     findings = SimpleNamespace(
         nothing=SimpleNamespace(outputs=np.zeros((4, 3))),
         noise=SimpleNamespace(std=np.ones((4, 3))),

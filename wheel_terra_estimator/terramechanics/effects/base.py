@@ -65,13 +65,13 @@ class Form:
     """Another law for the same effect, beside the one that the effect itself states."""
 
     name: str  # value of the configuration key ``effects.<effect>.form``
-    # ``claim``, ``symbol``, ``parameters``, ``source``: as for the effect
+    # ``claim``, ``symbol``, ``parameters``, ``source``: as for the effect; ``validity``,
+    # ``touches``, ``needs``, ``candidate``: None for those of the effect
     claim: str
     symbol: str
     parameters: tuple[EffectParameter, ...]
-    source: str
-    # ``validity``, ``touches``, ``needs``, ``candidate``: None for those of the effect
     validity: str | None = None
+    source: str = ''
     touches: frozenset[str] | None = None
     needs: tuple[str, ...] | None = None
     candidate: bool | None = None
@@ -97,11 +97,11 @@ class Effect:
     claim: str  # one line: what it stands for
     symbol: str  # the term as a formula
     parameters: tuple[EffectParameter, ...]  # at least one; `on_*` receives their values by name
-    # ``validity``, ``source``: where it holds; paper and equation
-    validity: str
-    source: str
     # Which of `TOUCHABLE` it is seen by (soil and rim change the lateral force as they do pull)
     touches: frozenset[str] = frozenset(OUTPUTS)
+    # ``validity``, ``source``: where it holds; paper and equation. Neither may be empty
+    validity: str = ''
+    source: str = ''
     instrument: bool = False  # True for an error of the measurement, False for physics of the soil
     # Columns of a table that must be there, and vary, for the effect to be seen
     needs: tuple[str, ...] = ()
@@ -133,6 +133,8 @@ class Effect:
             raise ValueError(
                 f'effect {self.name} touches {set(self.touches)}; allowed: {TOUCHABLE}'
             )
+        if not (self.validity and self.source):
+            raise ValueError(f'effect {self.name} states no validity, or no source')
         if all(getattr(self, stage) is None for stage in STAGES):
             raise ValueError(f'effect {self.name} has no term; it needs one of {STAGES}')
         names = [self.form, *(form.name for form in self.other_forms)]
