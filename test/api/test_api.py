@@ -15,6 +15,7 @@ import pytest
 
 from wheel_terra_estimator import api
 from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.discrepancy import law_ranking
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
@@ -24,6 +25,7 @@ from wheel_terra_estimator.estimation.measurements import (
 
 mpl.use('agg')
 MODULES = ('', '.models', '.soils', '.drives', '.tables')
+SECONDS = 4.0  # of the simulated drive
 
 
 @pytest.mark.parametrize('name', MODULES)
@@ -74,7 +76,7 @@ def test_a_load_that_the_soil_cannot_carry_is_nan():
 
 @pytest.fixture(scope='module')
 def drive():
-    return api.simulate('firm_drive', seed=3, duration=6.0)
+    return api.simulate('firm_drive', seed=3, duration=SECONDS)
 
 
 @pytest.fixture(scope='module')
@@ -83,7 +85,7 @@ def direct(drive):
 
 
 def test_simulated_drive_and_its_bag_give_the_same_numbers(drive, direct, tmp_path):
-    api.simulate('firm_drive', seed=3, duration=6.0, output=tmp_path / 'bag')
+    api.simulate('firm_drive', seed=3, duration=SECONDS, output=tmp_path / 'bag')
     bag = api.estimate(tmp_path / 'bag', drive.configuration, as_frame=False)
     assert direct.keys() == bag.keys()
     np.testing.assert_array_equal(direct['stamp'], bag['stamp'])
@@ -124,7 +126,7 @@ def test_logged_values_give_the_numbers_of_the_drive(drive, of_table):
     # A table has no late arrivals: each reading stands at its stamp.
     arrivals = sorted(drive.arrivals, key=lambda a: a.measurement.stamp)
     ordered = api.estimate(replace(drive, arrivals=arrivals), as_frame=False)
-    assert ordered['time'].size > 50
+    assert ordered['time'].size > 30
     for name in ordered.keys() - {'stamp'}:
         np.testing.assert_allclose(
             ordered[name], of_table[name], rtol=1e-4, atol=1e-5, err_msg=name
@@ -164,7 +166,9 @@ def named():
     kept = ('slip', 'normal_load', 'sinkage', 'drawbar_pull', 'torque')
     measured = {name: rows[name] for name in kept}
     model = api.Model.load('hit_wh3', 'hit_fit')
-    return measured, api.diagnose(measured, model, effects=['cohesion', 'hard_layer'])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(law_ranking, 'with_other_laws', lambda diagnosis: diagnosis)
+        return measured, api.diagnose(measured, model, effects=['cohesion', 'hard_layer'])
 
 
 def test_diagnose_and_the_corrected_model(named):
@@ -299,7 +303,7 @@ def test_units_go_with_frames(drive):
     beside = estimates[[f'slip.{wheel}']].join(truth[[f'slip.{wheel}']], rsuffix='.true')
     assert len(beside) == len(estimates)
     assert beside.iloc[20:].notna().all().all()
-    assert len(estimates.resample('1s').mean()) in (6, 7)
+    assert len(estimates.resample('1s').mean()) in (4, 5)
 
 
 def test_a_log_with_an_index_of_time_and_other_units(drive, of_table):

@@ -69,12 +69,12 @@ def test_figures_of_a_thinned_drive_are_those_of_all_sets():
 
 def test_memory_of_a_recorder_does_not_grow():
     names = tuple(f'w{i}' for i in range(estimate_set().slip.size))
-    recorder = HistoryRecorder(names, 200)
+    recorder = HistoryRecorder(names, 25)
     sizes = []
     tracemalloc.start()
-    for number, each in enumerate(sets(3200), start=1):
+    for number, each in enumerate(sets(600), start=1):
         recorder.add(each)
-        if number in (400, 3200):
+        if number in (50, 600):
             sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
     assert sizes[1] < sizes[0] + 50_000

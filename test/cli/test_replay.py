@@ -99,13 +99,13 @@ def test_what_cannot_be_used_is_one_line_and_status_2(
 def test_interrupted_replay_leaves_a_readable_bag(
     make_bag, make_drive, config, tmp_path, capsys, monkeypatch
 ):
-    """Ctrl-C in the midst of a drive of half a minute (of a process: test_several_bags)."""
-    bag, out = make_bag(messages=make_drive(300), name='long'), tmp_path / 'out'
+    """Ctrl-C in the midst of a drive of a quarter of a minute (of a process: test_several_bags)."""
+    bag, out = make_bag(messages=make_drive(150), name='long'), tmp_path / 'out'
     write, count = BagFile.write, itertools.count()
 
     def interrupted(*arguments: Any) -> None:
         write(*arguments)
-        if next(count) == 1500:
+        if next(count) == 900:
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(BagFile, 'write', interrupted)
@@ -114,7 +114,7 @@ def test_interrupted_replay_leaves_a_readable_bag(
     with open_bag(out) as opened:
         assert not opened.notes
         history = read_estimates(opened)
-    assert 50 < history.stamp.size < 300
+    assert 40 < history.stamp.size < 150
 
 
 @pytest.mark.shared
