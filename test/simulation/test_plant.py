@@ -39,7 +39,7 @@ def drive(plant: RoverPlant, seconds: float, forward: float = 0.05, turn: float 
 @pytest.mark.parametrize('slope', [-8.0, pytest.param(7.0, marks=pytest.mark.slow), 13.0])
 def test_steady_climb_is_the_steady_state_of_the_reference(plant, slope):
     configuration = rover()
-    truth = drive(plant(configuration, slope_deg=slope), 35.0)
+    truth = drive(plant(configuration, slope_deg=slope), 17.5, forward=0.1)
     wheels, mass = configuration.wheels, configuration.rover.mass
     steady = WheelSoilModel(configuration.soil, configuration.effects).steady_state(
         OperatingPoints(
@@ -121,10 +121,10 @@ def test_specific_force_times_mass_is_the_sum_of_pulls_while_accelerating(
 
 def test_too_steep_a_slope_entraps(plant):
     rover_plant = plant(slope_deg=24.0)
-    truth = drive(rover_plant, 15.0)
+    truth = drive(rover_plant, 8.0, forward=0.1)
     assert truth.forward_velocity < 0.002
     assert np.nanmin(truth.slip) > 0.9
-    deeper = drive(rover_plant, 3.0)
+    deeper = drive(rover_plant, 1.5, forward=0.1)
     assert (deeper.sinkage > truth.sinkage).all()
 
 
@@ -154,8 +154,8 @@ def test_reverse_mirrors_forward(plant):
         'rover.centre_of_gravity:=[0.0, 0.0, 0.2]',
         'wheels.passes:=[1, 1, 2, 2, 3, 3]',
     ]
-    ahead = drive(plant(rover(*ends)), 8.0, forward=0.05)
-    back = drive(plant(rover(*ends)), 8.0, forward=-0.05)
+    ahead = drive(plant(rover(*ends)), 4.0, forward=0.1)
+    back = drive(plant(rover(*ends)), 4.0, forward=-0.1)
     mirror = [4, 5, 2, 3, 0, 1]
     np.testing.assert_allclose(back.forward_velocity, -ahead.forward_velocity, rtol=1e-6)
     np.testing.assert_allclose(back.slip[mirror], ahead.slip, atol=1e-6)
@@ -164,12 +164,12 @@ def test_reverse_mirrors_forward(plant):
 
 
 def test_left_mirrors_right_and_scrub_slows_the_turn(plant):
-    left = drive(plant(), 8.0, turn=0.05)
-    right = drive(plant(), 8.0, turn=-0.05)
+    left = drive(plant(), 4.0, 0.1, turn=0.1)
+    right = drive(plant(), 4.0, 0.1, turn=-0.1)
     mirror = [1, 0, 3, 2, 5, 4]
     np.testing.assert_allclose(left.slip[mirror], right.slip, atol=1e-5)
     np.testing.assert_allclose(left.lateral_force[mirror], -right.lateral_force, atol=1e-2)
-    assert 0.0 < left.yaw_rate < 0.05
+    assert 0.0 < left.yaw_rate < 0.1
     # The outer wheels pull, the inner ones hold back: that turns against the scrub.
     assert left.drawbar_pull[1] > left.drawbar_pull[0]
 
@@ -191,7 +191,7 @@ def test_a_shorter_step_gives_the_same_drive(monkeypatch):
         hill = ground(
             slope_position=np.array([0.0, 0.2, 0.4]), slope_angle=np.radians([0.0, 0.0, 12.0])
         )
-        ends.append(drive(RoverPlant(configuration, hill, drives(configuration)), 9.0))
+        ends.append(drive(RoverPlant(configuration, hill, drives(configuration)), 4.5, 0.1))
     np.testing.assert_allclose(ends[0].slip, ends[1].slip, atol=3e-3)
     np.testing.assert_allclose(ends[0].sinkage, ends[1].sinkage, atol=3e-4)
     np.testing.assert_allclose(ends[0].position, ends[1].position, atol=5e-3)
@@ -205,7 +205,7 @@ def test_wheels_sink_one_after_the_other_in_a_patch(plant):
     before = drive(rover_plant, 2.0).sinkage
     entered = np.full(6, np.nan)
     for _ in range(1000):
-        truth = rover_plant.step(Command(0.05), 0.05)
+        truth = rover_plant.step(Command(0.1), 0.05)
         new = np.isnan(entered) & (truth.sinkage > before + 5e-3)
         entered[new] = truth.position[0]
         if not np.isnan(entered).any():
@@ -222,13 +222,13 @@ def test_a_steered_rover_turns_about_its_middle_axle_without_scrub(plant):
     """Ackermann: radius v / w, wheels on their circles, no lateral motion of the middle axle."""
     steered = plant(rover(f'wheels.steering_joints:={CORNERS}'))
     skidding = plant()
-    drive(steered, 3.0)
-    truth, other = drive(steered, 15.0, 0.05, 0.05), drive(skidding, 18.0, 0.05, 0.05)
+    drive(steered, 1.5, 0.1)
+    truth, other = drive(steered, 7.5, 0.1, 0.1), drive(skidding, 9.0, 0.1, 0.1)
     wheels = rover().wheels
-    expected = np.arctan2(0.05 * wheels.x, 0.05 - 0.05 * wheels.y)
+    expected = np.arctan2(0.1 * wheels.x, 0.1 - 0.1 * wheels.y)
     inner = np.abs(expected) < 1.2  # the others are at their limit
     assert truth.steering[inner] == pytest.approx(expected[inner], abs=1e-6)
-    assert truth.yaw_rate > 0.8 * 0.05
+    assert truth.yaw_rate > 0.8 * 0.1
     assert truth.yaw_rate > 1.2 * other.yaw_rate
     # Slip is that of each wheel along its heading, from the motion of a rigid body.
     hub = np.stack(
