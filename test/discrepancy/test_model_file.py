@@ -91,7 +91,8 @@ def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
     prefix = 'effects.slip_sinkage_exponent'
     values |= {f'{prefix}.enabled': True, f'{prefix}.n1': 0.3}
     configuration = reader.from_parameters(values, complete=False)
-    found = diagnose(check_table('t.csv', table), configuration)
+    few = Options(effects=('slip_sinkage_exponent', 'bulldozing', 'cohesion'))
+    found = diagnose(check_table('t.csv', table), configuration, options=few)
     assert [(e.name, e.form) for e in found.effects] == [('slip_sinkage_exponent', 'lyasko')]
     gain = found.effects[0].parameters['gain']
     assert abs(gain.value - 1.5) < 4.0 * gain.std

@@ -177,22 +177,18 @@ def test_forms_share_the_weight_of_their_effect():
     assert np.logaddexp(*both) == pytest.approx(alone)
 
 
-@pytest.mark.parametrize('softer', [0.5, 1.0])
-def test_soil_that_changes_along_the_way_is_said_in_words(softer, unproposed):
+def test_soil_that_changes_along_the_way_is_said_in_words(unproposed):
     table, values, soil, rows = make()
     rng = np.random.default_rng(1)
     time = 10.0 * rng.permutation(np.arange(len(rows['slip'])))
     patch = (time >= 120.0) & (time <= 250.0)
-    there = dataclasses.replace(soil, frictional_modulus=softer * soil.frictional_modulus)
+    there = dataclasses.replace(soil, frictional_modulus=0.5 * soil.frictional_modulus)
     here, over = solve(rows, soil), solve(rows, there)
     for key in OUTPUTS:
         table[key] = table[key] + np.where(patch, over[key] - here[key], 0.0)
     few = Options(effects=('bulldozing', 'cohesion', 'slip_sinkage_exponent'))
     found = run({**table, 'time': time}, values, options=few)
     notes = [note for note in found.notes if 'soil changes along the way' in note]
-    if softer == 1.0:
-        assert not notes
-        return
     start, end, factor = re.search(r'from (\d+) to (\d+) s it is about ([\d.]+)', notes[0]).groups()
     assert abs(float(start) - 120.0) <= 20.0
     assert abs(float(end) - 250.0) <= 20.0
@@ -222,7 +218,8 @@ def test_soil_that_is_said_to_be_uncertain_is_no_finding(unproposed):
     std = 0.6 * wrong['soil.frictional_modulus']
 
     def pull(values):
-        (shift,) = (s for s in run(table, values).soil if s.name == 'stiffness')
+        found = run(table, values, options=Options(effects=('bulldozing', 'cohesion')))
+        (shift,) = (s for s in found.soil if s.name == 'stiffness')
         return abs(shift.z_score)
 
     assert pull({**wrong, 'soil.frictional_modulus_std': std}) < 0.5 * pull(wrong)
@@ -269,7 +266,8 @@ def test_three_measurements_are_proposed_however_many_are_worth_it(monkeypatch):
     for limit in ('_WORTH', '_MORE'):
         monkeypatch.setattr(next_measurement, limit, 0.0)
     table, values, *_ = make('sweep40', ('lug_support',), 1.5)
-    proposals = run(table, values).next_measurement
+    few = Options(effects=('lug_support', 'sinkage_offset', 'cohesion'))
+    proposals = run(table, values, options=few).next_measurement
     assert set(Counter(p.separates for p in proposals if p.rows).values()) == {3}
 
 
