@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import io
 import logging
@@ -56,12 +57,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Sort the files, each as it stands: the longest first."""
     here = Path(__file__).parent
 
-    def rank(item: pytest.Item) -> int:
-        path = item.path.relative_to(here) if item.path.is_relative_to(here) else item.path
+    @functools.cache
+    def rank(file: Path) -> int:
+        path = file.relative_to(here) if file.is_relative_to(here) else file
         names = {path.as_posix(), path.parts[0]}
         return next((i for i, name in enumerate(LONGEST) if name in names), len(LONGEST))
 
-    items.sort(key=rank)
+    items.sort(key=lambda item: rank(item.path))
 
 
 def pytest_collection_finish() -> None:
@@ -143,10 +145,12 @@ def quick_metadata() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
-def library_metadata(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Write metadata as the library does: for tests of what is written."""
-    monkeypatch.setattr(bag_writer, 'YAML', LIBRARY_YAML)
+@pytest.fixture(scope='module')
+def library_metadata() -> Iterator[None]:
+    """Write metadata as the library does, from here on in a file: for tests of what is written."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bag_writer, 'YAML', LIBRARY_YAML)
+        yield
 
 
 @pytest.fixture(scope='session')

@@ -38,9 +38,9 @@ def sets(count: int = 25) -> list[Any]:
     ]
 
 
-@pytest.fixture
-def bag(tmp_path):
-    path = tmp_path / 'estimates'
+@pytest.fixture(scope='module')
+def bag(library_metadata, tmp_path_factory):
+    path = tmp_path_factory.mktemp('bag') / 'estimates'
     with EstimateBagWriter(path, NAMES) as writer:
         writer.clear_stuck(STAMP)
         for i, estimates in enumerate(sets()):

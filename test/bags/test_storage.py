@@ -25,17 +25,6 @@ def whole(make_bag):
     return contents(make_bag(name='whole'))
 
 
-def test_bags_of_the_tests_are_closed_as_the_library_does_it(make_bag, request):
-    stated = []
-    for number in range(2):
-        if number:
-            request.getfixturevalue('library_metadata')
-        folder = make_bag(name=f'{number}')
-        text = (folder / 'metadata.yaml').read_text()
-        stated.append((yaml.safe_load(text.replace(f'{number}.mcap', 'x')), contents(folder)))
-    assert stated[0] == stated[1]
-
-
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_folder_single_file_and_folder_without_metadata_are_the_same(make_bag, whole, storage):
     folder = make_bag(storage=storage)
@@ -145,3 +134,14 @@ def test_measured_bag_in_both_storages_is_the_same(shared):
     sqlite = contents(shared / 'bags' / 'frostyboy_event_1_6_db3')
     assert len(mcap) == 2570
     assert sorted(mcap) == sorted(sqlite)
+
+
+def test_bags_of_the_tests_are_closed_as_the_library_does_it(make_bag, request):
+    stated = []
+    for number in range(2):
+        if number:
+            request.getfixturevalue('library_metadata')
+        folder = make_bag(name=f'{number}')
+        text = (folder / 'metadata.yaml').read_text()
+        stated.append((yaml.safe_load(text.replace(f'{number}.mcap', 'x')), contents(folder)))
+    assert stated[0] == stated[1]
