@@ -228,7 +228,7 @@ EFFECT = Effect(
 """
 
 
-@pytest.mark.parametrize('words', ['sys.exit(0)', 'raise SystemExit', '1 / 0', '[][1]'])
+@pytest.mark.parametrize('words', ['sys.exit(0)', '1 / 0'])
 @pytest.mark.parametrize('where', ['top', 'body'])
 def test_a_file_of_effects_that_fails_or_ends_the_program(
     tmp_path, capsys, monkeypatch, words, where
