@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rover that rolls without slip, written down from kinematics alone: the truth of these tests."""
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import (
     ImuSeries,
     JointSeries,
@@ -23,18 +25,25 @@ START = 1_700_000_000_000_000_000
 RATE = 10.0  # [Hz]
 
 
+PARAMETERS = {
+    'rover.mass': MASS,
+    'wheels.names': list(NAMES),
+    'wheels.radius': [RADIUS] * 4,
+    'wheels.width': [0.1] * 4,
+    'wheels.x': [HALF_BASE, HALF_BASE, -HALF_BASE, -HALF_BASE],
+    'wheels.y': [HALF_TRACK, -HALF_TRACK] * 2,
+    'sensors.reference_std': 0.01,
+}
+
+
+@functools.cache
+def _usual_rover():
+    return reader.from_parameters(PARAMETERS)
+
+
 def rover(**changes):
     """The rover file; wheels in one row nearly, so that turns need no skid."""
-    parameters = {
-        'rover.mass': MASS,
-        'wheels.names': list(NAMES),
-        'wheels.radius': [RADIUS] * 4,
-        'wheels.width': [0.1] * 4,
-        'wheels.x': [HALF_BASE, HALF_BASE, -HALF_BASE, -HALF_BASE],
-        'wheels.y': [HALF_TRACK, -HALF_TRACK] * 2,
-        'sensors.reference_std': 0.01,
-    }
-    return reader.from_parameters(parameters | changes)
+    return reader.from_parameters(PARAMETERS | changes) if changes else _usual_rover()
 
 
 @dataclass(frozen=True)
@@ -74,9 +83,22 @@ def starts_and_curves():
     return Motion(time, speed, yaw, 0.0 * time)
 
 
-def recording(motion=None, seed=0, **changes):
+@functools.cache
+def _usual_recording(seed):
+    return _recorded(ten_minute_drive(), seed)
+
+
+def recording(motion=None, seed=0):
     """All channels of a drive, with honest noise."""
-    m = ten_minute_drive() if motion is None else motion
+    return _usual_recording(seed) if motion is None else _recorded(motion, seed)
+
+
+def checked(configuration=None, whole=None, **changes):
+    """The report on a drive, by default the usual one, with some of its channels changed."""
+    return check_recording(replace(whole or recording(), **changes), configuration or rover())
+
+
+def _recorded(m, seed):
     random = np.random.default_rng(seed)
     stamp = START + np.round(m.time * 1e9).astype(np.int64)
     arrival = stamp + 2_000_000
@@ -115,5 +137,4 @@ def recording(motion=None, seed=0, **changes):
     depth = DEPTH + 0.002 * np.sin(0.3 * m.time)[:, None] * np.ones(4)
     sinkage = SinkageSeries('/sinkage', stamp, arrival, NAMES, depth + noise(depth.shape, 0.002))
     topics = (('/joint_states', 'sensor_msgs/msg/JointState', stamp.size),)
-    whole = Recording('drive', topics, joints, imu, sinkage, reference, None)
-    return replace(whole, **changes)
+    return Recording('drive', topics, joints, imu, sinkage, reference, None)

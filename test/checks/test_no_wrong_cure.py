@@ -8,20 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rolling_rover as rolling
+from rolling_rover import checked
 
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.calibration import calibrate
 from wheel_terra_estimator.checks.evidence import gather
 from wheel_terra_estimator.checks.rover_facts import from_configuration
-from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import block_fit
 
 WHOLE = rolling.recording()
-
-
-def checked(configuration=None, whole=WHOLE, **changes):
-    return check_recording(replace(whole, **changes), configuration or rolling.rover())
 
 
 def faults(report):
@@ -163,16 +159,8 @@ def test_a_circle_with_a_gap_of_the_imu_tells_no_tilt():
     turn = np.radians(90.0) / 0.2
     seconds = WHOLE.imu.seconds
     kept = ~((seconds > 170.0) & (seconds < 170.0 + turn))
-    imu = replace(
-        WHOLE.imu,
-        force=(WHOLE.imu.force + slope)[kept],
-        rate=WHOLE.imu.rate[kept],
-        stamp=WHOLE.imu.stamp[kept],
-        log_time=WHOLE.imu.log_time[kept],
-        orientation=WHOLE.imu.orientation[kept],
-    )
+    imu = rows_of(replace(WHOLE.imu, force=WHOLE.imu.force + slope), kept)
     assert 'imu_tilt' not in faults(checked(imu=imu))
-    assert math.isclose(turn, 7.85, abs_tol=0.01)
 
 
 @pytest.mark.parametrize(('axis', 'name'), [(0, 'x'), (1, 'y')])
@@ -228,7 +216,7 @@ def test_radii_of_one_side_are_not_shared_out():
     np.testing.assert_allclose(told, rolling.RADIUS, rtol=0.02)
 
 
-@pytest.mark.parametrize('wheel', range(4))
+@pytest.mark.parametrize('wheel', [0, 3])
 def test_a_scale_of_one_torque_is_that_of_its_wheel(wheel):
     gain = np.where(np.arange(4) == wheel, 2.0, 1.0)
     report = checked(joints=replace(WHOLE.joints, torque=WHOLE.joints.torque * gain))

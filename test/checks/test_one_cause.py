@@ -17,9 +17,8 @@ from wheel_terra_estimator.checks.series import rows_of
 WHOLE = rolling.recording()
 
 
-def found(configuration=None, **changes):
-    whole = replace(WHOLE, **changes)
-    return check_recording(whole, configuration or rolling.rover()).findings
+def found(**changes):
+    return rolling.checked(**changes).findings
 
 
 def test_a_reference_that_freezes_before_a_stop_and_a_way_back():
@@ -69,7 +68,7 @@ def test_a_pitch_of_the_imu_that_no_circle_shows_is_named_beside_zeros_of_all_to
     imu = replace(
         whole.imu, force=pitch.inv().apply(whole.imu.force), rate=pitch.inv().apply(whole.imu.rate)
     )
-    (finding,) = check_recording(replace(whole, imu=imu), rolling.rover()).findings
+    (finding,) = rolling.checked(whole=whole, imu=imu).findings
     assert finding.fault == 'torque_zero' and 'or the IMU is pitched' in finding.words
     assert finding.confidence <= 0.5
 
@@ -131,7 +130,7 @@ def test_a_small_yaw_of_the_imu(degrees):
     whole = rolling.recording(rolling.starts_and_curves())
     turn = Rotation.from_euler('z', -degrees, degrees=True)
     imu = replace(whole.imu, force=turn.apply(whole.imu.force))
-    (finding,) = check_recording(replace(whole, imu=imu), rolling.rover()).findings
+    (finding,) = rolling.checked(whole=whole, imu=imu).findings
     assert finding.fault == 'imu_yaw' and abs(finding.value - degrees) < 2.0 * finding.std < 6.0
 
 
@@ -141,7 +140,7 @@ def test_a_turn_in_a_gap_of_the_imu_is_no_straight():
     yaw = np.where(motion.time > 230.0, 0.0, motion.yaw_rate)  # straight after the circle
     whole = rolling.recording(replace(motion, yaw_rate=yaw))
     heard = (whole.imu.seconds < 215.0) | (whole.imu.seconds > 245.0)
-    report = check_recording(replace(whole, imu=rows_of(whole.imu, heard)), rolling.rover())
+    report = rolling.checked(whole=whole, imu=rows_of(whole.imu, heard))
     assert {finding.kind for finding in report.findings} == {'drop_outs'}
 
 
@@ -165,6 +164,6 @@ def test_a_slope_driven_both_ways_is_no_zero_of_the_torques():
 def test_slopes_to_one_side_alone_are_not_called_none():
     motion = rolling.ten_minute_drive(turns=False)
     climb = replace(motion, slope=np.where(motion.speed > 0.0, 0.138, 0.0))
-    report = check_recording(rolling.recording(climb), rolling.rover())
+    report = rolling.checked(whole=rolling.recording(climb))
     (reason,) = {e.reason for e in report.not_checked if e.kind == 'gain'}
     assert 'slopes to one side alone, by 7.9 degrees' in reason

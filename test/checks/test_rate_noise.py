@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 
-from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.wheel_rates import rate_step
 
 WHOLE = rolling.recording()
@@ -31,7 +30,7 @@ def counted(counts=COUNTS, jitter=0.0):
 
 @pytest.mark.parametrize('jitter', [0.0, 0.02])
 def test_steps_are_named_with_the_noise_that_they_make(jitter):
-    report = check_recording(replace(WHOLE, joints=counted(jitter=jitter)), rolling.rover())
+    report = rolling.checked(joints=counted(jitter=jitter))
     (finding,) = [f for f in report.findings if f.parameter == 'sensors.wheel_rate_std']
     step = 2.0 * math.pi / COUNTS / 0.1
     assert finding.kind == 'noise' and finding.wheel is None
@@ -49,9 +48,9 @@ def test_counting_makes_that_noise():
 
 
 def test_fine_steps_and_real_noise_are_no_steps():
-    fine = check_recording(replace(WHOLE, joints=counted(20_000)), rolling.rover())
+    fine = rolling.checked(joints=counted(20_000))
     assert not fine.findings, [str(f) for f in fine.findings]
-    assert 'wheels.rate_step_rad_s' not in check_recording(WHOLE, rolling.rover()).figures
+    assert 'wheels.rate_step_rad_s' not in rolling.checked().figures
     assert rate_step(np.full(100, 2.0), np.full(100, 0.1)) == 0.0, 'one value is no step'
     random = np.random.default_rng(1)
     assert rate_step(random.normal(size=500), np.full(500, 0.1)) == 0.0
@@ -60,7 +59,7 @@ def test_fine_steps_and_real_noise_are_no_steps():
 def test_rates_in_counts_per_second():
     joints = WHOLE.joints
     counts = replace(joints, rate=joints.rate * 4096 / (2.0 * math.pi))
-    report = check_recording(replace(WHOLE, joints=counts), rolling.rover())
+    report = rolling.checked(joints=counts)
     (finding,) = report.findings
     assert finding.kind == 'unit' and 'counts' in finding.words
     assert finding.value == pytest.approx(2.0 * math.pi / 4096, rel=0.05)

@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 
-from wheel_terra_estimator.checks.run import check_recording
-
 
 def found(**changes):
-    whole = replace(rolling.recording(), **changes)
-    return check_recording(whole, rolling.rover()).findings
+    return rolling.checked(**changes).findings
 
 
 def held(channel, field, since, until, column=...):
@@ -98,7 +95,7 @@ def test_rates_without_noise_that_stay_together_are_alive_and_one_alone_is_not(d
     if dead is not None:
         rate[50:300, dead] = rate[50, dead]
     joints = replace(whole.joints, rate=rate)
-    told = check_recording(replace(whole, joints=joints), rolling.rover()).findings
+    told = rolling.checked(whole=whole, joints=joints).findings
     frozen = [f.wheel for f in told if f.kind == 'frozen']
     assert frozen == ([] if dead is None else [rolling.NAMES[dead]])
 

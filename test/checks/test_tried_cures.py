@@ -9,7 +9,6 @@ import pytest
 import rolling_rover as rolling
 
 from wheel_terra_estimator.checks.calibration import calibrate
-from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.statistics import Trial, halves, tried
 
 SKID = {'wheels.x': [0.3, 0.3, -0.3, -0.3]}  # wheels in two rows: its turns need skid
@@ -23,9 +22,9 @@ def spot_turns():
     return rolling.Motion(time, speed, yaw, 0.0 * time)
 
 
-@pytest.mark.parametrize('seed', range(2))
+@pytest.mark.parametrize('seed', [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_turns_on_the_spot_reverse_no_side(seed):
-    report = check_recording(rolling.recording(spot_turns(), seed), rolling.rover())
+    report = rolling.checked(whole=rolling.recording(spot_turns(), seed))
     assert not report.findings, [str(f) for f in report.findings]
 
 
@@ -34,7 +33,7 @@ def test_wheels_backwards_in_turns_on_the_spot_are_found_all_the_same(wheels):
     sound = rolling.recording(spot_turns())
     flip = np.where(np.isin(np.arange(4), wheels), -1.0, 1.0)
     joints = replace(sound.joints, rate=sound.joints.rate * flip, torque=sound.joints.torque * flip)
-    (finding,) = check_recording(replace(sound, joints=joints), rolling.rover()).findings
+    (finding,) = rolling.checked(whole=sound, joints=joints).findings
     assert finding.wheel == ', '.join(rolling.NAMES[i] for i in wheels)
     assert finding.cure == f'wheels.direction: [{", ".join(f"{int(s)}" for s in flip)}]'
     assert 'on the other half' in finding.words
@@ -54,7 +53,7 @@ def test_slopes_tell_whether_wheels_or_reference_run_backwards(what):
     if 'torque' in what:
         joints = replace(joints, torque=-joints.torque)
     recording = replace(whole, joints=joints, reference=reference)
-    findings = check_recording(recording, rolling.rover()).findings
+    findings = rolling.checked(whole=recording).findings
     cures, unsure = [f.cure for f in findings], 'or all wheels count backwards'
     backwards, negated = 'wheels.direction: [-1, -1, -1, -1]', 'negate twist.linear.x'
     assert (backwards in cures) is (what == 'wheels')
@@ -68,10 +67,10 @@ def test_a_scale_of_the_reference_is_no_radius(factor):
     whole = rolling.recording()
     scaled = replace(whole.reference, velocity=factor * whole.reference.velocity)
     recording = replace(whole, reference=scaled)
-    (finding,) = check_recording(recording, rolling.rover()).findings
+    (finding,) = rolling.checked(whole=recording).findings
     assert (finding.kind, finding.topic) == ('gain', '/reference_odom')
     assert finding.value == pytest.approx(1.0 / factor, abs=3.0 * finding.std)
-    skidding = check_recording(recording, rolling.rover(**SKID)).findings
+    skidding = rolling.checked(rolling.rover(**SKID), whole=recording).findings
     assert {f.kind for f in skidding} == {'radius', 'gain'}
     assert all(f.confidence < 0.9 and 'ten metres' in f.cure for f in skidding)
 
@@ -83,7 +82,7 @@ def test_a_zero_of_the_torques_is_no_radius(zero):
     for drive in (motion, forward):
         whole = rolling.recording(drive)
         joints = replace(whole.joints, torque=whole.joints.torque + zero)
-        found = check_recording(replace(whole, joints=joints), rolling.rover()).findings
+        found = rolling.checked(whole=whole, joints=joints).findings
         assert 'radius' not in {f.kind for f in found}, [str(f) for f in found]
 
 
@@ -93,17 +92,17 @@ def test_a_wheel_held_under_torque_is_not_frozen():
     held = (whole.joints.seconds > 20.0) & (whole.joints.seconds < 50.0)
     rate[held, 1], torque[held, 1] = 0.0, 80.0
     joints = replace(whole.joints, rate=rate, torque=torque)
-    found = check_recording(replace(whole, joints=joints), rolling.rover()).findings
+    found = rolling.checked(whole=whole, joints=joints).findings
     assert 'frozen' not in {f.kind for f in found}
     dead = replace(whole.joints, rate=rate)
-    found = check_recording(replace(whole, joints=dead), rolling.rover()).findings
+    found = rolling.checked(whole=whole, joints=dead).findings
     assert ('frozen', 'front_right') in {(f.kind, f.wheel) for f in found}
 
 
 def test_effort_of_zero_is_a_placeholder():
     whole = rolling.recording()
     joints = replace(whole.joints, torque=0.0 * whole.joints.torque)
-    (finding,) = check_recording(replace(whole, joints=joints), rolling.rover()).findings
+    (finding,) = rolling.checked(whole=whole, joints=joints).findings
     assert finding.kind == 'placeholder' and 'effort' in finding.words
 
 
@@ -120,12 +119,12 @@ def test_stamps_that_are_off_are_mended_by_a_parameter(channel):
     whole = rolling.recording()
     series = getattr(whole, channel)
     off = replace(whole, **{channel: replace(series, stamp=series.stamp + round(offset * 1e9))})
-    (finding,) = check_recording(off, rolling.rover()).findings
+    (finding,) = rolling.checked(whole=off).findings
     key = f'sensors.{name}_stamp_offset'
     assert (finding.kind, finding.parameter) == ('delay', key)
     assert finding.value == pytest.approx(offset, abs=max(2.0 * finding.std, 0.05))
     change = {c.key: c for c in calibrate(off, rolling.rover()).changes}[key]
-    mended = check_recording(off, rolling.rover(**{key: change.after}))
+    mended = rolling.checked(rolling.rover(**{key: change.after}), whole=off)
     assert not mended.findings, [str(f) for f in mended.findings]
 
 
@@ -145,10 +144,10 @@ def test_a_cure_that_one_half_contradicts_does_not_pass():
 def test_turns_on_the_spot_without_a_gyro_or_a_wheel_say_nothing_of_signs_and_units():
     sound = rolling.recording(spot_turns())
     dead = replace(sound.imu, rate=0.0 * sound.imu.rate)
-    found = check_recording(replace(sound, imu=dead), rolling.rover()).findings
+    found = rolling.checked(whole=sound, imu=dead).findings
     assert {f.kind for f in found} == {'placeholder'}, [str(f) for f in found]
     rate = sound.joints.rate.copy()
     rate[:, 0] = np.nan
     joints = replace(sound.joints, rate=rate)
-    found = check_recording(replace(sound, joints=joints), rolling.rover()).findings
+    found = rolling.checked(whole=sound, joints=joints).findings
     assert {f.kind for f in found} == {'missing_wheel'}, [str(f) for f in found]
