@@ -23,14 +23,13 @@ def test_what_was_written_comes_back(tmp_path):
     assert soil_file.read_state(tmp_path / 'soil.yaml') == state
 
 
-@pytest.mark.parametrize(
-    'stamp', ['Infinity', '-Infinity', 'NaN', '1e999', '1e30', '-1', '[]', '""']
-)
 @pytest.mark.parametrize('direction', ['1', 'Infinity', '7', '{}', None])
-def test_a_warning_stands_though_its_stamp_or_direction_is_none(tmp_path, stamp, direction):
+def test_a_warning_stands_though_its_stamp_or_direction_is_none(tmp_path, direction):
     more = '' if direction is None else f', "direction": {direction}'
-    text = f'{{"stuck": true, "reason": "digs in", "stamp": {stamp}{more}}}'
-    assert read(tmp_path, text) == StuckState(True, 'digs in', 0, 1 if direction == '1' else 0)
+    expected = StuckState(True, 'digs in', 0, 1 if direction == '1' else 0)
+    for stamp in ('Infinity', '-Infinity', 'NaN', '1e999', '1e30', '-1', '[]', '""'):
+        text = f'{{"stuck": true, "reason": "digs in", "stamp": {stamp}{more}}}'
+        assert read(tmp_path, text) == expected, stamp
 
 
 @pytest.mark.parametrize(

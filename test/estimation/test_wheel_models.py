@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The filter's wheel models: derivatives, and agreement with the reference quadrature."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -154,18 +156,18 @@ def test_mound_pushes_only_above_its_onset(models):
     assert high[1].pull > high[0].pull
 
 
-@pytest.mark.parametrize('z', [-0.01, 0.0, 1e-6, 0.5])
-@pytest.mark.parametrize('ratio', [-1.0, 0.0, 1.0, 10.0])
-def test_never_nan_outside_the_valid_range(models, z, ratio):
-    state = WheelStates(ratio, z, 100.0, rim_speed=0.05)
-    answer = models.forces(state)
-    assert all(np.isfinite(values).all() for values in answer)
-    assert (models.bearing(state).load > 0.0).all()
+def test_never_nan_outside_the_valid_range(models):
+    for ratio, z in itertools.product([-1.0, 0.0, 1.0, 10.0], [-0.01, 0.0, 1e-6, 0.5]):
+        state = WheelStates(ratio, z, 100.0, rim_speed=0.05)
+        answer = models.forces(state)
+        assert all(np.isfinite(values).all() for values in answer), (ratio, z)
+        assert (models.bearing(state).load > 0.0).all(), (ratio, z)
 
 
-@pytest.mark.parametrize('ratio', [-0.01, -1.0, -2.0])
-def test_a_speed_against_the_rim_is_slip_one(models, ratio):
-    at_stand, back = (forces(models, ratio=r, mound=0.3) for r in (0.0, ratio))
-    assert (back.torque, back.pull) == (at_stand.torque, at_stand.pull)
-    assert back.d_torque[0] == back.d_pull[0] == 0.0
-    assert (back.d_torque[1:], back.d_pull[1:]) == (at_stand.d_torque[1:], at_stand.d_pull[1:])
+def test_a_speed_against_the_rim_is_slip_one(models):
+    at_stand = forces(models, ratio=0.0, mound=0.3)
+    for ratio in (-0.01, -1.0, -2.0):
+        back = forces(models, ratio=ratio, mound=0.3)
+        assert (back.torque, back.pull) == (at_stand.torque, at_stand.pull)
+        assert back.d_torque[0] == back.d_pull[0] == 0.0
+        assert (back.d_torque[1:], back.d_pull[1:]) == (at_stand.d_torque[1:], at_stand.d_pull[1:])

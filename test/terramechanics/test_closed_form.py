@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed forms: against integrals, the quadrature and finite differences; safe at the edges."""
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import astuple, replace
@@ -120,23 +121,22 @@ def test_wheels_and_rows_are_worked_out_alike():
             assert all_of_them[i, j] == pytest.approx(one[0], rel=1e-12)
 
 
-@pytest.mark.parametrize('ratio', [-0.5, 0.0, 1e-9, 1.0, 1e6, 1e12])
 @pytest.mark.parametrize('sinkage', [-0.01, 0.0, 1e-6, 0.05, 0.3])
-def test_edges_are_those_of_the_model(ratio, sinkage):
-    assert np.isfinite(answer(conditioned(MOUND), ratio, sinkage)).all()
+def test_edges_are_those_of_the_model(sinkage):
     within = min(max(sinkage, 0.0), WHEEL.radius)
-    plain = conditioned({})
-    assert answer(plain, ratio, sinkage) == answer(plain, max(ratio, 0.0), within)
+    plain, mound = conditioned({}), conditioned(MOUND)
+    for ratio in (-0.5, 0.0, 1e-9, 1.0, 1e6, 1e12):
+        assert np.isfinite(answer(mound, ratio, sinkage)).all(), ratio
+        assert answer(plain, ratio, sinkage) == answer(plain, max(ratio, 0.0), within), ratio
 
 
-@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize('entry', range(7))
-def test_no_input_ends_in_an_exception_or_in_nan(entry, value):
-    for effects in ({}, MOUND):
+def test_no_input_ends_in_an_exception_or_in_nan(entry):
+    for effects, value in itertools.product(({}, MOUND), (-1.0, math.nan, math.inf, -math.inf)):
         inputs = [0.7, 0.012, 80.0, 250.0, 0.6, 0.0114, 0.01]
         inputs[entry] = value
         torque, pull = conditioned(effects).forces(ConditionedInputs(*inputs))
-        assert np.isfinite([torque[0], pull[0]]).all()
+        assert np.isfinite([torque[0], pull[0]]).all(), value
 
 
 def test_a_measured_leaving_angle_overrides_the_law():
