@@ -59,9 +59,7 @@ def test_overwrite_replaces_what_was_listed_and_nothing_else(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ['out']
 
 
-def test_a_file_of_others_in_an_output_within_an_output_is_left_alone(
-    tmp_path,
-):
+def test_a_file_of_others_in_an_output_within_an_output_is_left_alone(tmp_path):
     out = tmp_path / 'out'
     with working_folder(out, False, False, ['inner/']):
         write(out / 'inner')

@@ -88,13 +88,7 @@ def command_line(words: tuple[str, ...], given: dict[str, Path], spare: Path) ->
 
 
 @pytest.mark.parametrize(('words', 'output', 'given'), PAIRS)
-def test_no_output_is_an_input_or_holds_one_or_lies_in_it(
-    words,
-    output,
-    given,
-    tmp_path,
-    capsys,
-):
+def test_no_output_is_an_input_or_holds_one_or_lies_in_it(words, output, given, tmp_path, capsys):
     """By whatever name: the path itself, another spelling, a hard link, our own folder."""
     ours = tmp_path / 'ours'
     with new_folder(ours) as folder:
@@ -167,12 +161,7 @@ def test_the_refused_are_all_commands():
 
 
 @pytest.mark.parametrize('command', REFUSED)
-def test_a_refused_run_leaves_nothing_and_its_place_free(
-    command,
-    tmp_path,
-    monkeypatch,
-    capsys,
-):
+def test_a_refused_run_leaves_nothing_and_its_place_free(command, tmp_path, monkeypatch, capsys):
     """The next try is refused for the same reason, not because of what the first one left."""
     monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 0.2)
     refused = argparse.Namespace(returncode=2, stdout='')

@@ -112,13 +112,7 @@ def test_log_times_are_arrivals(bag_path):
         (['-o', 'x', '-p', 'rover.mas:=3.0'], 'rover.mass'),
     ],
 )
-def test_bad_arguments(
-    arguments,
-    words,
-    capsys,
-    tmp_path,
-    monkeypatch,
-):
+def test_bad_arguments(arguments, words, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(['simulate', *arguments]) == 2
     error = capsys.readouterr().err

@@ -14,12 +14,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.configuration import parameters, reader, shipped
-from wheel_terra_estimator.configuration.parameters import (
-    DECLARED,
-    RETIRED,
-    by_spelling,
-    declared,
-)
+from wheel_terra_estimator.configuration.parameters import DECLARED, RETIRED, by_spelling, declared
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
 from wheel_terra_estimator.terramechanics.contact_law import LAWS
 from wheel_terra_estimator.terramechanics.effects import catalogue

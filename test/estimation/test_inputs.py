@@ -9,10 +9,7 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.inputs.contact_sensors import (
-    LeavingAngleInput,
-    SinkageInput,
-)
+from wheel_terra_estimator.estimation.inputs.contact_sensors import LeavingAngleInput, SinkageInput
 from wheel_terra_estimator.estimation.inputs.inertial import GyroZero, InertialInput
 from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
 from wheel_terra_estimator.estimation.measurements import (

@@ -137,7 +137,7 @@ def test_bags_of_one_name_get_folders_of_their_own(bags, config, tmp_path, capsy
 )
 def test_what_cannot_be_done_is_said_first(
     bags, config, tmp_path, monkeypatch, capsys,
-    more, words,
+    more, words
 ):  # fmt: skip
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'taken').mkdir()

@@ -11,10 +11,7 @@ from estimate_sets import STAMP
 from recordings import Converter
 from scipy.spatial.transform import Rotation
 
-from wheel_terra_estimator.messages.convert import (
-    input_layout,
-    stamp_of,
-)
+from wheel_terra_estimator.messages.convert import input_layout, stamp_of
 
 
 @pytest.fixture
@@ -306,12 +303,7 @@ def test_without_steering_joints_positions_are_not_looked_at(converter, factory)
     ],
 )
 def test_a_reference_tells_a_lateral_speed_where_it_knows_one(
-    converter,
-    factory,
-    lateral,
-    stated,
-    told,
-    variance,
+    converter, factory, lateral, stated, told, variance
 ):
     covariance = np.zeros(36)
     covariance[[0, 7]] = 4e-4, stated

@@ -9,13 +9,7 @@ import numpy as np
 from estimate_sets import STAMP, some_estimates
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.messages.diagnostics import (
-    ERROR,
-    OK,
-    STALE,
-    WARN,
-    Diagnostics,
-)
+from wheel_terra_estimator.messages.diagnostics import ERROR, OK, STALE, WARN, Diagnostics
 from wheel_terra_estimator.messages.pipeline import Pipeline
 from wheel_terra_estimator.messages.unpack import Message
 

@@ -16,13 +16,7 @@ from wheel_terra_estimator.reporting.drive_summary import (
     short_names,
 )
 from wheel_terra_estimator.reporting.html import picture, render
-from wheel_terra_estimator.reporting.style import (
-    DARK,
-    INK,
-    for_dark_pages,
-    picture_style,
-    thin,
-)
+from wheel_terra_estimator.reporting.style import DARK, INK, for_dark_pages, picture_style, thin
 
 
 def test_a_thinned_line_keeps_ends_and_extremes():

@@ -88,9 +88,7 @@ def test_a_parked_rover_stays_where_it_is(plant):
     assert truth.drawbar_pull.sum() == pytest.approx(expected, rel=2e-3)
 
 
-def test_a_rover_parked_on_a_kink_is_held_against_the_slope_under_each_wheel(
-    plant,
-):
+def test_a_rover_parked_on_a_kink_is_held_against_the_slope_under_each_wheel(plant):
     kink = {'slope_position': np.array([0.1, 0.3]), 'slope_angle': np.radians([0.0, 12.0])}
     truth = drive(plant(**kink), 8.0, forward=0.0)
     under_front = truth.normal_load[:2].sum()  # hubs at 0.61, 0 and -0.61 m
@@ -108,9 +106,7 @@ def test_accelerometer_at_rest_shows_the_attitude_of_the_chassis(plant):
     assert truth.roll > np.radians(6.0)
 
 
-def test_specific_force_times_mass_is_the_sum_of_pulls_while_accelerating(
-    plant,
-):
+def test_specific_force_times_mass_is_the_sum_of_pulls_while_accelerating(plant):
     rover_plant = plant(slope_deg=5.0)
     for _ in range(40):
         truth = rover_plant.step(Command(0.08), 0.05)

@@ -15,13 +15,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab import jobs as jobs_module
 from wheel_terra_lab.jobs import ResultFile
 from wheel_terra_lab.reproduction import nakashima
-from wheel_terra_lab.soilbin import (
-    files,
-    output,
-    reproduction,
-    snapshots,
-    study,
-)
+from wheel_terra_lab.soilbin import files, output, reproduction, snapshots, study
 from wheel_terra_lab.soilbin.case import Case, from_dict, to_dict
 from wheel_terra_lab.soilbin.launch import CaseFailedError, StoppedByUserError
 from wheel_terra_lab.soilbin.study import Job

@@ -9,11 +9,7 @@ import pytest
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.soilbin import files
-from wheel_terra_lab.soilbin.stability import (
-    largest_time_step,
-    stable_time_step,
-    time_step,
-)
+from wheel_terra_lab.soilbin.stability import largest_time_step, stable_time_step, time_step
 
 
 def growth(a, b, step):
