@@ -15,7 +15,6 @@ import pytest
 
 from wheel_terra_estimator import api
 from wheel_terra_estimator.cli.main import main
-from wheel_terra_estimator.discrepancy import law_ranking
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
@@ -166,9 +165,7 @@ def named():
     kept = ('slip', 'normal_load', 'sinkage', 'drawbar_pull', 'torque')
     measured = {name: rows[name] for name in kept}
     model = api.Model.load('hit_wh3', 'hit_fit')
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(law_ranking, 'with_other_laws', lambda diagnosis: diagnosis)
-        return measured, api.diagnose(measured, model, effects=['cohesion', 'hard_layer'])
+    return measured, api.diagnose(measured, model, effects=['cohesion', 'hard_layer'])
 
 
 def test_diagnose_and_the_corrected_model(named):

@@ -70,7 +70,7 @@ def test_a_table_of_lateral_force_is_read_in_its_units_and_checked(tmp_path):
         check_table('t', {**row, 'lateral_force': -20.0 - np.arange(8)})
 
 
-def test_what_the_flank_does_is_named_from_the_lateral_force(capsys, own_law):
+def test_what_the_flank_does_is_named_from_the_lateral_force(capsys):
     flank = ('-p', 'effects.side_bulldozing.enabled:=true', '-p', 'effects.side_bulldozing.ks:=2.0')
     noise = ('--noise', '0.0003,0.5,0.1,0.3', '--seed', '4')
     rows = predicted(capsys, *GRID, '--load', '60,110', *flank, *noise)

@@ -99,7 +99,7 @@ class Effect:
     parameters: tuple[EffectParameter, ...]  # at least one; `on_*` receives their values by name
     # Which of `TOUCHABLE` it is seen by (soil and rim change the lateral force as they do pull)
     touches: frozenset[str] = frozenset(OUTPUTS)
-    # ``validity``, ``source``: where it holds; paper and equation. Neither may be empty
+    # ``validity``, ``source``: where it holds; paper and equation
     validity: str = ''
     source: str = ''
     instrument: bool = False  # True for an error of the measurement, False for physics of the soil
@@ -133,8 +133,6 @@ class Effect:
             raise ValueError(
                 f'effect {self.name} touches {set(self.touches)}; allowed: {TOUCHABLE}'
             )
-        if not (self.validity and self.source):
-            raise ValueError(f'effect {self.name} states no validity, or no source')
         if all(getattr(self, stage) is None for stage in STAGES):
             raise ValueError(f'effect {self.name} has no term; it needs one of {STAGES}')
         names = [self.form, *(form.name for form in self.other_forms)]
