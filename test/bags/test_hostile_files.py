@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from wheel_terra_estimator.bags.salvage import limits
+from wheel_terra_estimator.bags.salvage import limits, mcap_records
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.errors import UserError
 
@@ -170,3 +170,17 @@ def test_no_file_costs_much(tmp_path, monkeypatch, make, size):
     assert '\n' not in words
     assert used < longest
     assert memory < 1000.0
+
+
+def test_a_chunk_without_a_checksum_is_read_straight_on() -> None:
+    """What stands record behind record is not doubted: dense chunks cost a third."""
+    data = message(b'12') * 50
+    possible = mcap_records.Possible(
+        (mcap_records.SCHEMA, mcap_records.CHANNEL, mcap_records.MESSAGE)
+    )
+    straight = list(mcap_records.straight_records(data, possible))
+    assert (
+        straight == list(mcap_records.records(data, 0, len(data), possible)) and len(straight) == 50
+    )
+    other = mcap_records.Possible(possible.opcodes, start=straight[0].log_time + 1)
+    assert list(mcap_records.straight_records(data, other)) == [mcap_records.Gap(0, len(data))]

@@ -30,7 +30,7 @@ def test_a_message_that_is_heard_has_a_limit_of_its_own(
     assert reader.rejected['imu/data', 'above 200 B']
 
 
-def test_empty_records_in_a_chunk_with_a_right_checksum_are_not_held() -> None:
+def test_empty_records_in_a_chunk_are_not_held() -> None:
     schemas = (bytes([mcap.SCHEMA]) + bytes(8)) * 1000
     possible = mcap.Possible((mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE))
-    assert list(mcap.sound_records(schemas, possible)) == [mcap.Gap(0, len(schemas))]
+    assert list(mcap.straight_records(schemas, possible)) == [mcap.Gap(0, len(schemas))]

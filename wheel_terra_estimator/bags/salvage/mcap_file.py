@@ -402,10 +402,16 @@ class McapFile:
         else:  # at second try, the times in the head may be what is damaged
             possible = [mcap.Possible(_IN_CHUNK, known, head.start, head.end)]
             possible.append(mcap.Possible(_IN_CHUNK, known))
-        found = [self._pass(piece.begin, content, possible[0], wanted, allowed)]
-        for each in possible[1:]:
-            if found[-1].lost_bytes:
-                found.append(self._pass(piece.begin, content, each, wanted, allowed))
+        data = content.data
+        found: list[Reading] = []
+        if head is not None:
+            straight = mcap.straight_records(data, possible[0])
+            found = [self._pass(piece.begin, data, straight, wanted, allowed)]
+            found = [reading for reading in found if not reading.lost_bytes]
+        for each in possible:
+            if not found or found[-1].lost_bytes:
+                records = mcap.records(data, 0, len(data), each)
+                found.append(self._pass(piece.begin, data, records, wanted, allowed))
         self._add_work(_ROW_SIZE * sum(reading.counts.total() for reading in found))
         best = min(found, key=lambda reading: reading.lost_bytes)
         if best is not found[0] and 2 * found[0].counts.total() > best.counts.total():
@@ -422,19 +428,18 @@ class McapFile:
     def _pass(
         self,
         place: int,
-        content: Content,
-        possible: mcap.Possible,
+        data: bytes,
+        records: Iterator[mcap.Record | mcap.Gap],
         wanted: Collection[int],
         allowed: int,
     ) -> Reading:
-        found, data = Reading(), content.data
+        found = Reading()
         rows = found.rows
         counts: dict[int, int] = defaultdict(int)
         start, last = found.start, found.last
         time: int | None = None
         gap_after: tuple[int | None] | None = None
-        records = mcap.records(data, 0, len(data), possible)
-        for item in mcap.sound_records(data, possible) if content.sound else records:
+        for item in records:
             if isinstance(item, mcap.Gap):
                 found.lost_bytes += item.end - item.begin
                 self._add_work(_GAP_WORK)
