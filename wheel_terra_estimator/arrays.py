@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Types of arrays by what they hold, for annotations."""
+"""Types of arrays and tuples by what they hold, for annotations."""
 
 from typing import TypeAlias
 
@@ -12,3 +12,4 @@ IntArray = NDArray[np.int64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 Quantity: TypeAlias = 'float | NDArray[np.float64]'  # a number, or an array of a common shape
+Floats = tuple[float, ...]

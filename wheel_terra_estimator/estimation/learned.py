@@ -67,11 +67,7 @@ class Learned:
         self._start, self._named_soil = start.copy(), named_soil
 
     def values(
-        self,
-        mean: FloatArray,
-        covariance: FloatArray,
-        zero: GyroZero,
-        climbed: Climbed = _LEVEL,
+        self, mean: FloatArray, covariance: FloatArray, zero: GyroZero, climbed: Climbed = _LEVEL
     ) -> dict[str, Any]:
         """Return configuration key -> value, with the deviations ``_std``.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.pulls import PullState
@@ -22,11 +22,7 @@ from wheel_terra_estimator.estimation.estimates import (
     SlipOnSlope,
 )
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageState
-from wheel_terra_estimator.estimation.filter.state import (
-    SHEAR_MODULUS,
-    SHEAR_STRENGTH,
-    StateLayout,
-)
+from wheel_terra_estimator.estimation.filter.state import SHEAR_MODULUS, SHEAR_STRENGTH, StateLayout
 from wheel_terra_estimator.estimation.judgement.slip import WheelSlip
 from wheel_terra_estimator.estimation.judgement.stuck.forecast import LONGEST_TIME, WheelForecast
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment
@@ -34,13 +30,8 @@ from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import TINY
 from wheel_terra_estimator.estimation.sideways import Sideways
 from wheel_terra_estimator.estimation.taught import with_model_errors
-from wheel_terra_estimator.estimation.words import (
-    MissingInputs,
-    faults_in_words,
-    reasons_in_words,
-)
+from wheel_terra_estimator.estimation.words import MissingInputs, faults_in_words, reasons_in_words
 
-Floats = tuple[float, ...]
 _UNKNOWN_STD = 1.0  # of a slip velocity [m/s]
 _UNLOADED_STD = 1.0  # of the pull of a wheel in the air [N]
 _BELIEVED_LOAD = 0.1

@@ -22,12 +22,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.estimation.scalars import TINY
-
-Floats = tuple[float, ...]
 
 _NO_LOAD = 1e-3  # of all wheels [N]
 _PLACES = np.array([0.1 * u + 0.9 * u**3 for u in np.linspace(-1.0, 1.0, 49)])

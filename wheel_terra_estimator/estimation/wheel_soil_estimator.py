@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
@@ -45,11 +45,7 @@ from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.filter.consistency import excess
 from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
-from wheel_terra_estimator.estimation.filter.force_balance import (
-    ForceBalance,
-    SumOfPulls,
-    rut_tilt,
-)
+from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance, SumOfPulls, rut_tilt
 from wheel_terra_estimator.estimation.filter.initial_state import (
     gravity_bias_std,
     initial_filter,
@@ -71,10 +67,7 @@ from wheel_terra_estimator.estimation.filter.state import (
 )
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
-from wheel_terra_estimator.estimation.inputs.contact_sensors import (
-    LeavingAngleInput,
-    SinkageInput,
-)
+from wheel_terra_estimator.estimation.inputs.contact_sensors import LeavingAngleInput, SinkageInput
 from wheel_terra_estimator.estimation.inputs.inertial import InertialInput, InertialWindow
 from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
 from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
@@ -83,10 +76,7 @@ from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge, WheelSlip
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import Instant as SlopeInstant
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import SlopeCurve
-from wheel_terra_estimator.estimation.judgement.stuck.monitor import (
-    StuckAssessment,
-    StuckMonitor,
-)
+from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment, StuckMonitor
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     RoverMotion,
@@ -98,15 +88,11 @@ from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, Ste
 from wheel_terra_estimator.estimation.outputs import Outputs, Sources
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, NANOSECOND, known, median
-from wheel_terra_estimator.estimation.sideways import (
-    SidewaysInputs,
-    SidewaysMotion,
-)
+from wheel_terra_estimator.estimation.sideways import SidewaysInputs, SidewaysMotion
 from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 from wheel_terra_estimator.estimation.taught import Taught, Teaching, with_model_errors
 from wheel_terra_estimator.estimation.words import MissingInputs
 
-Floats = tuple[float, ...]
 _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
 _SHARP_TURN = 0.3
@@ -158,11 +144,7 @@ class WheelSoilEstimator:
         Keeps what a smoother needs.
     """
 
-    def __init__(
-        self,
-        configuration: Configuration,
-        buffer: HistoryBuffer | None = None,
-    ) -> None:
+    def __init__(self, configuration: Configuration, buffer: HistoryBuffer | None = None) -> None:
         self._configuration = configuration
         self._rover = rover = Rover.from_configuration(configuration)
         sensors = SensorFigures.from_configuration(configuration)
@@ -538,13 +520,7 @@ class WheelSoilEstimator:
         curvature = self._turning.curvature(float(ekf.mean[SPEED]))
         total = self._balance.sum_of_pulls(cycle, curvature)
         balance = self._balance.update(
-            ekf,
-            forces,
-            total,
-            cycle,
-            stationary=stationary,
-            model_variance=start,
-            repeats=repeats,
+            ekf, forces, total, cycle, stationary=stationary, model_variance=start, repeats=repeats
         )
         return forces, total, pulls, [*rows, balance]
 

@@ -7,10 +7,9 @@ from __future__ import annotations
 from math import isnan
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.judgement.slip import WheelSlip
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment
-
-Floats = tuple[float, ...]
 
 
 class MissingInputs(NamedTuple):

@@ -6,12 +6,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.scalars import NAN, known, median
-
-Floats = tuple[float, ...]
 
 
 class RimSpeeds(NamedTuple):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
@@ -30,9 +30,6 @@ from wheel_terra_estimator.estimation.filter.state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.rover import Rover
-
-Floats = tuple[float, ...]
-
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _SLOPE_KEEP = 0.9

@@ -45,10 +45,7 @@ class LoadDistribution:
     by_moment: FloatArray
 
     def loads(
-        self,
-        specific_force: Vector,
-        pull: Vector | None = None,
-        moment: Vector | None = None,
+        self, specific_force: Vector, pull: Vector | None = None, moment: Vector | None = None
     ) -> FloatArray:
         """Return the (n,) normal loads [N]; no wheel pulls on the ground.
 

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.estimation.scalars import TINY
 
-Floats = tuple[float, ...]
 LEAST_LOAD = 1e-3
 """Of a wheel on the ground [N]: with less it is in the air."""
 _LEAST_FORCE = 0.1  # specific force on z [m/s^2] below which a slope is not defined

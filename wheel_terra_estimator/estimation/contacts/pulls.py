@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
@@ -22,9 +22,6 @@ from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import TINY, clipped
-
-Floats = tuple[float, ...]
-
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _GUESS_STD = 0.1  # of the load, where no model holds
@@ -79,12 +76,7 @@ class Pulls(Component[PullState]):
         self._rover, self._sensors = rover, sensors
 
     def update(
-        self,
-        mean: FloatArray,
-        covariance: FloatArray,
-        evidence: PullEvidence,
-        *,
-        tilt: float,
+        self, mean: FloatArray, covariance: FloatArray, evidence: PullEvidence, *, tilt: float
     ) -> None:
         """Work out the pulls of a cycle.
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.rover import Rover
 
-Floats = tuple[float, ...]
 _LEAST_SPEED = 1e-3  # [m/s], for the curvature of the path
 _LEAST_WAY = 1e-3  # [m], of a rover with one axle
 

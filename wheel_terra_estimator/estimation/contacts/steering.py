@@ -26,11 +26,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.rover import Rover
 
-Floats = tuple[float, ...]
 _LEAST_SQUARE = 1e-3  # mean of cos^2 d: all wheels across
 
 

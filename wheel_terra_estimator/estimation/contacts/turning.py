@@ -7,14 +7,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped, known, median
-
-Floats = tuple[float, ...]
-
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _LEAST_GAIN = 0.25

@@ -7,13 +7,11 @@ from __future__ import annotations
 from math import isnan
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, median
-
-Floats = tuple[float, ...]
-
 
 # Tuned on simulated drives with lifted wheels, seeds 1000 to 1019.
 _HOLD = 0.3  # [s] before a wheel is called unloaded, or loaded again

@@ -134,11 +134,7 @@ class GatedFilter:
         self._keep_transition(before, transition)
 
     def update(
-        self,
-        residual: FloatArray,
-        H: FloatArray,
-        noise: FloatArray,
-        considered: Sequence[int] = (),
+        self, residual: FloatArray, H: FloatArray, noise: FloatArray, considered: Sequence[int] = ()
     ) -> None:
         """Fuse m readings: residual z - h(x) (m,), H (m, n), variances (m,).
 

@@ -19,9 +19,6 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.filter.torque import ForceRows
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
-Floats = tuple[float, ...]
-
-
 # Tuned on simulated drives, seeds 1000 to 1019.
 _WEIGHT_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
 _SIDE_SHARE = 0.5

@@ -10,19 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from wheel_terra_estimator.estimation.filter.state import (
-    SLIP_SINKAGE,
-    SPEED,
-    StateLayout,
-)
+from wheel_terra_estimator.estimation.filter.state import SLIP_SINKAGE, SPEED, StateLayout
 
 
 def considered_entries(
-    layout: StateLayout,
-    *,
-    settled: bool,
-    opposes_rims: bool,
-    unread: Sequence[int],
+    layout: StateLayout, *, settled: bool, opposes_rims: bool, unread: Sequence[int]
 ) -> list[int]:
     """Return the indices of what is considered, not learned.
 

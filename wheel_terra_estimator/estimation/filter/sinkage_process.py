@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import smoothed_slopes
@@ -26,9 +26,6 @@ from wheel_terra_estimator.estimation.filter.state import (
 )
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
-
-Floats = tuple[float, ...]
-
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _RESTING_WALK = 1e-10  # of a wheel that does not turn [m^2/s]
@@ -126,11 +123,7 @@ class SinkageProcess(Component[SinkageState]):
         return dt * float(travel[turning].sum()) / len(rims)
 
     def _relax(
-        self,
-        prediction: Prediction,
-        states: WheelStates,
-        motion: _Motion,
-        relaxes: BoolArray,
+        self, prediction: Prediction, states: WheelStates, motion: _Motion, relaxes: BoolArray
     ) -> None:
         """Relax the sinkages of turning wheels under a load."""
         layout, z = self._layout, np.asarray(states.sinkage)
@@ -153,10 +146,7 @@ class SinkageProcess(Component[SinkageState]):
         target = floored * np.exp(growth)
         sensitivity = alpha * target / power
         raw = np.stack(
-            [
-                np.log(carried[0] / carried[1]) / _RATIO_STEP,
-                np.abs(slip) * log_depths[0],
-            ]
+            [np.log(carried[0] / carried[1]) / _RATIO_STEP, np.abs(slip) * log_depths[0]]
         )
         slopes = smoothed_slopes(self.state.slopes, raw, _SLOPE_KEEP)
         self.state = self.state._replace(slopes=np.where(relaxes, slopes, self.state.slopes))

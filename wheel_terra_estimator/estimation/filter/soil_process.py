@@ -57,10 +57,7 @@ class SoilProcess:
     """Predicts soil and errors of the shear model; it has no memory of its own."""
 
     def __init__(
-        self,
-        configuration: Configuration,
-        layout: StateLayout,
-        tuning: SoilTuning = SoilTuning(),
+        self, configuration: Configuration, layout: StateLayout, tuning: SoilTuning = SoilTuning()
     ) -> None:
         priors = SoilPriors.from_configuration(configuration)
         n = layout.wheel_count

@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from math import isnan
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
@@ -40,7 +41,6 @@ from wheel_terra_estimator.estimation.scalars import (
     median,
 )
 
-Floats = tuple[float, ...]
 LEAST_SLIP_STD = 0.02
 """Of a speed over the rim speed [-]: no set of soil models is better than that."""
 _LEAST_WHEELS = 3
@@ -160,12 +160,7 @@ class SpeedProcess(Component[SpeedState]):
         unknown = RimSpeeds((NAN,) * rover.wheel_count, NAN)
         super().__init__(
             SpeedState(
-                NAN,
-                unknown,
-                _FIRST_RATIO,
-                _FIRST_RATIO_STD,
-                self._walk,
-                slow_rims=unknown.each,
+                NAN, unknown, _FIRST_RATIO, _FIRST_RATIO_STD, self._walk, slow_rims=unknown.each
             )
         )
         self._rover, self._sensors = rover, sensors

@@ -8,7 +8,7 @@ from math import isnan
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
@@ -19,7 +19,6 @@ from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_sq
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover
 
-Floats = tuple[float, ...]
 _FLOOR_VARIANCE = 1e-6  # [N^2 m^2]
 _APART_STD = 0.025
 """By how much torques differ from one another beyond the models, over their mean [-]: each wheel

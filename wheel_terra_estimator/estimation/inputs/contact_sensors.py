@@ -8,11 +8,10 @@ import math
 from math import isnan
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import LeavingAngleReading, SinkageReading
 from wheel_terra_estimator.estimation.scalars import NAN
-
-Floats = tuple[float, ...]
 
 
 class SinkageSums(NamedTuple):

@@ -15,13 +15,12 @@ from collections.abc import Collection, Container, Mapping
 from math import isnan
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
 from wheel_terra_estimator.estimation.measurements import StepInputs
 from wheel_terra_estimator.estimation.rover import SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped
-
-Floats = tuple[float, ...]
 
 _LINE = 6.0  # variance of x1 - 2 x2 + x3 over that of each
 

@@ -8,13 +8,11 @@ import math
 from math import isnan
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN
-
-Floats = tuple[float, ...]
-
 
 # Times of the wheel odometry.
 _SMOOTHING_TIME = 0.05

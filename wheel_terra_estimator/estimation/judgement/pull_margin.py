@@ -8,12 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
-
-Floats = tuple[float, ...]
-
 
 # Where and how often the greatest pull is looked for.
 _SLIPS = (0.3, 0.6, 0.9)

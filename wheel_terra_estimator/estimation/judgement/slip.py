@@ -8,13 +8,11 @@ import math
 from math import isnan
 from typing import NamedTuple
 
+from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, TIME_ROUNDING
-
-Floats = tuple[float, ...]
-
 
 # Deviations of the slip that no model of the filter has.
 _DRIFT = 0.05

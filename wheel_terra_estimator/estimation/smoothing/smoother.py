@@ -206,10 +206,7 @@ class _Judges:
             speed, variance = intersected(SpeedAndVariance(speed, variance), instant.usual)
         heard = known(given.rims)
         typical = sum(map(abs, heard)) / len(given.rims)
-        least = max(
-            typical * LEAST_SLIP_STD,
-            _LEAST_SHARE * instant.motion.speed_std,
-        )
+        least = max(typical * LEAST_SLIP_STD, _LEAST_SHARE * instant.motion.speed_std)
         return Moment(
             instant,
             now,
