@@ -13,17 +13,7 @@ class Component(Generic[State]):
     """A part of the estimator whose whole memory is one immutable value.
 
     ``update`` replaces that value; it never changes it. So a snapshot is a reference, and no part
-    can be changed behind its back.
-
-    Parameters
-    ----------
-    start : State
-        The memory at the start of a run.
-
-    Attributes
-    ----------
-    state : State
-        The present memory, for everyone to read.
+    can be changed behind its back. `state` is the present memory, for everyone to read.
     """
 
     def __init__(self, start: State) -> None:

@@ -40,18 +40,10 @@ _STIFFNESS_SPREAD = 0.38
 
 
 class Learned:
-    """Writes what was learned as parameters of the configuration.
+    """Writes what was learned as parameters of the configuration that the drive started with.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        That the drive started with.
-    layout : StateLayout
-        Of the filter.
-    start : numpy.ndarray
-        Covariance of the filter at the start of a run.
-    named_soil : callable
-        Mean and covariance of the filter -> keys, values and deviations of the soil.
+    `start` is the covariance of the filter at the start of a run; `named_soil` gives keys, values
+    and deviations of the soil for mean and covariance of the filter.
     """
 
     _BISECTIONS = 12  # of the strength: to a ten-thousandth

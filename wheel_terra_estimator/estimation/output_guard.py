@@ -31,10 +31,7 @@ _SCALARS = attrgetter(*_SCALAR_FIELDS)
 class OutputGuard:
     """Holds values that became nan or infinite, and says how little is known of them.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Says what an unknown quantity can be at most.
+    The configuration says what an unknown quantity can be at most.
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -42,15 +39,7 @@ class OutputGuard:
         self._good = self._blank
 
     def repaired(self, stamp: int, outcome: EstimateSet | Exception) -> tuple[EstimateSet, bool]:
-        """Return a set that can be published, and whether something had to be held.
-
-        Parameters
-        ----------
-        stamp : int
-            Stamp of the set [ns].
-        outcome : EstimateSet or Exception
-            What the estimator gave.
-        """
+        """Return a set that can be published at a stamp [ns], and whether something was held."""
         if isinstance(outcome, Exception):
             return self._held(stamp, self._good, f'{type(outcome).__name__}: {outcome}'), True
         if _is_finite(outcome):

@@ -113,15 +113,7 @@ class Parameter(NamedTuple):
 
 
 class Teaching:
-    """Compares the covariance of the filter with that of its start.
-
-    Parameters
-    ----------
-    parameters : sequence of Parameter
-        To be judged.
-    start : numpy.ndarray
-        (size, size) covariance at the start.
-    """
+    """Compares the covariance of the filter with that of its start, (size, size)."""
 
     def __init__(self, parameters: Sequence[Parameter], start: FloatArray) -> None:
         self._parameters = parameters

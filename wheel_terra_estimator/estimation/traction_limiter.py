@@ -149,15 +149,8 @@ def after_event(
 def after_stuck(state: LimiterState, stuck: bool, *, change: bool) -> LimiterState:
     """Return the state after ``~/stuck``.
 
-    Parameters
-    ----------
-    state : LimiterState
-        Before.
-    stuck : bool
-        What it says.
-    change : bool
-        Whether the same estimator had sent it before, so that False means cleared or reset; the
-        first one of an estimator that has just begun proves nothing.
+    `change`: the same estimator had sent it before, so that False means cleared or reset; the first
+    one of an estimator that has just begun proves nothing.
     """
     if stuck:
         return after_event(state, Event.STUCK, state.stuck_direction, 'stuck')

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from math import isnan
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -99,19 +99,6 @@ _SHARP_TURN = 0.3
 """Lateral motion above which slip comes from turning and says nothing of an entrapment [-]."""
 
 
-class Part(Protocol):
-    """What has a memory in the estimator."""
-
-    def reset(self) -> None:
-        """Go back to the start of a run."""
-
-    def snapshot(self) -> Any:
-        """Return the memory."""
-
-    def restore(self, snapshot: Any) -> None:
-        """Go back to a snapshot."""
-
-
 class Instant(NamedTuple):
     """What `WheelSoilEstimator` judged at a stamp and a smoother judges anew."""
 
@@ -136,12 +123,7 @@ class _Clock(NamedTuple):
 class WheelSoilEstimator:
     """Estimator of one rover; sees stamps in order and only checked numbers.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Rover, soil, sensors, tuning.
-    buffer : HistoryBuffer, optional
-        Keeps what a smoother needs.
+    `buffer` keeps what a smoother needs.
     """
 
     def __init__(self, configuration: Configuration, buffer: HistoryBuffer | None = None) -> None:
@@ -194,7 +176,8 @@ class WheelSoilEstimator:
         )
         self._teaching = Teaching.of_filter(layout, self._ekf.covariance)
         self._clock = _Clock()
-        self._parts: tuple[Part, ...] = tuple(
+        # What has a memory.
+        self._parts: tuple[Component[Any] | GatedFilter | HistoryBuffer, ...] = tuple(
             part for part in vars(self).values() if isinstance(part, Component | GatedFilter)
         )
         self._buffer = buffer

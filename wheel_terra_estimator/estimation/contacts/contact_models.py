@@ -52,11 +52,7 @@ class ResistiveForceModels(WheelModels):
     The sinkage is measured and the load given, so that the scale of the stress cancels in torque
     and pull. The learned strength is a factor on the stress tangential to the rim, 1 in the theory;
     K has no part. Stiffness and slip-sinkage act on the load that the law carries at a sinkage.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        Soil (its pressure on a plate gives the scale) and wheels.
+    The pressure of the configured soil on a plate gives the scale.
     """
 
     def __init__(self, configuration: Configuration) -> None:

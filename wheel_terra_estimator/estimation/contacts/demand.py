@@ -28,14 +28,8 @@ class Demand(Component[float]):
     def update(self, demand: float, dt: float, *, settled: bool) -> float:
         """Return the change of the demand over a cycle [-]; 0 where the contacts form anew.
 
-        Parameters
-        ----------
-        demand : float
-            Present demand, in the direction of the drive; nan = not measured.
-        dt : float
-            Length of the cycle [s].
-        settled : bool
-            Whether the contacts are formed: slip and demand of a start belong to no steady curve.
+        `demand` is the present one, in the direction of the drive; nan = not measured. Until the
+        contacts are `settled`, slip and demand belong to no steady curve.
         """
         if isnan(demand):
             return 0.0

@@ -61,13 +61,7 @@ class Linearisation(Component[FloatArray]):
     """Evaluates the wheel models once per cycle, with smoothed derivatives.
 
     Its memory: smoothed derivatives of torque and pull as in `WheelForces`, (2, 6, n); nan = none.
-
-    Parameters
-    ----------
-    rover, layout, models
-        Constants of the rover, layout of the state, wheel models.
-    leaving_angle_std : float
-        Of a measured leaving angle as it is used, smoothed [rad].
+    `leaving_angle_std` is that of a measured leaving angle as it is used, smoothed [rad].
 
     Notes
     -----

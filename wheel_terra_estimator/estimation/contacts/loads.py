@@ -49,16 +49,8 @@ class WheelLoads(Component[LoadState]):
     ) -> LoadState:
         """Work out the loads of a cycle; they are held where no IMU reading came.
 
-        Parameters
-        ----------
-        window : InertialWindow
-            IMU readings of the cycle.
-        pulls, torques : tuple of float
-            Of each wheel after the last cycle [N], [N m].
-        unloaded : tuple of bool
-            Wheels that carry nothing: their load goes to the others.
-        headings : Headings
-            Of the wheels: pulls and moments act along them.
+        `pulls` and `torques` are those of each wheel after the last cycle [N], [N m]; they act
+        along the headings. The load of wheels that carry nothing goes to the others.
         """
         if window.tells_force:
             force = window.mean_force()

@@ -10,23 +10,18 @@ al. 2011) and KLS-1's two (Wang and Han 2016) have u_max of 0.42 to 0.62 and s_0
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.scalars import NAN
 
-
-@dataclass(frozen=True)
-class MeasuredWheelsTuning:
-    """The curve and its spread, with that of wheels in three simulators of different laws."""
-
-    greatest_torque: float = 0.55  # u_max, over load times radius [-]
-    greatest_torque_std: float = 0.17  # [ln]
-    slip_scale: float = 0.17  # s_0 [-]
-    slip_scale_std: float = 0.6  # [ln]
-    least_std: float = 0.04  # of the slip [-]: the torque of rolling without pull
-    most_mobilised: float = 0.9  # of the greatest torque: beyond, it tells nothing of the slip
+# The curve and its spread, with that of wheels in three simulators of different laws.
+_GREATEST_TORQUE = 0.55  # u_max, over load times radius [-]
+_GREATEST_TORQUE_STD = 0.17  # [ln]
+_SLIP_SCALE = 0.17  # s_0 [-]
+_SLIP_SCALE_STD = 0.6  # [ln]
+_LEAST_STD = 0.04  # of the slip [-]: the torque of rolling without pull
+_MOST_MOBILISED = 0.9  # of the greatest torque: beyond, it tells nothing of the slip
 
 
 class SlipOfTorque(NamedTuple):
@@ -36,20 +31,18 @@ class SlipOfTorque(NamedTuple):
     std: float
 
 
-def slip_of_torque(
-    coefficient: float, tuning: MeasuredWheelsTuning = MeasuredWheelsTuning()
-) -> SlipOfTorque:
+def slip_of_torque(coefficient: float) -> SlipOfTorque:
     """Return the slip of measured wheels at a torque over load times radius [-], nan = unknown.
 
     Negative where the wheels brake. Valid on loose soil, for wheels that roll straight; near the
     greatest torque, and beyond, nothing is returned.
     """
-    share = abs(coefficient) / tuning.greatest_torque
-    if isnan(coefficient) or share > tuning.most_mobilised:
+    share = abs(coefficient) / _GREATEST_TORQUE
+    if isnan(coefficient) or share > _MOST_MOBILISED:
         return SlipOfTorque(NAN, NAN)
-    slip = -tuning.slip_scale * math.log(1.0 - share)
-    by_greatest = tuning.slip_scale * share / (1.0 - share) * tuning.greatest_torque_std
-    std = math.hypot(tuning.slip_scale_std * slip, by_greatest, tuning.least_std)
+    slip = -_SLIP_SCALE * math.log(1.0 - share)
+    by_greatest = _SLIP_SCALE * share / (1.0 - share) * _GREATEST_TORQUE_STD
+    std = math.hypot(_SLIP_SCALE_STD * slip, by_greatest, _LEAST_STD)
     return SlipOfTorque(math.copysign(slip, coefficient), std)
 
 

@@ -62,12 +62,7 @@ class PullState(NamedTuple):
 class Pulls(Component[PullState]):
     """Works out pulls, torques and deviations of all wheels.
 
-    Parameters
-    ----------
-    rover, sensors
-        Constants of the rover and its sensors.
-    loads : tuple of float
-        Of each wheel on level ground [N]: what a pull may be before anything is known.
+    The `loads` on level ground [N] are what a pull may be before anything is known.
     """
 
     def __init__(self, rover: Rover, sensors: SensorFigures, loads: Floats) -> None:
@@ -78,16 +73,9 @@ class Pulls(Component[PullState]):
     def update(
         self, mean: FloatArray, covariance: FloatArray, evidence: PullEvidence, *, tilt: float
     ) -> None:
-        """Work out the pulls of a cycle.
+        """Work out the pulls of a cycle from mean (size,) and covariance after its update.
 
-        Parameters
-        ----------
-        mean, covariance : numpy.ndarray
-            (size,), (size, size) after the update.
-        evidence : PullEvidence
-            Forces, their sum and torques of the cycle.
-        tilt : float
-            Of the body against the ground by its ruts [rad].
+        `tilt` is that of the body against the ground by its ruts [rad].
         """
         forces, total, cycle, readings, stationary = evidence
         loads, lateral_motion = cycle.loads, cycle.lateral_motion

@@ -27,31 +27,16 @@ class RutState(NamedTuple):
 
 
 class Ruts(Component[RutState]):
-    """Follows the depth of the ruts that the wheels meet.
-
-    Parameters
-    ----------
-    rover : Rover
-        Which wheels follow which, and how far behind.
-    """
+    """Follows the depth of the ruts that the wheels meet."""
 
     def __init__(self, rover: Rover) -> None:
         super().__init__(RutState((0.0,) * rover.wheel_count))
         self._rover = rover
 
     def advance(self, travel: float, direction: float, sinkage: Floats, curvature: float) -> None:
-        """Take the travel of a cycle.
+        """Take the travel of the body in a cycle [m] along a path of a curvature [1/m].
 
-        Parameters
-        ----------
-        travel : float
-            Of the body [m].
-        direction : float
-            Of the drive: 1, -1, 0 = none yet.
-        sinkage : tuple of float
-            Of each wheel [m].
-        curvature : float
-            Of the path [1/m].
+        `direction` is that of the drive: 1, -1, 0 = none yet; `sinkage` that of each wheel [m].
         """
         if direction == 0.0:
             return

@@ -42,12 +42,7 @@ _OPPOSED = 0.5
 def sides_oppose(rims: Floats, by_yaw_rate: Floats) -> bool:
     """Tell whether the wheels ask for a spin on the spot, however little the body follows.
 
-    Parameters
-    ----------
-    rims : tuple of float
-        Rim speeds [m/s]; nan = unknown.
-    by_yaw_rate : tuple of float
-        Speed of each contact over the yaw rate [m], see `Headings`: its sign tells the side.
+    `rims` [m/s], nan = unknown; the sign of `by_yaw_rate` [m] (see `Headings`) tells the side.
     """
     if not (any(rim > 0.0 for rim in rims) and any(rim < 0.0 for rim in rims)):
         return False  # most of the time

@@ -29,13 +29,6 @@ class UsualSlip:
     Each wheel stands at the sinkage at which the bearing law carries its load on level ground, at
     each slip; its pull there holds its resistance already (closed form, Ding et al. 2015). The
     curve is worked out when it is first asked for: with a reference velocity it never is.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        Soil, wheels, effects.
-    rover : Rover
-        Its constants.
     """
 
     def __init__(self, configuration: Configuration, rover: Rover) -> None:

@@ -78,24 +78,10 @@ class ForceBalance(ForceRows):
         model_variance: float,
         repeats: float,
     ) -> Row:
-        """Return the row of a cycle.
+        """Return the row of a cycle; the forces were worked out at the state of the filter.
 
-        Parameters
-        ----------
-        ekf : GatedFilter
-            At whose state the forces were worked out.
-        forces : ContactForces
-            Of all wheels.
-        total : SumOfPulls
-            What the specific force says.
-        cycle : Cycle
-            With loads and headings.
-        stationary : sequence of StationaryPull or None
-            Of each wheel; None where it turns.
-        model_variance : float
-            Of the shear model, over its square [-].
-        repeats : float
-            Cycles that are one piece of information.
+        `stationary` has None for a wheel that turns; `model_variance` is that of the shear model,
+        over its square [-]; `repeats` cycles are one piece of information.
         """
         headings, loads = cycle.headings, cycle.loads.load
         if headings.steered:

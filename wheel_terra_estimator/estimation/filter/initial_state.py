@@ -168,16 +168,7 @@ def initial_filter(
 ) -> GatedFilter:
     """Return the filter at the start of a run: the nominal soil, wheels at their sinkage at rest.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Soil and effects.
-    rover, sensors, layout, models
-        Constants of the rover, layout of the state, wheel models.
-    loads : tuple of float
-        Of each wheel on level ground [N].
-    tuning : PriorTuning
-        Deviations and bounds.
+    `loads` are those of each wheel on level ground [N].
     """
     priors = SoilPriors.from_configuration(configuration, tuning)
     n = rover.wheel_count

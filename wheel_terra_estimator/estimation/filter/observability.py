@@ -18,18 +18,10 @@ def considered_entries(
 ) -> list[int]:
     """Return the indices of what is considered, not learned.
 
-    Parameters
-    ----------
-    layout : StateLayout
-        Of the state.
-    settled : bool
-        Whether the contacts are those of a steady drive. The rut that forms at a start, or is left
-        behind after a spin on the spot, tells no speed.
-    opposes_rims : bool
-        Whether the rover moves against its wheels: their forces are the same at any such speed.
-    unread : sequence of int
-        Wheels without a sinkage reading: their sinkage and the errors of their shear model are not
-        told apart.
+    The rut that forms at a start, or is left behind after a spin on the spot (contacts that are not
+    `settled`), tells no speed. Where the rover moves against its wheels (`opposes_rims`), their
+    forces are the same at any such speed. Of wheels without a sinkage reading (`unread`), sinkage
+    and errors of the shear model are not told apart.
     """
     entries = []
     if not settled or opposes_rims:

@@ -152,22 +152,10 @@ class ReferenceUpdate(Component[ReferenceState]):
         fastest_rim: float,
         variance: float,
     ) -> bool:
-        """Fuse a reference velocity; return whether the speed was opened to it.
+        """Fuse a reference velocity at a time [s]; return whether the speed was opened to it.
 
-        Parameters
-        ----------
-        ekf : GatedFilter
-            Is updated.
-        time : float
-            [s].
-        reference : ReferenceVelocity
-            The reading.
-        still : bool
-            Whether all wheels stand.
-        fastest_rim : float
-            Greatest rim speed [m/s].
-        variance : float
-            Of the reading as stated, or more where more is seen [(m/s)^2].
+        `still`: all wheels stand; `fastest_rim` is the greatest rim speed [m/s], `variance` that of
+        the reading as stated, or more where more is seen [(m/s)^2].
         """
         self._note_time(time)
         if still:

@@ -71,12 +71,7 @@ class _Motion(NamedTuple):
 class SinkageProcess(Component[SinkageState]):
     """Predicts the sinkage of all wheels; keeps its rate.
 
-    Parameters
-    ----------
-    rover, layout, models
-        Constants of the rover, layout of the state, wheel models.
-    leaving_angle_std : float
-        Of a measured leaving angle as it is used, smoothed [rad].
+    `leaving_angle_std` is that of a measured leaving angle as it is used, smoothed [rad].
     """
 
     def __init__(

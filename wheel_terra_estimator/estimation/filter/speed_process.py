@@ -211,15 +211,8 @@ class SpeedProcess(Component[SpeedState]):
 
         It is that of the last drive in this direction, else of the drive that ended. The slip
         changes by the learned slip per demand times what is asked less (or more) than there, and
-        begins with a share of that.
-
-        Parameters
-        ----------
-        ekf : GatedFilter
-            Gives the slip per demand.
-        before, now : float
-            What the ground asked of the drive that ended, and asks of this one, as shares of the
-            load [-]; nan = unknown.
+        begins with a share of that. `before` and `now` are what the ground asked of the drive that
+        ended, and asks of this one, as shares of the load [-]; nan = unknown.
         """
         state = self.state
         ended = PastDrive(state.ratio, state.ratio_std, before)
@@ -241,16 +234,10 @@ class SpeedProcess(Component[SpeedState]):
         )
 
     def follow_contacts(self, travel: float, digging: float, *, reference_known: bool) -> None:
-        """Note how far the slip may walk: farther where contacts change.
+        """Note how far the slip may walk: farther where contacts change, `travel` [m] from a start.
 
-        Parameters
-        ----------
-        travel : float
-            Since the start [m].
-        digging : float
-            Sinkage that most wheels gain over rim travel [m/m]; nan = most are not read.
-        reference_known : bool
-            Without a reference the walk between changes is not narrowed.
+        `digging` is the sinkage that most wheels gain over rim travel [m/m]; nan = most are not
+        read. Without a reference the walk between changes is not narrowed.
         """
         walk = self._walk
         start = _START_WALK * math.exp(-travel / _START_WALK_TRAVEL)
@@ -272,17 +259,8 @@ class SpeedProcess(Component[SpeedState]):
     ) -> SpeedStep:
         """Return how the speed goes on from the last cycle to a time [s].
 
-        Parameters
-        ----------
-        time : float
-            [s].
-        rims : RimSpeeds
-            At that time.
-        window : InertialWindow
-            IMU readings in between.
-        inflated : bool
-            Whether changing contacts widen it. Without a reference velocity they must not: the
-            speed would follow soil models that are off by as much.
+        `inflated`: changing contacts widen it. Without a reference velocity they must not: the
+        speed would follow soil models that are off by as much.
         """
         state = self.state
         by_wheels = self.by_wheels(

@@ -76,22 +76,9 @@ class TorqueUpdate(ForceRows):
         """Return the rows of the torques of a cycle.
 
         Without a reference velocity the slip follows what all torques say, and only little what
-        they differ by.
-
-        Parameters
-        ----------
-        ekf : GatedFilter
-            At whose state the forces were worked out.
-        forces : ContactForces
-            Of all wheels.
-        cycle : Cycle
-            With the readings.
-        variance : float
-            Of a reading [N^2 m^2].
-        model_variance : float
-            Of the shear model, over its square [-].
-        repeats : float
-            Cycles that are one piece of information.
+        they differ by. The forces were worked out at the state of the filter; `variance` is that of
+        a reading [N^2 m^2], `model_variance` that of the shear model, over its square [-];
+        `repeats` cycles are one piece of information.
         """
         rows = []
         H, zeros = forces.torque_rows, self.zeros(ekf.mean)

@@ -89,12 +89,7 @@ class InertialState(NamedTuple):
 class InertialInput(Component[InertialState]):
     """Sums IMU readings; knows the body's slope, with or without a reported orientation.
 
-    Parameters
-    ----------
-    gravity : float
-        [m/s^2].
-    given : container of str
-        Keys that a file states, as against defaults; all of them by default.
+    `given` are the keys that a file states, as against defaults; all of them by default.
     """
 
     def __init__(self, gravity: float, given: Container[str] = frozenset(KEYS)) -> None:

@@ -91,12 +91,7 @@ class SeenNoiseState(NamedTuple):
 class SeenNoise(Component[SeenNoiseState]):
     """Learns the noise of a message of each sensor; readings are means of those of a step.
 
-    Parameters
-    ----------
-    sensors : SensorFigures
-        What is stated, or the defaults, and messages a second.
-    given : container of str
-        Keys that somebody stated, as against defaults; all of them by default.
+    `given` are the keys that somebody stated, as against defaults; all of them by default.
     """
 
     def __init__(self, sensors: SensorFigures, given: Container[str] = _ALL) -> None:

@@ -43,12 +43,7 @@ class StatedNoise(NamedTuple):
     def completed(self, variance: InertialVariance, given: Container[str]) -> StatedNoise:
         """Return it with what a message states and neither a file nor a message before it did.
 
-        Parameters
-        ----------
-        variance : InertialVariance
-            Of the message, no placeholders.
-        given : container of str
-            Keys that a file states.
+        `variance` holds no placeholders; `given` are the keys that a file states.
         """
         stds = list(self)
         for i, key in enumerate(KEYS):

@@ -85,13 +85,7 @@ class SlipClassifier:
 
 
 class PublishedClasses:
-    """Gives the sets of a drive their classes, in the order in which they are published.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        The keys ``filter.class_*``.
-    """
+    """Gives the sets of a drive their classes, in the order in which they are published."""
 
     def __init__(self, configuration: Configuration) -> None:
         self._states = [ClassState()] * configuration.wheels.count

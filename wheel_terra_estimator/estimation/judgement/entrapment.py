@@ -60,14 +60,9 @@ class Span(NamedTuple):
 
 
 def entrapments(time: FloatArray, slip: FloatArray) -> Entrapments:
-    """Return the entrapments of a drive.
+    """Return the entrapments of a drive: times (k,) [s], slip ratios (k, n), nan at rest.
 
-    Parameters
-    ----------
-    time : numpy.ndarray
-        (k,) [s].
-    slip : numpy.ndarray
-        (k, n) slip ratio, nan at rest; skidding is no entrapment, nor is rest.
+    Skidding is no entrapment, nor is rest.
     """
     above = np.concatenate([[False], _median(slip) > ENTRAPPED_SLIP, [False]]).astype(int)
     starts, ends = np.flatnonzero(np.diff(above) == 1), np.flatnonzero(np.diff(above) == -1)

@@ -38,16 +38,9 @@ class PullMargin(Component[MarginState]):
         return time - self.state.time >= _PERIOD
 
     def update(self, time: float, wheels: WheelStates, demand: float) -> None:
-        """Work out the margins.
+        """Work out the margins of all wheels at a time [s]; their speed ratios do not matter.
 
-        Parameters
-        ----------
-        time : float
-            [s].
-        wheels : WheelStates
-            Of all wheels; their speed ratios do not matter.
-        demand : float
-            Pull that the ground asks in the direction of driving, over the load [-].
+        `demand` is the pull that the ground asks in the direction of driving, over the load [-].
         """
         ratios = 1.0 - np.array(_SLIPS)
         _, pull = self._models.torque_and_pull(wheels._replace(speed_ratio=ratios[:, None]))

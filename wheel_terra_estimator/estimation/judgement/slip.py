@@ -98,14 +98,7 @@ def slip_and_deviation(
 ) -> tuple[float, float]:
     """Return the slip ratio and its standard deviation, not both speeds being at rest.
 
-    Parameters
-    ----------
-    rim, v : float
-        Rim and ground speed [m/s].
-    v_std, rim_std : float
-        Their standard deviations [m/s].
-    rest_speed : float
-        Below it a rim stands [m/s].
+    Rim speed, ground speed `v` and their deviations [m/s]; below `rest_speed` a rim stands.
     """
     if abs(rim) <= rest_speed:
         return -1.0, v_std / max(abs(v), rest_speed)

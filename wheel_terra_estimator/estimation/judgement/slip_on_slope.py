@@ -183,14 +183,9 @@ def slips_at(
 ) -> SlipOnSlope:
     """Return the slips that a curve gives at the `SLOPES`, driving forward.
 
-    Parameters
-    ----------
-    mean, covariance : numpy.ndarray
-        (3,), (3, 3) of a, ln s_0, ln p_max.
-    scatter : float
-        Deviation of the slip from place to place on one slope [-].
-    beyond : numpy.ndarray or float
-        (11,) deviation of ln p_max that comes on top, of slopes beyond those driven.
+    Mean (3,) and covariance (3, 3) are those of a, ln s_0, ln p_max; `scatter` is the deviation of
+    the slip from place to place on one slope [-]; `beyond` (11,) that of ln p_max which comes on
+    top, of slopes beyond those driven.
     """
     lower = np.linalg.cholesky(covariance + TINY * np.eye(3))
     offset, scale, greatest = (mean + _STANDARD[:, :3] @ lower.T).T[:, :, None]

@@ -30,21 +30,10 @@ inverse of a covariance is rounding."""
 def smoothed_before(
     transition: Transition, later: Gaussian | None, lower: FloatArray, upper: FloatArray
 ) -> Gaussian:
-    """Return the smoothed state before a transition.
+    """Return the smoothed state before a transition of the forward pass, within bounds (size,).
 
-    Parameters
-    ----------
-    transition : Transition
-        Of the forward pass.
-    later : Gaussian or None
-        Smoothed state after it; None = nothing is known of what came later.
-    lower, upper : numpy.ndarray
-        (size,) bounds of the state.
-
-    Returns
-    -------
-    Gaussian
-        The filter's own where the covariance cannot be inverted.
+    `later` is the smoothed state after it, None where nothing is known of what came later. Where
+    the covariance cannot be inverted the filter's own state is returned.
     """
     before, F, after = transition
     if later is None:

@@ -94,17 +94,7 @@ class DriveSmoother:
     """Fixed-interval smoother of one drive.
 
     Run the drive through a core with `estimator`, keep the sets that it gives, then ask for those
-    of the smoother.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        Rover, soil, sensors, tuning.
-
-    Attributes
-    ----------
-    estimator : WheelSoilEstimator
-        Makes the forward pass.
+    of the smoother. `estimator` makes the forward pass.
     """
 
     def __init__(self, configuration: Configuration) -> None:

@@ -99,16 +99,9 @@ class Entry:
 
 
 class InputLog:
-    """Inputs of one run and what runs through them.
+    """Inputs of one run and what runs through them: runners that make the same steps side by side.
 
-    Parameters
-    ----------
-    runners : sequence of Stepped
-        All make the same steps, side by side.
-    grid : StepGrid
-        When a step ends.
-    reference_period : int
-        Reference velocities are thinned to this period, by stamps [ns]; 0: all are used.
+    Reference velocities are thinned to `reference_period`, by stamps [ns]; 0: all are used.
 
     Attributes
     ----------

@@ -27,17 +27,8 @@ _ROOM = 1.05  # over the lag that was seen
 class LagLearner:
     """Lag of each of the two channels, and how long to hold inputs back.
 
-    Parameters
-    ----------
-    fixed : int
-        How long inputs are held back [ns]; below 0: as learned.
-
-    Attributes
-    ----------
-    fixed : int
-        As given; may be changed.
-    learned : dict
-        Channel -> lag [ns].
+    `fixed` is how long [ns], below 0: as learned; it may be changed. `learned` has the lag of each
+    channel [ns].
     """
 
     def __init__(self, fixed: int) -> None:

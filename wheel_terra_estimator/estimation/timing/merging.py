@@ -62,21 +62,10 @@ Heard: TypeAlias = 'tuple[int, ...] | None'
 
 
 def merge_step(stamp: int, parts: Sequence[list[Any]], heard: Heard) -> tuple[StepInputs, Heard]:
-    """Merge what came between two steps; plain floats, which beat numpy for a few readings.
+    """Return the inputs of a step, merged from what came since the last, and what is heard then.
 
-    Parameters
-    ----------
-    stamp : int
-        Time of the step [ns].
-    parts : sequence of list
-        Entries in the order of stamps, each with one measurement or None per channel.
-    heard : tuple of int or None
-        Before the step.
-
-    Returns
-    -------
-    tuple
-        The inputs of the step; what was heard after it.
+    `parts` are entries in the order of stamps, each with one measurement or None per channel. Plain
+    floats, which beat numpy for a few readings.
     """
     odometry, inertial, *wheels, references = (
         [measurement for measurement in channel if measurement is not None]

@@ -22,10 +22,7 @@ LONGEST_STEP = 120_000_000
 class StepGrid:
     """Multiples of the periods of steps and sets, in whole nanoseconds as stamps are.
 
-    Parameters
-    ----------
-    output_rate : float
-        Sets per second [Hz]; 0: a step and a set at every stamp.
+    `output_rate`: sets per second [Hz]; 0: a step and a set at every stamp.
     """
 
     def __init__(self, output_rate: float) -> None:

@@ -58,19 +58,7 @@ class Due(NamedTuple):
 class Timeline:
     """Log of one run after the other, and the sets that are due.
 
-    Parameters
-    ----------
-    log : InputLog
-        Into which the inputs go.
-    settings : TimeSettings
-        Durations and rates.
-
-    Attributes
-    ----------
-    counts : dict
-        ``runs``, ``filter_restarts``, ``late_inputs_deferred``, ``late_inputs_dropped``.
-    released : int
-        ``log.entries[:released]`` may be used.
+    ``log.entries[:released]`` may be used.
     """
 
     def __init__(self, log: InputLog, settings: TimeSettings) -> None:
@@ -82,17 +70,19 @@ class Timeline:
             'late_inputs_deferred': 0,
             'late_inputs_dropped': 0,
         }
-        self._begins_run: bool  # the next input is the first of its run
-        self.released: int
-        self._state: int | None  # newest released stamp
-        self._last_set: int | None
-        self._odometry: int | None  # newest released stamp of wheel odometry
-        self._heartbeats: int  # sets of the present silence
-        self._overdue: int  # wheel odometry lags by so much more than is waited for [ns]
-        self._deferred: list[tuple[int, Measurement]]
-        self._newest: int | None
-        self._allowance: float  # steps that may be run again now
         self._clear()
+
+    def _clear(self) -> None:
+        self._begins_run = True  # the next input is the first of its run
+        self.released = 0
+        self._state: int | None = None  # newest released stamp
+        self._last_set: int | None = None
+        self._odometry: int | None = None  # newest released stamp of wheel odometry
+        self._heartbeats = 0  # sets of the present silence
+        self._overdue = 0  # wheel odometry lags by so much more than is waited for [ns]
+        self._deferred: list[tuple[int, Measurement]] = []
+        self._newest: int | None = None
+        self._allowance = self.settings.rerun_rate * ALLOWANCE  # steps that may be run again now
 
     def end_run(self, *, keep_soil: bool) -> None:
         """Let the next input begin a new run; soil and biases kept but widened, or forgotten."""
@@ -105,15 +95,10 @@ class Timeline:
         self._allowance = min(self._allowance, settings.rerun_rate * ALLOWANCE)
 
     def insert(self, channel: int, measurement: Measurement) -> tuple[Fate, Due | None]:
-        """Put an input into the log.
+        """Put an input into the log; return its fate, and the set that it made due at once.
 
-        Returns
-        -------
-        fate : Fate
-            What became of it.
-        due : Due or None
-            The set that it made due at once: wheel odometry that comes after younger inputs of
-            other channels but is younger than the last set.
+        Such is wheel odometry that comes after younger inputs of other channels but is younger than
+        the last set.
         """
         stamp, state = measurement.stamp, self._state
         if state is not None and stamp < state - self.settings.history:
@@ -130,16 +115,9 @@ class Timeline:
         return self._insert(channel, measurement)
 
     def advance(self, newest: int, hold: int = 0, overdue: int = 0) -> Iterator[Due]:
-        """Release inputs and yield the sets that became due.
+        """Release inputs up to `hold` before the newest stamp; yield the sets that became due.
 
-        Parameters
-        ----------
-        newest : int
-            Newest stamp seen [ns].
-        hold : int
-            How long inputs are held back [ns].
-        overdue : int
-            By how much wheel odometry lags behind what is held back [ns]; no silence.
+        `overdue` is by how much wheel odometry lags behind what is held back: no silence. All [ns].
         """
         self._overdue = overdue
         if self._newest is None or newest > self._newest:
@@ -164,18 +142,6 @@ class Timeline:
         self.released -= due.entry + 1
 
     # -- The log --------------------------------------------------------------------------------
-
-    def _clear(self) -> None:
-        self._begins_run = True
-        self.released = 0
-        self._state = None
-        self._last_set = None
-        self._odometry = None
-        self._heartbeats = 0
-        self._overdue = 0
-        self._deferred = []
-        self._newest = None
-        self._allowance = self.settings.rerun_rate * ALLOWANCE
 
     def _insert(self, channel: int, measurement: Measurement) -> tuple[Fate, Due | None]:
         stamp, state = measurement.stamp, self._state

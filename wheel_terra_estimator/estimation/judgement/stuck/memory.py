@@ -22,17 +22,9 @@ _LONGEST_GAP = 1.0  # [s] between two sets of one drive, or two of their periods
 
 
 class StuckMemory:
-    """Keeps a warning over a new beginning of the estimator.
+    """Keeps a warning over a new beginning of the estimator; `state` is the one that stands.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Says when the rover is free: ``filter.stuck_clear_slip`` and ``filter.stuck_clear_time``.
-
-    Attributes
-    ----------
-    state : StuckState
-        The warning that stands.
+    ``filter.stuck_clear_slip`` and ``filter.stuck_clear_time`` say when the rover is free.
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -67,12 +59,7 @@ class StuckMemory:
     def follow(self, estimates: EstimateSet, *, run_again: bool = False) -> EstimateSet:
         """Return the set with the warning that stands; take it over.
 
-        Parameters
-        ----------
-        estimates : EstimateSet
-            As the estimator gives it.
-        run_again : bool
-            Whether a late input was fused at its own stamp since the set before.
+        `run_again`: a late input was fused at its own stamp since the set before.
         """
         if run_again and self.state.stuck and not estimates.stuck and not self._restored:
             self.begin_anew()

@@ -66,13 +66,7 @@ class StuckState(NamedTuple):
 
 
 class StuckMonitor(Component[StuckState]):
-    """Stuck warning of one rover.
-
-    Parameters
-    ----------
-    settings : StuckSettings
-        The parameters.
-    """
+    """Stuck warning of one rover."""
 
     def __init__(self, settings: StuckSettings) -> None:
         super().__init__(StuckState())

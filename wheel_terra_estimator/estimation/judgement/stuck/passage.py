@@ -52,12 +52,8 @@ def passage_probability(
 ) -> FloatArray:
     """Return the probability within each of the `TRAVELS` for each of n wheels, (n, travels).
 
-    Parameters
-    ----------
-    slip, std : sequence of float
-        Present slip and its standard deviation [-].
-    deepening : float
-        Sinkage gained over rim travel by the rover [m/m]; s_0 is the median slip.
+    `slip` and `std` are those of the wheels now [-], `deepening` is the sinkage that the rover
+    gains over rim travel [m/m]; s_0 is the median slip.
     """
     variance = np.square(np.maximum(std, _LEAST_STD))
     known = USUAL_STD**2 / (USUAL_STD**2 + variance)
