@@ -10,10 +10,9 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
-from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
+from wheel_terra_estimator.estimation.filter.consistency import correlated_cycles
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
-from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import FLOOR_VARIANCE, SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
@@ -23,6 +22,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
     SPEED,
+    Prediction,
 )
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate

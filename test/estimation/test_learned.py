@@ -10,7 +10,7 @@ from fake_estimator import SECOND
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import read_values, write_values
-from wheel_terra_estimator.estimation.contacts.steepest_climb import Climbed, SteepestClimb
+from wheel_terra_estimator.estimation.contacts.demand import Climbed, SteepestClimb
 from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH

@@ -8,13 +8,12 @@ from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
-from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.speed_process import (
     USUAL_LENGTH,
     SpeedProcess,
     SpeedStep,
 )
-from wheel_terra_estimator.estimation.filter.state import SLIP_PER_DEMAND, SPEED
+from wheel_terra_estimator.estimation.filter.state import SLIP_PER_DEMAND, SPEED, Prediction
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
 

@@ -13,7 +13,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
-from wheel_terra_estimator.estimation.contacts.steepest_climb import Climbed
+from wheel_terra_estimator.estimation.contacts.demand import Climbed
 from wheel_terra_estimator.estimation.contacts.usual_slip import steady_pull
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
 from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning

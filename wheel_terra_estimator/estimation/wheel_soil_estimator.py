@@ -21,7 +21,7 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
-from wheel_terra_estimator.estimation.contacts.demand import Demand
+from wheel_terra_estimator.estimation.contacts.demand import Demand, SteepestClimb
 from wheel_terra_estimator.estimation.contacts.linearisation import (
     ContactForces,
     Linearisation,
@@ -37,13 +37,11 @@ from wheel_terra_estimator.estimation.contacts.measured_wheels import (
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.contacts.ruts import Ruts, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
-from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestClimb
 from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.estimation.filter.consistency import excess
-from wheel_terra_estimator.estimation.filter.correlation import correlated_cycles
+from wheel_terra_estimator.estimation.filter.consistency import correlated_cycles, excess
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance, SumOfPulls, rut_tilt
 from wheel_terra_estimator.estimation.filter.initial_state import (
@@ -53,7 +51,6 @@ from wheel_terra_estimator.estimation.filter.initial_state import (
     with_soil_of,
 )
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
-from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
@@ -64,6 +61,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
     SPEED,
+    Prediction,
 )
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
@@ -76,8 +74,8 @@ from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge, WheelSlip
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import Instant as SlopeInstant
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import SlopeCurve
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment, StuckMonitor
-from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     RoverMotion,
     WheelMotion,

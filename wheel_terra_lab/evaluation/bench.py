@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any
 
 from wheel_terra_estimator.configuration.ros_yaml import Value
-from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import StuckSettings
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.scheduler import finished
 from wheel_terra_lab.evaluation import baselines, scores

@@ -17,7 +17,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.judgement.entrapment import entrapments
-from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import StuckSettings
 from wheel_terra_lab.evaluation.bench_drive import Truth
 from wheel_terra_lab.evaluation.runner import Record
 

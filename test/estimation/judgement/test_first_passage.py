@@ -10,7 +10,7 @@ from parts import SAND
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
-from wheel_terra_estimator.estimation.judgement.stuck.forecast import outlook
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import StuckSettings, outlook
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
 from wheel_terra_estimator.estimation.judgement.stuck.passage import (
     DIGGING,
@@ -21,7 +21,6 @@ from wheel_terra_estimator.estimation.judgement.stuck.passage import (
     USUAL_STD,
     passage_probability,
 )
-from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     Memory,
     RoverMotion,

@@ -9,8 +9,8 @@ import pytest
 from parts import SAND
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
-from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import RoverMotion, WheelMotion
 
 SETTINGS = StuckSettings.from_configuration(reader.load(SAND))

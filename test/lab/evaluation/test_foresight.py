@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import StuckSettings
 from wheel_terra_lab.evaluation.foresight import (
     Foresight,
     brier_interval,

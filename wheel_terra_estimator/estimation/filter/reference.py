@@ -13,8 +13,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.filter.consistency import smoothed_nis
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
-from wheel_terra_estimator.estimation.filter.prediction import Prediction
-from wheel_terra_estimator.estimation.filter.state import SPEED, StateLayout
+from wheel_terra_estimator.estimation.filter.state import SPEED, Prediction, StateLayout
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped

@@ -16,12 +16,12 @@ from wheel_terra_estimator.estimation.contacts.linearisation import smoothed_slo
 from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
-from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
     SPEED,
+    Prediction,
     StateLayout,
 )
 from wheel_terra_estimator.estimation.rover import Rover

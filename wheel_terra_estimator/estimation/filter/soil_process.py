@@ -11,7 +11,6 @@ import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning, SoilPriors
-from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     MOUND,
@@ -20,6 +19,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
+    Prediction,
     StateLayout,
 )
 

@@ -27,8 +27,12 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
 from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
-from wheel_terra_estimator.estimation.filter.prediction import Prediction
-from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SLIP_PER_DEMAND, SPEED
+from wheel_terra_estimator.estimation.filter.state import (
+    GRAVITY_BIAS,
+    SLIP_PER_DEMAND,
+    SPEED,
+    Prediction,
+)
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Layout of the filter's state, with the reasons.
+"""Layout of the filter's state, with the reasons, and a prediction of it.
 
 ===============  =====  ===========================================================================
 entry            unit   why it is there
@@ -50,6 +50,11 @@ observable at the same time as the soil: they enter the published deviations).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from wheel_terra_estimator.arrays import FloatArray
 
 (
     SPEED,
@@ -90,3 +95,17 @@ class StateLayout:
         object.__setattr__(self, 'shear_error', slice(_COMMON + 2 * n, errors))
         object.__setattr__(self, 'torque_zero', slice(errors, each))
         object.__setattr__(self, 'reference_error', each if self.reference_wanders else None)
+
+
+class Prediction(NamedTuple):
+    """Predicted mean, transition matrix F and process noise Q; each part fills in its entries."""
+
+    mean: FloatArray  # (size,)
+    F: FloatArray  # (size, size)
+    Q: FloatArray  # (size, size)
+
+    @classmethod
+    def unchanged(cls, mean: FloatArray) -> Prediction:
+        """Return the prediction that everything stays as it is."""
+        size = len(mean)
+        return cls(mean.copy(), np.eye(size), np.zeros((size, size)))

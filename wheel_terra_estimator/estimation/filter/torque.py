@@ -13,8 +13,11 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
-from wheel_terra_estimator.estimation.filter.consistency import distrusted, smoothed_nis
-from wheel_terra_estimator.estimation.filter.correlation import SAME_GROUND
+from wheel_terra_estimator.estimation.filter.consistency import (
+    SAME_GROUND,
+    distrusted,
+    smoothed_nis,
+)
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover

@@ -8,14 +8,31 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT
 from wheel_terra_estimator.estimation.judgement.stuck.passage import TRAVELS, passage_probability
-from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import Situation
 from wheel_terra_estimator.estimation.scalars import median
 
 LONGEST_TIME = 600.0
 """Time to entrapment that is said where none is in sight [s]."""
+
+
+class StuckSettings(NamedTuple):
+    """The keys ``filter.stuck_*``."""
+
+    horizon: float  # [s]
+    travel: float  # [m]
+    threshold: float  # probability
+    clear_slip: float
+    clear_time: float  # [s]
+
+    @classmethod
+    def from_configuration(cls, configuration: Configuration) -> StuckSettings:
+        """Take them from a configuration."""
+        return cls(
+            **{name: float(getattr(configuration.filter, f'stuck_{name}')) for name in cls._fields}
+        )
 
 
 class WheelForecast(NamedTuple):
