@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.checks import rover_facts
 from wheel_terra_estimator.checks.faults import FAULTS, RANK
 from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
@@ -34,8 +34,6 @@ from wheel_terra_estimator.checks.series import (
 )
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import StepInputs
-
-Floats = tuple[float, ...]
 
 BIN = 100_000_000  # means are over this [ns of stamps]
 KEPT = 300  # bins that are kept: 30 s

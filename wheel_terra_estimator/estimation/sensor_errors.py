@@ -3,10 +3,9 @@
 """Known errors of the sensors: the zeros, gains, biases and stamp offsets of the configuration.
 
 A sensor reads ``gain * true + zero``; an IMU reads its bias on top, in ``base_link``; stamps are
-late by their offset. Readings are
-corrected once, where they enter the estimator core or the rows of a drive; the simulator makes
-readings the other way round. An instrument effect in a model (``torque_gain``, ``sinkage_offset``)
-is what is left after this correction.
+late by their offset. Readings are corrected once, where they enter the estimator core or the rows
+of a drive; the simulator makes readings the other way round. An instrument effect in a model
+(``torque_gain``, ``sinkage_offset``) is what is left after this correction.
 """
 
 from __future__ import annotations
