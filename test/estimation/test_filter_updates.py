@@ -123,16 +123,6 @@ def test_models_are_doubted_while_the_references_keep_to_one_side(parts, ekf):
     assert doubt['white'] < 2.0
 
 
-def test_models_are_doubted_where_a_small_lean_lasts(parts):
-    """Half a deviation to one side: within what six references scatter, no chance over sixty."""
-    noise = 0.003 * (-1.0) ** np.arange(60)
-    lean, white = (
-        references(parts, parts.filter(), 0.045 + by + noise, held=0.045)[0].model_variance_factor
-        for by in (0.0015, 0.0)
-    )
-    assert lean > 10.0 > 2.0 > white
-
-
 def test_two_references_on_standing_wheels_say_that_the_rover_slides(parts, ekf):
     """A single one may be wild: neither is it believed, nor does it open the speed."""
     update = reference_update(parts)

@@ -37,8 +37,6 @@ _SLIDE_GAPS = 2.0  # gaps for which a slide on standing wheels is believed
 _SHORTEST_SLIDE = 1.0  # [s]
 _MEAN_COUNT = 6.0
 """References over which their innovations' mean is taken."""
-_LASTING_COUNT = 30.0
-"""The same of a common-mode bias that lasts: smaller, and over longer."""
 _MOST_DEVIATIONS = 3.0  # deviations that one reference counts for in it
 _MOST_VARIANCE_FACTOR = 100.0
 _RUN_EXCESS = 4.0
@@ -64,7 +62,6 @@ class ReferenceState(NamedTuple):
     nis: float | None = None  # running mean; None = none came yet
     mean_innovation: float = 0.0
     """Running mean of the innovations, each over its deviation."""
-    lasting_innovation: float = 0.0  # the same over more of them
 
 
 class ReferenceUpdate(Component[ReferenceState]):
@@ -118,24 +115,14 @@ class ReferenceUpdate(Component[ReferenceState]):
 
         Innovations of a filter that is right are white. Where they keep to one side for several
         references, the models hold the speed against them; a gate on single ones cannot see it.
-        The running mean of white innovations has variance 1 / (2 n - 1) over n.
+        The running mean of white innovations has variance 1 / (2 n - 1) over n. Where references
+        come faster than one a second it counts less, so that white ones pass the limit of a run as
+        seldom a second as slow ones do.
         """
-        state = self.state
-        excess = max(
-            self._excess(state.mean_innovation, _MEAN_COUNT),
-            self._excess(state.lasting_innovation, _LASTING_COUNT),
-        )
-        return clipped(excess**2, 1.0, _MOST_VARIANCE_FACTOR)
-
-    def _excess(self, mean: float, count: float) -> float:
-        """Return the square of a mean of `count` innovations over the variance of white ones [-].
-
-        Where references come faster than one a second it counts less, so that white ones pass the
-        limit of a run as seldom a second as slow ones do.
-        """
+        square = self.state.mean_innovation**2 * (2.0 * _MEAN_COUNT - 1.0)
         gap = clipped(self.state.gap, _LEAST_GAP, 1.0)
-        limit = _RUN_EXCESS
-        return mean * mean * (2.0 * count - 1.0) * limit / (limit - _RISE * math.log(gap))
+        excess = square * _RUN_EXCESS / (_RUN_EXCESS - _RISE * math.log(gap))
+        return clipped(excess**2, 1.0, _MOST_VARIANCE_FACTOR)
 
     def believes(self, agreeing: int, *, beyond: bool) -> bool:
         """Say whether so many references in a row that disagree by the same amount are right."""
@@ -167,11 +154,8 @@ class ReferenceUpdate(Component[ReferenceState]):
         state = self.state
         state = state._replace(nis=smoothed_nis(state.nis, nis))
         if nis <= self._gate or state.rejected_in_a_row:  # a single wild one is no bias
-            mean, lasting = state.mean_innovation, state.lasting_innovation
-            state = state._replace(
-                mean_innovation=mean + (score - mean) / _MEAN_COUNT,
-                lasting_innovation=lasting + (score - lasting) / _LASTING_COUNT,
-            )
+            mean = state.mean_innovation
+            state = state._replace(mean_innovation=mean + (score - mean) / _MEAN_COUNT)
         opened = False
         if nis > self._gate:
             beyond = abs(reference.forward) > (
