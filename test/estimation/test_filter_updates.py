@@ -68,16 +68,11 @@ def hear(parts, update, ekf, time, speed, still=False, fastest_rim=0.05):
     )
 
 
-def references(parts, ekf, speeds, held=None):
-    """Fuse one reference per second; return for each whether the speed was opened to it.
-
-    Something else may hold the speed at a value.
-    """
+def references(parts, ekf, speeds):
+    """Fuse one reference per second; return for each whether the speed was opened to it."""
     update, opened = reference_update(parts), []
     for i, speed in enumerate(speeds):
         ekf.inflate(SPEED, 1e-8)
-        if held is not None:
-            ekf.set(SPEED, held, 1e-8)
         opened.append(hear(parts, update, ekf, float(i), speed))
     return update, opened
 
