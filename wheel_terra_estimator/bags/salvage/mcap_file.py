@@ -405,9 +405,9 @@ class McapFile:
         data = content.data
         found: list[Reading] = []
         if head is not None:
-            straight = mcap.straight_records(data, possible[0])
-            found = [self._pass(piece.begin, data, straight, wanted, allowed)]
-            found = [reading for reading in found if not reading.lost_bytes]
+            records = mcap.straight_records(data, possible[0])
+            straight = self._pass(piece.begin, data, records, wanted, allowed)
+            found = [] if straight.lost_bytes else [straight]
         for each in possible:
             if not found or found[-1].lost_bytes:
                 records = mcap.records(data, 0, len(data), each)

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the ground asks of the wheels, and how it changes: the slip follows at once.
+"""What the ground asks of the wheels, how it changes, and the most that it asked of a drive.
 
 The sum of the pulls is mass times the specific force along the body, whatever slope and
 acceleration make it (Newton). A rover that must pull more slips more, in the next contact length
