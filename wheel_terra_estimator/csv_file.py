@@ -8,7 +8,7 @@ import csv
 import math
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,6 +86,15 @@ def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) 
         writer = csv.writer(file)
         writer.writerow(header)
         writer.writerows(rows)
+
+
+def check_width(cells: Sequence[Any], columns: int, where: str) -> None:
+    """Raise UserError where something stands beyond the last column."""
+    if any(cells[columns:]):
+        raise UserError(
+            f'{where}: {len(cells)} cells but {columns} columns; use commas between cells and a '
+            'point as decimal mark'
+        )
 
 
 def number(cell: Any, where: str, decimal_comma: bool = False) -> float:

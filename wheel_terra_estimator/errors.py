@@ -56,7 +56,9 @@ def outside_cause(error: BaseException) -> str | None:
         return f'not enough memory ({error})'
     if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
         place = error.filename or 'output or a temporary file'
-        return f'{place}: {error.strerror}; make room or use another place'
+        refused = error.errno in (errno.EACCES, errno.EPERM)
+        cure = 'change its permissions' if refused else 'make room'
+        return f'{place}: {error.strerror}; {cure} or use another place'
     if isinstance(error, UnicodeEncodeError) and error.reason == 'surrogates not allowed':
         return f'a name that is not UTF-8 ({error.object[:200]!a}): rename that file or folder'
     return None

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from estimate_sets import STAMP, some_estimates
 
-from wheel_terra_estimator.bags.history import HistoryRecorder, read_estimates
+from wheel_terra_estimator.bags.history import WHEEL_FIELDS, HistoryRecorder, read_estimates
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.frames import unit_of
 
 SECOND = 1_000_000_000
 
@@ -108,3 +109,7 @@ def test_true_slip_of_a_measured_drive_is_that_of_its_table(shared):
     found = truth.slip.value
     assert found.shape == expected.shape
     np.testing.assert_allclose(found[driving], expected[driving], atol=2e-6)
+
+
+def test_every_column_of_a_wheel_has_its_unit_or_is_a_ratio():
+    assert {name for name in WHEEL_FIELDS if unit_of(name) == '-'} == {'slip', 'slip_std'}

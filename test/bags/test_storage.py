@@ -94,6 +94,7 @@ def test_truncated_mcap_gives_the_messages_before_the_cut(make_bag, whole, tmp_p
     [
         ('gone', None, 'no such bag'),
         ('notes.txt', b'hello', 'not a bag'),
+        ('log.csv', b'time,rate', 'wheel-terra convert'),
         ('empty.mcap', b'', 'not one message can be read'),
         ('rubbish.mcap', b'rubbish' * 100, 'does not begin as an MCAP file'),
         ('rubbish.db3', b'rubbish' * 100, 'finds no recording in it'),

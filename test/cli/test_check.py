@@ -3,6 +3,7 @@
 """``wheel-terra check``: exit status and JSON, on the Pathfinder recording."""
 
 import json
+import shlex
 from pathlib import Path
 
 import pytest
@@ -41,3 +42,24 @@ def test_a_remap_to_nothing_names_the_topic_that_is_not_there(make_bag, drive, c
     assert main(['check', str(bag), '--remap', 'joint_states:=/wheels']) == 2
     said = capsys.readouterr().err
     assert 'no wheel rates on /wheels' in said and '/joint_states (sensor_msgs' in said
+
+
+@pytest.mark.parametrize('topic', ['/nothing', '/imu/data'])
+@pytest.mark.parametrize('command', ['check', 'calibrate'])
+def test_a_remap_of_an_input_that_can_be_absent_must_fit(tmp_path, capsys, command, topic):
+    words = [command, str(PATHFINDER), '--config', 'pathfinder']
+    words += ['--remap', f'reference_odom:={topic}']
+    if command == 'calibrate':
+        words += ['-o', str(tmp_path / 'rover.yaml')]
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert f'{topic}: no such topic of nav_msgs/msg/Odometry' in said
+    assert '/truth/odometry (nav_msgs/msg/Odometry)' in said
+
+
+def test_the_next_command_of_a_calibration_can_be_pasted(tmp_path, capsys):
+    remap, rover = 'reference_odom:=/truth/odometry', str(tmp_path / 'my rover.yaml')
+    words = ['calibrate', str(PATHFINDER), '--config', 'pathfinder', '--remap', remap, '-o', rover]
+    assert main(words) == 0
+    following = shlex.split(capsys.readouterr().out.rpartition('next: ')[2])
+    assert following[2:7] == [str(PATHFINDER), '--config', rover, '--remap', remap]

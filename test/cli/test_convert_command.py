@@ -51,6 +51,15 @@ def test_the_example_converts_units_and_signs(files):
     assert main(command(files)) == 2  # nothing is overwritten
 
 
+def test_decimal_commas_between_commas_are_refused(files, capsys):
+    rows = [line.replace('.', ',') for line in ROWS]
+    (files / 'log.csv').write_text('\n'.join([HEADER, *rows]))
+    assert main(command(files)) == 2
+    assert 'line 2: 17 cells but 13 columns; use commas between' in capsys.readouterr().err
+    (files / 'log.csv').write_text('\n'.join([HEADER, *(f'{row},,' for row in ROWS)]))
+    assert main(command(files)) == 0  # empty cells beyond the last column are none
+
+
 @pytest.mark.parametrize('entry', ['time', 'joint_states'])
 def test_a_map_without_what_is_needed_says_so(files, capsys, entry):
     columns = yaml.safe_load((files / 'map.yaml').read_text())

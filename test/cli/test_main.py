@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import completion, main
-from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.scheduler import worker_pool
 
 
@@ -262,3 +262,12 @@ def test_exit_status_with_closed_streams(words, status):
     code = 'import sys; from wheel_terra_estimator.cli.main import main; sys.exit(main())'
     script = f'"{sys.executable}" -c "{code}" {words} >&- 2>&-'
     assert subprocess.run(['bash', '-c', script], check=False).returncode == status
+
+
+@pytest.mark.parametrize(
+    ('number', 'cure'),
+    [(errno.EACCES, 'change its permissions'), (errno.ENOSPC, 'make room')],
+)
+def test_what_the_machine_refuses_is_told_with_its_cure(number, cure):
+    said = outside_cause(OSError(number, 'no', 'rows.csv'))
+    assert said == f'rows.csv: no; {cure} or use another place'

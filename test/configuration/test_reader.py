@@ -223,10 +223,11 @@ def test_a_configuration_is_read_only_and_can_be_copied():
         ({'qwertz': 1}, 'the nearest known one is'),
         ({'wheels.radius': [0.1]}, 'has 1 entries instead of 2 (as many as wheels.names)'),
         ({'wheels.radius': [0.1] * 3}, 'has 3 entries instead of 2'),
-        ({'wheels.radius': 0.1}, '0.1 is not a list, write [0.1]; allowed: list of'),
+        ({'wheels.radius': 0.1}, '0.1 is not a list, write [0.1, 0.1]; allowed: list of'),
         ({'rover.centre_of_gravity': [0.0, 1.0]}, 'has 2 entries instead of 3'),
         ({'rover.mass': [1.0]}, 'is a list; allowed: number'),
         ({'rover.mass': '12'}, "'12' is not a number"),
+        ({'rover.mass': '12,5'}, "'12,5' is not a number; the decimal mark is a point"),
         ({'rover.mass': True}, 'True is not a number'),
         ({'rover.mass': 0}, '0.0 is out of range; allowed: number (above 0)'),
         ({'rover.mass': math.nan}, 'nan is not finite'),
@@ -446,3 +447,31 @@ def test_an_effect_of_ones_own(tmp_path):
         assert again.effects == c.effects
     finally:
         effects._registered.pop('my_effect', None)
+
+
+@pytest.mark.parametrize(
+    ('end', 'pivot', 'words'),
+    [
+        ('rear', -0.3, ''),
+        ('front', 0.3, ''),
+        ('rear', 0.0, 'x 0 m must lie between those of the two rear wheels of a side, -0.6 and 0'),
+        ('front', -0.3, 'of the two front wheels of a side, 0 and 0.6 m'),
+    ],
+)
+def test_the_bogie_pivot_lies_between_its_wheels(end, pivot, words):
+    rover = {
+        'rover.mass': 100.0,
+        'rover.suspension': 'rocker_bogie',
+        'rover.bogie_wheels': end,
+        'rover.bogie_pivot': [pivot, 0.2],
+        'wheels.names': list('abcdef'),
+        'wheels.radius': [0.2] * 6,
+        'wheels.width': [0.15] * 6,
+        'wheels.x': [0.6, 0.6, 0.0, 0.0, -0.6, -0.6],
+        'wheels.y': [0.5, -0.5] * 3,
+    }
+    if not words:
+        reader.from_parameters(rover)
+    else:
+        said = complaint(reader.from_parameters, rover, source='rover.yaml')
+        assert said.startswith('rover.yaml: rover.bogie_pivot: ') and words in said

@@ -172,6 +172,17 @@ class MeasurementReader:
         )
 
 
+def check_remaps(bag: Bag, remaps: Mapping[str, str]) -> None:
+    """Raise UserError where a topic that was named is not in the bag, or has another type."""
+    for name, topic in remaps.items():
+        found = bag.topics.get(topic)
+        if found is None or found.type != INPUT_TYPES[name]:
+            raise UserError(
+                f'{bag.path}: --remap {name}:={topic}: no such topic of {INPUT_TYPES[name]}; there '
+                f'are: {in_one_line((t.name, t.type) for t in bag.topics.values())}'
+            )
+
+
 def parse_remaps(texts: Iterable[str]) -> dict[str, str]:
     """Return {estimator's topic: bag's topic} of ``FROM:=TO`` texts.
 

@@ -130,7 +130,10 @@ def _open_sources(path: Path, notes: list[str], stack: ExitStack) -> list[_Sourc
                 f'--src {path} --dst {path.stem}'
             )
         if not path.name.endswith(STORAGE_SUFFIXES):
-            raise UserError(f'{path}: not a bag; give a rosbag2 folder, a .mcap or a .db3 file')
+            raise UserError(
+                f'{path}: not a bag; give a rosbag2 folder, a .mcap or a .db3 file (of a CSV log: '
+                'wheel-terra convert)'
+            )
         return [_open_file(path, notes, stack)]
     metadata = bag_metadata.read(path)
     files = _storage_files(path, metadata, notes)

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.configuration.column_map import UNITS, entry_of, factor, read_map
 from wheel_terra_estimator.configuration.parameters import nearest
-from wheel_terra_estimator.csv_file import number, open_csv
+from wheel_terra_estimator.csv_file import CsvFile, check_width, number, open_csv
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.messages import pack
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
@@ -101,7 +101,7 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
         topics = {f'/{name}': INPUT_TYPES[name] for name in _used(layout)}
         held = _held(table, layout)
         with BagFile(output, topics, overwrite=overwrite, inputs=[table, columns]) as bag:
-            sender = _Sender(bag, layout, table, file.decimal_comma, held)
+            sender = _Sender(bag, layout, file, held)
             for line, row in file.rows:
                 sender.send(line, row)
             if not sender.sent:
@@ -231,22 +231,18 @@ class _Sender:
     """Writes the messages of each row, at its own stamp."""
 
     def __init__(
-        self,
-        bag: BagFile,
-        layout: ColumnMap,
-        table: Path,
-        decimal_comma: bool,
-        held: Mapping[str, int],
+        self, bag: BagFile, layout: ColumnMap, file: CsvFile, held: Mapping[str, int]
     ) -> None:
-        self.bag, self.layout, self.table, self.held = bag, layout, table, held
+        self.bag, self.layout, self.table, self.held = bag, layout, file.path, held
+        self.width, self.decimal_comma = len(file.header), file.decimal_comma
         self.last: dict[str, tuple[list[str], int]] = {}  # a reading, and rows since
-        self.decimal_comma = decimal_comma
         self.sent = 0
         self.short: dict[int, None] = {}  # lines, in order
         self.places: deque[tuple[int, float, float]] = deque()  # stamp [ns], place
         self.one_way = self.any_way = 0.0  # common rate and mean size of rates, times speed
 
     def send(self, line: int, row: list[str]) -> None:
+        check_width(row, self.width, f'{self.table}, line {line}')
         seconds = self.value(line, row, self.layout.time)
         if not math.isfinite(seconds) or not 0.0 <= seconds < 9e9:
             column = self.layout.time.name

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 
 from wheel_terra_estimator.cli.outputs import add_output, add_remaps
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    from wheel_terra_estimator.bags.reader import parse_remaps
+    from wheel_terra_estimator.bags.reader import check_remaps, parse_remaps
     from wheel_terra_estimator.bags.series_reader import read_series
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.checks.calibration import as_file, calibrate, summary
@@ -44,6 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     with open_bag(arguments.bag) as bag:
         name = arguments.bag.resolve().name
         remaps = parse_remaps(arguments.remap)
+        check_remaps(bag, remaps)
         recording = read_series(bag, remaps, name)
         calibration = calibrate(recording, configuration, tuple(remaps))
     text = as_file(calibration, configuration, name)
@@ -54,7 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
     for note in recording.notes:
         print(f'note: {note}')
     print(f'rover file: {arguments.output}')
-    print(
-        f'next: wheel-terra replay {arguments.bag} --config {arguments.output} --report report.html'
-    )
+    words = ['wheel-terra', 'replay', str(arguments.bag), '--config', str(arguments.output)]
+    for remap in arguments.remap:
+        words += ['--remap', remap]
+    print(f'next: {shlex.join(words)} --report report.html')
     return 0

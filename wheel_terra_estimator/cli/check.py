@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command: 0 nothing wrong, 1 something to mend."""
-    from wheel_terra_estimator.bags.reader import in_one_line, parse_remaps
+    from wheel_terra_estimator.bags.reader import check_remaps, in_one_line, parse_remaps
     from wheel_terra_estimator.bags.series_reader import read_series
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.checks.run import check_recording
@@ -52,6 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
                 f'{arguments.bag}: no wheel rates on {topic}, and no odometry; there are: {there}; '
                 'name the wheel rates with --remap joint_states:=/TOPIC, or record them'
             )
+        check_remaps(bag, remaps)
     report = check_recording(recording, configuration, tuple(remaps))
     if recording.notes:
         report.figures['recording.notes'] = list(recording.notes)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 
 from wheel_terra_estimator.cli.outputs import add_output
@@ -53,5 +54,5 @@ def run(arguments: argparse.Namespace) -> int:
         )
     for topic, count in written.held.items():
         print(f'note: {topic} repeats each reading over about {count} rows; it is written once')
-    print(f'next: wheel-terra check {arguments.output} --config ROVER')
+    print(f'next: wheel-terra check {shlex.quote(str(arguments.output))} --config ROVER')
     return 0

@@ -101,16 +101,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _show(arguments: argparse.Namespace, output: Path) -> int:
     """Run drives and trial into the folder; return the first status that is not 0."""
-    there = all(importlib.util.find_spec(name) for name in ('rclpy', 'wheel_terra_lab'))
-    live = not arguments.no_node and there
+    absent = [name for name in ('rclpy', 'wheel_terra_lab') if not importlib.util.find_spec(name)]
+    live = not arguments.no_node and not absent
     if live:
         print('The drives go over DDS to estimator_node, as fast as it takes them.')
     else:
-        why = (
-            ''
-            if arguments.no_node
-            else 'There is no rclpy here (no sourced Jazzy), or no laboratory: '
-        )
+        why = '' if arguments.no_node else f'Without {" and ".join(absent)} (docs/install.md) '
         print(f'{why}the drives go through `wheel-terra replay`; the numbers are the same.')
     with ThreadPoolExecutor(AT_ONCE) as pool:
         drives = [pool.submit(_drive, i, output, live) for i in range(len(DRIVES))]

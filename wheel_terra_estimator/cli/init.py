@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -79,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(f'rover file: {arguments.output} ({len(sketch.wheels)} wheels, {sketch.mass:g} kg)')
     for key in sorted(sketch.guessed):
         print(f'  {key} is a guess: measure it')
-    print(f'next: wheel-terra check RECORDING --config {arguments.output}')
+    print(f'next: wheel-terra check RECORDING --config {shlex.quote(str(arguments.output))}')
     return 0
 
 

@@ -235,7 +235,9 @@ def checked_value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:
             raise refuse(f'has {len(items)} entries instead of {wanted or "at least 1"}{of}')
         return items
     if parameter.size is not None:
-        raise refuse(f'{value!r} is not a list, write [{value}]')
+        count = parameter.size if isinstance(parameter.size, int) else wheels
+        items = [value] * (1 if parameter.one_for_all else count)
+        raise refuse(f'{value!r} is not a list, write [{", ".join(map(str, items))}]')
     return _scalar(parameter, value, refuse)
 
 
@@ -254,7 +256,8 @@ def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]
             raise refuse(f"{value!r} is unknown, nearest is '{nearest(value, parameter.choices)}'")
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise refuse(f'{value!r} is not a number')
+        comma = '; the decimal mark is a point' if ',' in str(value) else ''
+        raise refuse(f'{value!r} is not a number{comma}')
     if not math.isfinite(value):
         raise refuse(f'{value!r} is not finite')
     if kind == 'integer':
@@ -311,6 +314,16 @@ def _check_suspension(values: Mapping[str, Any], refuse: Callable[[str, str], Us
                 'rocker_bogie needs three wheels on each side; '
                 f'wheels.y gives {left} left and {right} right',
             )
+        pivot, end = values['rover.bogie_pivot'][0], values['rover.bogie_wheels']
+        for sign in (1.0, -1.0):
+            along = sorted(there for there, side in zip(x, y, strict=True) if sign * side > 0.0)
+            first, last = along[:2] if end == 'rear' else along[1:]
+            if not first < pivot < last:
+                raise refuse(
+                    'rover.bogie_pivot',
+                    f'x {pivot:g} m must lie between those of the two {end} wheels of a side, '
+                    f'{first:g} and {last:g} m',
+                )
 
 
 def _check_effects(

@@ -195,8 +195,9 @@ def notes(
     guessed = [q for q, origin in findings.noise.origin.items() if origin == 'estimated']
     if guessed:
         found.append(
-            f'noise of {", ".join(guessed)} was not stated and was estimated from the scatter; '
-            'repeats or *_std columns make every figure sharper'
+            f'noise of {", ".join(guessed)} was not stated and was estimated from the scatter: '
+            'errors that neighbouring rows share (digitised figures) are not in it; state them in '
+            '*_std columns'
         )
     found += _repeatability(findings.noise)
     if findings.outliers:

@@ -16,7 +16,14 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
-from wheel_terra_estimator.csv_file import CsvFile, is_number, number, open_csv, value_of
+from wheel_terra_estimator.csv_file import (
+    CsvFile,
+    check_width,
+    is_number,
+    number,
+    open_csv,
+    value_of,
+)
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.header import Choice, Header, meaning_of, with_unit
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
@@ -140,11 +147,7 @@ def _read_rows(
     for line, cells in rows:
         if not lines:
             _check_first_row(source, line, [_cell(cells, column.place) for column, _ in values])
-        if len(cells) > width and any(cells[width:]):
-            raise UserError(
-                f'{source}, line {line}: {len(cells)} cells but {width} columns; '
-                'use commas between cells and a point as decimal mark'
-            )
+        check_width(cells, width, f'{source}, line {line}')
         for column, found in values:
             where = f'{source}, line {line}, column {column.name}'
             cell = _cell(cells, column.place)
