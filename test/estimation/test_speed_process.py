@@ -207,6 +207,18 @@ def test_the_slip_walks_farther_where_most_wheels_sink(digging, reference_known,
     assert made.state.ratio_walk == pytest.approx(walk)
 
 
+def test_in_a_turn_on_the_spot_the_speed_does_not_follow_what_two_sides_leave():
+    """They leave 5 mm/s, then 1 mm/s: no reason for the body to slow down to a fifth."""
+    made = process([0.105, -0.095] * 3)
+    found = made.by_wheels(0.1, speeds([0.101, -0.099] * 3), 0.0)
+    assert found.speed_gain == 1.0
+    assert found.constant == pytest.approx(-0.8 * 0.004)
+    ekf = Parts(reader.load(SAND)).filter()
+    ekf.set(SPEED, 0.02, 1e-6)
+    made.end_cycle(0.2, ekf, speeds([0.14, -0.06] * 3), settled=True)
+    assert made.state.ratio == 0.8
+
+
 def test_without_a_reference_the_rover_does_not_move_against_its_wheels():
     spin = [0.05, -0.05] * 3
     for rims, speed, kept in (

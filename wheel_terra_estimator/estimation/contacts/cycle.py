@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.arrays import Floats
@@ -11,6 +12,8 @@ from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.scalars import NAN, known, median
+
+_TOGETHER = 0.5  # least typical rim speed over their magnitude where the sides drive together [-]
 
 
 class RimSpeeds(NamedTuple):
@@ -34,6 +37,16 @@ class RimSpeeds(NamedTuple):
             )
         heard = known(each)
         return cls(each, median(heard) if heard else NAN)
+
+    def along(self, least: float) -> bool:
+        """Tell whether the wheels drive the body along, faster than `least` [m/s].
+
+        In a turn on the spot the typical speed is what two sides leave: its changes are noise.
+        """
+        if isnan(self.typical):
+            return False
+        magnitude = median([abs(rim) for rim in known(self.each)])
+        return abs(self.typical) > max(least, _TOGETHER * magnitude)
 
     def oppose(self, speed: float) -> bool:
         """Tell whether all wheels turn against a speed of the body [m/s]; in a spin some do not."""

@@ -306,7 +306,7 @@ class SpeedProcess(Component[SpeedState]):
         variance += (_RIM_CHANGE * change) ** 2 + _FLOOR_WALK * dt
         apart = self.disagreement(rims)
         variance += _INFLATION_RATE * inflation * inflation * dt + apart * apart
-        if state.settled and abs(before) > self._rover.low_rim:
+        if state.settled and state.rims.along(self._rover.low_rim):
             return SpeedStep(now / before, 0.0, 0.0, variance)
         # From a start on: a ratio taken from slow wheels would carry their noise up the ramp.
         variance += state.ratio_std**2 * max(now * now - before * before, 0.0)
@@ -430,7 +430,7 @@ class SpeedProcess(Component[SpeedState]):
         state, rim = self.state, rims.typical
         inflation = state.inflation * math.exp(-self.since_cycle(time) / _INFLATION_TIME)
         ratio, ratio_std = state.ratio, state.ratio_std
-        if settled and abs(rim) > _RATIO_RIM * self._rover.low_rim:
+        if settled and rims.along(_RATIO_RIM * self._rover.low_rim):
             speed, variance = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
             ratio = clipped(speed / rim, _LEAST_RATIO, _MOST_RATIO)
             std = math.sqrt(variance) / abs(rim)
