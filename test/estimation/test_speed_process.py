@@ -219,6 +219,13 @@ def test_in_a_turn_on_the_spot_the_speed_does_not_follow_what_two_sides_leave():
     assert made.state.ratio == 0.8
 
 
+def test_in_a_turn_on_the_spot_the_sides_slip_apart():
+    """The slip of each side walks by 0.6 per root metre: the body, their mean, by 0.6 / sqrt(2)."""
+    spin, rim, dt = process([0.1, -0.1] * 3), 0.1, 0.2
+    variance = spin.by_wheels(dt, speeds([rim, -rim] * 3), 0.0).variance
+    assert variance == pytest.approx((0.6 * rim) ** 2 * rim * dt / 2.0, rel=1e-3)
+
+
 def test_without_a_reference_the_rover_does_not_move_against_its_wheels():
     spin = [0.05, -0.05] * 3
     for rims, speed, kept in (

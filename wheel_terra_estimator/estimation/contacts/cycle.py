@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.arrays import Floats
@@ -43,10 +42,13 @@ class RimSpeeds(NamedTuple):
 
         In a turn on the spot the typical speed is what two sides leave: its changes are noise.
         """
-        if isnan(self.typical):
-            return False
-        magnitude = median([abs(rim) for rim in known(self.each)])
-        return abs(self.typical) > max(least, _TOGETHER * magnitude)
+        return abs(self.typical) > max(least, _TOGETHER * self.magnitude)
+
+    @property
+    def magnitude(self) -> float:
+        """Median of the magnitudes of the known ones [m/s]; nan = none is known."""
+        heard = known(self.each)
+        return median([abs(rim) for rim in heard]) if heard else NAN
 
     def oppose(self, speed: float) -> bool:
         """Tell whether all wheels turn against a speed of the body [m/s]; in a spin some do not."""
