@@ -86,10 +86,11 @@ def test_a_zero_of_the_torques_is_no_radius(zero):
         assert 'radius' not in {f.kind for f in found}, [str(f) for f in found]
 
 
-def test_a_wheel_held_under_torque_is_not_frozen():
+@pytest.mark.parametrize(('since', 'until'), [(20.0, 50.0), (-1.0, np.inf)])
+def test_a_wheel_held_under_torque_is_not_frozen(since, until):
     whole = rolling.recording()
     rate, torque = whole.joints.rate.copy(), whole.joints.torque.copy()
-    held = (whole.joints.seconds > 20.0) & (whole.joints.seconds < 50.0)
+    held = (whole.joints.seconds > since) & (whole.joints.seconds < until)
     rate[held, 1], torque[held, 1] = 0.0, 80.0
     joints = replace(whole.joints, rate=rate, torque=torque)
     found = rolling.checked(whole=whole, joints=joints).findings

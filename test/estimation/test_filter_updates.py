@@ -419,6 +419,24 @@ def test_torques_are_rows_of_turning_wheels_that_were_read(parts, ekf):
     assert many[0].variance == pytest.approx(30.0 * noise, rel=1e-3)
 
 
+def test_a_wheel_that_the_models_keep_missing_counts_less_and_no_other(parts, ekf):
+    """Its variance grows by the square of the mean of its NIS (Birge 1932) beyond 1."""
+    found, _ = forces(parts, ekf)
+    update = TorqueUpdate(parts.configuration, parts.rover, parts.layout)
+    off = np.array([20.0 * parts.sensors.torque_std, 0.0, 0.0, 0.0, 0.0, 0.0])
+    cycle = parts.cycle(FORWARD, torque=tuple((found.torque + off).tolist()))
+    arguments = {'variance': parts.sensors.torque_std**2, **SURE}
+    first, *_, last = [update.update(ekf, found, cycle, **arguments) for _ in range(21)]
+    assert [row.variance for row in last[1:]] == [row.variance for row in first[1:]]
+    prior = first[0].jacobian @ ekf.covariance @ first[0].jacobian
+    noise = parts.sensors.torque_std**2 + (parts.rover.load_std * found.torque[0]) ** 2
+    nis = off[0] ** 2 / (prior + noise)
+    mean = nis + (1.0 - nis) * 0.95**21
+    gate = max(off[0] ** 2 / parts.configuration.filter.gate - (prior + noise), 0.0)
+    assert last[0].variance == pytest.approx(noise * mean**2 + gate, rel=1e-3)
+    assert mean > 2.0
+
+
 def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ekf):
     """A wheel's share of the load changes along the way: the soil's torque does, the zero not."""
     zero, rng = 2.0 * parts.sensors.torque_zero_std, np.random.default_rng(2)

@@ -96,9 +96,11 @@ def _about_a_side(evidence: Evidence, index: int) -> Mask:
 
 
 def _stays(evidence: Evidence, index: int) -> float:
-    """Return how long a rate stays the same."""
+    """Return how long a rate stays the same, but for 0, where the torque decides."""
     dead = stays(evidence, evidence.time, evidence.rate[:, index : index + 1])
-    return dead.longest if dead is not None and dead.longest > LONG_FROZEN_TIME else 0.0
+    if dead is None or dead.value == 0.0 or dead.longest <= LONG_FROZEN_TIME:
+        return 0.0
+    return dead.longest
 
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:

@@ -492,7 +492,6 @@ class WheelSoilEstimator:
         )
         read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
         self._speed.follow_contacts(
-            self._contact_age.state.travel,
             self._clock.assessment.digging if read else NAN,
             reference_known=cycle.reference_known,
         )
@@ -632,7 +631,7 @@ class WheelSoilEstimator:
             return filtered
         usual = self._usual_speed(rolling)
         speed, variance = filtered if usual is None else intersected(filtered, usual)
-        return SpeedAndVariance(speed, variance * excess(self._torque.state))
+        return SpeedAndVariance(speed, variance * excess(self._torque.nis))
 
     def _yaw_compensated(self, rims: Floats) -> RimSpeeds:
         return RimSpeeds.of(rims, self._turning.state.yaw_rate, self._steering.state.headings)
@@ -725,7 +724,7 @@ class WheelSoilEstimator:
         for channel, nis in (
             ('sinkage', sinkage.nis),
             ('reference', reference.nis),
-            ('torque', self._torque.state),
+            ('torque', self._torque.nis),
             ('balance', self._balance.state),
         ):
             if nis is not None:

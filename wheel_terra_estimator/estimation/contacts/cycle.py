@@ -12,6 +12,8 @@ from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.scalars import NAN, known, median
 
+_TOGETHER = 0.5  # least typical rim speed over their magnitude where the sides drive together [-]
+
 
 class RimSpeeds(NamedTuple):
     """Rim speeds without the share that turning and steering have in them [m/s]; nan = unknown."""
@@ -34,6 +36,19 @@ class RimSpeeds(NamedTuple):
             )
         heard = known(each)
         return cls(each, median(heard) if heard else NAN)
+
+    def along(self, least: float) -> bool:
+        """Tell whether the wheels drive the body along, faster than `least` [m/s].
+
+        In a turn on the spot the typical speed is what two sides leave: its changes are noise.
+        """
+        return abs(self.typical) > max(least, _TOGETHER * self.magnitude)
+
+    @property
+    def magnitude(self) -> float:
+        """Median of the magnitudes of the known ones [m/s]; nan = none is known."""
+        heard = known(self.each)
+        return median([abs(rim) for rim in heard]) if heard else NAN
 
     def oppose(self, speed: float) -> bool:
         """Tell whether all wheels turn against a speed of the body [m/s]; in a spin some do not."""

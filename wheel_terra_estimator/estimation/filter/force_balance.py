@@ -11,12 +11,13 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
-from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
+from wheel_terra_estimator.estimation.filter.consistency import smoothed_nis
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import StateLayout
-from wheel_terra_estimator.estimation.filter.torque import ForceRows
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 # Tuned on simulated drives, seeds 1000 to 1019.
@@ -35,8 +36,11 @@ class SumOfPulls(NamedTuple):
     variance: float  # [N^2]
 
 
-class ForceBalance(ForceRows):
-    """Turns the balance of forces along the ground into a row of the update."""
+class ForceBalance(Component['float | None']):
+    """Turns the balance of forces along the ground into a row of the update.
+
+    Keeps the running mean of its NIS, None = none came yet.
+    """
 
     def __init__(
         self,
@@ -45,7 +49,8 @@ class ForceBalance(ForceRows):
         sensors: SensorFigures,
         layout: StateLayout,
     ) -> None:
-        super().__init__(configuration)
+        super().__init__(None)
+        self._gate = float(configuration.filter.gate)
         self._rover, self._sensors, self._layout = rover, sensors, layout
 
     def sum_of_pulls(self, cycle: Cycle, curvature: float) -> SumOfPulls:
@@ -104,8 +109,11 @@ class ForceBalance(ForceRows):
             # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
             jacobian[self._layout.sinkage.start + i] += total.weight * gain
         residual = total.along - (pull_sum + total.weight * tilt)
-        prior = float(jacobian @ ekf.covariance @ jacobian)
-        return self.row(Row(residual, jacobian, repeats * total.variance + open_variance), prior)
+        variance = repeats * total.variance + open_variance
+        expected = float(jacobian @ ekf.covariance @ jacobian) + variance
+        self.state = smoothed_nis(self.state, residual * residual / expected)
+        gate = chi_square_gate(residual, expected, self._gate)
+        return Row(residual, jacobian, variance + gate)
 
 
 def rut_tilt(rover: Rover, layout: StateLayout, mean: FloatArray) -> float:

@@ -72,13 +72,10 @@ _COAST_WALK = 0.02  # [m/s/sqrt(s)]
 _RIM_CHANGE = 0.2
 """Error of a change of rim speed as a change of speed, over that change [-]."""
 _FLOOR_WALK = 1e-8  # [(m/s)^2/s]
-_START_WALK = 0.4
-"""Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
-_START_WALK_TRAVEL = 0.2  # [m] with which it decays
 _DIGGING_WALK = 12.0
-"""The same over the sinkage that most wheels gain per rim travel [1/sqrt(m)]: where contacts
-change, the slip does."""
-_MOST_WALK = 0.6  # of it where contacts change [1/sqrt(m)]
+"""Random walk of v / rim speed over the sinkage that most wheels gain per rim travel [1/sqrt(m)]:
+where contacts change, the slip does."""
+_MOST_WALK = 0.6  # of it there [1/sqrt(m)]
 _WATCHED_SHARE = 0.5
 """Of ``filter.ratio_walk`` where sinkages would show such a change."""
 _DEMAND_ERROR = 0.3  # of what the demand changes, over that change [-]
@@ -237,19 +234,18 @@ class SpeedProcess(Component[SpeedState]):
             other_direction=ended,
         )
 
-    def follow_contacts(self, travel: float, digging: float, *, reference_known: bool) -> None:
-        """Note how far the slip may walk: farther where contacts change, `travel` [m] from a start.
+    def follow_contacts(self, digging: float, *, reference_known: bool) -> None:
+        """Note how far the slip may walk: farther where contacts change.
 
         `digging` is the sinkage that most wheels gain over rim travel [m/m]; nan = most are not
         read. Without a reference the walk between changes is not narrowed.
         """
         walk = self._walk
-        start = _START_WALK * math.exp(-travel / _START_WALK_TRAVEL)
         if not isnan(digging):
             steady = walk * (_WATCHED_SHARE if reference_known else 1.0)
             changing = min(_DIGGING_WALK * max(digging, 0.0), _MOST_WALK)
             walk = math.hypot(steady, changing)
-        self.state = self.state._replace(ratio_walk=max(walk, start))
+        self.state = self.state._replace(ratio_walk=walk)
 
     # -- Prediction ------------------------------------------------------------------------------
 
@@ -307,10 +303,13 @@ class SpeedProcess(Component[SpeedState]):
         change = now - before
         mean = 0.5 * (abs(before) + abs(now))
         variance = mean * mean * state.ratio_walk**2 * mean * dt
+        # Sides against each other slip apart, and the body moves by half of the difference.
+        opposed = max(rims.magnitude**2 - now**2, 0.0)
+        variance += 0.5 * opposed * _MOST_WALK**2 * rims.magnitude * dt
         variance += (_RIM_CHANGE * change) ** 2 + _FLOOR_WALK * dt
         apart = self.disagreement(rims)
         variance += _INFLATION_RATE * inflation * inflation * dt + apart * apart
-        if state.settled and abs(before) > self._rover.low_rim:
+        if state.settled and state.rims.along(self._rover.low_rim):
             return SpeedStep(now / before, 0.0, 0.0, variance)
         # From a start on: a ratio taken from slow wheels would carry their noise up the ramp.
         variance += state.ratio_std**2 * max(now * now - before * before, 0.0)
@@ -434,7 +433,7 @@ class SpeedProcess(Component[SpeedState]):
         state, rim = self.state, rims.typical
         inflation = state.inflation * math.exp(-self.since_cycle(time) / _INFLATION_TIME)
         ratio, ratio_std = state.ratio, state.ratio_std
-        if settled and abs(rim) > _RATIO_RIM * self._rover.low_rim:
+        if settled and rims.along(_RATIO_RIM * self._rover.low_rim):
             speed, variance = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
             ratio = clipped(speed / rim, _LEAST_RATIO, _MOST_RATIO)
             std = math.sqrt(variance) / abs(rim)

@@ -15,7 +15,7 @@ from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.filter.consistency import (
     SAME_GROUND,
-    distrusted,
+    excess,
     smoothed_nis,
 )
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
@@ -30,30 +30,17 @@ _APART_LENGTH = 5.0  # rim travel over which it lasts [m]
 _LEAST_APART = 2  # wheels that can differ
 
 
-class ForceRows(Component['float | None']):
-    """Rows of one channel of forces; keeps the running mean of its NIS, None = none came yet.
+class TorqueUpdate(Component['tuple[float | None, ...]']):
+    """Turns the torques of turning wheels into rows of the update.
 
-    A soil change looks like an outlier: a row beyond the gate is weakened, not locked out.
+    Keeps the running mean of the NIS of each wheel, None = no torque came yet: one that the models
+    keep missing, by a stone or a failing drive, counts less, the others as before. A soil change
+    looks like an outlier: a row beyond the gate is weakened, not locked out.
     """
 
-    def __init__(self, configuration: Configuration) -> None:
-        super().__init__(None)
-        self._gate = float(configuration.filter.gate)
-
-    def row(self, row: Row, prior: float) -> Row:
-        """Return a row with the variance that its channel deserves; `prior`: that of h(x)."""
-        residual, jacobian, variance = row
-        total = prior + variance
-        self.state = mean = smoothed_nis(self.state, residual * residual / total)
-        gate = chi_square_gate(residual, total, self._gate)
-        return Row(residual, jacobian, distrusted(variance, mean) + gate)
-
-
-class TorqueUpdate(ForceRows):
-    """Turns the torques of turning wheels into rows of the update."""
-
     def __init__(self, configuration: Configuration, rover: Rover, layout: StateLayout) -> None:
-        super().__init__(configuration)
+        super().__init__((None,) * layout.wheel_count)
+        self._gate = float(configuration.filter.gate)
         self._zeros = layout.torque_zero
         # Where the zeros stand in the rows, as indices that numpy need not convert in each cycle.
         columns = np.arange(layout.size)[layout.torque_zero]
@@ -61,6 +48,12 @@ class TorqueUpdate(ForceRows):
         self._known = bool(len(columns))
         self._none = (0.0,) * layout.wheel_count
         self._load_std = rover.load_std
+
+    @property
+    def nis(self) -> float | None:
+        """Mean of the NIS of the wheels; None = no torque came yet."""
+        told = [nis for nis in self.state if nis is not None]
+        return sum(told) / len(told) if told else None
 
     def zeros(self, mean: FloatArray) -> Floats:
         """Return the zeros of the sensors in a state [N m]."""
@@ -83,7 +76,7 @@ class TorqueUpdate(ForceRows):
         a reading [N^2 m^2], `model_variance` that of the shear model, over its square [-];
         `repeats` cycles are one piece of information.
         """
-        rows = []
+        rows, means = [], list(self.state)
         H, zeros = forces.torque_rows, self.zeros(ekf.mean)
         if self._known:
             H = H.copy()
@@ -97,7 +90,11 @@ class TorqueUpdate(ForceRows):
             noise = variance + (self._load_std * model) ** 2 + _FLOOR_VARIANCE
             total = repeats * noise + model_variance * model**2
             total += noises[i] ** 2
-            rows.append(self.row(Row(reading - zeros[i] - model, H[i], total), priors[i]))
+            residual, expected = reading - zeros[i] - model, priors[i] + total
+            means[i] = mean = smoothed_nis(means[i], residual * residual / expected)
+            gate = chi_square_gate(residual, expected, self._gate)
+            rows.append(Row(residual, H[i], total * excess(mean) ** 2 + gate))
+        self.state = tuple(means)
         if cycle.reference_known or len(rows) < _LEAST_APART:
             return rows
         return _independent(rows, _APART_STD * float(np.abs(forces.torque).mean()), repeats)
