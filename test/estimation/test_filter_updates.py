@@ -431,7 +431,7 @@ def test_a_wheel_that_the_models_keep_missing_counts_less_and_no_other(parts, ek
     prior = first[0].jacobian @ ekf.covariance @ first[0].jacobian
     noise = parts.sensors.torque_std**2 + (parts.rover.load_std * found.torque[0]) ** 2
     nis = off[0] ** 2 / (prior + noise)
-    mean = nis + (1.0 - nis) * 0.95**21
+    mean = nis + (1.0 - nis) * 0.9**21
     gate = max(off[0] ** 2 / parts.configuration.filter.gate - (prior + noise), 0.0)
     assert last[0].variance == pytest.approx(noise * mean**2 + gate, rel=1e-3)
     assert mean > 2.0

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from wheel_terra_estimator.estimation.scalars import TINY, clipped, known
 
-_KEEP, _GAIN = 0.95, 0.05  # of the mean per reading: it goes over the last 20
+_GAIN = 0.05  # of the mean per reading: it goes over the last 20
 _LARGEST = 100.0  # NIS that enters the mean: one outlier does not fill it
 CONSISTENT = 1.0
 """Normalised innovation squared (NIS) of a scalar reading, on average, in a filter that is right
@@ -16,10 +16,10 @@ SAME_GROUND = 0.15
 _MOST_CYCLES = 100.0
 
 
-def smoothed_nis(mean: float | None, nis: float) -> float:
+def smoothed_nis(mean: float | None, nis: float, gain: float = _GAIN) -> float:
     """Return the running mean of the NIS of a channel; None = nothing was read before."""
     old = CONSISTENT if mean is None else mean
-    return _KEEP * old + _GAIN * min(nis, _LARGEST)
+    return (1.0 - gain) * old + gain * min(nis, _LARGEST)
 
 
 def excess(mean_nis: float | None) -> float:

@@ -27,6 +27,7 @@ _APART_STD = 0.025
 """By how much torques differ from one another beyond the models, over their mean [-]: each wheel
 has its own load and ground. Tuned without references on simulators A, B and a foreign one."""
 _APART_LENGTH = 5.0  # rim travel over which it lasts [m]
+_GAIN = 0.1  # of the NIS of a wheel per reading: its mean goes over the last ten
 _LEAST_APART = 2  # wheels that can differ
 
 
@@ -91,7 +92,7 @@ class TorqueUpdate(Component['tuple[float | None, ...]']):
             total = repeats * noise + model_variance * model**2
             total += noises[i] ** 2
             residual, expected = reading - zeros[i] - model, priors[i] + total
-            means[i] = mean = smoothed_nis(means[i], residual * residual / expected)
+            means[i] = mean = smoothed_nis(means[i], residual * residual / expected, _GAIN)
             gate = chi_square_gate(residual, expected, self._gate)
             rows.append(Row(residual, H[i], total * excess(mean) ** 2 + gate))
         self.state = tuple(means)
