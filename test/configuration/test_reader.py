@@ -231,6 +231,8 @@ def test_a_configuration_is_read_only_and_can_be_copied():
         ({'rover.mass': 0}, '0.0 is out of range; allowed: number (above 0)'),
         ({'rover.mass': math.nan}, 'nan is not finite'),
         ({'rover.mass': math.inf}, 'inf is not finite'),
+        ({'rover.mass': 1e300}, '1e+300 is no quantity'),
+        ({'reference_odom_max_rate': 1e-300}, '1e-300 is no quantity'),
         ({'wheels.radius': [0.1, -0.1]}, '-0.1 is out of range'),
         ({'wheels.lug_count': [1.5, 2]}, '1.5 is not an integer'),
         ({'wheels.direction': [1, 0]}, 'each entry must be 1 or -1'),
@@ -258,6 +260,13 @@ def test_complaints(changes, words):
     assert message.startswith('rover.yaml: ')
     key = 'rover.suspension' if 'wheels.y' in changes else next(iter(changes))
     assert key in message
+
+
+@pytest.mark.parametrize(('wheels', 'pivot'), [('rear', 0.5), ('front', -0.5)])
+def test_a_bogie_hangs_between_its_wheels(wheels, pivot):
+    changes = [f'rover.bogie_wheels:={wheels}', f'rover.bogie_pivot:=[{pivot}, 0.2]']
+    message = complaint(reader.load, ['generic_six_wheel'], changes)
+    assert 'rover.bogie_pivot: its x must lie between the bogie wheels' in message
 
 
 def test_what_is_missing_is_named():
