@@ -45,7 +45,7 @@ from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
 from wheel_terra_estimator.ros.outputs import EstimatePublisher
-from wheel_terra_estimator.ros.qos import FREQUENT, OVERRIDABLE, input_profile
+from wheel_terra_estimator.ros.qos import FREQUENT, OVERRIDABLE, check_overrides, input_profile
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.ros.live_views import LiveViews
@@ -148,6 +148,9 @@ class EstimatorNode(LifecycleNode):
             except UserError as error:
                 self.get_logger().error(str(error))
                 return TransitionCallbackReturn.FAILURE
+            except Exception as error:  # rclpy goes on without a word of it
+                self.get_logger().error(f'error of the program ({type(error).__name__}: {error})')
+                raise
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -186,6 +189,7 @@ class EstimatorNode(LifecycleNode):
 
         Raises UserError if a parameter is unknown or its value cannot be used.
         """
+        check_overrides(self)
         configuration = parameters.configuration(self._given, self.get_logger().warning)
         self._kept = self._kept_over_restart(configuration)
         kept = self._kept.values(configuration) if self._kept is not None else {}
