@@ -103,6 +103,30 @@ def test_a_failure_while_it_is_configured_is_logged():
     assert 'ZeroDivisionError: of no weight' in log.error.call_args.args[0]
 
 
+def test_a_silence_is_put_down_to_what_is_refused_in_it():
+    from wheel_terra_estimator.configuration import reader
+    from wheel_terra_estimator.messages.pipeline import Pipeline
+    from wheel_terra_estimator.ros.input_watch import InputWatch
+    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
+
+    pipeline = Pipeline(reader.load(['pathfinder']))
+    pipeline.refuse('imu/data', 'damaged')
+    node = SimpleNamespace(
+        _pipeline=pipeline,
+        _rejected=pipeline.rejected,  # an hour ago, while estimates flowed
+        _latest=None,
+        _started=0.0,
+        _set_at=0.0,
+        _watch_inputs=InputWatch(),
+        _publishers_in_words=lambda topic: 'no publishers',
+        resolve_topic_name=lambda topic: f'/{topic}',
+    )
+    assert 'rejected' not in EstimatorNode._silence_in_words(node, 10.0)
+    pipeline.refuse('joint_states', 'damaged')
+    words = EstimatorNode._silence_in_words(node, 10.0)
+    assert words.endswith('/joint_states: rejected: damaged (1 messages)')
+
+
 @pytest.mark.usefixtures('running_estimator')
 class TestOneNode:
     """One node for all, in this order: it has heard nothing before the last."""

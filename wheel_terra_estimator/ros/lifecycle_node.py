@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
@@ -207,6 +208,7 @@ class EstimatorNode(LifecycleNode):
         self._latest: EstimateSet | None = None
         self._started = self._seconds()
         self._set_at = self._diagnostics_at = float('-inf')
+        self._rejected: Counter[tuple[str, str]] = Counter()  # while sets still flowed
         self._incompatible: dict[str, str] = {}
         self._numbered: set[str] = set()
         self._same_name = self._said_ready = False
@@ -462,6 +464,8 @@ class EstimatorNode(LifecycleNode):
         diagnostics = self._pipeline.diagnostics
         diagnostics.look()
         silent = now - self._set_at > SILENCE
+        if not silent:
+            self._rejected = self._pipeline.rejected
         stopped = self._stopped_in_words()
         # While sets flow they bring their own diagnostics; leave them the first word.
         flowing = not (silent or stopped)
@@ -531,7 +535,7 @@ class EstimatorNode(LifecycleNode):
                 words.append(f'{name}: never received ({self._publishers_in_words(topic)})')
             elif age > SILENCE and not self._watch_inputs.is_silent(topic, now):  # told as a fault
                 words.append(f'{name}: silent for {age:.0f} s')
-        for (topic, reason), count in self._pipeline.rejected.items():
+        for (topic, reason), count in (self._pipeline.rejected - self._rejected).items():
             reason = self._pipeline.converter.in_words(topic, reason)
             words.append(f'{self.resolve_topic_name(topic)}: rejected: {reason} ({count} messages)')
         seconds = now - max(self._set_at, self._started)
