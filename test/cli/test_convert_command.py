@@ -137,6 +137,12 @@ def test_a_cell_that_is_no_number(files, capsys):
     assert "log.csv, line 3, column rpm_fl: 'abc' is not a number" in capsys.readouterr().err
 
 
+def test_milliseconds_taken_for_seconds_are_told(files, capsys):
+    (files / 'log.csv').write_text('\n'.join([HEADER, ROWS[0].replace('100.0', '1.7e12')]))
+    assert main(command(files)) == 2
+    assert 'column time: 1.7e+12 s is no time from 0 to 2038; is' in capsys.readouterr().err
+
+
 def test_an_empty_table_is_called_empty(files, capsys):
     (files / 'log.csv').write_text('')
     assert main(command(files)) == 2

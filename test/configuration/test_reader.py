@@ -232,6 +232,8 @@ def test_a_configuration_is_read_only_and_can_be_copied():
         ({'rover.mass': 0}, '0.0 is out of range; allowed: number (above 0)'),
         ({'rover.mass': math.nan}, 'nan is not finite'),
         ({'rover.mass': math.inf}, 'inf is not finite'),
+        ({'rover.mass': 1e300}, '1e+300 is no quantity'),
+        ({'reference_odom_max_rate': 1e-300}, '1e-300 is no quantity'),
         ({'wheels.radius': [0.1, -0.1]}, '-0.1 is out of range'),
         ({'wheels.lug_count': [1.5, 2]}, '1.5 is not an integer'),
         ({'wheels.direction': [1, 0]}, 'each entry must be 1 or -1'),
@@ -454,8 +456,8 @@ def test_an_effect_of_ones_own(tmp_path):
     [
         ('rear', -0.3, ''),
         ('front', 0.3, ''),
-        ('rear', 0.0, 'x 0 m must lie between those of the two rear wheels of a side, -0.6 and 0'),
-        ('front', -0.3, 'of the two front wheels of a side, 0 and 0.6 m'),
+        ('rear', 0.0, 'its x must lie between the bogie wheels, -0.6 and 0 m'),
+        ('front', -0.3, 'the bogie wheels, 0 and 0.6 m'),
     ],
 )
 def test_the_bogie_pivot_lies_between_its_wheels(end, pivot, words):

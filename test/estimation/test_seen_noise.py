@@ -77,6 +77,12 @@ def test_noise_that_messages_of_the_imu_state_is_told_as_stated():
     assert '(covariance of imu/data, or sensors.angular_rate_std: ' in words['default']
 
 
+def test_a_factor_that_tells_nothing_is_not_written_out(noise):
+    for i in range(20):
+        noise.compare_reference(float(i), 0.05 * (-1) ** i, 1e-4, 1e-6, stated=1e-300)
+    assert 'reference noise over 1000 times what is stated' in noise.in_words()['stated']
+
+
 def test_what_nobody_stated_is_known_after_the_first_seconds():
     rng = np.random.default_rng(8)
     told, silent = SeenNoise(sensors()), SeenNoise(sensors(), given=())

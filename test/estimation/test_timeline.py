@@ -263,6 +263,9 @@ def test_a_looped_bag_begins_a_new_run_that_keeps_the_soil():
     assert times(sets) == [round(0.1 * i, 6) for i in range(20)] * 3
     assert core.health()['clock_steps_back'] == 2
     assert core.health()['runs'] == 3
+    told = [(i, s.faults['clock']) for i, s in enumerate(sets) if 'clock' in s.faults]
+    assert [i for i, _ in told] == [20, 40], 'with the first set of the new run'
+    assert 'went back, 2 times so far: a new run' in told[1][1]
     kept = [keep for _, keep in fake.begun]
     assert kept[0] is False and kept == sorted(kept) and kept.count(True) >= 2
 

@@ -62,6 +62,34 @@ def test_joint_state_that_does_not_fit_is_counted(
     assert converter.rejected == {('joint_states', reason): 1}
 
 
+def test_other_joints_on_the_topic_of_the_wheels_are_no_fault(converter, factory):
+    """A mast publishes there too, without a rate: unknown names are ignored."""
+    header = factory.header(STAMP)
+    mast = factory.joint_state(header, ('mast',), position=(0.1,))
+    wheel = factory.joint_state(header, ('left',), velocity=(1.0,))
+    assert converter.convert('joint_states', mast) is None
+    assert converter.rejected  # for so long as nothing else comes
+    assert converter.convert('joint_states', wheel) is not None
+    assert converter.convert('joint_states', mast) is None
+    assert not converter.rejected
+
+
+@pytest.mark.parametrize(
+    ('names', 'words'),
+    [
+        ((), 'no names'),
+        (('mast', ''), "mast, ''"),
+        (('a\nb', '\x1b[2J'), r"'a\nb', '\x1b[2J'"),
+        (('x' * 5000,), f'{"x" * 300} ...'),
+    ],
+)
+def test_odd_names_stay_in_one_short_line(converter, factory, names, words):
+    message = factory.joint_state(factory.header(STAMP), names, velocity=(0.0,) * len(names))
+    converter.convert('joint_states', message)
+    ((topic, reason),) = converter.rejected
+    assert f'in it but {words}; wheels.names' in converter.in_words(topic, reason)
+
+
 def test_effort_of_another_length_costs_the_torque_only(converter, factory):
     message = factory.joint_state(
         factory.header(STAMP), ('left', 'right'), velocity=(1.0, -1.0), effort=(1.0,)

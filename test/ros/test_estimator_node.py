@@ -3,6 +3,8 @@
 """The node as other nodes see it."""
 
 import signal
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -60,6 +62,69 @@ def test_tools_are_told_the_range_of_each_bounded_parameter():
         assert ranges[key] in ([], [bounds]), key
         if not np.isfinite(bounds).all():
             assert ranges[key] == []
+
+
+def test_an_integer_will_do_where_a_number_is_wanted_in_any_state():
+    from wheel_terra_estimator.configuration.parameters import declared
+    from wheel_terra_estimator.ros.parameters import _descriptor
+
+    assert all(_descriptor(p).dynamic_typing is (p.kind == 'number') for p in declared().values())
+
+
+@pytest.mark.parametrize(
+    ('policy', 'good', 'bad'), [('reliability', 'reliable', 'reliabel'), ('depth', 7, '7')]
+)
+def test_a_quality_of_service_that_cannot_be_is_named(policy, good, bad):
+    from wheel_terra_estimator.errors import UserError
+    from wheel_terra_estimator.ros.qos import check_overrides
+
+    def node(value):
+        return SimpleNamespace(
+            get_parameters_by_prefix=lambda prefix: [f'/joint_states.subscription.{policy}'],
+            get_parameter=lambda name: SimpleNamespace(value=value),
+        )
+
+    check_overrides(node(good))
+    with pytest.raises(UserError, match=rf'subscription\.{policy}: {bad!r}; allowed: '):
+        check_overrides(node(bad))
+
+
+def test_a_failure_while_it_is_configured_is_logged():
+    """By a life cycle manager it is told nothing but that it failed."""
+    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
+
+    def fails():
+        raise ZeroDivisionError('of no weight')
+
+    log = Mock()
+    node = SimpleNamespace(_pipeline=None, _configure=fails, get_logger=lambda: log)
+    with pytest.raises(ZeroDivisionError):
+        EstimatorNode.on_configure(node, None)
+    assert 'ZeroDivisionError: of no weight' in log.error.call_args.args[0]
+
+
+def test_a_silence_is_put_down_to_what_is_refused_in_it():
+    from wheel_terra_estimator.configuration import reader
+    from wheel_terra_estimator.messages.pipeline import Pipeline
+    from wheel_terra_estimator.ros.input_watch import InputWatch
+    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
+
+    pipeline = Pipeline(reader.load(['pathfinder']))
+    pipeline.refuse('imu/data', 'damaged')
+    node = SimpleNamespace(
+        _pipeline=pipeline,
+        _rejected=pipeline.rejected,  # an hour ago, while estimates flowed
+        _latest=None,
+        _started=0.0,
+        _set_at=0.0,
+        _watch_inputs=InputWatch(),
+        _publishers_in_words=lambda topic: 'no publishers',
+        resolve_topic_name=lambda topic: f'/{topic}',
+    )
+    assert 'rejected' not in EstimatorNode._silence_in_words(node, 10.0)
+    pipeline.refuse('joint_states', 'damaged')
+    words = EstimatorNode._silence_in_words(node, 10.0)
+    assert words.endswith('/joint_states: rejected: damaged (1 messages)')
 
 
 @pytest.mark.usefixtures('running_estimator')

@@ -62,6 +62,11 @@ def test_a_file_of_somebody_else_is_refused_and_stays_as_it_is(tmp_path, content
     assert not list(tmp_path.glob('.*')), 'nothing is left beside it'
 
 
+def test_a_path_without_a_name_is_refused():
+    with pytest.raises(UserError, match=r'soil_file: /: is a folder'):
+        KeptSoil(Path('/'))
+
+
 def test_a_file_that_the_node_reads_is_refused_even_if_it_is_a_soil_file(tmp_path):
     path = tmp_path / 's.yaml'
     write_values(path, LEARNED)

@@ -19,6 +19,7 @@ from wheel_terra_estimator.messages.convert import (
     INPUT_TYPES,
     InputConverter,
     input_layout,
+    names_in_words,
 )
 from wheel_terra_estimator.messages.unpack import DamagedMessageError, Message, unpack
 
@@ -167,7 +168,7 @@ class MeasurementReader:
                 heard.update(dict.fromkeys(message.names))
         raise UserError(
             f'{self.bag.path}: no wheel of wheels.names ({", ".join(wanted)}) is on '
-            f'{self.topics["joint_states"]}, which holds {", ".join(heard) or "no names"}; '
+            f'{self.topics["joint_states"]}, which holds {names_in_words(heard)}; '
             'set -p wheels.names:=[...] to the names in the bag, front to rear, left before right'
         )
 

@@ -54,6 +54,7 @@ EARTH_RADIUS = 6_371_000.0  # mean [m]
 BASELINE = 1.0  # positions so far apart [s] make a speed: closer ones are noise
 ONE_WAY = 0.5
 """Share of their rate that the wheels have in common, metre for metre, if all count one way [-]."""
+_LATEST = 2**31 - 1  # stamp that a message can hold [s]
 _JOINT = {'velocity': 'rate', 'effort': 'torque', 'position': 'angle'}
 _TOPICS = ('joint_states', 'imu/data', 'sinkage', 'reference_odom')
 REGULAR = 0.8
@@ -244,9 +245,9 @@ class _Sender:
     def send(self, line: int, row: list[str]) -> None:
         check_width(row, self.width, f'{self.table}, line {line}')
         seconds = self.value(line, row, self.layout.time)
-        if not math.isfinite(seconds) or not 0.0 <= seconds < 9e9:
-            column = self.layout.time.name
-            raise UserError(f'{self.table}, line {line}, column {column}: no time from 0 on')
+        if not 0.0 <= seconds < _LATEST:
+            where = f'{self.table}, line {line}, column {self.layout.time.name}'
+            raise UserError(f'{where}: {seconds:g} s is no time from 0 to 2038; is its unit right?')
         stamp = max(round(seconds * 1e6) * 1000, 1)  # of a date no more is held; 0 is no stamp
         joints = self.layout.joints
         rates, torques, angles = (

@@ -34,6 +34,8 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect
 STANDARD_PARAMETERS = ('use_sim_time', 'start_type_description_service')
 STANDARD_PREFIXES = ('qos_overrides.',)
 
+LEAST, MOST = 1e-30, 1e30  # of numbers but 0: squares and inverses are finite
+
 _Sourced = dict[str, tuple[Any, str]]
 
 
@@ -266,6 +268,8 @@ def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]
         value = int(value)
     else:
         value = float(value)
+    if value and not LEAST <= abs(value) <= MOST:
+        raise refuse(f'{value!r} is no quantity ({LEAST} to {MOST})')
     too_low = value <= parameter.lower if parameter.open_lower else value < parameter.lower
     if too_low or value > parameter.upper:
         raise refuse(f'{value!r} is out of range')
@@ -314,15 +318,13 @@ def _check_suspension(values: Mapping[str, Any], refuse: Callable[[str, str], Us
                 'rocker_bogie needs three wheels on each side; '
                 f'wheels.y gives {left} left and {right} right',
             )
-        pivot, end = values['rover.bogie_pivot'][0], values['rover.bogie_wheels']
-        for sign in (1.0, -1.0):
-            along = sorted(there for there, side in zip(x, y, strict=True) if sign * side > 0.0)
-            first, last = along[:2] if end == 'rear' else along[1:]
-            if not first < pivot < last:
+        for side in (1.0, -1.0):
+            along = sorted(xi for xi, yi in zip(x, y, strict=True) if yi * side > 0.0)
+            rear, front = along[:2] if values['rover.bogie_wheels'] == 'rear' else along[1:]
+            if not rear < values['rover.bogie_pivot'][0] < front:
                 raise refuse(
                     'rover.bogie_pivot',
-                    f'x {pivot:g} m must lie between those of the two {end} wheels of a side, '
-                    f'{first:g} and {last:g} m',
+                    f'its x must lie between the bogie wheels, {rear:g} and {front:g} m (wheels.x)',
                 )
 
 

@@ -104,6 +104,7 @@ class EstimatorCore:
         self._reruns = 0  # until the last set
         self._latest: EstimateSet | None = None
         self._clock_steps = 0
+        self._clock_stepped = False  # since the last set
         self._resets = 0
 
     def add(self, measurement: Measurement) -> list[EstimateSet]:
@@ -230,6 +231,7 @@ ReferenceVelocity
             sets += [self._published(due) for due in self._timeline.flush()]
             self.warning.begin_anew()
             self._end_run(keep_soil=True)
+            self._clock_stepped = True
         for arrival in judgement.accepted:
             self._lags.note(arrival.channel, arrival.measurement.stamp)
             sets += self._insert(arrival)
@@ -303,6 +305,12 @@ ReferenceVelocity
             faults['late inputs'] = (
                 f'more than {self._settings.rerun_rate:.0f} steps a second would be run again '
                 '(filter.rerun_rate): fused with delay'
+            )
+        if self._clock_stepped:
+            self._clock_stepped = False
+            faults['clock'] = (
+                f'stamps went back, {self._clock_steps} times so far: a new run begins, soil is '
+                'kept (a looped recording, a clock that was set, or two sources of other clocks)'
             )
         if silent:
             faults['wheel_odometry'] = f'{self._checks.names[0]} silent: wheel rates unknown'

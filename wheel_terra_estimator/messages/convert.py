@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -45,6 +45,7 @@ INPUT_TYPES = {
 _FASTEST = 30.0  # lateral speed that no rover has [m/s]
 DAMAGED = 'damaged message'  # why bytes are refused that are no message of their type
 _NO_WHEEL = 'none of the configured wheels in it'
+_MOST_LETTERS = 300  # of the names of joints in one line of words
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,7 @@ class InputConverter:
         # Messages that did not fit, by (topic, reason in words)
         self.rejected: Counter[tuple[str, str]] = Counter()
         self._unknown_names: dict[str, Sequence[str]] = {}  # topic -> names in a message
+        self._with_wheels: set[str] = set()  # topics that had a wheel: other joints are no fault
         self._columns: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}
         self._index = {name: i for i, name in enumerate(layout.names)}
         self._all = list(range(len(layout.names)))
@@ -120,7 +122,7 @@ class InputConverter:
         """Return a reason for a rejection, with the names where these are the reason."""
         if reason != _NO_WHEEL:
             return reason
-        there = ', '.join(self._unknown_names[topic]) or 'no name'
+        there = names_in_words(self._unknown_names[topic])
         return f'{reason} but {there}; wheels.names: {", ".join(self.layout.names)}'
 
     def _joint_states(self, message: Message) -> WheelOdometry | None:
@@ -233,13 +235,17 @@ class InputConverter:
         self, topic: str, names: Sequence[str], values: Any, label: str
     ) -> FloatArray | None:
         """Sort the values of a JointState into the order of the wheels, nan where there is none."""
-        if len(values) != len(names):
-            self.rejected[topic, f'{label} and name differ in length'] += 1
-            return None
         source, target = self._columns_of(names)
         if not source:
-            self.rejected[topic, _NO_WHEEL] += 1
-            self._unknown_names[topic] = names
+            if topic not in self._with_wheels:
+                self.rejected[topic, _NO_WHEEL] += 1
+                self._unknown_names[topic] = names
+            return None
+        if topic not in self._with_wheels:
+            self._with_wheels.add(topic)
+            del self.rejected[topic, _NO_WHEEL]
+        if len(values) != len(names):
+            self.rejected[topic, f'{label} and name differ in length'] += 1
             return None
         given = np.array(values, dtype=np.float64)
         if target == self._all and len(given) == len(target):
@@ -268,6 +274,12 @@ class InputConverter:
         if not self._mounted:
             return sensor
         return (Rotation.from_quat(sensor) * self.layout.imu_mounting.inv()).as_quat()
+
+
+def names_in_words(names: Iterable[str]) -> str:
+    """Return the names of joints in one line of bounded length, whatever they hold."""
+    words = ', '.join(name if name and name.isprintable() else repr(name) for name in names)
+    return f'{words[:_MOST_LETTERS]} ...' if len(words) > _MOST_LETTERS else words or 'no names'
 
 
 def stamp_of(message: Any) -> int:

@@ -27,7 +27,6 @@ class KeptSoil:
 
     def __init__(self, path: Path, inputs: Iterable[Path] = ()) -> None:
         self.path = path.resolve()
-        self._state_path = soil_file.state_path(self.path)
         self.fault = ''  # why nothing is kept, in words; empty where it is
         self._unusable = ''
         try:
@@ -37,6 +36,7 @@ class KeptSoil:
                 f'soil_file: {error}, or leave it out of the files that the node reads: it is '
                 'read at the start without that'
             ) from None
+        self._state_path = soil_file.state_path(self.path)
         try:
             try_to_write(self.path)
         except UserError as error:

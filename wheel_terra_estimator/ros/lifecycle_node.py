@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
@@ -45,7 +46,7 @@ from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
 from wheel_terra_estimator.ros.outputs import EstimatePublisher
-from wheel_terra_estimator.ros.qos import FREQUENT, OVERRIDABLE, input_profile
+from wheel_terra_estimator.ros.qos import FREQUENT, OVERRIDABLE, check_overrides, input_profile
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.ros.live_views import LiveViews
@@ -148,6 +149,9 @@ class EstimatorNode(LifecycleNode):
             except UserError as error:
                 self.get_logger().error(str(error))
                 return TransitionCallbackReturn.FAILURE
+            except Exception as error:  # rclpy goes on without a word of it
+                self.get_logger().error(f'error of the program ({type(error).__name__}: {error})')
+                raise
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -186,6 +190,7 @@ class EstimatorNode(LifecycleNode):
 
         Raises UserError if a parameter is unknown or its value cannot be used.
         """
+        check_overrides(self)
         configuration = parameters.configuration(self._given, self.get_logger().warning)
         self._kept = self._kept_over_restart(configuration)
         kept = self._kept.values(configuration) if self._kept is not None else {}
@@ -203,6 +208,7 @@ class EstimatorNode(LifecycleNode):
         self._latest: EstimateSet | None = None
         self._started = self._seconds()
         self._set_at = self._diagnostics_at = float('-inf')
+        self._rejected: Counter[tuple[str, str]] = Counter()  # while sets still flowed
         self._incompatible: dict[str, str] = {}
         self._numbered: set[str] = set()
         self._same_name = self._said_ready = False
@@ -458,6 +464,8 @@ class EstimatorNode(LifecycleNode):
         diagnostics = self._pipeline.diagnostics
         diagnostics.look()
         silent = now - self._set_at > SILENCE
+        if not silent:
+            self._rejected = self._pipeline.rejected
         stopped = self._stopped_in_words()
         # While sets flow they bring their own diagnostics; leave them the first word.
         flowing = not (silent or stopped)
@@ -527,7 +535,7 @@ class EstimatorNode(LifecycleNode):
                 words.append(f'{name}: never received ({self._publishers_in_words(topic)})')
             elif age > SILENCE and not self._watch_inputs.is_silent(topic, now):  # told as a fault
                 words.append(f'{name}: silent for {age:.0f} s')
-        for (topic, reason), count in self._pipeline.rejected.items():
+        for (topic, reason), count in (self._pipeline.rejected - self._rejected).items():
             reason = self._pipeline.converter.in_words(topic, reason)
             words.append(f'{self.resolve_topic_name(topic)}: rejected: {reason} ({count} messages)')
         seconds = now - max(self._set_at, self._started)

@@ -93,7 +93,7 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
         description=f'{parameter.meaning}{unit}',
         additional_constraints=f'{parameter.allowed}{when}',
         # An integer will do where a number is wanted; the validator knows.
-        dynamic_typing=tuning and parameter.kind == 'number',
+        dynamic_typing=parameter.kind == 'number',
     )
     finite = parameter.lower > float('-inf') and parameter.upper < float('inf')
     if finite and parameter.kind == 'number' and not tuning:

@@ -60,7 +60,8 @@ def run_node(module: str, name: str, args: list[str] | None = None) -> int:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         except Exception as error:  # rcl's: a parameter file or argument that cannot be read
             # What rcl complains of, without the places in its source.
-            print(str(error).splitlines()[0].partition(', at ')[0], file=sys.stderr)
+            words = str(error).splitlines()[0].partition(', at ')[0]
+            print(f'unknown: {words}' if words.startswith('[') else words, file=sys.stderr)
             return 2
         node = factory()
         if signals is not None:

@@ -4,8 +4,12 @@
 
 from __future__ import annotations
 
+from rclpy import qos
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from wheel_terra_estimator.errors import UserError
 
 OVERRIDABLE = QoSOverridingOptions(
     (
@@ -43,3 +47,15 @@ def output_profile(latched: bool = False) -> QoSProfile:
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
+
+
+def check_overrides(node: Node) -> None:
+    """Raise UserError for a quality of service over which rclpy would end the process."""
+    for end in node.get_parameters_by_prefix('qos_overrides'):
+        name, policy = f'qos_overrides.{end}', end.rpartition('.')[2]
+        value = node.get_parameter(name).value
+        known = getattr(qos, f'{policy.capitalize()}Policy', None)
+        allowed = ', '.join(known.__members__).lower() if known else 'integer (at least 0)'
+        bad_depth = policy == 'depth' and (type(value) is not int or value < 0)
+        if bad_depth or (known and str(value).lower() not in allowed.split(', ')):
+            raise UserError(f'parameters: {name}: {value!r}; allowed: {allowed}')

@@ -41,6 +41,7 @@ _MOST_SHARE = 100.0
 _TOLD_AFTER = 100  # readings before it is told
 _TOLD_REFERENCES = 10
 _MUCH = 5.0  # times what is stated, to be said
+_FAR = 1000.0  # times what is stated, from which the figure tells nothing more
 _CLEARLY = 2.0
 """Times what is stated, to be taken in its place: less may be the motion's own."""
 
@@ -246,10 +247,10 @@ class SeenNoise(Component[SeenNoiseState]):
                 where = sensor.key
                 if by_message:
                     where = _BY_MESSAGE.get(name, f'covariance of imu/data, or {sensor.key}')
+                times = f'{seen / stated:.0f}' if seen < _FAR * stated else f'over {_FAR:.0f}'
                 than = 'what is stated' if binding or by_message else 'the default'
                 words['stated' if binding else 'default'].append(
-                    f'{name.replace("_", " ")} noise {seen / stated:.0f} times {than} '
-                    f'({where}: {seen:.2g})'
+                    f'{name.replace("_", " ")} noise {times} times {than} ({where}: {seen:.2g})'
                 )
         return {than: '; '.join(found) for than, found in words.items() if found}
 

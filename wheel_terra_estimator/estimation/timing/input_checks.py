@@ -120,7 +120,7 @@ class InputChecks:
         if stamp <= 0:
             self.refuse(channel, 'stamp is zero or negative')
             return None
-        if stamp > LATEST_STAMP:
+        if stamp >= LATEST_STAMP:
             self.refuse(channel, 'stamp is beyond the range of ROS time')
             return None
         checked: Measurement | None = self._checks[channel](measurement)
