@@ -320,3 +320,44 @@ def test_exchanged_wheels_are_no_gyro_in_degrees(degrees):
     assert 0.004 < abs(turning.track_ratio(evidence)) < 0.07
     told, _ = turning.check_gyro_unit(evidence)
     assert [finding.fault for finding in told] == ['gyro_degrees'] * degrees
+
+
+def test_a_gyro_that_no_rest_tells_the_zero_of_exchanges_no_wheels():
+    """Turns of 0.2 rad/s with a zero of a third of that, and never a standstill."""
+    time = np.arange(0.0, 60.0, 0.1)
+    yaw = 0.2 * np.sin(0.3 * time)
+    turns = rolling.recording(rolling.Motion(time, 0.3 + 0.0 * time, yaw, 0.0 * time))
+    biased = replace(turns.imu, rate=turns.imu.rate + 0.07 * np.eye(3)[2])
+    told = faults(checked(whole=turns, imu=biased))
+    assert not {'exchanged', 'backwards', 'swapped_sides'} & {*told}
+
+
+@pytest.mark.parametrize('angle', [90.0, -50.0, 140.0])
+def test_a_reference_that_points_aside_is_no_reversed_one(angle):
+    forward, a = WHOLE.reference.velocity[:, 0], math.radians(angle)
+    aside = np.column_stack([forward * math.cos(a), forward * math.sin(a), 0.0 * forward])
+    report = checked(reference=replace(WHOLE.reference, velocity=aside))
+    (told,) = report.findings
+    assert told.fault == 'reference_turned' and told.confidence > 0.8
+    assert told.value == pytest.approx(angle, abs=3.0)
+    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
+    either = checked(whole=straight, reference=replace(straight.reference, velocity=aside))
+    assert 'world frame' in next(f.words for f in either.findings if f.kind == 'mounting')
+
+
+def test_an_orientation_that_hardly_turns_tells_degrees_per_second():
+    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
+    imu = straight.imu
+    yaw = 0.04 * np.sin(0.5 * imu.seconds)
+    half = 0.5 * np.cumsum(yaw) * imu.period
+    attitude = np.column_stack([0 * half, 0 * half, np.sin(half), np.cos(half)])
+    rate = np.degrees(imu.rate + np.outer(yaw, [0.0, 0.0, 1.0]))
+    told = faults(checked(whole=straight, imu=replace(imu, rate=rate, orientation=attitude)))
+    assert told == ['gyro_degrees']
+
+
+def test_a_specific_force_a_little_off_gravity_is_reported():
+    """A zero along z, a scale or another gravity: nothing in a recording tells which."""
+    report = checked(imu=replace(WHOLE.imu, force=WHOLE.imu.force + 0.6 * np.eye(3)[2]))
+    assert not [f for f in report.findings if f.kind in ('gravity', 'unit', 'zero')]
+    assert any('z zero' in e.reason for e in report.not_checked if e.kind == 'gravity')

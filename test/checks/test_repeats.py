@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 
+from wheel_terra_estimator.checks.series import rows_of
+
 
 def found(**changes):
     return rolling.checked(**changes).findings
@@ -136,3 +138,18 @@ def test_torques_that_brake_down_a_slope_have_a_sign():
     joints = replace(WHOLE.joints, torque=np.abs(WHOLE.joints.torque))
     downhill = replace(WHOLE.imu, force=force)
     assert 'torque_unsigned' not in {f.fault for f in found(joints=joints, imu=downhill)}
+
+
+def test_a_seldom_reference_that_stays_for_six_readings():
+    """One reading a second, with noise: six alike are no chance."""
+    reference = rows_of(WHOLE.reference, np.arange(WHOLE.reference.stamp.size) % 2 == 0)
+    (finding,) = found(reference=held(reference, 'velocity', 120.0, 127.5))
+    assert finding.fault == 'reference_frozen'
+
+
+@pytest.mark.parametrize('times', [2, 5])
+def test_rates_that_are_sent_more_often_than_measured(times):
+    rows = np.arange(WHOLE.joints.stamp.size) // times * times
+    joints = replace(WHOLE.joints, rate=WHOLE.joints.rate[rows], torque=WHOLE.joints.torque[rows])
+    told = next(f for f in found(joints=joints) if f.fault == 'rates_held')
+    assert told.words.startswith(f'each value comes {times} times')

@@ -20,18 +20,16 @@ from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import of_offset, untold
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import Channel, Recording
+from wheel_terra_estimator.checks.series import Channel, Recording, shifted
 from wheel_terra_estimator.checks.statistics import (
-    Trial,
     averaged,
     correlation,
     even_times,
-    halves,
     moving_mean,
     without_drift,
-    worst,
 )
 from wheel_terra_estimator.checks.transport import FUTURE
+from wheel_terra_estimator.checks.trial import Trial, halves, worst
 
 STEP = 0.05  # time between the values that are compared [s]
 LONGEST = {'imu': 2.0, 'reference': 3.0}  # greatest lag that is looked for [s]
@@ -42,7 +40,7 @@ LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the 
 FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part with it, at most
 LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1}  # of chassis and filters [s]
 APART = 0.2  # lags of two halves or motions that differ by less agree [s]
-SIGMAS = 4.0
+SIGMAS, SHARP_SIGMAS = 4.0, 10.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]
 SLOWEST = 1.5  # period above which nothing is said of the stamps [s]
 SMOOTHED = 1.0  # speeds and turns are averaged over this to share a drive in halves [s]
@@ -71,7 +69,9 @@ class Lag(NamedTuple):
         """Whether it is a lag of a channel and stood its trial."""
         periods = LEAST_PERIODS * _channel(evidence, name).period if name == 'reference' else 0.0
         clear = max(LEAST_OFFSET, 1.5 * evidence.period, periods, SIGMAS * self.std)
-        return abs(self.value) > clear and self.trial.after < FALLS[self.by] * self.trial.before
+        sharp = abs(self.value) > SHARP_SIGMAS * self.std  # what else is unlike, no stamp mends
+        falls = self.trial.after < (1.0 if sharp else FALLS[self.by]) * self.trial.before
+        return abs(self.value) > clear and falls
 
     def of_the_first(self) -> Lag:
         """Return how late the first sensor's stamps are."""
@@ -97,11 +97,6 @@ def corrected(recording: Recording, facts: RoverFacts) -> Recording:
         if channel is not None and offset:
             changes[name] = shifted(channel, offset)
     return replace(recording, **changes) if changes else recording
-
-
-def shifted(channel: Any, offset: int) -> Any:
-    """Return a channel with an offset [ns] taken off its stamps; 0 stays no stamp."""
-    return replace(channel, stamp=np.where(channel.stamp > 0, channel.stamp - offset, 0))
 
 
 def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

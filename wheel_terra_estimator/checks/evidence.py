@@ -321,10 +321,15 @@ def gather(
     if imu is not None and imu.stamp.size > 1 and time.size > 1:
         at = (imu.stamp - joints.stamp[rows[0]]) * 1e-9
         width = float(np.median(np.diff(time)))
-        force = averaged(at, np.nan_to_num(imu.force) @ rotation.T, time, width)
-        gyro = averaged(at, np.nan_to_num(imu.rate) @ rotation.T, time, width)
-        force = force - facts.errors.specific_force_bias
-        gyro = gyro - facts.errors.angular_rate_bias
+        force, gyro = (
+            averaged(at, np.nan_to_num(values) @ rotation.T, time, width) - bias
+            if np.isfinite(values).any()
+            else None
+            for values, bias in (
+                (imu.force, facts.errors.specific_force_bias),
+                (imu.rate, facts.errors.angular_rate_bias),
+            )
+        )
     return Evidence(recording, facts, time, rate, torque, force, gyro, rotation, figures, steering)
 
 

@@ -19,19 +19,18 @@ from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
     UNIFORM_STD,
     Estimate,
-    Trial,
     bend_noise,
     block_fit,
     confidence,
     correlation,
     probability,
-    tried,
 )
 from wheel_terra_estimator.checks.torque import SOFT_TRACTION, both_ways, thrust
+from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.checks.wheel_rates import OF_RADII, rounding
 
 LEAST_RADIUS_ERROR = 0.025  # share by which a radius is wrong before it is a finding [-]
-RADIUS_SIGMAS = 4.0
+RADIUS_SIGMAS, UNCLEAR_SIGMAS = 4.0, 2.0  # from which it is a finding, or left open [-]
 LEAST_OF_SIDES = 0.05  # difference of the sides' radii, at least [-]; a cross slope makes slip
 OUTRUN_STD = 0.01  # slip that is left open where a rover outruns its wheels [-]
 PRIOR_OF_RADIUS = 0.85  # probability that it is the radius, not the scale of the reference [-]
@@ -245,8 +244,10 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sides = _of_sides(evidence)
     lopsided = abs(sides.value) > max(LEAST_OF_SIDES, RADIUS_SIGMAS * sides.std)
     sigmas = sides.sigmas_from(0.0) if lopsided else ratio.sigmas_from(1.0)
-    if not lopsided and (abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < RADIUS_SIGMAS):
+    if not lopsided and (abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < UNCLEAR_SIGMAS):
         return [], evidence
+    if sigmas < RADIUS_SIGMAS:
+        return [untold('radius', 'unclear', ratio=ratio.value, std=ratio.std)], evidence
     if not (trial.falls or lopsided):
         return [untold('radius', 'halves')], evidence
     apart = sides.value * facts.side if lopsided else np.zeros(facts.side.size)

@@ -35,10 +35,11 @@ from wheel_terra_estimator.checks.statistics import (
     runs,
     step_of,
 )
-from wheel_terra_estimator.checks.turning import ordinary_track, track_ratio
+from wheel_terra_estimator.checks.turning import IN_DEGREES, ordinary_track, track_ratio
 from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
 
 GRAVITY_TOLERANCE = 0.1  # of the mean specific force (slopes, bias, vibration) [-]
+SLOPES = 0.035  # the same by slopes and bias alone [-]
 GRAVITY_BIAS = 0.3  # the same as an acceleration: biases [m/s^2]
 GRAVITIES = {'the Moon': 1.62, 'Mars': 3.71, 'the Earth': 9.81}  # [m/s^2]
 UPRIGHT_SHARE = 0.5  # share of the mean specific force along z that gravity has on a rover [-]
@@ -67,7 +68,6 @@ LEAST_WILD = 3
 MOST_WILD = 0.2  # share of wild samples that are single ones, at most [-]
 LEAST_MESSAGES = 20
 UNIT_TOLERANCE = 0.12  # share by which the mean specific force may lie off gravity in another unit
-ORIENTATION_DEGREES = (30.0, 110.0)  # gyro over orientation if in degrees per second [-]
 UP_APART = math.radians(25.0)  # that no acceleration makes [rad]
 MOST_COMPARED = 5000  # messages
 FROZEN_SHARE = 0.3  # share of messages that repeat the one before
@@ -83,8 +83,6 @@ class ImuState:
     recording: Recording
     rotation: FloatArray
     gravity: float
-    usable_force: bool = True
-    usable_gyro: bool = True
 
     @property
     def imu(self) -> ImuSeries:
@@ -100,6 +98,15 @@ class ImuState:
         """Return the state with another channel of the IMU."""
         return replace(self, recording=replace(self.recording, imu=imu))
 
+    def without(self, *names: str) -> ImuState:
+        """Return the state without the force or the rate, which mean nothing."""
+        nothing = np.full_like(self.imu.force, np.nan)
+        return self.with_values(**dict.fromkeys(names, nothing))
+
+    def has(self, name: str) -> bool:
+        """Whether there is a force or a rate that means something."""
+        return bool(np.isfinite(getattr(self.imu, name)).any())
+
     def found(self, key: str, sure: float, **told: Any) -> Finding:
         """Return a finding on its topic."""
         return found(key, self.imu.topic, sure, **told)
@@ -112,17 +119,16 @@ def check_imu(state: ImuState) -> Judged:
     """Return what the IMU says against itself, and the recording with that mended."""
     if state.recording.imu is None or state.imu.stamp.size < LEAST_MESSAGES:
         none: list[Outcome] = [untold(kind, 'no_imu') for kind in ('mounting', 'gravity')]
-        return none, replace(state, usable_force=False, usable_gyro=False)
+        return none, replace(state, recording=replace(state.recording, imu=None))
     outcomes, state = _placeholders(state)
-    force, gyro = 'usable_force', 'usable_gyro'
     for check, *needed in (
-        (_frozen, force, gyro),
-        (_gravity, force),
-        (_wild, force, gyro),
-        (_up_by_orientation, force),
-        (_against_orientation, gyro),
+        (_frozen, 'force', 'rate'),
+        (_gravity, 'force'),
+        (_wild, 'force', 'rate'),
+        (_up_by_orientation, 'force'),
+        (_against_orientation, 'rate'),
     ):
-        if all(getattr(state, name) for name in needed):
+        if all(map(state.has, needed)):
             told, state = check(state)
             outcomes += told
     return outcomes, state
@@ -151,17 +157,15 @@ def _up_by_orientation(state: ImuState) -> Judged:
 def _placeholders(state: ImuState) -> Judged:
     outcomes: list[Outcome] = []
     imu = state.imu
-    usable: dict[str, Any] = {}
-    for name, field in (('force', 'linear_acceleration'), ('gyro', 'angular_velocity')):
-        values = imu.force if name == 'force' else imu.rate
-        there = bool(np.isfinite(values).any())  # its covariance may say that there is none
-        usable[f'usable_{name}'] = bool(np.any(np.nan_to_num(values)))
-        if there and not usable[f'usable_{name}']:
-            outcomes.append(state.found('force_zero', 0.999, field=field))
-        elif not there:
-            of, tells = ('gravity', 'slope and load') if name == 'force' else ('sign', 'turns')
+    for name, field, of, tells in (
+        ('force', 'linear_acceleration', 'gravity', 'slope and load'),
+        ('rate', 'angular_velocity', 'sign', 'turns'),
+    ):
+        if not state.has(name):  # its covariance may say so
             outcomes.append(untold(of, f'{name}_missing', field=field, tells=tells))
-    state = replace(state, **usable)
+        elif not np.nan_to_num(getattr(imu, name)).any():
+            outcomes.append(state.found('force_zero', 0.999, field=field))
+            state = state.without(name)
     known = np.isfinite(imu.orientation).all(axis=1)
     orientation = imu.orientation[known]
     if known.sum() > LEAST_MESSAGES:
@@ -187,7 +191,7 @@ def _frozen(state: ImuState) -> Judged:
     if alive.sum() >= LEAST_MESSAGES:
         state = state.with_imu(rows_of(imu, alive))
     else:
-        state = replace(state, usable_force=False, usable_gyro=False)
+        state = state.without('force', 'rate')
     return [state.found('sensor_frozen', 0.99, how=how)], state
 
 
@@ -205,8 +209,10 @@ def _gravity(state: ImuState) -> Judged:
     imu, gravity = state.imu, state.gravity
     middle = np.median(imu.force, axis=0)
     size = float(np.linalg.norm(middle))
-    if abs(size - gravity) <= max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):
-        return [], state
+    off = abs(size - gravity)
+    if off <= max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):
+        small = off <= max(SLOPES * gravity, GRAVITY_BIAS)
+        return [] if small else [untold('gravity', 'unlike', size=size, gravity=gravity)], state
 
     def told(key: str, value: float, **figures: Any) -> list[Outcome]:
         return [state.found(key, 0.98, value=value, size=size, gravity=gravity, **figures)]
@@ -215,7 +221,7 @@ def _gravity(state: ImuState) -> Judged:
     # What a slope leaves may have the size of gravity in g.
     in_g = abs(size * STANDARD_GRAVITY / gravity - 1.0) <= UNIT_TOLERANCE and upright
     if size < 0.3 * min(gravity, STANDARD_GRAVITY) and not in_g:
-        return told('gravity_off', gravity), replace(state, usable_force=False)
+        return told('gravity_off', gravity), state.without('force')
     for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
         if abs(size * factor / gravity - 1.0) <= UNIT_TOLERANCE:
             return told('force_unit', factor, unit=unit), state.with_values(
@@ -258,7 +264,7 @@ def _against_orientation(state: ImuState) -> Judged:
             words = {'value': -1.0, 'axis': name, 'against': 'the orientation'}
             outcomes.append(state.found('gyro_reversed', confidence(6.0 * abs(fit)), **words))
         times = abs(float(x @ y) / float(x @ x))
-        if ORIENTATION_DEGREES[0] < times < ORIENTATION_DEGREES[1]:
+        if IN_DEGREES[0] < times < IN_DEGREES[1]:
             degrees.append(times)
     if degrees:
         factor *= math.radians(1.0)

@@ -116,7 +116,16 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         return [evidence.found('reference_world', 0.95)], mended
     if in_body < STEADY:
         return [untold('mounting', 'reference_frame')], evidence
-    return [], evidence
+    if not reference.points_aside:
+        return [], evidence
+    angle, told = float(np.angle(direction.mean())), float(np.ptp(psi)) > CLEAR_HEADING
+    turned = velocity * np.exp(-1j * angle)
+    mended = evidence.with_channel(
+        'reference', velocity=np.column_stack([turned.real, turned.imag, 0.0 * rim])
+    )
+    rival = '' if told else ', or it is given in the world frame: drive a circle'
+    sure, words = 0.9 if told else 0.5, {'angle': math.degrees(angle), 'rival': rival}
+    return [evidence.found('reference_turned', sure, value=words['angle'], **words)], mended
 
 
 def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[FloatArray, Mask]:

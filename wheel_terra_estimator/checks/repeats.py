@@ -23,12 +23,15 @@ from wheel_terra_estimator.checks.statistics import runs
 LEAST_TIME = 5.0  # time of driving in which a reading that stays is frozen [s]
 ZERO_TIME = 20.0  # the same of a vector of zeros [s]
 LEAST_MESSAGES = 10  # messages in which it stays, at least
+LEAST_NOISY = 4  # the same of a reading with noise
 LONGER = 10.0  # so many times longer than a reading usually stays [-]
 FINE = 50  # different readings of a sensor whose steps are not what makes it stay
 MOST_REPEATED = 0.5  # share of rates that repeat themselves: more are rounded, or noiseless
+LEAST_BESIDE = 30  # other readings that tell whether a sensor has noise
 SELDOM = 0.1  # share of readings that repeat the one before of a sensor with noise [-]
 CHANGES = 0.5  # change of the rates over the working rate that all else then changes with [-]
 AT_ONCE = 0.9  # share of a stretch in which no rate without noise changes, at least [-]
+LEAST_CHANGES = 30  # changes of rates from which their rhythm is told
 CLEAR_SINKAGE = 0.005  # of the other wheels, beside which none reads 0 all the time [m]
 
 
@@ -47,7 +50,20 @@ def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
                 outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
                 evidence = replace(evidence, **{name: None})  # type: ignore[arg-type]
     torques, evidence = _torques(evidence)
-    return [*outcomes, *torques, *deep], evidence
+    return [*outcomes, *torques, *deep, *_held(evidence)], evidence
+
+
+def _held(evidence: Evidence) -> list[Outcome]:
+    """Return rates and torques that change with every so many messages only: sent on a timer."""
+    readings = np.nan_to_num(np.hstack([evidence.rate, evidence.torque]))
+    changes = np.any(np.diff(readings, axis=0) != 0.0, axis=1) & evidence.moving[1:]
+    steps = np.diff(np.flatnonzero(changes))
+    if steps.size < LEAST_CHANGES:
+        return []
+    times = float(np.median(steps))
+    if times < 2.0 or np.mean(steps == times) < AT_ONCE:
+        return []
+    return [evidence.found('rates_held', 0.95, times=times, period=times * evidence.period)]
 
 
 def _reference(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -127,7 +143,7 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         lasts = share * (last - first) * period  # a gap is none
         beside = np.delete(same, np.s_[first:last])
         steady = np.ptp(speed[first:last]) < CHANGES * evidence.working_rate
-        noisy = 2 * beside.size > last - first and np.mean(beside) < SELDOM
+        noisy = beside.size > LEAST_BESIDE and np.mean(beside) < SELDOM
         live = not readings[first].any() and bool(readings.any())
         live = live and not (noisy and values.shape[1] > 1 and lasts > ZERO_TIME)
         if live or lasts < LEAST_TIME or (rounded and steady and not noisy):
@@ -139,7 +155,8 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
             FINE, len(others) // 2
         )
-        if coarse or share * (last - first) < max(LEAST_MESSAGES, LONGER * usual):
+        needed = LEAST_NOISY if noisy else max(LEAST_MESSAGES, LONGER * usual)
+        if coarse or share * (last - first) < needed:
             continue
         rows[np.flatnonzero(known)[first : last + 1]] = True
         if lasts > longest:

@@ -134,14 +134,10 @@ def _examined(
     mended('unknown_name', None, lambda: names.check_topics(recording, remapped))
     stated = facts
     facts = mended('missing_wheel', facts, lambda: names.check_wheel_names(recording, stated))
-    late: dict[str, float] = {}
-    late = mended(
-        'order', late, lambda: transport.check_transport(recording, stated, report.figures)
+    arrived = recording
+    stamped = mended(
+        'order', arrived, lambda: transport.check_transport(arrived, stated, report.figures)
     )
-    for name, offset in late.items():
-        on_time = clocks.shifted(getattr(recording, name), round(offset * 1e9))
-        recording = replace(recording, **{name: on_time})
-    stamped = recording
     recording = mended('placeholder', stamped, lambda: _whole_rows(stamped))
     evidence = against_each_other(recording, facts, AGAINST_EACH_OTHER, mended)
     if evidence is None:
@@ -194,8 +190,6 @@ def against_each_other(
     evidence = gather(state.recording, facts, state.rotation, mended.report.figures)
     if evidence is None or np.isfinite(evidence.rate).any(axis=1).sum() < LEAST_MOVING_ROWS:
         return None
-    force = evidence.force if state.usable_force else None
-    evidence = replace(evidence, force=force, gyro=evidence.gyro if state.usable_gyro else None)
     for kind, module, check, *_ in checks:
         given = evidence
         evidence = mended(kind, given, lambda: getattr(module, check)(given), check)  # noqa: B023

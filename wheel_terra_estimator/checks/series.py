@@ -7,12 +7,15 @@ Stamps and log times are integer nanoseconds; ``nan`` marks what a message did n
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
+
+ASIDE = math.radians(30.0)  # direction of a velocity that no rover slides in all along [rad]
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,11 @@ def rows_of(series: Series, kept: BoolArray) -> Series:
     return replace(series, **arrays)
 
 
+def shifted(channel: Any, offset: int | IntArray) -> Any:
+    """Return a channel with an offset, () or (k,) [ns], taken off its stamps; 0 stays no stamp."""
+    return replace(channel, stamp=np.where(channel.stamp > 0, channel.stamp - offset, 0))
+
+
 @dataclass(frozen=True)
 class JointSeries(Channel):
     """Joint states: rate, effort and, where kept, position of every joint that occurs, (k, n)."""
@@ -84,6 +92,12 @@ class VelocitySeries(Channel):
     velocity: FloatArray  # (k, 3) linear
     yaw_rate: FloatArray  # (k,)
     variance: FloatArray  # (k,) of linear.x as stated
+
+    @property
+    def points_aside(self) -> bool:
+        """Whether it is no velocity along x of the rover."""
+        forward, side = np.nanmedian(np.abs(self.velocity[:, :2]), axis=0)
+        return bool(side > math.tan(ASIDE) * forward)
 
 
 @dataclass(frozen=True)

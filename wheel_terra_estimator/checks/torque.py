@@ -22,13 +22,12 @@ from wheel_terra_estimator.checks.felt_motion import felt_yaw
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
-    Trial,
     block_fit,
     confidence,
     moving_mean,
     runs,
-    tried,
 )
+from wheel_terra_estimator.checks.trial import Trial, tried
 
 UPHILL_ENOUGH = -0.02  # specific force along the drive at which a wheel takes power [g]
 SIGN_SIGMAS = 4.0
@@ -71,7 +70,7 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if unsigned:
         blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
         return [*unsigned, *_not_told('no_sign')], blank
-    outcomes, evidence = _signs(evidence)
+    outcomes, evidence, unsure = _signs(evidence)
     if not evidence.facts.known or evidence.force is None:
         return outcomes, evidence
     if not known.all():
@@ -87,7 +86,7 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes += scale
     if any(isinstance(o, Finding) for o in scale):
         return outcomes, without
-    wrong = _zeros(evidence, zeros)
+    wrong = _zeros(evidence, zeros, unsure)
     if any(isinstance(o, Finding) for o in wrong) and zeros is not None:
         evidence = without
     return [*outcomes, *_gain(evidence), *wrong], evidence
@@ -97,14 +96,14 @@ def _not_told(why: str, **figures: float) -> list[Outcome]:
     return [untold(kind, why, **figures) for kind in ('gain', 'mass')]
 
 
-def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence, bool]:
     """Return torques of the wrong sign: by what slopes, starts and stops change in them.
 
     The mean alone does not tell: a wheel whose radius is a little smaller is dragged by the others.
     """
     facts, told = evidence.facts, answers(evidence)
     if told is None:
-        return [untold('sign', 'torque_no_change')], evidence
+        return [untold('sign', 'torque_no_change')], evidence, False
     usual = float(np.median([abs(answer.value) for answer, _ in told]))
     agree = all(answer.value * level.value > 0.0 for answer, level in told)
     wrong, unsure = [], []
@@ -119,13 +118,13 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     why = untold('sign', 'torque_unsure', wheels=', '.join(unsure))
     outcomes: list[Outcome] = [why] if unsure else []
     if not wrong:
-        return outcomes, evidence
+        return outcomes, evidence, bool(unsure)
     torque = evidence.torque.copy()
     torque[:, wrong] *= -1.0
     sure = confidence(min(max(one.sigmas_from(0.0) for one in told[i]) for i in wrong))
     names = ', '.join(facts.names[i] for i in wrong)
     outcomes.append(evidence.found('torque_sign', sure, wheel=names, value=-1.0))
-    return outcomes, evidence.with_rate(evidence.rate, torque)
+    return outcomes, evidence.with_rate(evidence.rate, torque), bool(unsure)
 
 
 def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
@@ -416,12 +415,13 @@ def drive_friction(evidence: Evidence) -> Estimate | NotChecked:
     return Estimate(mean, math.hypot(scatter, zero / math.sqrt(len(wheels)), noise))
 
 
-def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
+def _zeros(evidence: Evidence, zeros: list[Estimate] | None, unsure: bool) -> list[Outcome]:
+    """Return zeros that are off; standing tells none where a sign is ``unsure``."""
     facts, rest, where = evidence.facts, evidence.at_rest, 'driving both ways'
     stated = max(float(facts.sensors.torque_zero_std), 1e-3)
     driving = float(np.nanmedian(np.abs(evidence.torque[evidence.moving])))
     if zeros is None:
-        if rest.sum() < LEAST_MOVING_ROWS:
+        if rest.sum() < LEAST_MOVING_ROWS or unsure:
             return [untold('zero', 'torque_no_rest')]
         # Standing wheels are wound up against each other, otherwise at each stop; only an odd one
         # out is told.

@@ -5,15 +5,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.faults import found, of_offset
 from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import Channel, JointSeries, Recording, SinkageSeries
+from wheel_terra_estimator.checks.series import (
+    Channel,
+    JointSeries,
+    Recording,
+    SinkageSeries,
+    shifted,
+)
 from wheel_terra_estimator.checks.statistics import robust_std
 
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
@@ -25,6 +33,7 @@ OFF_PERIOD, REGULAR = 0.2, 0.6
 than that (0.4 by chance) below which stamps jitter [-]."""
 BACKWARD_SHARE = 0.05  # share of stamps before that of an earlier arrival, at most [-]
 FAR_BACK = 1.0  # A stamp that goes back by more than this [s] is out of order by itself
+MOST_STEPS = 5  # of a clock that is set; more are of another kind and stay
 FUTURE = -0.1  # arrival less stamp that no message has [s]
 MOST_OFFSET = 1e4  # offset that a rover file may state, either way [s]
 ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
@@ -33,19 +42,23 @@ CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
 
 def check_transport(
     recording: Recording, facts: RoverFacts, figures: dict[str, Any]
-) -> tuple[list[Outcome], dict[str, float]]:
-    """Return what is wrong with the stamps, and how late those of a channel are by log time [s]."""
+) -> tuple[list[Outcome], Recording]:
+    """Return what is wrong with the stamps, and the recording with that mended by log time."""
     outcomes: list[Outcome] = []
     late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
+    mended: dict[str, Any] = {}
     for name in ('joints', 'imu', 'sinkage', 'reference'):
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
             continue
         most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
-        order, step = _order(channel, most_back), _step(channel)
+        order, jumps = _order(channel, most_back), _steps(channel)
+        step = float(jumps[np.argmax(np.abs(jumps))])
         outcomes += order
         if step and not order:
             steps[channel.topic] = step
+            if np.count_nonzero(jumps) <= MOST_STEPS:
+                mended[name] = shifted(channel, np.round(1e9 * np.cumsum(jumps)).astype(np.int64))
         elif not order:
             outcomes += _drop_outs(name, channel, figures)
         if channel.late.size and not step:
@@ -58,13 +71,13 @@ def check_transport(
         how += f', as those of {", ".join(rest)} do: a clock was set' if rest else ''
         outcomes.append(found('order', topic, 0.99, how=how))
     if 'joints' not in late:
-        return outcomes, {}
+        return outcomes, replace(recording, **mended)
     assert recording.joints is not None
     if max(shifts.values()) - min(shifts.values()) > CLOCK_DIFFERENCE:  # no offset mends that
         name = max(shifts, key=lambda one: abs(shifts[one]))
         how = f'its stamps shift by {shifts[name]:.2g} s against log time: a clock set, or drifting'
         topic = getattr(recording, name).topic
-        return [*outcomes, found('order', topic, 0.97, how=how)], {}
+        return [*outcomes, found('order', topic, 0.97, how=how)], replace(recording, **mended)
     off, joints = {}, late['joints']
     if abs(joints - late.get('imu', joints)) > CLOCK_DIFFERENCE:
         # Stamps lie near their arrival: those that are farther off are wrong.
@@ -74,7 +87,6 @@ def check_transport(
         ahead = name == 'sinkage' and late.get(name, 0.0) < FUTURE < joints
         if ahead or abs(late.get(name, joints) - joints) > MOST_OFFSET:
             off[name] = late[name] - joints
-    told = dict[str, float]()
     for key, value in off.items():
         channel, name = getattr(recording, key), 'wheel_odometry' if key == 'joints' else key
         if abs(value) > MOST_OFFSET:
@@ -84,16 +96,18 @@ def check_transport(
         std = math.hypot(robust_std(channel.late), robust_std(recording.joints.late), ARRIVAL_STD)
         words = of_offset(name, -value, std, 'log time: two clocks', facts)
         outcomes.append(found(f'{name}_offset', channel.topic, 0.999, **words))
-        told[key] = -value
-    return outcomes, told
+        mended[key] = shifted(channel, round(-value * 1e9))
+    return outcomes, replace(recording, **mended)
 
 
-def _step(channel: Channel) -> float:
-    """Return the greatest step of the stamps that messages do not arrive by [s]; 0 for none."""
+def _steps(channel: Channel) -> FloatArray:
+    """Return the steps (k,) before stamps that messages do not arrive by [s]; 0 for none."""
     stamped = channel.stamp > 0
     step, arrival = (np.diff(at[stamped]) * 1e-9 for at in (channel.stamp, channel.log_time))
     far = (step < -FAR_BACK) | ((step > FAR_BACK) & (arrival < 0.5 * step))
-    return float(step[far][np.argmax(np.abs(step[far]))]) if far.any() else 0.0
+    steps = np.zeros(stamped.size)
+    steps[np.flatnonzero(stamped)[1:]] = np.where(far, step - arrival, 0.0)
+    return steps
 
 
 def _order(channel: Channel, most_back: float) -> list[Outcome]:

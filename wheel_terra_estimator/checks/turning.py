@@ -28,16 +28,14 @@ from wheel_terra_estimator.checks.finding import Finding, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
-    Trial,
     block_fit,
     confidence,
     correlation,
-    halves,
     integrated,
     robust_std,
-    worst,
 )
 from wheel_terra_estimator.checks.torque import Slopes, slope_fit
+from wheel_terra_estimator.checks.trial import Trial, halves, worst
 from wheel_terra_estimator.estimation.measurements import heading_of
 
 Mask = BoolArray
@@ -51,7 +49,9 @@ UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
 CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
+IN_DEGREES = (30.0, 110.0)  # gyro over orientation if in degrees per second [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
+LEAST_TURNED = 0.1  # turn in that time, which no rolling of a pitched body is [rad]
 LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
 TIE = 1e-3  # residuals [-] that differ by less are the same
 NOISE_FLOOR = 0.02  # residual [-] by which hypotheses must differ at least
@@ -141,13 +141,16 @@ def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
     if stretch.turns.sum() >= LEAST_TURNING_ROWS:
         left, right = lateral > 0.0, lateral < 0.0
         stated = float(lateral[left].mean() - lateral[right].mean())
-        turned, apart = yaw, speed[:, :, right].mean(axis=2) - speed[:, :, left].mean(axis=2)
-        if not stretch.unbiased:
-            turned, apart = yaw - yaw.mean(), apart - apart.mean(axis=1, keepdims=True)
+        apart = speed[:, :, right].mean(axis=2) - speed[:, :, left].mean(axis=2)
+        turned, usual = yaw, np.zeros((len(fixes), 1))
+        if not stretch.unbiased:  # the mean turn is that of the wheels
+            turned, usual = yaw - yaw.mean(), apart.mean(axis=1, keepdims=True)
+            apart = apart - usual
         both, energy = apart @ turned, float(turned @ turned)
         alike = both / np.maximum(np.sqrt(energy * (apart**2).sum(axis=1)), 1e-300)
         track = both / max(energy, 1e-12) / stated
-        rolling = speed + track[:, None, None] * yaw[:, None] * lateral
+        rims = track[:, None] * turned + usual / stated
+        rolling = speed + rims[:, :, None] * lateral
         cost = UNTURNED * (1.0 - alike**2)
     middle = (lateral.size - 1) // 2, lateral.size // 2
     median = np.sort(rolling, axis=2)[:, :, middle].mean(axis=2)
@@ -362,7 +365,7 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
     """Return how the common speed agrees with reference and specific force; None: not told."""
     speed = row_medians(np.nan_to_num(evidence.rate) * signs)
     reference, by_reference, by_force = evidence.recording.reference, None, None
-    if reference is not None:
+    if reference is not None and not reference.points_aside:
         sense = np.sign(np.nan_to_num(evidence.rim_at(reference.stamp, speed)))
         forward = np.nan_to_num(reference.velocity[:, 0])  # the faster, the more it tells
         most = 2.0 * float(np.median(np.abs(forward[sense != 0.0]))) if sense.any() else 0.0
@@ -456,8 +459,12 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         cure = block_fit(np.column_stack([gyro, one]), seen)[0]
         other_way = 1.0 / block_fit(np.column_stack([seen, one]), gyro)[0].value
         off = min((cure.value - 1.0, other_way - 1.0), key=abs)
-        if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
-            told = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
+        times = 1.0 / cure.value
+        if IN_DEGREES[0] < times < IN_DEGREES[1]:
+            return _in_degrees(evidence, times, f'turning by {name}')
+        turned = float(np.quantile(np.abs(seen), 0.95)) > LEAST_TURNED
+        if turned and abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
+            told = {'value': cure.value, 'times': times, 'against': name}
             finding = evidence.found('gyro_scale', 0.9, std=cure.std, **told)
             return [finding], replace(evidence, gyro=evidence.gyro * cure.value)
     return [], evidence
@@ -497,10 +504,16 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     scaled = GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]
     if not scaled or left_in_turns(evidence) > MOST_SCALED:
         return [], evidence
-    told = {'times': 1.0 / abs(ratio), 'how': 'turning of the wheels'}
-    finding = evidence.found('gyro_degrees', 0.95, value=math.radians(1.0), **told)
+    return _in_degrees(evidence, 1.0 / abs(ratio), 'turning of the wheels')
+
+
+def _in_degrees(evidence: Evidence, times: float, how: str) -> tuple[list[Outcome], Evidence]:
+    """Return a gyro in degrees per second, and the evidence with that mended."""
+    told = evidence.found('gyro_degrees', 0.95, value=math.radians(1.0), times=times, how=how)
+    imu, gyro = evidence.recording.imu, evidence.gyro
+    assert imu is not None and gyro is not None
     mended = evidence.with_channel('imu', rate=np.radians(imu.rate))
-    return [finding], replace(mended, gyro=np.radians(evidence.gyro))
+    return [told], replace(mended, gyro=np.radians(gyro))
 
 
 def track_ratio(evidence: Evidence) -> float | None:
