@@ -59,7 +59,8 @@ def test_predict_with_the_written_model_gives_the_reported_error(hidden, known, 
             'effects.slip_sinkage_exponent.n1_std': 0.5,
         }
     configuration = reader.from_parameters(values, complete=False)
-    found = diagnose(check_table('t.csv', table), configuration)
+    few = Options(effects=('slip_sinkage_exponent', 'drivetrain_friction', 'lug_digging'))
+    found = diagnose(check_table('t.csv', table), configuration, options=few)
     write_model(found, tmp_path / 'model.yaml')
     rows = predicted(table, configuration, tmp_path, 'model.yaml')
     for q, quantity in enumerate(QUANTITIES):
@@ -69,7 +70,7 @@ def test_predict_with_the_written_model_gives_the_reported_error(hidden, known, 
     both = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
     assert both.effects_std['slip_sinkage_exponent']['n1'] > 0.0
     assert known or 'slip_sinkage_exponent' in both.provenance
-    again = diagnose(check_table('t.csv', table), both)
+    again = diagnose(check_table('t.csv', table), both, options=few)
     assert again.verdict == 'agrees'
     assert set(again.base_effects) == {'slip_sinkage_exponent'}
     friction = 1.5 * LISTED['drivetrain_friction'].typical(true_rows, soil)
@@ -108,6 +109,10 @@ def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
             assert error == pytest.approx(said, rel=2e-3)
 
 
+OF_SENSORS = 'torque_gain', 'sinkage_gain', 'sinkage_offset', 'drivetrain_friction'
+SENSORS = Options(effects=(*OF_SENSORS, 'slip_sinkage_exponent', 'cohesion'))
+
+
 def with_errors(table, factors, zeros):
     """Return the table as sensors of this gain and zero read it."""
     read = {key: table[key] * factors.get(key, 1.0) + zeros.get(key, 0.0) for key in QUANTITIES}
@@ -136,21 +141,19 @@ def test_errors_of_readings_are_written_once_where_the_node_takes_them_off(
     # One of two wheels states errors already: what is found comes on top.
     before = {'sensors.torque_gain': [1.0], 'sensors.sinkage_zero': [0.0]}
     configuration = reader.from_parameters({**values, **before}, complete=False)
-    found = diagnose(check_table('t.csv', table), configuration)
+    found = diagnose(check_table('t.csv', table), configuration, options=SENSORS)
     write_model(found, tmp_path / 'model.yaml')
     model = reader.load([tmp_path / 'model.yaml'], complete=False)
     for key, value in keys.items():
         std = {'torque_gain': 0.06, 'sinkage_gain': 0.06, 'torque_zero': 0.15, 'sinkage_zero': 1e-3}
         assert getattr(model.sensors, key)[0] == pytest.approx(value, abs=std[key])
-    assert not set(model.effects) & {
-        'torque_gain', 'sinkage_gain', 'sinkage_offset', 'drivetrain_friction',
-    }  # fmt: skip
+    assert not set(model.effects) & set(OF_SENSORS)
     rows = predicted(table, configuration, tmp_path, 'model.yaml')
     for q, quantity in enumerate(QUANTITIES):
         error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
         assert error == pytest.approx(found.gap[quantity].fitted, rel=2e-3)
     again = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
-    second = diagnose(check_table('t.csv', table), again)
+    second = diagnose(check_table('t.csv', table), again, options=SENSORS)
     assert second.verdict == 'agrees'
     for quantity in QUANTITIES:
         assert second.gap[quantity].before == pytest.approx(found.gap[quantity].fitted, rel=2e-3)
@@ -168,7 +171,7 @@ def test_an_error_of_a_reading_that_was_an_effect_moves_to_the_sensors(tmp_path)
         'effects.torque_gain.gain_std': 0.1,
     }
     configuration = reader.from_parameters(values, complete=False)
-    found = diagnose(check_table('t.csv', table), configuration)
+    found = diagnose(check_table('t.csv', table), configuration, options=SENSORS)
     write_model(found, tmp_path / 'model.yaml')
     rows = predicted(table, configuration, tmp_path, 'model.yaml')
     both = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
