@@ -54,13 +54,3 @@ def test_fine_steps_and_real_noise_are_no_steps():
     assert rate_step(np.full(100, 2.0), np.full(100, 0.1)) == 0.0, 'one value is no step'
     random = np.random.default_rng(1)
     assert rate_step(random.normal(size=500), np.full(500, 0.1)) == 0.0
-
-
-def test_rates_in_counts_per_second():
-    joints = WHOLE.joints
-    counts = replace(joints, rate=joints.rate * 4096 / (2.0 * math.pi))
-    report = rolling.checked(joints=counts)
-    (finding,) = report.findings
-    assert finding.kind == 'unit' and 'counts' in finding.words
-    assert finding.value == pytest.approx(2.0 * math.pi / 4096, rel=0.05)
-    assert 'multiply velocity' in finding.cure
