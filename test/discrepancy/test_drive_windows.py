@@ -308,7 +308,7 @@ def test_the_smoothed_speed_owes_nothing_to_torque_and_sinkage():
         assert all(a is b for a, b in zip(passed_on, measurements, strict=True))
         return smoother.speed()
 
-    heard = list(up_the_stairs()[:240])
+    heard = list(up_the_stairs()[:180])
     other = [
         replace(m, torque=2.0 * m.torque) if isinstance(m, WheelOdometry) else m
         for m in heard
