@@ -13,6 +13,7 @@ import yaml
 from estimate_sets import STAMP, some_estimates
 
 from wheel_terra_estimator.bags.history import HistoryRecorder, read_estimates
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.estimation.estimates import SlipClass
@@ -49,8 +50,6 @@ def bag(library_metadata, tmp_path_factory):
 
 
 def messages(path: Path) -> list[tuple[int, str, Any]]:
-    from wheel_terra_estimator.bags.message_types import jazzy_types
-
     store = jazzy_types()
     with open_bag(path) as bag:
         return [

@@ -10,6 +10,7 @@ from recordings import beginning
 
 from wheel_terra_estimator.bags.replay import replay
 from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.cli.demo import DRIVES
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
@@ -50,8 +51,6 @@ def test_a_failing_filter_is_said_in_summary_and_diagnostics(
 
 def test_odometry_that_might_be_the_reference_is_named(tmp_path):
     """On a measured drive, on which the filter never restarts."""
-    from wheel_terra_estimator.cli.demo import DRIVES
-
     drive = next(drive for drive in DRIVES if drive.name == 'pathfinder')
     recording = beginning(shipped.demo_recording(drive.name), tmp_path / 'drive', 6.0)
     with open_bag(recording) as bag:

@@ -18,6 +18,7 @@ from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.imu import ImuState, check_imu
 from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import rows_of
+from wheel_terra_estimator.checks.statistics import MOST_TIMES, even_times
 from wheel_terra_estimator.messages import pack
 
 WHOLE = rolling.recording()
@@ -334,8 +335,6 @@ def test_gravity_taken_off_on_a_slope_is_not_a_unit():
 
 def test_even_times_over_stamps_that_jump():
     """The longest stretch, where a clock jumps by years; the whole drive where it only pauses."""
-    from wheel_terra_estimator.checks.statistics import MOST_TIMES, even_times
-
     drive = np.arange(0.0, 60.0, 0.1)
     paused = np.concatenate([drive, drive + 900.0])
     assert even_times(paused, 0.05)[-1] == pytest.approx(paused[-1], abs=0.051)

@@ -16,6 +16,7 @@ import pytest
 from wheel_terra_estimator.configuration import parameters, reader, shipped
 from wheel_terra_estimator.configuration.parameters import DECLARED, RETIRED, by_spelling, declared
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
+from wheel_terra_estimator.terramechanics import effects
 from wheel_terra_estimator.terramechanics.contact_law import LAWS
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -433,8 +434,6 @@ def test_an_effect_of_ones_own(tmp_path):
         'm.yaml',
         'effect_file: mine.py\neffects.my_effect: {enabled: true, extra: 2.0}',
     )
-    from wheel_terra_estimator.terramechanics import effects
-
     try:
         with pytest.raises(UserError, match='--allow-effect-files'):
             reader.load([file], complete=False)

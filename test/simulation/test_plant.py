@@ -13,6 +13,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation import plant as plant_module
 from wheel_terra_estimator.simulation.drives import Command
 from wheel_terra_estimator.simulation.plant import RoverPlant
+from wheel_terra_estimator.simulation.terrain import Patch
 from wheel_terra_estimator.simulation.truth import Truth
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -194,8 +195,6 @@ def test_a_shorter_step_gives_the_same_drive(monkeypatch):
 
 
 def test_wheels_sink_one_after_the_other_in_a_patch(plant):
-    from wheel_terra_estimator.simulation.terrain import Patch
-
     patch = Patch(1.0, 9.0, -9.0, 9.0, {'stiffness': 0.3})
     rover_plant = plant(patches=[patch])
     before = drive(rover_plant, 2.0).sinkage

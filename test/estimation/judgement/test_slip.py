@@ -29,6 +29,7 @@ from wheel_terra_estimator.estimation.judgement.slip import (
 from wheel_terra_estimator.estimation.output_guard import blank_estimates
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
+from wheel_terra_lab.evaluation.kinds import KINDS
 
 BORDERS = (0.3, 0.6, 0.9)
 HYSTERESIS, DWELL, CLASS_STD = 0.02, 0.3, 0.25
@@ -184,8 +185,6 @@ def test_the_class_is_that_of_the_published_slip(stretches, dt):
 @pytest.mark.parametrize(('kind', 'duration'), [('near_stuck', 18.0), ('turns', 25.0)])
 def test_the_class_is_that_of_the_published_slip_in_drives(kind, duration):
     """References come late, so that the past is estimated anew while the present is published."""
-    from wheel_terra_lab.evaluation.kinds import KINDS
-
     drive = simulate(load(dict(KINDS[kind])), 1000, duration)
     core = EstimatorCore(drive.configuration)
     sets = [e for a in drive.arrivals for e in core.add(a.measurement)] + core.flush()

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.soilbin import files, geometry
@@ -38,8 +39,6 @@ def test_element_counts_are_the_papers(rows, length, count):
 @pytest.mark.parametrize('arrangement', ['staggered', 'random'])
 @pytest.mark.parametrize('scale', [1.0, 2.0])
 def test_discs_start_apart_and_inside(arrangement, scale):
-    from scipy.spatial import cKDTree
-
     case = Case(bed=Bed(length=0.3, rows=12, arrangement=arrangement, grain_scale=scale))
     centres, diameters, _ = geometry.bed_discs(case)
     pairs = cKDTree(centres).query_pairs(diameters.max(), output_type='ndarray')
