@@ -16,9 +16,12 @@ from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.checks.clocks import lag
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.imu import ImuState, check_imu
+from wheel_terra_estimator.checks.names import _pairs, check_wheel_names
+from wheel_terra_estimator.checks.rover_facts import from_configuration
 from wheel_terra_estimator.checks.run import check_recording
-from wheel_terra_estimator.checks.series import rows_of
+from wheel_terra_estimator.checks.series import JointSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import MOST_TIMES, even_times
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.messages import pack
 
 WHOLE = rolling.recording()
@@ -401,3 +404,30 @@ def test_starts_that_fall_alike_between_references_do_not_look_late(period, late
 
     told, _ = lag(time, speed(time), at, speed(at - late), 3.0)
     assert told == pytest.approx(late, abs=0.03)
+
+
+# Joints that steer are not passed over where the rover file knows of none.
+
+
+STEERED = "['', '', '', '', rear_left_steering_joint, rear_right_steering_joint]"
+
+
+@pytest.mark.parametrize('stated', [False, True])
+def test_joints_that_steer(stated):
+    parameters = [f'wheels.steering_joints:={STEERED}'] if stated else []
+    rover = reader.load(['generic_six_wheel'], parameters)
+    names = (*rover.wheels.names, 'rear_left_steering_joint', 'rear_right_steering_joint')
+    stamp = np.arange(10) * 100_000_000
+    rate = np.ones((10, len(names)))
+    joints = JointSeries('/joint_states', stamp, stamp, names, rate, np.full_like(rate, np.nan))
+    outcomes, _ = check_wheel_names(
+        Recording('drive', (), joints, None, None, None, None), from_configuration(rover)
+    )
+    cures = [str(outcome.cure) for outcome in outcomes]
+    told = f'wheels.steering_joints: {STEERED}'
+    assert cures == ([] if stated else [told])
+
+
+def test_names_that_are_like_none_are_taken_in_the_usual_order():
+    assert _pairs(['fore', 'hind'], ['m1', 'm2']) == {'fore': 'm1', 'hind': 'm2'}
+    assert _pairs(['fore', 'hind'], ['m1', 'm2', 'm3']) == {}

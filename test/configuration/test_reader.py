@@ -6,10 +6,12 @@ import argparse
 import copy
 import math
 import pickle
+import re
 import warnings
 from array import array
 from pathlib import Path
 
+import document_parameters as documentation
 import numpy as np
 import pytest
 
@@ -445,3 +447,18 @@ def test_an_effect_of_ones_own(tmp_path):
         assert again.effects == c.effects
     finally:
         effects._registered.pop('my_effect', None)
+
+
+# The page of parameters is what the table says.
+
+
+def test_the_page_is_current():
+    page = documentation.PAGE.read_text(encoding='utf-8')
+    assert page == documentation.page(), 'run python tools/document_parameters.py'
+
+
+def test_every_parameter_is_on_the_page_once():
+    rows = re.findall(r'^- ((?:`[\w.]+`(?:, )?)+) \(', documentation.page(), re.MULTILINE)
+    told = [key for row in rows for key in re.findall(r'`([\w.]+)`', row)]
+    # Those of effects have a page of their own.
+    assert sorted(told) == sorted(key for key in declared() if not key.startswith('effects.'))
