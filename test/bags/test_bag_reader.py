@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings as measurements: topics, remaps, names, damaged and unknown messages."""
 
+import sqlite3
 from collections import Counter
 from typing import Any
 
 import pytest
+from rosbags.interfaces import ConnectionExtRosbag2
+from rosbags.rosbag2 import StoragePlugin, Writer
 
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.reader import MeasurementReader, in_one_line, parse_remaps, read
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.errors import UserError
@@ -104,11 +108,6 @@ def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(
     make_bag, rover, drive, tmp_path
 ):
     """Types that nobody knows are never unpacked; a damaged message costs itself alone."""
-    from rosbags.interfaces import ConnectionExtRosbag2
-    from rosbags.rosbag2 import StoragePlugin, Writer
-
-    from wheel_terra_estimator.bags.message_types import jazzy_types
-
     store = jazzy_types()
     path = tmp_path / 'odd'
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
@@ -134,8 +133,6 @@ def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(
 
 def test_bag_without_message_definitions(make_bag, rover):
     """SQLite recordings of Foxy and Humble have none: Jazzy's own are used."""
-    import sqlite3
-
     bag = make_bag(storage='sqlite3')
     (file,) = bag.glob('*.db3')
     with sqlite3.connect(file) as connection:

@@ -12,10 +12,12 @@ import pytest
 import yaml
 from estimate_sets import STAMP, some_estimates
 
-from wheel_terra_estimator.bags.history import HistoryRecorder, read_estimates
+from wheel_terra_estimator.bags.history import WHEEL_FIELDS, HistoryRecorder, read_estimates
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.reporting.comparison import compare
 
 pytestmark = pytest.mark.usefixtures('library_metadata')
@@ -49,8 +51,6 @@ def bag(library_metadata, tmp_path_factory):
 
 
 def messages(path: Path) -> list[tuple[int, str, Any]]:
-    from wheel_terra_estimator.bags.message_types import jazzy_types
-
     store = jazzy_types()
     with open_bag(path) as bag:
         return [
@@ -214,3 +214,7 @@ def test_a_changed_byte_in_a_message_is_said(make_bag):
     with open_bag(folder) as bag:
         assert len(list(bag.messages(tuple(bag.topics)))) == 84
         assert 'stand in a chunk with a wrong checksum' in bag.notes[0]
+
+
+def test_every_column_of_a_wheel_has_its_unit_or_is_a_ratio():
+    assert {name for name in WHEEL_FIELDS if unit_of(name) == '-'} == {'slip', 'slip_std'}

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rosbags.rosbag2.storage_mcap import McapWriter
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.cli.main import main
@@ -53,7 +54,6 @@ def test_a_bag_on_a_disk_that_fills_up_is_not_there(tmp_path, fails_at):
 
 def test_a_disk_that_is_full_at_the_end_only(tmp_path, monkeypatch):
     """The last chunk does not fit when the bag is closed."""
-    from rosbags.rosbag2.storage_mcap import McapWriter
 
     def full(*_: Any) -> None:
         raise OSError(errno.ENOSPC, 'No space left on device')

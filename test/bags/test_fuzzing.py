@@ -5,6 +5,9 @@
 import random
 from typing import Any
 
+from rosbags.rosbag2 import Reader
+
+from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
 from wheel_terra_lab.studies.fuzz_files import fuzz
 from wheel_terra_lab.studies.fuzzing import cases
 from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, make
@@ -25,8 +28,6 @@ def test_a_message_that_lost_bytes_hides_no_chunk_behind_it():
 
 def test_the_judgement_can_fail(tmp_path, monkeypatch):
     """A reader that drops one message is found out."""
-    from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
-
     honest = McapFile.messages
 
     def careless(self: Any, topics: Any) -> Any:
@@ -40,8 +41,6 @@ def test_the_judgement_can_fail(tmp_path, monkeypatch):
 
 
 def test_the_maker_is_read_by_another_reader(tmp_path):
-    from rosbags.rosbag2 import Reader
-
     dice = random.Random(5)
     samples = cases._samples(dice)
     for codec in ('', 'zstd', 'lz4'):

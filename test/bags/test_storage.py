@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 import yaml
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
 from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import open_bag
@@ -51,10 +53,6 @@ def test_unreadable_metadata_is_set_aside(make_bag, whole):
 
 @pytest.mark.parametrize('mode', ['FILE', 'MESSAGE', 'STORAGE'])
 def test_compressed_bags(tmp_path, drive, whole, mode):
-    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-
-    from wheel_terra_estimator.bags.message_types import jazzy_types
-
     store = jazzy_types()
     writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)

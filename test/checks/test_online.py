@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faults put into a simulated drive are told while driving, and nothing is judged meanwhile."""
 
+import functools
 from dataclasses import fields, replace
 
 import numpy as np
@@ -37,15 +38,11 @@ PROFILE = {
 SIX, FOUR = None, 'frostyboy'
 
 
+@functools.cache
 def drive_of(rover):
     changes = {key.replace('.', '__'): value for key, value in PROFILE.items()}
     source = scenario.load('calibration_drive', rover=rover, duration=END, **changes)
     return simulate(source, seed=7)
-
-
-@pytest.fixture(scope='module')
-def drives():
-    return {rover: drive_of(rover) for rover in (SIX, FOUR)}
 
 
 def on_wheels(rate=1.0, torque=1.0):
@@ -167,9 +164,9 @@ def told(estimates):
 
 
 @pytest.mark.parametrize('name', FAULTS)
-def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(drives, name):
+def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(name):
     fault, kind, topic, cure, begins = FAULTS[name]
-    drive = drives[SIX]
+    drive = drive_of(SIX)
     sets = sets_of(drive, fault, min(END, begins + LONGEST + 2.0), stands=3.0)
     found = [s for s in sets if told(s)]
     assert found, f'{kind} was not found'
@@ -183,8 +180,8 @@ def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(drives, name):
 
 
 @pytest.mark.parametrize('confirmed', [False, True])
-def test_a_warning_that_is_confirmed_does_not_wait(drives, confirmed):
-    drive = drives[SIX]
+def test_a_warning_that_is_confirmed_does_not_wait(confirmed):
+    drive = drive_of(SIX)
     judge = InputJudge(drive.configuration)
     for second in range(3):
         stamp = 10**12 + second * 10**9
@@ -193,8 +190,8 @@ def test_a_warning_that_is_confirmed_does_not_wait(drives, confirmed):
 
 
 @pytest.mark.parametrize('rover', [SIX, FOUR])
-def test_a_drive_without_fault_is_silent(drives, rover):
-    sets = sets_of(drives[rover], lambda m: m)
+def test_a_drive_without_fault_is_silent(rover):
+    sets = sets_of(drive_of(rover), lambda m: m)
     assert not any(told(s) for s in sets)
     decided = sets[0].stamp + LONGEST_WAIT
     assert all(s.stuck for s in sets if s.stamp >= decided), 'what the estimator says passes'
@@ -234,13 +231,13 @@ def test_sinkage_counted_upwards_is_told_and_a_small_one_is_not():
     assert '-20 mm' in finding.words and 'negate position' in finding.cure
 
 
-def test_sinkage_in_millimetres_and_a_variance_of_a_million_are_told_with_their_cure(drives):
+def test_sinkage_in_millimetres_and_a_variance_of_a_million_are_told_with_their_cure():
     def fault(m):
         if isinstance(m, SinkageReading):
             return replace(m, sinkage=1000.0 * (0.01 + m.sinkage))
         return replace(m, variance=1e6) if isinstance(m, ReferenceVelocity) else m
 
-    drive = drives[SIX]
+    drive = drive_of(SIX)
     pipeline = Pipeline(drive.configuration)
     for arrival in drive.arrivals[:500]:
         pipeline.core.add(fault(arrival.measurement))
@@ -330,11 +327,11 @@ def test_the_table_of_faults_names_kinds_parameters_and_channels_that_there_are(
         assert fault.channel in {field.name for field in fields(Recording)}
 
 
-def test_kinds_are_those_of_the_checks_of_a_recording(drives):
+def test_kinds_are_those_of_the_checks_of_a_recording():
     for name, (fault, kind, topic, _, begins) in FAULTS.items():
         if name not in ('g', 'no_gravity', 'upside_down'):
             continue
-        checks = checks_over(drives[SIX], fault, begins + LONGEST)
+        checks = checks_over(drive_of(SIX), fault, begins + LONGEST)
         assert [(f.kind, f.topic) for f in checks.findings] == [(kind, topic)]
         assert 0.8 < checks.findings[0].confidence < 1.0
 
@@ -350,10 +347,10 @@ def checks_over(drive, fault, seconds):
     return checks
 
 
-def test_a_kept_state_gives_the_same_verdict(drives):
+def test_a_kept_state_gives_the_same_verdict():
     """Late inputs are run again from kept states: what came between leaves no trace."""
     fault = on_imu(1.0 / 9.80665)
-    drive = drives[SIX]
+    drive = drive_of(SIX)
     checks = checks_over(drive, fault, 3.0)
     assert not checks.findings
     kept = checks.snapshot()
@@ -386,7 +383,7 @@ def test_a_finding_comes_and_goes_with_hysteresis():
 
 
 @pytest.mark.check_fails
-def test_checks_that_fail_leave_the_estimates_alone(drives, monkeypatch):
+def test_checks_that_fail_leave_the_estimates_alone(monkeypatch):
     calls = []
 
     def fail(self):
@@ -394,7 +391,7 @@ def test_checks_that_fail_leave_the_estimates_alone(drives, monkeypatch):
         raise ZeroDivisionError('on purpose')
 
     monkeypatch.setattr(OnlineChecks, '_judge', fail)
-    sets = sets_of(drives[SIX], lambda m: m, seconds=20.0)
+    sets = sets_of(drive_of(SIX), lambda m: m, seconds=20.0)
     assert len(calls) == 1, 'not asked again before the next run'
     assert all(s.stuck for s in sets if s.faults), 'a warning does not wait for them'
     assert any('internal error, see --debug' in ' '.join(s.faults.values()) for s in sets)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Readings that stay the same, and sizes without a sign, beside sound ones that look like them."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import rolling_rover as rolling
 
 from wheel_terra_estimator.checks.series import rows_of
+from wheel_terra_estimator.checks.wheel_rates import rate_step
 
 
 def found(**changes):
@@ -25,24 +27,6 @@ def held(channel, field, since, until, column=...):
 
 
 WHOLE = rolling.recording()
-
-
-@pytest.mark.parametrize(
-    'name, field, column, key',
-    [
-        ('reference', 'velocity', ..., 'reference_frozen'),
-        ('joints', 'torque', 2, 'torque_frozen'),
-        ('sinkage', 'sinkage', 1, 'sinkage_frozen'),
-        ('imu', 'force', ..., 'sensor_frozen'),
-        ('imu', 'rate', ..., 'sensor_frozen'),
-    ],
-)
-def test_a_sensor_that_freezes_on_the_way(name, field, column, key):
-    (finding,) = found(**{name: held(getattr(WHOLE, name), field, 120.0, 160.0, column)})
-    assert finding.fault == key and finding.kind == 'frozen'
-    assert finding.wheel == (None if column is ... else rolling.NAMES[column])
-    seconds = float(finding.words.split('up to ')[1].split(' s')[0])
-    assert seconds == pytest.approx(40.0, abs=0.5)
 
 
 def test_a_vector_that_is_the_same_all_along_is_not_said_to_be_zero():
@@ -107,12 +91,6 @@ def rover_y():
     return np.array(rolling.rover().wheels.y)
 
 
-def test_a_reference_of_zeros_is_a_placeholder():
-    none = replace(WHOLE.reference, velocity=0.0 * WHOLE.reference.velocity)
-    (finding,) = found(reference=none)
-    assert (finding.fault, finding.kind) == ('reference_zero', 'placeholder')
-
-
 def test_no_sinkage_is_read_on_firm_ground():
     firm = replace(WHOLE.sinkage, sinkage=0.0 * WHOLE.sinkage.sinkage)
     assert found(sinkage=firm) == []
@@ -120,14 +98,6 @@ def test_no_sinkage_is_read_on_firm_ground():
     dead[:, 3] = 0.0
     names = {(f.fault, f.wheel) for f in found(sinkage=replace(WHOLE.sinkage, sinkage=dead))}
     assert ('sinkage_frozen', 'rear_right') in names
-
-
-def test_speed_and_torque_without_a_sign():
-    speed = replace(WHOLE.reference, velocity=np.abs(WHOLE.reference.velocity))
-    (finding,) = found(reference=speed)
-    assert finding.fault == 'reference_unsigned'
-    (finding,) = found(joints=replace(WHOLE.joints, torque=np.abs(WHOLE.joints.torque)))
-    assert finding.fault == 'torque_unsigned' and finding.kind == 'sign'
 
 
 def test_torques_that_brake_down_a_slope_have_a_sign():
@@ -153,3 +123,50 @@ def test_rates_that_are_sent_more_often_than_measured(times):
     joints = replace(WHOLE.joints, rate=WHOLE.joints.rate[rows], torque=WHOLE.joints.torque[rows])
     told = next(f for f in found(joints=joints) if f.fault == 'rates_held')
     assert told.words.startswith(f'each value comes {times} times')
+
+
+# Steps of a coarse encoder: counted from angles, told with their size, apart from noise.
+
+
+COUNTS = 180  # per turn of the wheel
+
+
+def counted(counts=COUNTS, jitter=0.0):
+    """The drive as an encoder sees it: whole counts of the angle, over the time between stamps."""
+    random = np.random.default_rng(4)
+    joints = WHOLE.joints
+    stamp = joints.stamp + np.round(jitter * random.uniform(size=joints.stamp.size) * 1e9)
+    time = (stamp - stamp[0]) * 1e-9
+    angle = np.vstack([np.zeros(4), np.cumsum(0.1 * joints.rate[1:], axis=0)])
+    ticks = np.floor(angle * counts / (2.0 * math.pi))
+    rate = np.diff(ticks, axis=0) * 2.0 * math.pi / counts / np.diff(time)[:, None]
+    rate = np.vstack([np.zeros(4), rate])
+    return replace(joints, stamp=stamp.astype(np.int64), rate=rate)
+
+
+@pytest.mark.parametrize('jitter', [0.0, 0.02])
+def test_steps_are_named_with_the_noise_that_they_make(jitter):
+    report = rolling.checked(joints=counted(jitter=jitter))
+    (finding,) = [f for f in report.findings if f.parameter == 'sensors.wheel_rate_std']
+    step = 2.0 * math.pi / COUNTS / 0.1
+    assert finding.kind == 'noise' and finding.wheel is None
+    assert report.figures['wheels.rate_step_rad_s'] == pytest.approx(step, rel=0.02)
+    assert finding.value == pytest.approx(step / math.sqrt(6.0), rel=0.05)
+    assert f'{COUNTS} counts per turn' in finding.words
+
+
+def test_counting_makes_that_noise():
+    """A rate from two counts, each cut off at a whole one, against the rate itself."""
+    turning = np.abs(WHOLE.joints.rate).mean(axis=1) > 1.0
+    error = (counted().rate - WHOLE.joints.rate)[turning]
+    step = 2.0 * math.pi / COUNTS / 0.1
+    assert np.std(error) == pytest.approx(step / math.sqrt(6.0), rel=0.05)
+
+
+def test_fine_steps_and_real_noise_are_no_steps():
+    fine = rolling.checked(joints=counted(20_000))
+    assert not fine.findings, [str(f) for f in fine.findings]
+    assert 'wheels.rate_step_rad_s' not in rolling.checked().figures
+    assert rate_step(np.full(100, 2.0), np.full(100, 0.1)) == 0.0, 'one value is no step'
+    random = np.random.default_rng(1)
+    assert rate_step(random.normal(size=500), np.full(500, 0.1)) == 0.0

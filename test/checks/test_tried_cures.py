@@ -100,13 +100,6 @@ def test_a_wheel_held_under_torque_is_not_frozen(since, until):
     assert ('frozen', 'front_right') in {(f.kind, f.wheel) for f in found}
 
 
-def test_effort_of_zero_is_a_placeholder():
-    whole = rolling.recording()
-    joints = replace(whole.joints, torque=0.0 * whole.joints.torque)
-    (finding,) = rolling.checked(whole=whole, joints=joints).findings
-    assert finding.kind == 'placeholder' and 'effort' in finding.words
-
-
 OFFSETS = {
     'imu': ('imu', 0.7),
     'reference': ('reference', -0.8),

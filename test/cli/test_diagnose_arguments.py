@@ -22,14 +22,10 @@ def _table(path: Path) -> str:
     return str(path)
 
 
-def test_remap_is_for_bags(tmp_path, capsys):
+def test_remaps_and_smoothing_are_for_bags(tmp_path, capsys):
     command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
     assert main([*command, '--remap', 'odom:=/vo']) == 2
     assert 'rig.csv is a table' in capsys.readouterr().err
-
-
-def test_smoothing_is_for_bags(tmp_path, capsys):
-    command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
     assert main([*command, '--smooth']) == 2
     assert '--smooth: goes with a bag' in capsys.readouterr().err
 

@@ -75,14 +75,13 @@ def test_picture_and_the_refusal_to_overwrite(tmp_path, capsys):
     assert main([*BASE, '-o', str(picture)]) == 2
     assert 'exists already; choose another path or give --overwrite' in capsys.readouterr().err
     assert picture.read_bytes() == before
-    assert main([*BASE, '--load', '20', '-o', str(picture), '--overwrite']) == 0
-    assert picture.read_bytes() != before
     drawing = tmp_path / 'curves.svg'
     assert main([*BASE, '--slip', '0.3', '--slip-angle', '0:1.5:6', '-o', str(drawing)]) == 0
     assert drawing.read_text().count('>slip angle [rad]<') == 4  # one slip: over the angle
     sheet = tmp_path / 'curves.csv'
     assert main([*BASE, '--slip', '0:0.9:4', '-o', str(sheet)]) == 0
-    assert len(table(sheet.read_text())['slip']) == 4
+    assert main([*BASE, '--slip', '0:0.9:5', '-o', str(sheet), '--overwrite']) == 0
+    assert len(table(sheet.read_text())['slip']) == 5
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from recordings import changed
 
 from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
 from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.writer import NAMESPACE
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 from wheel_terra_estimator.simulation import scenario
@@ -77,8 +78,6 @@ def test_findings_come_before_anything_else(upside_down, tmp_path, capsys):
 
 def test_smoothed(drive, live, tmp_path, capsys, undrawn):
     """Same sets at the same times, warnings and diagnostics as given live, both in the report."""
-    from wheel_terra_estimator.bags.writer import NAMESPACE
-
     page, table = tmp_path / 'page.html', tmp_path / 'table.csv'
     ways = ['--track', str(tmp_path / 'way.csv')]
     smooth = ['--smooth', '--report', str(page), '--table', str(table), *ways]

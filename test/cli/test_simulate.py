@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.bags.message_types import messages_of
+from wheel_terra_estimator.bags.message_types import jazzy_types, messages_of
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.simulated_drive import TRUTH_TOPICS, write_simulated_drive
 from wheel_terra_estimator.bags.storage import open_bag
@@ -90,8 +90,6 @@ def test_true_slip_of_wheels_at_rest_is_unknown(tmp_path):
 
 
 def test_log_times_are_arrivals(bag_path):
-    from wheel_terra_estimator.bags.message_types import jazzy_types
-
     store = jazzy_types()
     with open_bag(bag_path) as bag:
         late = [

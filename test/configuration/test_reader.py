@@ -6,16 +6,19 @@ import argparse
 import copy
 import math
 import pickle
+import re
 import warnings
 from array import array
 from pathlib import Path
 
+import document_parameters as documentation
 import numpy as np
 import pytest
 
 from wheel_terra_estimator.configuration import parameters, reader, shipped
 from wheel_terra_estimator.configuration.parameters import DECLARED, RETIRED, by_spelling, declared
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
+from wheel_terra_estimator.terramechanics import effects
 from wheel_terra_estimator.terramechanics.contact_law import LAWS
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -436,8 +439,6 @@ def test_an_effect_of_ones_own(tmp_path):
         'm.yaml',
         'effect_file: mine.py\neffects.my_effect: {enabled: true, extra: 2.0}',
     )
-    from wheel_terra_estimator.terramechanics import effects
-
     try:
         with pytest.raises(UserError, match='--allow-effect-files'):
             reader.load([file], complete=False)
@@ -477,3 +478,18 @@ def test_the_bogie_pivot_lies_between_its_wheels(end, pivot, words):
     else:
         said = complaint(reader.from_parameters, rover, source='rover.yaml')
         assert said.startswith('rover.yaml: rover.bogie_pivot: ') and words in said
+
+
+# The page of parameters is what the table says.
+
+
+def test_the_page_is_current():
+    page = documentation.PAGE.read_text(encoding='utf-8')
+    assert page == documentation.page(), 'run python tools/document_parameters.py'
+
+
+def test_every_parameter_is_on_the_page_once():
+    rows = re.findall(r'^- ((?:`[\w.]+`(?:, )?)+) \(', documentation.page(), re.MULTILINE)
+    told = [key for row in rows for key in re.findall(r'`([\w.]+)`', row)]
+    # Those of effects have a page of their own.
+    assert sorted(told) == sorted(key for key in declared() if not key.startswith('effects.'))

@@ -6,10 +6,12 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy import constants
 
 from wheel_terra_estimator import api
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader, shipped
+from wheel_terra_estimator.configuration.column_map import UNITS
 from wheel_terra_estimator.errors import ConfigurationWarning
 
 SOILS = [name for name in shipped.files() if name.startswith('soils/')]
@@ -70,3 +72,35 @@ def test_a_model_takes_the_name_of_a_soil_and_says_what_it_cannot_take():
     with pytest.raises(api.UserError, match="did you mean 'dlr_mss'"):
         api.Model(WHEEL, 'dlr_msss')
     assert np.isfinite(named.torque).all()
+
+
+# Units of a table's columns against those of scipy.
+
+
+TURN = 2.0 * constants.pi
+KNOWN = {
+    ('s', 'ms'): constants.milli,
+    ('m', 'in'): constants.inch,
+    ('m', 'ft'): constants.foot,
+    ('m/s', 'km/h'): constants.kmh,
+    ('m/s^2', 'g'): constants.g,
+    ('N', 'lbf'): constants.lbf,
+    ('N m', 'lbf ft'): constants.lbf * constants.foot,
+    ('N m', 'N mm'): constants.milli,
+    ('rad', 'deg'): constants.degree,
+    ('rad/s', 'rpm'): TURN / constants.minute,
+    ('rad/s', 'rev/s'): TURN,
+    ('rad/s', 'deg/s'): constants.degree,
+}
+
+
+@pytest.mark.parametrize(('quantity', 'unit'), KNOWN)
+def test_a_unit_is_that_of_the_tables(quantity, unit):
+    assert UNITS[quantity][unit] == pytest.approx(KNOWN[quantity, unit], rel=1e-12)
+
+
+def test_the_unit_of_a_quantity_is_one_and_all_are_positive():
+    for quantity, units in UNITS.items():
+        if quantity in units:
+            assert units[quantity] == 1.0
+        assert min(units.values()) > 0.0

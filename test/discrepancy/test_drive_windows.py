@@ -6,10 +6,12 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.bags.reader import parse_remaps
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.drives import windows
 from wheel_terra_estimator.discrepancy.drives.series import Channel, SpeedSmoother, collect
@@ -28,6 +30,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.simulation import drive, scenario
 
 GRAVITY = 9.80665
 RADIUS, LUG = 0.12, 0.01
@@ -247,8 +250,6 @@ def test_many_windows_are_merged_and_know_more():
 
 @functools.cache
 def simulated():
-    from wheel_terra_estimator.simulation import drive, scenario
-
     stairs = scenario.load(
         {
             'configuration': ['generic_six_wheel'],
@@ -308,7 +309,7 @@ def test_the_smoothed_speed_owes_nothing_to_torque_and_sinkage():
         assert all(a is b for a, b in zip(passed_on, measurements, strict=True))
         return smoother.speed()
 
-    heard = list(up_the_stairs()[:240])
+    heard = list(up_the_stairs()[:180])
     other = [
         replace(m, torque=2.0 * m.torque) if isinstance(m, WheelOdometry) else m
         for m in heard
@@ -332,10 +333,6 @@ def test_silent_references_give_no_window_to_the_smoother_either():
 
 @pytest.mark.shared
 def test_pathfinder_recording_skids_by_its_radius_error():
-    from pathlib import Path
-
-    from wheel_terra_estimator.bags.reader import parse_remaps
-
     bag = Path(__file__).parents[3] / 'shared/measured/bags/wvu_pathfinder_test17_mcap'
     if not bag.exists():
         pytest.skip(f'{bag} is not here')

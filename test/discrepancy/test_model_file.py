@@ -38,6 +38,13 @@ def predicted(table, configuration, tmp_path, *files):
     return np.array([[float(row[name]) for name in QUANTITIES] for row in rows])
 
 
+def assert_errors(rows, table, gaps, which='fitted', near=2e-3):
+    """The errors of what ``predict`` gives are those that the diagnosis states."""
+    for q, quantity in enumerate(QUANTITIES):
+        error = np.sqrt(np.nanmean((rows[:, q] - table[quantity]) ** 2))
+        assert error == pytest.approx(getattr(gaps[quantity], which), rel=near)
+
+
 @pytest.mark.parametrize(
     ('hidden', 'known', 'design'),
     [
@@ -59,17 +66,17 @@ def test_predict_with_the_written_model_gives_the_reported_error(hidden, known, 
             'effects.slip_sinkage_exponent.n1_std': 0.5,
         }
     configuration = reader.from_parameters(values, complete=False)
-    found = diagnose(check_table('t.csv', table), configuration)
+    few = Options(effects=('slip_sinkage_exponent', 'drivetrain_friction', 'lug_digging'))
+    found = diagnose(check_table('t.csv', table), configuration, options=few)
     write_model(found, tmp_path / 'model.yaml')
     rows = predicted(table, configuration, tmp_path, 'model.yaml')
-    for q, quantity in enumerate(QUANTITIES):
-        error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
-        assert error == pytest.approx(found.gap[quantity].fitted, rel=2e-3)
-        assert error == pytest.approx(found.gap[quantity].after, rel=0.3)
+    assert_errors(rows, table, found.gap)
+    for gap in found.gap.values():
+        assert gap.fitted == pytest.approx(gap.after, rel=0.3)
     both = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
     assert both.effects_std['slip_sinkage_exponent']['n1'] > 0.0
     assert known or 'slip_sinkage_exponent' in both.provenance
-    again = diagnose(check_table('t.csv', table), both)
+    again = diagnose(check_table('t.csv', table), both, options=few)
     assert again.verdict == 'agrees'
     assert set(again.base_effects) == {'slip_sinkage_exponent'}
     friction = 1.5 * LISTED['drivetrain_friction'].typical(true_rows, soil)
@@ -99,13 +106,12 @@ def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
     assert 'the form named here takes its place' in found.notes[0]
     assert 'other forms, in its place, were tried' in found.not_tried['slip_sinkage_exponent']
     write_model(found, tmp_path / 'model.yaml')
-    configured = predicted(table, configuration, tmp_path)
-    corrected_rows = predicted(table, configuration, tmp_path, 'model.yaml')
-    for q, quantity in enumerate(QUANTITIES):
-        gap = found.gap[quantity]
-        for rows, said in ((configured, gap.before), (corrected_rows, gap.fitted)):
-            error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
-            assert error == pytest.approx(said, rel=2e-3)
+    assert_errors(predicted(table, configuration, tmp_path), table, found.gap, 'before')
+    assert_errors(predicted(table, configuration, tmp_path, 'model.yaml'), table, found.gap)
+
+
+OF_SENSORS = 'torque_gain', 'sinkage_gain', 'sinkage_offset', 'drivetrain_friction'
+SENSORS = Options(effects=(*OF_SENSORS, 'slip_sinkage_exponent', 'cohesion'))
 
 
 def with_errors(table, factors, zeros):
@@ -136,21 +142,17 @@ def test_errors_of_readings_are_written_once_where_the_node_takes_them_off(
     # One of two wheels states errors already: what is found comes on top.
     before = {'sensors.torque_gain': [1.0], 'sensors.sinkage_zero': [0.0]}
     configuration = reader.from_parameters({**values, **before}, complete=False)
-    found = diagnose(check_table('t.csv', table), configuration)
+    found = diagnose(check_table('t.csv', table), configuration, options=SENSORS)
     write_model(found, tmp_path / 'model.yaml')
     model = reader.load([tmp_path / 'model.yaml'], complete=False)
     for key, value in keys.items():
         std = {'torque_gain': 0.06, 'sinkage_gain': 0.06, 'torque_zero': 0.15, 'sinkage_zero': 1e-3}
         assert getattr(model.sensors, key)[0] == pytest.approx(value, abs=std[key])
-    assert not set(model.effects) & {
-        'torque_gain', 'sinkage_gain', 'sinkage_offset', 'drivetrain_friction',
-    }  # fmt: skip
+    assert not set(model.effects) & set(OF_SENSORS)
     rows = predicted(table, configuration, tmp_path, 'model.yaml')
-    for q, quantity in enumerate(QUANTITIES):
-        error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
-        assert error == pytest.approx(found.gap[quantity].fitted, rel=2e-3)
+    assert_errors(rows, table, found.gap)
     again = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
-    second = diagnose(check_table('t.csv', table), again)
+    second = diagnose(check_table('t.csv', table), again, options=SENSORS)
     assert second.verdict == 'agrees'
     for quantity in QUANTITIES:
         assert second.gap[quantity].before == pytest.approx(found.gap[quantity].fitted, rel=2e-3)
@@ -168,7 +170,7 @@ def test_an_error_of_a_reading_that_was_an_effect_moves_to_the_sensors(tmp_path)
         'effects.torque_gain.gain_std': 0.1,
     }
     configuration = reader.from_parameters(values, complete=False)
-    found = diagnose(check_table('t.csv', table), configuration)
+    found = diagnose(check_table('t.csv', table), configuration, options=SENSORS)
     write_model(found, tmp_path / 'model.yaml')
     rows = predicted(table, configuration, tmp_path, 'model.yaml')
     both = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)

@@ -11,6 +11,9 @@ import pytest
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.terramechanics import effects
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.studies.campaigns import Plan, make_campaign
 
 EXAMPLE = Path(__file__).parents[2] / 'docs' / 'discrepancy' / 'examples' / 'side_drag.py'
@@ -78,10 +81,6 @@ def test_without_it_nobody_claims_to_know(rubbing_table, told, unproposed):
 
 def test_the_term_is_the_formula_in_its_symbol():
     """The example's own arithmetic, against a plain evaluation."""
-    from wheel_terra_estimator.terramechanics.model import WheelSoilModel
-    from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-    from wheel_terra_estimator.terramechanics.wheel import Wheel
-
     effects.load_file(EXAMPLE)
     soil = reader.from_parameters({}, complete=False).soil
     points = OperatingPoints(

@@ -10,6 +10,7 @@ from wheel_terra_estimator.discrepancy.assessment import along as order
 from wheel_terra_estimator.discrepancy.assessment.along import changes_along_rows
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
+from wheel_terra_estimator.discrepancy.workflow import Options
 
 
 def columns(count, seed=1):
@@ -81,12 +82,13 @@ def test_texts_and_dates_are_read(tmp_path):
     assert len(np.unique(table.columns['trial'])) == 3
 
 
-def test_a_diagnosis_says_along_which_column_its_residuals_change():
+def test_a_diagnosis_says_along_which_column_its_residuals_change(unproposed):
     table, values, *_ = make('sweep40')
     rng = np.random.default_rng(3)
     order = rng.permutation(len(table['slip'])).astype(float)
     drift = 6.0 * table['torque_std'] * (order / order.max() - 0.5)
-    found = run(table | {'row_order': order, 'torque': table['torque'] + drift}, values)
+    drifting = table | {'row_order': order, 'torque': table['torque'] + drift}
+    found = run(drifting, values, options=Options(effects=('cohesion',)))
     assert [(c.column, c.quantity) for c in found.along_rows] == [('row_order', 'torque')]
     assert any('change along row order' in note for note in found.notes)
     assert found.to_dict()['along_rows'][0]['column'] == 'row_order'

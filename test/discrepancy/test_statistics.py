@@ -76,6 +76,19 @@ def setting(forward):
     return soil, truth, std, inputs, np.ptp(truth, axis=0)
 
 
+def of_soil(forward, problem, soil, variance, *more):
+    """Return the fit of the soil alone."""
+    start = [np.zeros(len(soil))]
+    return fit(forward, problem, problem.observed, [((), soil)], start, variance, *more)[0]
+
+
+def smooth_error(problem, inputs, scale, amplitude):
+    """Return the dense covariance of a structural error."""
+    row, quantity = problem.row, problem.quantity
+    alike = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
+    return alike * np.outer(scale[quantity], scale[quantity]) * amplitude**2
+
+
 @pytest.mark.parametrize(
     ('source', 'pascal'), [('', 0.2 * 250 + 10), ('published', 0.5 * 250 + 50), ('proxy', 175.0)]
 )
@@ -152,9 +165,7 @@ def test_evidence_is_the_integral_over_parameters(setting):
     floor = Floor((amplitude,) * 4, 0.0, False)
     got = evidence(problem, model, (floor,)).log_joint[0]
 
-    row, quantity = problem.row, problem.quantity
-    smooth = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
-    smooth = smooth * np.outer(scale[quantity], scale[quantity]) * amplitude**2
+    smooth = smooth_error(problem, inputs, scale, amplitude)
     density = multivariate_normal(np.zeros(problem.size), np.diag(problem.std**2) + smooth)
     total = 0.0
     for width, share in ((1 / WIDENING, 1 - WORSE_SHARE), (1.0, WORSE_SHARE)):
@@ -182,8 +193,7 @@ def test_rotation_gives_the_dense_covariance(setting):
     expected = np.diag(problem.std**2)
     error = 0.02 * by_slip[row, quantity]
     expected += np.outer(error, error) * (group[row][:, None] == group[row][None, :])
-    smooth = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
-    expected += 0.03**2 * smooth * np.outer(scale[quantity], scale[quantity])
+    expected += smooth_error(problem, inputs, scale, 0.03)
     root = np.sqrt(np.diag(expected))
     np.testing.assert_allclose(
         dense / np.outer(root, root), expected / np.outer(root, root), atol=1e-8
@@ -196,9 +206,7 @@ def test_gap_test_is_calibrated(forward, setting):
     rng = np.random.default_rng(3)
     problem = build_problem(truth, std, inputs, scale)
     one = np.ones(problem.size)
-    at_truth = fit(
-        forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], one, None, 3
-    )[0]
+    at_truth = of_soil(forward, problem, soil, one, None, 3)
     squares = []
     for _ in range(200):
         shift = at_truth.sensitivity @ rng.standard_normal(len(soil))
@@ -216,10 +224,8 @@ def test_cells_left_out_are_marginalised(setting):
     rng = np.random.default_rng(4)
     _, truth, std, inputs, scale = setting
     problem = build_problem(std * rng.standard_normal(truth.shape), std, inputs, scale)
-    amplitude, row, quantity = 0.02, problem.row, problem.quantity
-    smooth = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
-    noise = np.diag(problem.std**2)
-    noise += smooth * np.outer(scale[quantity], scale[quantity]) * amplitude**2
+    amplitude, row = 0.02, problem.row
+    noise = np.diag(problem.std**2) + smooth_error(problem, inputs, scale, amplitude)
     inverse = held_out._inverse(problem, problem.variance(amplitude))
     for label in range(4):
         out = row % 4 == label
@@ -287,9 +293,7 @@ def test_outliers_are_found_and_a_hump_is_none(forward, setting):
     def cells_apart(measured):
         problem = build_problem(measured, std, inputs, scale)
         one = [problem.variance(0.02), problem.variance(0.25)]
-        nothing = fit(
-            forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], one[0]
-        )[0]
+        nothing = of_soil(forward, problem, soil, one[0])
         found = noise.find_outliers(problem, nothing, one, problem.observed, narrow)
         return {cell[:2] for cell in found}
 
@@ -315,14 +319,7 @@ def test_noise_is_estimated_beside_an_effect(forward, setting):
         guess = np.broadcast_to(0.01 * scale, truth.shape)
         origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
         problem = build_problem(measured, guess, inputs, scale)
-        nothing = fit(
-            forward,
-            problem,
-            problem.observed,
-            [((), soil)],
-            [np.zeros(len(soil))],
-            problem.variance(0.1),
-        )[0]
+        nothing = of_soil(forward, problem, soil, problem.variance(0.1))
         before = Noise(guess, origin)
         after = noise.estimate_noise(before, nothing, problem, problem.observed)
         ratios.append((after.std[0] / std[0])[:3])
@@ -334,8 +331,7 @@ def test_smooth_rows_are_not_taken_for_free_of_noise(forward, setting):
     soil, truth, _, inputs, scale = setting
     guess = np.broadcast_to(0.01 * scale, truth.shape)
     problem = build_problem(truth, guess, inputs, scale)
-    start, variance = [np.zeros(len(soil))], problem.variance(0.1)
-    nothing = fit(forward, problem, problem.observed, [((), soil)], start, variance)[0]
+    nothing = of_soil(forward, problem, soil, problem.variance(0.1))
     origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
     before = Noise(guess, origin)
     after = noise.estimate_noise(before, nothing, problem, problem.observed)
@@ -431,9 +427,7 @@ def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
             measured[forward.points.slip > 0.6, 1] += 12.0 * std[0, 1]
         problem = build_problem(measured, std, inputs, scale)
         one = np.ones(problem.size)
-        nothing = fit(forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], one)[
-            0
-        ]
+        nothing = of_soil(forward, problem, soil, one)
         named = dict(zip(QUANTITIES, measured.T, strict=True))
         table = check_table('t', {**columns, **named})
         found.append(locate(table, problem, nothing, problem.observed, len(table)))
@@ -466,9 +460,7 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
         measured[rows, :3] += (other.steady_state(forward.points).outputs() - truth[:, :3])[rows]
         problem = build_problem(measured, std, inputs, scale)
         one = np.ones(problem.size)
-        nothing = fit(forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], one)[
-            0
-        ]
+        nothing = of_soil(forward, problem, soil, one)
         table = SimpleNamespace(columns={'time': order.astype(float)})
         work = SimpleNamespace(problem=problem, observed=problem.observed)
         return changed_stretch(table, work, nothing, one)

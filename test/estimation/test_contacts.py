@@ -346,11 +346,15 @@ ENTRIES = {
 }
 
 
+@pytest.fixture(scope='module')
+def here(parts):
+    return forces_at(parts)
+
+
 @pytest.mark.parametrize(
     ('name', 'step'), [(n, 1e-5 if n in {'speed', 'sinkage'} else 1e-3) for n in ENTRIES]
 )
-def test_rows_are_the_derivatives_of_torque_and_pull(parts, name, step):
-    here = forces_at(parts)
+def test_rows_are_the_derivatives_of_torque_and_pull(parts, here, name, step):
     up, down = (forces_at(parts, **{name: side * step}) for side in (1.0, -1.0))
     columns = np.zeros(parts.layout.size)
     columns[ENTRIES[name](parts.layout)] = 1.0

@@ -13,6 +13,7 @@ from wheel_terra_estimator.estimation.sideways import (
     UNKNOWN_ANGLE_STD,
     SidewaysInputs,
     SidewaysMotion,
+    _angle_std,
 )
 from wheel_terra_estimator.simulation import scenario as scenarios
 from wheel_terra_estimator.simulation.drive import START, Drive
@@ -166,8 +167,6 @@ def test_slip_angles_of_simulated_drives_lie_within_their_deviations(name, side)
 
 def test_a_direction_of_speeds_known_no_better_than_their_size_may_be_any():
     """Against draws: the spread of the direction of two Gaussian speeds."""
-    from wheel_terra_estimator.estimation.sideways import _angle_std
-
     draws = np.random.default_rng(1).normal(size=(2, 20000))
     for along, across, std in ((0.05, 0.01, 0.003), (0.12, 0.27, 0.27), (0.12, 0.1, 0.1)):
         angle = np.arctan2(across + std * draws[1], along + 0.01 * draws[0])

@@ -15,11 +15,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wheel_terra_estimator import api
 from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, StuckWarning
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.report.page import write_report
 from wheel_terra_estimator.reporting.drive_summary import summarise
+from wheel_terra_estimator.reporting.fleet_summary import CLASSES, DriveRow, write_summary_page
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
+from wheel_terra_lab.soilbin import output
+from wheel_terra_lab.soilbin.bookkeeping import SERIES
+from wheel_terra_lab.soilbin.case import Case
 
 BROWSER = next(
     (
@@ -155,9 +161,6 @@ def test_an_hour_of_driving_stays_a_small_file_that_needs_nothing_else(report: P
 
 @pytest.fixture(scope='module')
 def diagnosis_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_estimator import api
-    from wheel_terra_estimator.discrepancy.report.page import write_report
-
     slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.05, 0.6, 10), [60.0, 100.0]))
     model = api.Model.load('hit_wh3', 'dlr_mss')
     rows = api.Model.load(
@@ -172,10 +175,6 @@ def diagnosis_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope='module')
 def soilbin_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_lab.soilbin import output
-    from wheel_terra_lab.soilbin.bookkeeping import SERIES
-    from wheel_terra_lab.soilbin.case import Case
-
     series = np.random.default_rng(1).random((200, len(SERIES)))
     series[:, 0] = np.linspace(0.0, 40.0, 200)
     folder = tmp_path_factory.mktemp('soilbin')
@@ -185,8 +184,6 @@ def soilbin_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope='module')
 def fleet_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_estimator.reporting.fleet_summary import CLASSES, DriveRow, write_summary_page
-
     shares = dict(zip(CLASSES, (60.0, 10.0, 5.0, 0.0, 1.0), strict=True))
     finding = 'radius (100 %), /joint_states: the rover runs 1.068 of what its rims say'
     drive = DriveRow('bags/a', 'a', verdict='No stuck warning.', duration=76.0, sets=760,

@@ -3,6 +3,8 @@
 """Lines keep their peaks, names lose what they share, pages hold what they show."""
 
 import re
+from io import StringIO
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -78,8 +80,6 @@ def test_the_same_picture_is_the_same_text_and_no_setting_stays():
 
 
 def test_text_of_others_is_escaped(tmp_path):
-    from pathlib import Path
-
     folder = Path(str(tmp_path))
     (folder / 'page.html').write_text(
         "{% extends 'base.html' %}{% block title %}{{ name }}{% endblock %}"
@@ -119,9 +119,6 @@ def test_what_is_beyond_the_border_is_not_known():
 
 def test_pictures_follow_the_dark_mode_of_the_reader():
     """Every dark ink of a picture has a rule that makes it light; nothing else is touched."""
-    import re
-    from io import StringIO
-
     from matplotlib.figure import Figure
 
     with picture_style():

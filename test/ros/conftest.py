@@ -135,6 +135,16 @@ def start_interpreter():
     yield from _starter(interpreter)
 
 
+@pytest.fixture
+def parameters(tmp_path):
+    """The file of a rover."""
+    from wheel_terra_estimator.configuration import reader
+
+    path = tmp_path / 'rover.yaml'
+    reader.load(['pathfinder']).write(path)
+    return str(path)
+
+
 @pytest.fixture(scope='class')
 def running_estimator(node_server, tmp_path_factory):
     """One estimator node for the tests of a class, in their order."""

@@ -8,34 +8,24 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import ros_types as ros
+
+from wheel_terra_estimator.configuration import reader
 
 ROVER = ['--ros-args', '--params-file']
 NODE = '/wheel_terra_estimator'
 
 
-@pytest.fixture
-def parameters(tmp_path):
-    from wheel_terra_estimator.configuration import reader
-
-    path = tmp_path / 'rover.yaml'
-    reader.load(['pathfinder']).write(path)
-    return str(path)
-
-
 def latched():
-    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-
-    return QoSProfile(
+    return ros.QoSProfile(
         depth=1,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        reliability=ros.ReliabilityPolicy.RELIABLE,
+        durability=ros.DurabilityPolicy.TRANSIENT_LOCAL,
     )
 
 
 def wheel_message(names, seconds, rate=1.0):
-    from sensor_msgs.msg import JointState
-
-    message = JointState(name=list(names), velocity=[rate] * len(names))
+    message = ros.JointState(name=list(names), velocity=[rate] * len(names))
     message.header.stamp.sec = int(seconds)
     message.header.stamp.nanosec = round((seconds % 1.0) * 1e9)
     return message
@@ -132,19 +122,15 @@ class TestOneNode:
     """One node for all, in this order: it has heard nothing before the last."""
 
     def test_silence_is_said_in_diagnostics(self, listener):
-        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-
         node, until = listener
-        diagnostics = hear(node, DiagnosticArray, '/diagnostics')
+        diagnostics = hear(node, ros.DiagnosticArray, '/diagnostics')
         until(lambda: diagnostics)
         until(lambda: 'never received' in diagnostics[-1].status[0].message)
         statuses = diagnostics[-1].status
         assert len(statuses) == 5, 'one per wheel and one for the node'
-        assert all(s.level == DiagnosticStatus.STALE for s in statuses)
+        assert all(s.level == ros.DiagnosticStatus.STALE for s in statuses)
 
     def test_topics_types_and_stuck_for_those_who_come_late(self, listener):
-        from std_msgs.msg import Bool, Int8
-
         node, until = listener
         expected = {
             'slip': 'sensor_msgs/msg/JointState',
@@ -178,20 +164,17 @@ class TestOneNode:
         ):
             if subscribers := node.get_subscriptions_info_by_topic(f'/{topic}'):
                 assert subscribers[0].qos_profile.reliability.name == 'BEST_EFFORT', topic
-        stuck = hear(node, Bool, f'{NODE}/stuck', latched())
+        stuck = hear(node, ros.Bool, f'{NODE}/stuck', latched())
         until(lambda: stuck)
         assert [m.data for m in stuck] == [False]
-        direction = hear(node, Int8, f'{NODE}/stuck_direction', latched())
+        direction = hear(node, ros.Int8, f'{NODE}/stuck_direction', latched())
         until(lambda: direction)
         assert [m.data for m in direction] == [0]
 
     def test_messages_that_give_no_estimate_are_explained(self, listener):
-        from diagnostic_msgs.msg import DiagnosticArray
-        from sensor_msgs.msg import JointState
-
         node, until = listener
-        diagnostics = hear(node, DiagnosticArray, '/diagnostics')
-        wheels = node.create_publisher(JointState, 'joint_states', 10)
+        diagnostics = hear(node, ros.DiagnosticArray, '/diagnostics')
+        wheels = node.create_publisher(ros.JointState, 'joint_states', 10)
 
         def said_after(message, *words):
             wheels.publish(message)
@@ -203,16 +186,11 @@ class TestOneNode:
 
 
 def test_publisher_of_another_type_or_quality_is_named(start, parameters, listener):
-    from diagnostic_msgs.msg import DiagnosticArray
-    from geometry_msgs.msg import Twist
-    from nav_msgs.msg import Odometry
-    from rclpy.qos import QoSProfile, ReliabilityPolicy
-
     node, until = listener
-    diagnostics = hear(node, DiagnosticArray, '/diagnostics')
-    node.create_publisher(Twist, 'joint_states', 10)
-    offered = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-    node.create_publisher(Odometry, 'reference_odom', offered)
+    diagnostics = hear(node, ros.DiagnosticArray, '/diagnostics')
+    node.create_publisher(ros.Twist, 'joint_states', 10)
+    offered = ros.QoSProfile(depth=10, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
+    node.create_publisher(ros.Odometry, 'reference_odom', offered)
     wanted = 'qos_overrides./reference_odom.subscription.reliability:=reliable'
     start('estimator_node', *ROVER, parameters, '-p', wanted)
 
@@ -224,14 +202,11 @@ def test_publisher_of_another_type_or_quality_is_named(start, parameters, listen
 
 
 def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, parameters, listener):
-    from diagnostic_msgs.msg import DiagnosticArray
-    from sensor_msgs.msg import Imu
-
     node, until = listener
-    diagnostics = hear(node, DiagnosticArray, '/diagnostics')
-    imu = node.create_publisher(Imu, 'imu/data', 10)
+    diagnostics = hear(node, ros.DiagnosticArray, '/diagnostics')
+    imu = node.create_publisher(ros.Imu, 'imu/data', 10)
     process = start('estimator_node', *ROVER, parameters, '-r', 'joint_states:=/drive/joints')
-    message = Imu()
+    message = ros.Imu()
     message.linear_acceleration.z = 9.81
 
     def said(words):
@@ -258,8 +233,6 @@ def test_wrong_parameters_end_the_node_with_one_line(start, parameters):
 @pytest.fixture
 def proposal(tmp_path):
     """The file of a law that no listed effect states, as a diagnosis writes it."""
-    from wheel_terra_estimator.configuration import reader
-
     law = {
         'enabled': True,
         'targets': ['torque', 'exponent'],
@@ -276,20 +249,17 @@ def proposal(tmp_path):
 def test_a_proposed_law_is_a_further_file_and_an_integer_may_stand_for_a_number(
     start, parameters, proposal, listener
 ):
-    from rcl_interfaces.srv import GetParameters
-    from std_msgs.msg import Bool
-
     node, until = listener
     further = ['--params-file', proposal, '-p', 'rover.mass:=20', '-p', 'use_sim_time:=true']
     further += ['-p', 'rover.contact_law:=wong_reece']
     start('estimator_node', *ROVER, parameters, *further)
-    stuck = hear(node, Bool, f'{NODE}/stuck', latched())
+    stuck = hear(node, ros.Bool, f'{NODE}/stuck', latched())
     until(lambda: stuck)
-    get = node.create_client(GetParameters, f'{NODE}/get_parameters')
+    get = node.create_client(ros.GetParameters, f'{NODE}/get_parameters')
     until(get.service_is_ready)
     law = 'effects.learned_closure'
     names = [f'{law}.enabled', f'{law}.targets', f'{law}.coefficients', 'rover.contact_law']
-    future = get.call_async(GetParameters.Request(names=names))
+    future = get.call_async(ros.GetParameters.Request(names=names))
     until(future.done)
     enabled, targets, coefficients, contact_law = future.result().values
     assert enabled.bool_value

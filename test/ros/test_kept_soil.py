@@ -10,7 +10,8 @@ import signal
 from pathlib import Path
 
 import pytest
-from test_estimator_node import ROVER, hear, parameters
+import ros_types as ros
+from test_estimator_node import ROVER, hear
 
 from wheel_terra_estimator import output_folder
 from wheel_terra_estimator.configuration import reader
@@ -19,7 +20,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog, why_no_arrival_log
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
 
-__all__ = ['parameters']
 LEARNED = {'soil.cohesion': 400.0, 'soil.cohesion_std': 100.0}
 STUCK = StuckState(True, 'wheels dig in', 90, 1)
 OWN = f'# {HEADER}\n/**:\n  ros__parameters:\n'
@@ -161,10 +161,8 @@ def test_the_folder_is_on_the_disk_behind_each_rename(tmp_path, monkeypatch):
 
 
 def test_a_place_that_takes_no_file_is_told_at_the_start(start, parameters, listener):
-    from diagnostic_msgs.msg import DiagnosticArray
-
     node, until = listener
-    said = hear(node, DiagnosticArray, '/diagnostics')
+    said = hear(node, ros.DiagnosticArray, '/diagnostics')
     path = '/proc/s.yaml'
     process = start('estimator_node', *ROVER, parameters, '-p', f'soil_file:={path}')
     until(lambda: any(f'soil_file: {path}: ' in m.status[0].message for m in said))

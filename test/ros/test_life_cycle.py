@@ -13,17 +13,19 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from test_estimator_node import NODE, ROVER, hear, latched, parameters, wheel_message
+import ros_types as ros
+from test_estimator_node import NODE, ROVER, hear, latched, wheel_message
 
-__all__ = ['parameters']
+from wheel_terra_estimator.configuration import reader
+
 STALE = b'\x03'
 
 
-def call(node, until, kind, name, request):
+def call(node, until, kind, name, **request):
     client = node.create_client(kind, f'{NODE}/{name}')
     until(client.service_is_ready)
     until(answer_to_a_question(node))
-    future = client.call_async(request)
+    future = client.call_async(kind.Request(**request))
     until(future.done)
     return future.result()
 
@@ -33,48 +35,36 @@ def answer_to_a_question(node):
 
     An answer to a client of which it has not heard yet is lost; a question may be asked again.
     """
-    from lifecycle_msgs.srv import GetState
 
-    client = node.create_client(GetState, f'{NODE}/get_state')
+    client = node.create_client(ros.GetState, f'{NODE}/get_state')
     asked, turns = [], itertools.count()
 
     def answered():
         if client.service_is_ready() and next(turns) % 20 == 0:
-            asked.append(client.call_async(GetState.Request()))
+            asked.append(client.call_async(ros.GetState.Request()))
         return any(future.done() for future in asked)
 
     return answered
 
 
 def test_life_cycle_services_and_live_parameters(start, parameters, listener, tmp_path):
-    from diagnostic_msgs.msg import DiagnosticArray
-    from lifecycle_msgs.msg import Transition
-    from lifecycle_msgs.srv import ChangeState, GetState
-    from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-    from rcl_interfaces.srv import SetParameters
-    from sensor_msgs.msg import JointState
-    from std_msgs.msg import Bool
-    from std_srvs.srv import SetBool, Trigger
-
-    from wheel_terra_estimator.configuration import reader
-
     names = reader.load(['pathfinder']).wheels.names
     node, until = listener
     soil = tmp_path / 'soil.yaml'
     options = ['-p', 'autostart:=false', '-p', f'soil_file:={soil}']
     process = start('estimator_node', *ROVER, parameters, *options)
-    slip = hear(node, JointState, f'{NODE}/slip')
-    stuck = hear(node, Bool, f'{NODE}/stuck', latched())
-    said = hear(node, DiagnosticArray, '/diagnostics')
-    wheels = node.create_publisher(JointState, 'joint_states', 10)
+    slip = hear(node, ros.JointState, f'{NODE}/slip')
+    stuck = hear(node, ros.Bool, f'{NODE}/stuck', latched())
+    said = hear(node, ros.DiagnosticArray, '/diagnostics')
+    wheels = node.create_publisher(ros.JointState, 'joint_states', 10)
     sent = 0
 
     def change(transition):
-        request = ChangeState.Request(transition=Transition(id=transition))
-        return call(node, until, ChangeState, 'change_state', request).success
+        wanted = ros.Transition(id=transition)
+        return call(node, until, ros.ChangeState, 'change_state', transition=wanted).success
 
     def state():
-        return call(node, until, GetState, 'get_state', GetState.Request()).current_state.label
+        return call(node, until, ros.GetState, 'get_state').current_state.label
 
     def drive(condition):
         def step():
@@ -91,35 +81,36 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
         return min(b - a for a, b in pairwise(stamps)) > 0.45
 
     def set_parameter(name, value):
-        kind = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
-        request = SetParameters.Request(parameters=[Parameter(name=name, value=kind)])
-        return call(node, until, SetParameters, 'set_parameters', request).results[0]
+        kind = ros.ParameterValue(type=ros.ParameterType.PARAMETER_DOUBLE, double_value=value)
+        wanted = [ros.Parameter(name=name, value=kind)]
+        return call(node, until, ros.SetParameters, 'set_parameters', parameters=wanted).results[0]
 
     assert state() == 'unconfigured'
-    assert not call(node, until, Trigger, 'reset', Trigger.Request()).success
-    for transition in (Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_CLEANUP, 250):
+    assert not call(node, until, ros.Trigger, 'reset').success
+    for transition in (ros.Transition.TRANSITION_ACTIVATE, ros.Transition.TRANSITION_CLEANUP, 250):
         assert not change(transition)
     assert state() == 'unconfigured'
     refused = set_parameter('rover.mass', -5.0)
     assert not refused.successful and 'rover.mass' in refused.reason
     assert set_parameter('rover.mass', 120.0).successful
-    assert change(Transition.TRANSITION_CONFIGURE)
+    assert change(ros.Transition.TRANSITION_CONFIGURE)
     until(lambda: wheels.get_subscription_count() and stuck)
     drive(lambda: said and said[-1].status[0].message.startswith('inactive'))
     assert all(s.level == STALE for s in said[-1].status)
     assert not slip, 'configured, not active: the filter goes on, nothing is published'
-    assert change(Transition.TRANSITION_ACTIVATE)
-    assert not change(Transition.TRANSITION_CONFIGURE), 'as a manager does that knows no autostart'
+    assert change(ros.Transition.TRANSITION_ACTIVATE)
+    # As a manager does that knows no autostart.
+    assert not change(ros.Transition.TRANSITION_CONFIGURE)
     drive(lambda: len(slip) > 2)
     # The filter had gone on: stamps do not begin anew.
     assert slip[0].header.stamp.sec + 1e-9 * slip[0].header.stamp.nanosec > 100.0
 
-    assert call(node, until, SetBool, 'set_enabled', SetBool.Request(data=False)).success
+    assert call(node, until, ros.SetBool, 'set_enabled', data=False).success
     drive(lambda: said[-1].status[0].message.startswith('disabled'))
     count = len(slip)
     drive(lambda: sent % 10 == 0)
     assert len(slip) == count
-    assert call(node, until, SetBool, 'set_enabled', SetBool.Request(data=True)).success
+    assert call(node, until, ros.SetBool, 'set_enabled', data=True).success
     drive(lambda: len(slip) > count + 2)
 
     refused = set_parameter('rover.mass', 1.0)
@@ -130,29 +121,23 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
     assert not rate_is_two()
     drive(rate_is_two)
 
-    answer = call(node, until, Trigger, 'save_soil', Trigger.Request())
+    answer = call(node, until, ros.Trigger, 'save_soil')
     assert answer.success and answer.message == str(soil)
     again = reader.load([parameters, soil])
     assert again.soil.cohesion > 0.0 and 'soil.cohesion' in again.stated
     assert json.loads(soil.with_name('soil.yaml.state.json').read_text())['stuck'] is False
 
-    assert change(Transition.TRANSITION_DEACTIVATE)
-    assert change(Transition.TRANSITION_CLEANUP)
+    assert change(ros.Transition.TRANSITION_DEACTIVATE)
+    assert change(ros.Transition.TRANSITION_CLEANUP)
     assert state() == 'unconfigured'
     until(lambda: not wheels.get_subscription_count())
-    assert change(Transition.TRANSITION_CONFIGURE)
+    assert change(ros.Transition.TRANSITION_CONFIGURE)
     status, words = process.stop(signal.SIGTERM)
     assert status == 0 and 'Traceback' not in words, words
     assert 'no transition 1 from active\n' in words
 
 
 def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener, tmp_path):
-    from diagnostic_msgs.msg import DiagnosticArray
-    from sensor_msgs.msg import JointState
-    from std_msgs.msg import Bool, Int8
-    from std_srvs.srv import Trigger
-
-    from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.configuration.soil_file import write_values
 
     node, until = listener
@@ -161,10 +146,10 @@ def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener
     state = tmp_path / 'soil.yaml.state.json'
     kept = {'stuck': True, 'reason': 'wheels dig in', 'stamp': math.inf, 'direction': -1}
     state.write_text(json.dumps(kept))
-    stuck = hear(node, Bool, f'{NODE}/stuck', latched())
-    direction = hear(node, Int8, f'{NODE}/stuck_direction', latched())
-    said = hear(node, DiagnosticArray, '/diagnostics')
-    wheels = node.create_publisher(JointState, 'joint_states', 10)
+    stuck = hear(node, ros.Bool, f'{NODE}/stuck', latched())
+    direction = hear(node, ros.Int8, f'{NODE}/stuck_direction', latched())
+    said = hear(node, ros.DiagnosticArray, '/diagnostics')
+    wheels = node.create_publisher(ros.JointState, 'joint_states', 10)
     process = start('estimator_node', *ROVER, parameters, '-p', f'soil_file:={soil}')
     until(lambda: stuck and direction and wheels.get_subscription_count())
     assert stuck[-1].data and direction[-1].data == -1
@@ -185,11 +170,11 @@ def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener
 
     until(told)
     assert len(stuck) == 1, 'rest does not clear it'
-    assert call(node, until, Trigger, 'reset', Trigger.Request()).success
+    assert call(node, until, ros.Trigger, 'reset').success
     until(lambda: not stuck[-1].data and direction[-1].data == 0)
     assert not state.exists()
     until(lambda: told() and sent % 20 == 0)
-    assert not call(node, until, Trigger, 'save_soil', Trigger.Request()).message.endswith('empty')
+    assert not call(node, until, ros.Trigger, 'save_soil').message.endswith('empty')
     written = reader.load([parameters, soil]).soil.cohesion
     assert written == pytest.approx(432.1, rel=0.2)
     status, words = process.stop(signal.SIGINT)

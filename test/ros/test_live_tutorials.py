@@ -7,16 +7,19 @@ import shlex
 from pathlib import Path
 
 import pytest
+import ros_types as ros
 import yaml
+from test_estimator_node import NODE, latched, wheel_message
+
+from wheel_terra_estimator.configuration import reader
 
 TUTORIALS = Path(__file__).resolve().parents[2] / 'docs' / 'tutorials'
-NODE = '/wheel_terra_estimator'
 BASH = re.compile(r'^```bash\n(.*?)^```', re.M | re.S)
 TYPES = {
-    'slip': 'sensor_msgs.msg.JointState',
-    'mobility': 'sensor_msgs.msg.JointState',
-    'slip_class': 'std_msgs.msg.UInt8MultiArray',
-    'stuck': 'std_msgs.msg.Bool',
+    'slip': 'JointState',
+    'mobility': 'JointState',
+    'slip_class': 'UInt8MultiArray',
+    'stuck': 'Bool',
 }
 STEP = 0.05  # [s] between two messages of the wheels
 
@@ -39,22 +42,8 @@ def named_in_table(page, below):
     return re.findall(r'^\| `~/(\w+)` \| `(\w+)` \|', text, re.M)
 
 
-def kind(path):
-    import importlib
-
-    module, _, name = path.rpartition('.')
-    return getattr(importlib.import_module(module), name)
-
-
 def test_the_live_tutorials_in_one_drive(start, listener, tmp_path):
     """Drive on firm ground; every topic of the controller's table comes, the command passes."""
-    from geometry_msgs.msg import TwistStamped, TwistWithCovarianceStamped
-    from nav_msgs.msg import Odometry
-    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-    from sensor_msgs.msg import JointState
-
-    from wheel_terra_estimator.configuration import reader
-
     configuration = reader.load(['pathfinder'])
     rover = tmp_path / 'my_rover.yaml'
     configuration.write(rover)
@@ -64,26 +53,21 @@ def test_the_live_tutorials_in_one_drive(start, listener, tmp_path):
         start(executable, *(str(rover) if a == rover.name else a for a in arguments))
 
     node, until = listener
-    latched = QoSProfile(
-        depth=1,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    )
     table = named_in_table('node', '## Feeding a controller')
     assert {topic for topic, _ in table} == set(TYPES)
     heard = {topic: [] for topic in (*TYPES, 'twist', 'command')}
-    for topic, path in TYPES.items():
-        profile = latched if topic == 'stuck' else 10
-        node.create_subscription(kind(path), f'{NODE}/{topic}', heard[topic].append, profile)
+    for topic, name in TYPES.items():
+        profile, kind = latched() if topic == 'stuck' else 10, getattr(ros, name)
+        node.create_subscription(kind, f'{NODE}/{topic}', heard[topic].append, profile)
     text = (TUTORIALS / 'nav2.md').read_text(encoding='utf-8')
     block = yaml.safe_load(re.search(r'^```yaml\n(.*?)^```', text, re.M | re.S)[1])
     twist = block['ekf_filter_node']['ros__parameters']['twist0']
-    node.create_subscription(TwistWithCovarianceStamped, twist, heard['twist'].append, 10)
-    node.create_subscription(TwistStamped, '/cmd_vel', heard['command'].append, 10)
-    wheels = node.create_publisher(JointState, 'joint_states', 10)
+    node.create_subscription(ros.TwistWithCovarianceStamped, twist, heard['twist'].append, 10)
+    node.create_subscription(ros.TwistStamped, '/cmd_vel', heard['command'].append, 10)
+    wheels = node.create_publisher(ros.JointState, 'joint_states', 10)
     # The command remaps the reference; a remap that failed would leave this without a listener.
-    reference = node.create_publisher(Odometry, '/visual_odometry', 10)
-    wanted = node.create_publisher(TwistStamped, '/cmd_vel_raw', 10)
+    reference = node.create_publisher(ros.Odometry, '/visual_odometry', 10)
+    wanted = node.create_publisher(ros.TwistStamped, '/cmd_vel_raw', 10)
     until(
         lambda: (
             all(p.get_subscription_count() for p in (wheels, reference, wanted))
@@ -93,18 +77,15 @@ def test_the_live_tutorials_in_one_drive(start, listener, tmp_path):
 
     names, rate, clock = configuration.wheels.names, 1.0, 100.0
     speed = rate * float(configuration.wheels.slip_radius[0])
-    command = TwistStamped()
+    command = ros.TwistStamped()
     command.twist.linear.x = speed
 
     def passes():
         nonlocal clock
         clock += STEP
-        stamp = {'sec': int(clock), 'nanosec': round((clock % 1.0) * 1e9)}
-        odometry = Odometry()
+        message = wheel_message(names, clock, rate)
+        odometry = ros.Odometry(header=message.header)
         odometry.twist.twist.linear.x, odometry.twist.covariance[0] = speed, 1e-4
-        message = JointState(name=list(names), velocity=[rate] * len(names))
-        for m in (message, odometry):
-            m.header.stamp.sec, m.header.stamp.nanosec = stamp['sec'], stamp['nanosec']
         wheels.publish(message)
         reference.publish(odometry)
         wanted.publish(command)
@@ -124,8 +105,6 @@ def test_the_live_tutorials_in_one_drive(start, listener, tmp_path):
 
 
 def test_launch_line_of_the_tutorial_names_files_and_arguments_that_are_there():
-    from wheel_terra_estimator.configuration import reader
-
     (line,) = [words for words in commands('node') if words[:2] == ['ros2', 'launch']]
     launch = Path(__file__).resolve().parents[2] / 'launch' / line[3]
     declared = launch.read_text(encoding='utf-8')

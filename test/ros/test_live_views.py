@@ -6,20 +6,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_estimator_node import wheel_message
+import ros_types as ros
+from test_estimator_node import NODE, wheel_message
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.estimates import SlipClass
 
-NODE = '/wheel_terra_estimator'
 STEP = 0.1  # [s] between two messages
 
 
 def test_wrenches_and_markers_hold_the_estimates(start, listener, tmp_path):
-    from geometry_msgs.msg import WrenchStamped
-    from sensor_msgs.msg import JointState
-    from visualization_msgs.msg import MarkerArray
-
     rover = reader.load(['pathfinder'])
     names = rover.wheels.names
     path = tmp_path / 'rover.yaml'
@@ -32,11 +28,11 @@ def test_wrenches_and_markers_hold_the_estimates(start, listener, tmp_path):
     node, until = listener
     heard = {'slip': [], 'sinkage': [], 'wrench': [], 'markers': []}
     subscribe = node.create_subscription
-    subscribe(JointState, f'{NODE}/slip', heard['slip'].append, 10)
-    subscribe(JointState, f'{NODE}/sinkage', heard['sinkage'].append, 10)
-    subscribe(WrenchStamped, f'{NODE}/wrench/{names[1]}', heard['wrench'].append, 10)
-    subscribe(MarkerArray, f'{NODE}/markers', heard['markers'].append, 10)
-    publisher = node.create_publisher(JointState, 'joint_states', 10)
+    subscribe(ros.JointState, f'{NODE}/slip', heard['slip'].append, 10)
+    subscribe(ros.JointState, f'{NODE}/sinkage', heard['sinkage'].append, 10)
+    subscribe(ros.WrenchStamped, f'{NODE}/wrench/{names[1]}', heard['wrench'].append, 10)
+    subscribe(ros.MarkerArray, f'{NODE}/markers', heard['markers'].append, 10)
+    publisher = node.create_publisher(ros.JointState, 'joint_states', 10)
     start('estimator_node', '--ros-args', '--params-file', str(path))
     until(publisher.get_subscription_count)
     sent = 0

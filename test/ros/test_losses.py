@@ -83,7 +83,7 @@ def test_a_process_that_stood_tells_each_loss_with_its_count(drive):
             break
     assert fast <= lost(rover).keys()
     first = time.monotonic()
-    while time.monotonic() < first + 5.0:
+    while time.monotonic() < first + 3.0:
         for topic, count in lost(rover).items():
             assert f'{topic}: {count} messages lost on the way so far' in rover.said
         heard = rover.diagnostics
@@ -104,7 +104,7 @@ def test_a_process_that_stood_and_lost_nothing_is_behind_and_no_topic_silent(dri
     sets, said = rover.sets, set()
     until(lambda: 'late' in rover.said)
     assert re.search(r'inputs: taken [12]\.\d s late', rover.said), rover.said
-    over = lasts(4.0)  # seconds in which each status is looked at
+    over = lasts(3.0)  # seconds in which each status is looked at
     until(lambda: said.add(rover.said) or over())
     if not lost(rover):  # the middleware may keep nothing for a process that stands
         assert not [words for words in said if re.search('silent|lost|ahead|older', words)]

@@ -9,27 +9,24 @@ import time
 from pathlib import Path
 
 import pytest
-from test_estimator_node import ROVER, parameters, wheel_message
+import ros_types as ros
+from test_estimator_node import ROVER, wheel_message
 
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.errors import UserError
-
-__all__ = ['parameters']
 
 
 class Operator:
     """Commands, and wheel odometry of the present time, as long as a condition does not hold."""
 
     def __init__(self, listener, names=()):
-        from geometry_msgs.msg import TwistStamped
-        from sensor_msgs.msg import JointState
-
         self.node, self.until = listener
         self.names = names
         self.out = []
-        self.node.create_subscription(TwistStamped, 'cmd_vel_out', self.out.append, 10)
-        self.commands = self.node.create_publisher(TwistStamped, 'cmd_vel_in', 10)
-        self.wheels = self.node.create_publisher(JointState, 'joint_states', 10)
-        self.command = TwistStamped()
+        self.node.create_subscription(ros.TwistStamped, 'cmd_vel_out', self.out.append, 10)
+        self.commands = self.node.create_publisher(ros.TwistStamped, 'cmd_vel_in', 10)
+        self.wheels = self.node.create_publisher(ros.JointState, 'joint_states', 10)
+        self.command = ros.TwistStamped()
         self.command.header.stamp.sec = 7
         self._sent = 0.0
 
@@ -56,11 +53,9 @@ class Operator:
         return [self.out[-1].twist.linear.x, self.out[-1].twist.angular.z]
 
     def call(self, service):
-        from std_srvs.srv import Trigger
-
-        client = self.node.create_client(Trigger, service)
+        client = self.node.create_client(ros.Trigger, service)
         self.until(client.service_is_ready)
-        future = client.call_async(Trigger.Request())
+        future = client.call_async(ros.Trigger.Request())
         self.until(future.done)
         return future.result()
 
@@ -68,17 +63,13 @@ class Operator:
 def test_estimator_and_limiter_restarted_while_stuck_release_and_reset(
     start, parameters, listener, tmp_path
 ):
-    from diagnostic_msgs.msg import DiagnosticArray
-
-    from wheel_terra_estimator.configuration import reader
-
     soil = tmp_path / 'soil.yaml'
     kept = {'stuck': True, 'reason': 'digs in', 'stamp': time.time_ns(), 'direction': 1}
     soil.with_name('soil.yaml.state.json').write_text(json.dumps(kept))
     limiter = start('traction_limiter_node', '--ros-args', '-p', 'stale_scale:=0.25')
     operator = Operator(listener, reader.load(['pathfinder']).wheels.names)
     said = []
-    operator.node.create_subscription(DiagnosticArray, '/diagnostics', said.append, 10)
+    operator.node.create_subscription(ros.DiagnosticArray, '/diagnostics', said.append, 10)
     operator.comes_to(0.25, 0.1)
     estimator = [
         *ROVER,
@@ -113,27 +104,24 @@ def test_estimator_and_limiter_restarted_while_stuck_release_and_reset(
 
 
 def test_a_stop_by_its_topics_outlives_the_limiter(start, listener, tmp_path):
-    from sensor_msgs.msg import JointState
-    from std_msgs.msg import Float64, UInt8MultiArray
-
     operator = Operator(listener)
     scales = []
-    operator.node.create_subscription(Float64, 'traction_limiter/scale', scales.append, 10)
+    operator.node.create_subscription(ros.Float64, 'traction_limiter/scale', scales.append, 10)
     slip, mobility = (
-        operator.node.create_publisher(JointState, f'wheel_terra_estimator/{name}', 10)
+        operator.node.create_publisher(ros.JointState, f'wheel_terra_estimator/{name}', 10)
         for name in ('slip', 'mobility')
     )
     classes = operator.node.create_publisher(
-        UInt8MultiArray, 'wheel_terra_estimator/slip_class', 10
+        ros.UInt8MultiArray, 'wheel_terra_estimator/slip_class', 10
     )
 
     def comes_to(share, forward, travel=10.0, age=0.0, **more):
         def published():
             stamped = wheel_message(['a', 'b'], time.time() - age)
-            values = JointState(header=stamped.header, name=['a', 'b'])
+            values = ros.JointState(header=stamped.header, name=['a', 'b'])
             values.position, values.velocity = [0.2, 0.2], [0.02, 0.02]
             slip.publish(values)
-            classes.publish(UInt8MultiArray(data=[0, 0]))
+            classes.publish(ros.UInt8MultiArray(data=[0, 0]))
             values.position, values.velocity = [travel, travel], []
             mobility.publish(values)
             return scales and scales[-1].data == pytest.approx(share)
@@ -161,11 +149,8 @@ def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
     listener, tmp_path, monkeypatch
 ):
     """The state is kept with a sync of the disk; a bag played back sends ``~/stuck``, too."""
-    from diagnostic_msgs.msg import DiagnosticArray
-    from geometry_msgs.msg import TwistStamped
     from rclpy.parameter import Parameter
     from rclpy.serialization import deserialize_message
-    from std_msgs.msg import Bool
 
     from wheel_terra_estimator.configuration import soil_file
     from wheel_terra_estimator.estimation.traction_limiter import Event, after_event
@@ -178,7 +163,7 @@ def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
     monkeypatch.setattr(
         soil_file, 'write_state', lambda path, state: kept.append((state.stuck, sent[-1]))
     )
-    command = TwistStamped()
+    command = ros.TwistStamped()
     for _ in range(20):
         command.twist.linear.x = 0.1
         node._on_command(command)
@@ -188,11 +173,11 @@ def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
     assert kept == [(True, 0.0)]
     said = []
     monkeypatch.setattr(node._diagnostics, 'publish', said.append)
-    rival = listener[0].create_publisher(Bool, 'wheel_terra_estimator/stuck', 1)
+    rival = listener[0].create_publisher(ros.Bool, 'wheel_terra_estimator/stuck', 1)
     node._say()
-    other = listener[0].create_publisher(Bool, 'wheel_terra_estimator/stuck', 1)
+    other = listener[0].create_publisher(ros.Bool, 'wheel_terra_estimator/stuck', 1)
     node._say()
-    words = [deserialize_message(data, DiagnosticArray).status[0].message for data in said]
+    words = [deserialize_message(data, ros.DiagnosticArray).status[0].message for data in said]
     assert ['2 publishers' in word for word in words] == [False, True], words
     for publisher in (rival, other):
         listener[0].destroy_publisher(publisher)
@@ -224,14 +209,12 @@ def test_what_cannot_be_used_is_refused_at_the_start(listener, parameters, param
 
 
 def test_plain_twist(start, listener):
-    from geometry_msgs.msg import Twist
-
     node, until = listener
     process = start('traction_limiter_node', '--ros-args', '-p', 'stamped:=false')
     heard = []
-    node.create_subscription(Twist, 'cmd_vel_out', heard.append, 10)
-    commands = node.create_publisher(Twist, 'cmd_vel_in', 10)
-    command = Twist()
+    node.create_subscription(ros.Twist, 'cmd_vel_out', heard.append, 10)
+    commands = node.create_publisher(ros.Twist, 'cmd_vel_in', 10)
+    command = ros.Twist()
     command.linear.x = 0.1
     reached = pytest.approx(0.03)
     timer = node.create_timer(0.02, lambda: commands.publish(command))

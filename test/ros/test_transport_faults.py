@@ -6,10 +6,11 @@ import signal
 from types import SimpleNamespace
 
 import pytest
+import ros_types as ros
+from test_estimator_node import NODE
 
 from wheel_terra_estimator.configuration import reader
 
-NODE = '/wheel_terra_estimator'
 ROVER = ('generic_six_wheel',)
 BURST = 200  # messages sent while the node is held up
 TURNS = 100  # of the node in this process between two looks at a condition
@@ -27,25 +28,21 @@ def rover(tmp_path):
 @pytest.fixture
 def heard(listener):
     """Return the listener's node, its waiting, and the statuses of the estimator as they come."""
-    from diagnostic_msgs.msg import DiagnosticArray
-
     node, until = listener
     statuses = []
 
     def take(message):
         statuses.extend(s for s in message.status if s.name.endswith(': estimator'))
 
-    node.create_subscription(DiagnosticArray, '/diagnostics', take, 100)
+    node.create_subscription(ros.DiagnosticArray, '/diagnostics', take, 100)
     return node, until, statuses
 
 
 def joint_states(node, stamp, *, topic='joint_states'):
     """Return a function that publishes wheel rates with stamps a millisecond apart."""
-    from sensor_msgs.msg import JointState
-
     names = list(reader.load(ROVER).wheels.names)
-    publisher = node.create_publisher(JointState, topic, 1000)
-    message = JointState(name=names, velocity=[1.0] * len(names), effort=[2.0] * len(names))
+    publisher = node.create_publisher(ros.JointState, topic, 1000)
+    message = ros.JointState(name=names, velocity=[1.0] * len(names), effort=[2.0] * len(names))
 
     def send():
         stamp[0] += 1_000_000
@@ -68,20 +65,17 @@ def test_two_nodes_of_one_name_are_told(start, heard, rover):
 
 
 def test_sim_time_without_a_clock_is_told_until_it_comes_and_estimates_go_on(start, heard, rover):
-    from rosgraph_msgs.msg import Clock
-    from sensor_msgs.msg import JointState
-
     node, until, statuses = heard
     sets = []
-    node.create_subscription(JointState, f'{NODE}/slip', sets.append, 10)
+    node.create_subscription(ros.JointState, f'{NODE}/slip', sets.append, 10)
     publisher, send = joint_states(node, [100_000_000_000])
     start('estimator_node', *rover, '-p', 'use_sim_time:=true')
     until(lambda: publisher.get_subscription_count() and node.count_publishers(f'{NODE}/slip'))
     until(lambda: (send(), len(sets) > 3)[1])
     words = 'nothing comes on /clock'
     until(lambda: (send(), any(s.level[0] == 1 and words in s.message for s in statuses))[1])
-    clock = node.create_publisher(Clock, '/clock', 10)
-    tick = Clock()
+    clock = node.create_publisher(ros.Clock, '/clock', 10)
+    tick = ros.Clock()
     tick.clock.sec = 100
 
     def gone():
@@ -95,20 +89,18 @@ def test_sim_time_without_a_clock_is_told_until_it_comes_and_estimates_go_on(sta
 @pytest.mark.parametrize(('topic', 'kept'), [('joint_states', BURST), ('reference_odom', 10)])
 def test_fast_topics_are_queued_for_a_quarter_of_a_second_at_1000_hz(listener, topic, kept):
     """One node sends to itself, so that nothing but the queue decides what is kept."""
-    from std_msgs.msg import Int64
-
     from wheel_terra_estimator.ros.qos import FAST_DEPTH, input_profile
 
     assert FAST_DEPTH >= 1000.0 * HELD_UP >= BURST
     assert {input_profile(t).depth for t in ('joint_states', 'odom', 'imu/data')} == {FAST_DEPTH}
     node, until = listener
     received = []
-    publisher = node.create_publisher(Int64, 'queued', 1000)
+    publisher = node.create_publisher(ros.Int64, 'queued', 1000)
     profile = input_profile(topic)
-    node.create_subscription(Int64, 'queued', lambda m: received.append(m.data), profile)
-    until(lambda: (publisher.publish(Int64(data=-1)), received)[1])
+    node.create_subscription(ros.Int64, 'queued', lambda m: received.append(m.data), profile)
+    until(lambda: (publisher.publish(ros.Int64(data=-1)), received)[1])
     for number in range(BURST):  # nobody takes them meanwhile
-        publisher.publish(Int64(data=number))
+        publisher.publish(ros.Int64(data=number))
     until(lambda: received[-1] == BURST - 1)
     assert received[-kept:] == list(range(BURST - kept, BURST))
     assert max(received[:-kept]) == -1

@@ -13,6 +13,8 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation import plant as plant_module
 from wheel_terra_estimator.simulation.drives import Command
 from wheel_terra_estimator.simulation.plant import RoverPlant
+from wheel_terra_estimator.simulation.suspension import LEAST_LOAD_SHARE, suspension_of
+from wheel_terra_estimator.simulation.terrain import GRID, Patch, smooth_noise
 from wheel_terra_estimator.simulation.truth import Truth
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -194,8 +196,6 @@ def test_a_shorter_step_gives_the_same_drive(monkeypatch):
 
 
 def test_wheels_sink_one_after_the_other_in_a_patch(plant):
-    from wheel_terra_estimator.simulation.terrain import Patch
-
     patch = Patch(1.0, 9.0, -9.0, 9.0, {'stiffness': 0.3})
     rover_plant = plant(patches=[patch])
     before = drive(rover_plant, 2.0).sinkage
@@ -246,3 +246,95 @@ def test_the_forces_of_steered_wheels_add_up_in_the_body(plant):
     # A steady circle: the soil turns the speed, and holds nothing else.
     assert across == pytest.approx(mass * truth.yaw_rate * truth.forward_velocity, abs=1.0)
     assert along == pytest.approx(0.0, abs=1.0)
+
+
+# Ground: height is the integral of the slope, soil changes where the patches say.
+
+
+def test_height_is_the_integral_of_the_slope():
+    hill = ground(
+        slope_position=np.array([0.0, 5.0]), slope_angle=np.radians([0.0, 10.0]), undulation=0.02
+    )
+    x = np.linspace(-5.0, 15.0, 2001)
+    height = hill.height(x, np.zeros_like(x))
+    slope = np.gradient(height, x)
+    np.testing.assert_allclose(slope[5:-5], hill.sine_of_slope(x)[5:-5], atol=4e-3)
+    assert hill.height(np.array([0.0]), np.array([0.0])) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_beyond_its_extent_the_slope_goes_on():
+    hill = ground(slope_deg=10.0)
+    far = np.array([19.0, 25.0, -15.0])
+    np.testing.assert_allclose(
+        hill.height(far, np.zeros(3)), far * np.sin(np.radians(10.0)), atol=2 * GRID
+    )
+
+
+def test_patch_has_its_factor_inside_and_a_smooth_border():
+    patch = Patch(2.0, 4.0, -9.0, 0.0, {'stiffness': 0.25, 'cohesion': 3.0})
+    soft = ground(patches=[patch], base_factors={'stiffness': 1.2})
+    x = np.array([1.0, 2.0, 3.0, 3.0, 5.0])
+    y = np.array([-0.5, -0.5, -0.5, 0.5, -0.5])
+    factors = soft.soil_factors(x, y)
+    np.testing.assert_allclose(factors['stiffness'], 1.2 * np.array([1, 0.5, 0.25, 1, 1]))
+    np.testing.assert_allclose(factors['cohesion'][[0, 2, 3]], [1.0, 3.0, 1.0])
+    line = soft.soil_factors(np.linspace(1.5, 2.5, 200), np.full(200, -0.5))['stiffness']
+    assert (np.diff(line) <= 1e-12).all()
+    assert np.abs(np.diff(line)).max() < 0.03
+
+
+def test_noise_has_the_stated_spread_and_length():
+    noise = smooth_noise(np.random.default_rng(2), 200_000, 0.5)
+    assert noise.std() == pytest.approx(1.0, rel=0.1)
+    lag = round(0.5 / GRID)
+    correlation = np.corrcoef(noise[:-lag], noise[lag:])[0, 1]
+    # Gaussian kernel of width L: correlation exp(-1/4) at distance L.
+    assert correlation == pytest.approx(np.exp(-0.25), abs=0.05)
+
+
+# Loads against statics done by hand.
+
+
+def test_rocker_bogie_statics_on_the_level():
+    configuration = rover()
+    loads = suspension_of(configuration).normal_loads(
+        180.0, np.array([0.0, 0.0, G]), np.zeros(6), np.zeros(6)
+    )
+    # Front wheel at 0.61 m and bogie at -0.305 m about the centre of gravity: 1 to 2.
+    np.testing.assert_allclose(loads, 180.0 * G / 6.0, rtol=1e-9)
+
+
+def test_moments_balance_for_any_force():
+    configuration = rover()
+    suspension = suspension_of(configuration)
+    x, y = configuration.wheels.x, configuration.wheels.y
+    random = np.random.default_rng(1)
+    for _ in range(50):
+        force = np.array([*random.uniform(-1.5, 1.5, 2), G])
+        pull = random.dirichlet(np.ones(6)) * 180.0 * force[0]
+        moment = random.uniform(0.0, 5.0, 6)
+        loads = suspension.normal_loads(180.0, force, pull, moment)
+        assert loads.sum() == pytest.approx(180.0 * G)
+        assert (loads * x + moment).sum() == pytest.approx(-180.0 * force[0] * 0.45, abs=1e-6)
+        assert (loads * y).sum() == pytest.approx(-180.0 * force[1] * 0.45, abs=1e-6)
+        for side in (y > 0, y < 0):
+            bogie = side & (x < 0.1)
+            about_pivot = loads * (x + 0.305) + moment + pull * 0.25
+            assert about_pivot[bogie].sum() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_no_wheel_pulls_on_the_ground():
+    suspension = suspension_of(rover('rover.suspension:=rigid'))
+    loads = suspension.normal_loads(180.0, np.array([9.0, 0.0, 4.0]), np.zeros(6), np.zeros(6))
+    assert loads.min() >= LEAST_LOAD_SHARE * 180.0 * 4.0 / 6.0 * 0.5
+    assert loads.sum() == pytest.approx(720.0)
+
+
+def test_given_shares():
+    configuration = rover(
+        'rover.suspension:=shares', 'rover.load_shares:=[0.1, 0.1, 0.2, 0.2, 0.2, 0.2]'
+    )
+    loads = suspension_of(configuration).normal_loads(
+        180.0, np.array([1.0, 0.0, 5.0]), np.zeros(6), np.zeros(6)
+    )
+    np.testing.assert_allclose(loads, 900.0 * np.array([0.1, 0.1, 0.2, 0.2, 0.2, 0.2]))

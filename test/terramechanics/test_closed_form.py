@@ -14,6 +14,7 @@ from scipy.integrate import quad
 from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, state
 
 from wheel_terra_estimator.terramechanics import closed_form, quadrature
+from wheel_terra_estimator.terramechanics.closed_form import branch_moments
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -223,3 +224,27 @@ def test_a_peak_beyond_the_contact_is_moved_into_it_alike_everywhere(peak):
     expected = min(max(0.5 * peak, -0.15 + 0.65e-3), 0.5 - 0.65e-3)
     assert soil.peak_angle == pytest.approx(expected)
     assert soil.leaving_angle == pytest.approx(-0.15)
+
+
+# Moments of the stress on one side of its peak against integrals.
+
+
+def moment(exponent, skew, power):
+    return quad(lambda v: v**power * (v * (1.0 + skew * (1.0 - v))) ** exponent, 0.0, 1.0)[0]
+
+
+@pytest.mark.parametrize('skew', [-0.3, 0.0, 0.4])
+@pytest.mark.parametrize(('exponent', 'tolerance'), [(1.0, 1e-10), (2.0, 1e-10), (1.3, 2e-3)])
+def test_area_and_centroid_are_those_of_the_integral(exponent, tolerance, skew):
+    """The series in the skew ends after its square for whole exponents up to two."""
+    area, centroid, _ = branch_moments(exponent, skew)
+    assert area == pytest.approx(moment(exponent, skew, 0), rel=tolerance)
+    first = moment(exponent, skew, 1)
+    assert area * centroid == pytest.approx(first, rel=tolerance)
+
+
+@pytest.mark.parametrize('exponent', [0.5, 1.0, 1.7])
+def test_spread_is_the_variance_under_the_stress(exponent):
+    area, first, second = (moment(exponent, 0.0, power) for power in range(3))
+    expected = second / area - (first / area) ** 2
+    assert branch_moments(exponent, 0.0)[2] == pytest.approx(expected)

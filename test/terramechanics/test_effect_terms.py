@@ -135,6 +135,14 @@ def test_effects_without_their_column_do_nothing():
             {'grouser_thrust': {}, 'lug_shear_radius': {}},
             'effects grouser_thrust and lug_shear_radius exclude each other',
         ),
+        (
+            {'slip_sinkage_exponent': {'form': 'none'}},
+            "has no form 'none'; it has linear, lyasko, load",
+        ),
+        (
+            {'slip_sinkage_exponent': {'form': 'lyasko', 'n1': 0.3}},
+            'has no parameter n1 in the form lyasko; it has gain',
+        ),
     ],
 )
 def test_settings_that_are_refused(settings, words):

@@ -10,14 +10,12 @@ from terra_tools import SAND, WHEEL, points, state
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
 from wheel_terra_estimator.terramechanics.effects import (
     Effect,
     EffectParameter,
     Form,
     by_variant,
     catalogue,
-    check_settings,
 )
 from wheel_terra_estimator.terramechanics.model import METHODS, WheelSoilModel
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -96,21 +94,6 @@ def test_forms_are_effects_of_one_form_under_keys_of_their_own():
     assert by_variant({SKID: {'form': 'lyasko', 'gain': 0.5}}) == {f'{SKID}:lyasko': {'gain': 0.5}}
 
 
-@pytest.mark.parametrize(
-    ('settings', 'words'),
-    [
-        ({SKID: {'form': 'none'}}, "has no form 'none'; it has linear, lyasko, load"),
-        (
-            {SKID: {'form': 'lyasko', 'n1': 0.3}},
-            'has no parameter n1 in the form lyasko; it has gain',
-        ),
-    ],
-)
-def test_settings_of_a_wrong_form_are_refused(settings, words):
-    with pytest.raises(ValueError, match=words):
-        check_settings(settings)
-
-
 def test_two_forms_stand_side_by_side_in_one_model():
     """What a search over forms needs: the one at its neutral value leaves the other alone."""
     both = state(0.4, effects={SKID: {'n1': 0.3}, f'{SKID}:lyasko': {'gain': 0.0}})
@@ -143,16 +126,6 @@ def test_a_shared_parameter_means_the_same_in_every_form():
             'twice', 'c', 's', (one,), frozenset({'torque'}), 'v', 's', on_outputs=term,
             other_forms=(Form('other', 'c', 's', (other,), 'v', 's', on_outputs=term),),
         )  # fmt: skip
-
-
-def test_the_filter_s_forces_know_the_forms():
-    inputs = ConditionedInputs(0.7, 0.01, 80.0, 250.0, 0.6, 0.01)
-    _, plain = ConditionedForces(WHEEL, SAND).forces(inputs)
-    # With the sinkage given, the bearing law sets no force: the exponent does, a factor on it not.
-    _, steeper = ConditionedForces(WHEEL, SAND, {SKID: {'n1': 0.5}}).forces(inputs)
-    _, weaker = ConditionedForces(WHEEL, SAND, {SKID: {'form': 'lyasko'}}).forces(inputs)
-    assert steeper[0] != pytest.approx(plain[0], rel=1e-4)
-    assert weaker[0] == pytest.approx(plain[0], rel=1e-12)
 
 
 # Configuration ---------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from wheel_terra_estimator.estimation.measurements import (
 )
 from wheel_terra_estimator.simulation.scenario import load
 from wheel_terra_estimator.simulation.sensors import Arrival
-from wheel_terra_lab.evaluation import baselines, kinds, simulators
+from wheel_terra_lab.evaluation import baselines, bench, kinds, simulators, tables
 from wheel_terra_lab.evaluation.runner import inputs_of_mode
 from wheel_terra_lab.evaluation.two_state_filters import slip_course
 
@@ -64,8 +64,6 @@ def test_what_is_no_rover_and_no_scenario_is_refused_before_the_first_drive(opti
 
 
 def test_the_estimator_is_told_of_config_and_parameters_and_the_drive_is_not(monkeypatch, capsys):
-    from wheel_terra_lab.evaluation import bench, tables
-
     estimators, drives = [], []
 
     def score(simulator, kind, seed, mode, drive):
@@ -205,8 +203,6 @@ def test_pitch_filter_sees_the_slope_by_orientation_or_by_specific_force():
 
 
 def test_a_filter_that_failed_on_a_drive_ends_evaluate_with_status_1(monkeypatch, capsys):
-    from wheel_terra_lab.evaluation import bench, tables
-
     health = {'filter_restarts': 2}
     drive = bench.DriveScore('climb', 1, 'reference', None, None, health)
     monkeypatch.setattr(bench, 'run', lambda *_: bench.Results([drive]))

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import yaml
 
+from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.evaluation.simulators import SIMULATORS
 from wheel_terra_lab.studies import readme_figures
 
@@ -62,8 +63,6 @@ def test_each_kind_on_half_of_the_soils_and_an_entrapment_of_each_simulator_on_e
 
 
 def test_rows_of_two_commits_are_refused():
-    from wheel_terra_estimator.errors import UserError
-
     mixed = rows()
     mixed[0]['commit'] = 'def5678'
     with pytest.raises(UserError, match='abc1234, def5678'):

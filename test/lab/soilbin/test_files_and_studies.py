@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration import shipped
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab import jobs as jobs_module
 from wheel_terra_lab.jobs import ResultFile
 from wheel_terra_lab.reproduction import nakashima
 from wheel_terra_lab.soilbin import files, output, reproduction, snapshots, study
-from wheel_terra_lab.soilbin.case import Case, from_dict, to_dict
+from wheel_terra_lab.soilbin.case import Case, check, from_dict, to_dict
 from wheel_terra_lab.soilbin.launch import CaseFailedError, StoppedByUserError
+from wheel_terra_lab.soilbin.stability import time_step
 from wheel_terra_lab.soilbin.study import Job
 
 
@@ -44,10 +46,6 @@ def test_wrong_keys_and_types_are_named(override, words):
 
 
 def test_every_shipped_case_can_be_built():
-    from wheel_terra_estimator.configuration import shipped
-    from wheel_terra_lab.soilbin.case import check
-    from wheel_terra_lab.soilbin.stability import time_step
-
     names = list(shipped.files(files.CONFIG))
     assert len(names) >= 14
     for name in names:

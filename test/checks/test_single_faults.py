@@ -1,0 +1,125 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""One fault put into a rover that rolls without slip: found alone, with wheel, size and cure."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+from pytest import approx
+
+WHOLE = rolling.recording()
+FL, FR, RL, RR = rolling.NAMES
+IMU, JOINTS, REFERENCE, SINKAGE = 'imu', 'joints', 'reference', 'sinkage'
+
+
+def by(factor):
+    return lambda values: values * factor
+
+
+def plus(*offsets):
+    return lambda values: values + np.array(offsets)
+
+
+def both(change):
+    return dict.fromkeys(('rate', 'torque'), change)
+
+
+def units(factor):
+    """Velocities and their variances in another unit."""
+    return {'velocity': by(factor), 'variance': by(factor**2)}
+
+
+def stays(channel, field, column=...):
+    """Forty seconds without a new number."""
+
+    def change(values):
+        values, seconds = values.copy(), getattr(WHOLE, channel).seconds
+        rows = np.flatnonzero((seconds > 120.0) & (seconds < 160.0))
+        values[rows, column] = values[rows[0], column]
+        return values
+
+    return channel, {field: change}
+
+
+def in_steps(values):
+    step = 0.25 * np.nanmax(np.abs(values))
+    return step * np.round(values / step)
+
+
+def one_number(*numbers):
+    return lambda values: np.tile(numbers, (len(values), 1))
+
+
+RPM, DEGREES, COUNTS, G = 30.0 / math.pi, 180.0 / math.pi, 4096 / (2.0 * math.pi), rolling.GRAVITY
+EXCHANGED = 'wheels.names: [front_right, front_left, rear_left, rear_right]'
+RENAMED = 'wheels.names: [fl_wheel, front_right, rear_left, rear_right]'
+THREE = {**both(lambda v: v[:, :3]), 'names': lambda names: names[:3]}
+FROZEN = 'up to '
+FAULTS = [  # channel, what its fields become, the only fault, its wheel, its true size, said
+    (JOINTS, both(by([1, 1, -1, 1])), 'backwards', RL, None, 'direction: [1, 1, -1, 1]'),
+    (JOINTS, both(by([-1, 1, -1, 1])), 'backwards', f'{FL}, {RL}', None, '[-1, 1, -1, 1]'),
+    (JOINTS, both(lambda v: v[:, [1, 0, 2, 3]]), 'exchanged', f'{FL}, {FR}', None, EXCHANGED),
+    (JOINTS, {'rate': by(RPM)}, 'rate_unit', None, approx(1.0 / RPM), ''),
+    (JOINTS, {'rate': by(DEGREES)}, 'rate_unit', None, approx(1.0 / DEGREES), ''),
+    (JOINTS, {'rate': by(COUNTS)}, 'rate_counts', None, approx(1.0 / COUNTS, rel=0.05), 'counts'),
+    (JOINTS, {'rate': by(4.0)}, 'rate_unit', None, approx(0.25, rel=0.03), 'before a gear'),
+    (JOINTS, {'rate': np.abs}, 'rates_unsigned', None, None, ''),
+    (JOINTS, {'rate': in_steps}, 'rate_steps', None, None, 'steps of'),
+    (JOINTS, {'rate': by([1, 1, 0.5, 1])}, 'wheel_counts', RL, None, ''),
+    (JOINTS, {'rate': by([1, 1, 1.2, 1])}, 'wheel_scale', RL, approx(0.2 / 1.2, rel=0.01), ''),
+    (JOINTS, {'torque': np.abs}, 'torque_unsigned', None, None, ''),
+    (JOINTS, {'torque': by(0.0)}, 'torque_placeholder', None, None, 'effort'),
+    (JOINTS, {'torque': by([1, -1, 1, 1])}, 'torque_sign', FR, None, ''),
+    (JOINTS, {'torque': by([2, 1, 1, 1])}, 'wheel_torque', FL, approx(2.0, rel=0.05), ''),
+    (JOINTS, {'torque': by([1, 1, 1, 2])}, 'wheel_torque', RR, approx(2.0, rel=0.05), ''),
+    (*stays(JOINTS, 'torque', 2), 'torque_frozen', RL, None, FROZEN),
+    (JOINTS, {'names': lambda n: ('fl_wheel', *n[1:])}, 'joint_name', FL, None, RENAMED),
+    (JOINTS, THREE, 'missing_wheel', RR, None, ''),
+    (IMU, {k: by([1, -1, -1]) for k in ('force', 'rate')}, 'imu_upside', None, approx(180.0),
+     'sensors.imu_mounting_roll_deg'),
+    (IMU, {'force': by(1.0 / G)}, 'force_unit', None, approx(G), ''),
+    (IMU, {'force': by(1000.0 / G)}, 'force_unit', None, approx(G / 1000.0), ''),
+    (IMU, {'force': plus(0.0, 0.0, -G)}, 'gravity_off', None, None, ''),
+    (IMU, {'force': np.negative}, 'force_reversed', None, None, 'linear_acceleration'),
+    (IMU, {'rate': np.degrees}, 'gyro_degrees', None, approx(math.radians(1.0)), ''),
+    (IMU, {'rate': by(0.0)}, 'force_zero', None, None, ''),
+    (IMU, {'rate': plus(0.0, 0.0, 0.03)}, 'gyro_bias', None, approx(0.03, abs=1e-3), ''),
+    (IMU, {'rate': by(1.15)}, 'gyro_scale', None, approx(1.0 / 1.15, rel=0.01), ''),
+    (IMU, {'force': one_number(2.6, 2.0, 2.4), 'rate': one_number(0.01, 0.01, 0.01)},
+     'sensor_frozen', None, None, ''),  # far from what gravity is, but that is not told
+    (*stays(IMU, 'force'), 'sensor_frozen', None, None, FROZEN),
+    (*stays(IMU, 'rate'), 'sensor_frozen', None, None, FROZEN),
+    (REFERENCE, {'velocity': np.negative}, 'reference_reversed', None, None, ''),
+    (REFERENCE, {'velocity': np.abs}, 'reference_unsigned', None, None, ''),
+    (REFERENCE, {'velocity': by(0.0)}, 'reference_zero', None, None, ''),
+    (REFERENCE, {'velocity': by(3.6)}, 'reference_unit', None, approx(1.0 / 3.6), ''),
+    (REFERENCE, units(100.0), 'reference_unit', None, approx(0.01), ''),
+    (REFERENCE, units(1000.0), 'reference_unit', None, approx(0.001), ''),
+    (REFERENCE, {'variance': lambda v: 0.0 * v + 1e6}, 'covariance', None, None, ''),
+    (*stays(REFERENCE, 'velocity'), 'reference_frozen', None, None, FROZEN),
+    (SINKAGE, {'sinkage': by(1000.0)}, 'sinkage_unit', None, approx(0.001), ''),
+    (SINKAGE, {'sinkage': lambda v: rolling.RADIUS - v}, 'sinkage_height', None, None, ''),
+    (SINKAGE, {'sinkage': plus(0.0, 0.04, 0.0, 0.0)}, 'sinkage_zero', FR,
+     approx(0.04, abs=0.002), ''),
+    (*stays(SINKAGE, 'sinkage', 1), 'sinkage_frozen', FR, None, FROZEN),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('channel', 'changes', 'fault', 'wheel', 'size', 'said'),
+    FAULTS,
+    ids=[f'{fault}-{number}' for number, (*_, fault, _, _, _) in enumerate(FAULTS)],
+)
+def test_the_fault_is_the_only_finding(channel, changes, fault, wheel, size, said):
+    told = getattr(WHOLE, channel)
+    changed = {field: change(getattr(told, field)) for field, change in changes.items()}
+    (finding,) = rolling.checked(**{channel: replace(told, **changed)}).findings
+    assert (finding.fault, finding.wheel) == (fault, wheel)
+    assert size is None or abs(finding.value) == size
+    assert said in f'{finding.words} {finding.parameter} {finding.cure}'
+    if said == FROZEN:
+        assert float(finding.words.split(said)[1].split(' s')[0]) == approx(40.0, abs=0.5)
+    assert finding.confidence >= 0.8
