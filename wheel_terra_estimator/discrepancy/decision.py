@@ -85,24 +85,14 @@ class Decision:
         return self.findings.selection.floors[self.floor_index].largest
 
 
-def decide(
-    table: SteadyTable, both: SteadyTable, findings: Findings, allowed_error: float
-) -> Decision:
-    """Decide what is reported of a table; ``both`` has the rows of a reference behind its own.
-
-    ``allowed_error`` is the model error that is no reason for doubt [share of the range].
-    """
-    return _Decider(table, both, findings, allowed_error).decision()
-
-
 @dataclass(frozen=True)
-class _Decider:
+class Decider:
     """The loop, and what its rounds share."""
 
     table: SteadyTable
-    both: SteadyTable
+    both: SteadyTable  # with the rows of a reference behind those of the table
     findings: Findings
-    allowed_error: float
+    allowed_error: float  # model error that is no reason for doubt [share of the range]
     # The best law beside each floor, soil held or not: it competes with doubtful names, or is
     # proposed
     laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
