@@ -160,7 +160,7 @@ class Configuration:
         effects, effects_std = _effects(values)
         single: dict[str, Any] = {f.name: values[f.name] for f in fields(cls) if f.name in values}
         section = Section(values, 'soil.')
-        soil = _soil(section)
+        soil = Soil(**{field.name: getattr(section, field.name) for field in fields(Soil)})
         return cls(
             wheels=Wheels(values),
             rover=Rover(values),
@@ -214,10 +214,6 @@ def _number(values: Mapping[str, Value], key: str) -> float:
     value = values[key]
     assert isinstance(value, (int, float))
     return float(value)
-
-
-def _soil(section: Section) -> Soil:
-    return Soil(**{field.name: getattr(section, field.name) for field in fields(Soil)})
 
 
 def _soil_std(section: Section, soil: Soil) -> dict[str, float]:
