@@ -212,10 +212,11 @@ def _hardware(node_name: str, wheel: str) -> str:
 
 def _values(counters: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
-        (key, f'{_no_dust(value):.6g}' if isinstance(value, float) else str(value))
+        (
+            key,
+            f'{0.0 if abs(value) < SMALLEST else value:.6g}'
+            if isinstance(value, float)
+            else str(value),
+        )
         for key, value in counters.items()
     ]
-
-
-def _no_dust(value: float) -> float:
-    return 0.0 if abs(value) < SMALLEST else value
