@@ -150,6 +150,15 @@ class Configuration:
         return str(self._values['soil.source'])
 
     @property
+    def soil_std_stated(self) -> dict[str, float]:
+        """The part of ``soil_std`` that somebody stated number by number."""
+        return {
+            field: std
+            for field, std in self.soil_std.items()
+            if self.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'}
+        }
+
+    @property
     def soil_stated(self) -> bool:
         """Whether anybody stated a soil, or how well it is known; else the default is a guess."""
         return any(key.startswith('soil.') and key not in _SOIL_LABELS for key in self.stated)

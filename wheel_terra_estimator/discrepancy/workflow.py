@@ -121,12 +121,8 @@ def nuisance_coordinates(
 ) -> tuple[Coordinate, ...]:
     """Return the soil parameters and the stated uncertain parameters of effects that are on."""
     # soil.relative_std is the estimator's doubt of a soil on its way, not that of a measured soil.
-    stated = {
-        field: value
-        for field, value in configuration.soil_std.items()
-        if configuration.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'}
-    }
-    soil = deviations(configuration.soil, stated, configuration.soil_source, known_to)
+    stated, source = configuration.soil_std_stated, configuration.soil_source
+    soil = deviations(configuration.soil, stated, source, known_to)
     return (
         *soil_coordinates(configuration.soil, soil),
         *base_coordinates(configuration.effects, configuration.effects_std, known),

@@ -50,7 +50,6 @@ from wheel_terra_estimator.estimation.filter.initial_state import (
     layout_of,
     with_soil_of,
 )
-from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
@@ -289,13 +288,15 @@ class WheelSoilEstimator:
         self._unloaded.update(cycle)
         forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
         if cycle.still:
-            self._forget_contacts()
+            # They form anew.
+            self._contact_age.stop()
+            self._linearisation.reset()
+            self._sinkage_process.forget_slopes()
         else:
             forces, total, stationary, force_rows = self._force_rows(cycle)
             if self._contact_age.settled or cycle.reference_known:
                 rows += force_rows
-        considered = considered_entries(
-            layout,
+        considered = layout.considered(
             settled=self._contact_age.settled,
             opposes_rims=cycle.yaw_compensated.oppose(float(ekf.mean[SPEED])),
             unread=self._sinkage.unread(time),
@@ -466,12 +467,6 @@ class WheelSoilEstimator:
             fastest_rim=self._wheels.fastest(),
             variance=noise,
         )
-
-    def _forget_contacts(self) -> None:
-        """Let the contacts form anew: all wheels stand."""
-        self._contact_age.stop()
-        self._linearisation.reset()
-        self._sinkage_process.forget_slopes()
 
     def _force_rows(
         self, cycle: Cycle

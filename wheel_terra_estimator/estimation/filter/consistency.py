@@ -27,11 +27,6 @@ def excess(mean_nis: float | None) -> float:
     return CONSISTENT if mean_nis is None else max(mean_nis, CONSISTENT)
 
 
-def distrusted(variance: float, mean_nis: float) -> float:
-    """Return the variance of a channel whose innovations keep being larger than foreseen."""
-    return variance * excess(mean_nis) ** 2
-
-
 def correlated_cycles(rims: tuple[float, ...], dt: float) -> float:
     """Return how many cycles of length `dt` [s] are one piece of information.
 

@@ -13,11 +13,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
-from wheel_terra_estimator.estimation.filter.consistency import (
-    SAME_GROUND,
-    distrusted,
-    smoothed_nis,
-)
+from wheel_terra_estimator.estimation.filter.consistency import SAME_GROUND, excess, smoothed_nis
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover
@@ -46,7 +42,7 @@ class ForceRows(Component['float | None']):
         total = prior + variance
         self.state = mean = smoothed_nis(self.state, residual * residual / total)
         gate = chi_square_gate(residual, total, self._gate)
-        return Row(residual, jacobian, distrusted(variance, mean) + gate)
+        return Row(residual, jacobian, variance * excess(mean) ** 2 + gate)
 
 
 class TorqueUpdate(ForceRows):
