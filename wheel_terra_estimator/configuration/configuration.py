@@ -174,7 +174,13 @@ class Configuration:
             wheels=Wheels(values),
             rover=Rover(values),
             soil=soil,
-            soil_std=_soil_std(section, soil),
+            soil_std={
+                name: float(
+                    getattr(section, f'{name}_std')
+                    or section.relative_std * abs(float(getattr(soil, name)))
+                )
+                for name in SOIL_NUMBERS
+            },
             effects=effects,
             effects_std=effects_std,
             sensors=Section(values, 'sensors.'),
@@ -223,16 +229,6 @@ def _number(values: Mapping[str, Value], key: str) -> float:
     value = values[key]
     assert isinstance(value, (int, float))
     return float(value)
-
-
-def _soil_std(section: Section, soil: Soil) -> dict[str, float]:
-    return {
-        field: float(
-            getattr(section, f'{field}_std')
-            or section.relative_std * abs(float(getattr(soil, field)))
-        )
-        for field in SOIL_NUMBERS
-    }
 
 
 def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSettings]:

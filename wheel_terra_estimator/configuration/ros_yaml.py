@@ -113,11 +113,15 @@ def _in_range(read: Callable[[str], float], text: str) -> float | str:
 
 def parse_value(text: str, source: str) -> Value:
     """Return the value of ``text`` as it would be read behind a key; errors name ``source``."""
+    value = _loaded(text, source)
+    return _checked(value if text.strip() else None, source)
+
+
+def _loaded(text: str, source: object) -> Any:
     try:
-        value = bounded_yaml.load(text, _RosLoader)
+        return bounded_yaml.load(text, _RosLoader)
     except yaml.YAMLError as error:
         raise UserError(f'{source}: {in_words(error)}') from None
-    return _checked(value if text.strip() else None, source)
 
 
 def read(path: Path) -> dict[str, Value]:
@@ -129,11 +133,7 @@ def read(path: Path) -> dict[str, Value]:
     needs the section. Raises UserError if the file cannot be read, is not YAML or not a parameter
     file.
     """
-    text = read_text(path)
-    try:
-        document = bounded_yaml.load(text, _RosLoader)
-    except yaml.YAMLError as error:
-        raise UserError(f'{path}: {in_words(error)}') from None
+    document = _loaded(read_text(path), path)
     if not isinstance(document, Mapping):
         raise UserError(
             f"{path}: no parameters; give lines 'rover.mass: 22.0', or a ROS parameter file, which "

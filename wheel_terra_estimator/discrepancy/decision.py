@@ -226,13 +226,9 @@ def known_alike(name: str, findings: Findings, known: Mapping[str, Effect]) -> t
     on = set(findings.setting.forward.base_effects)
     own = known[effect_of(name)].confounded_with
     others = (o.base_name for o in known.values() if effect_of(name) in o.confounded_with)
-
-    def might_be(other: str) -> bool:
-        effect = known.get(other)
-        return effect is None or (effect.candidate and not effect.incompatible_with & on)
-
+    aside = {n for n, o in known.items() if not o.candidate or o.incompatible_with & on}
     names = dict.fromkeys((*own, *others))
-    return tuple(other for other in names if other not in findings.tried and might_be(other))
+    return tuple(name for name in names if name not in aside and name not in findings.tried)
 
 
 def _what_rows_show(

@@ -88,7 +88,7 @@ from wheel_terra_estimator.estimation.scalars import NAN, NANOSECOND, known, med
 from wheel_terra_estimator.estimation.sideways import SidewaysInputs, SidewaysMotion
 from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 from wheel_terra_estimator.estimation.taught import Taught, Teaching, with_model_errors
-from wheel_terra_estimator.estimation.words import MissingInputs
+from wheel_terra_estimator.estimation.words import COST
 
 _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
@@ -661,17 +661,18 @@ class WheelSoilEstimator:
         time = self._clock.time
         inertial = self._inertial.state
         silent = time - inertial.time > self._rover.silence
-        missing = MissingInputs(
-            wheel_odometry=self._wheels.silent(time),
-            imu=silent,
-            orientation=not silent and not inertial.attitude.reported,
-            torque=not self._wheels.torque_known(time),
-            sinkage=len(self._sinkage.unread(time)) == self._rover.wheel_count,
-            acceleration=not silent and time - inertial.force_time > self._rover.silence,
-            angular_rate=not silent and time - inertial.rate_time > self._rover.silence,
-            reference=not self._reference.fresh(time),
-        )
-        return self._outputs.estimate_set(self._sources(), missing)
+        missing = {
+            'wheel_odometry': self._wheels.silent(time),
+            'imu': silent,
+            'orientation': not silent and not inertial.attitude.reported,
+            'torque': not self._wheels.torque_known(time),
+            'sinkage': len(self._sinkage.unread(time)) == self._rover.wheel_count,
+            'acceleration': not silent and time - inertial.force_time > self._rover.silence,
+            'angular_rate': not silent and time - inertial.rate_time > self._rover.silence,
+            'reference': not self._reference.fresh(time),
+        }
+        faults = {name: words for name, words in COST.items() if missing[name]}
+        return self._outputs.estimate_set(self._sources(), faults)
 
     def _sources(self) -> Sources:
         """Return what the outputs of the present stamp follow from."""

@@ -77,14 +77,11 @@ def repeats(table: SteadyTable, quantity: int) -> tuple[float, int]:
         if len(mine) > 1:
             # The median resists an outlier among three or more repeats.
             centre = np.median(mine) if len(mine) > 2 else mine.mean()
-            square += float(np.minimum((mine - centre) ** 2, _clip(mine)).sum())
+            spread = 1.4826 * float(np.median(np.abs(mine - np.median(mine))))
+            clip = (5.0 * spread) ** 2 if spread else np.inf
+            square += float(np.minimum((mine - centre) ** 2, clip).sum())
             freedom += len(mine) - 1
     return (float(np.sqrt(square / freedom)), freedom) if freedom else (np.nan, 0)
-
-
-def _clip(values: FloatArray) -> float:
-    spread = 1.4826 * float(np.median(np.abs(values - np.median(values))))
-    return np.inf if spread == 0.0 else (5.0 * spread) ** 2
 
 
 def estimate_noise(noise: Noise, fitted: Fit, problem: Problem, observed: FloatArray) -> Noise:
