@@ -223,13 +223,10 @@ def working_folder(
     finally:
         with suppress(OSError, UserError):
             _remove_leftovers(path)
-            if path.is_dir() and not any(_holds(path / name) for name in _own_files(path)):
-                _remove_own_files(path)
-
-
-def _holds(entry: Path) -> bool:
-    """Whether a file (or what looks like one) holds something; empty folders do not."""
-    return not entry.is_dir() and entry.lstat().st_size > 0
+            if path.is_dir():
+                found = [path / name for name in _own_files(path)]
+                if not any(e.lstat().st_size for e in found if not e.is_dir()):
+                    _remove_own_files(path)  # what is empty is no result
 
 
 def mark(
@@ -341,7 +338,8 @@ def _listed(folder: Path) -> set[str]:
         if marker.is_symlink() or marker.stat().st_size > LARGEST_MARKER:
             raise ValueError
         names = json.loads(marker.read_text(encoding='utf-8'))['files']
-        if not all(isinstance(name, str) and _stays_inside(name) for name in names):
+        inside = (PurePosixPath(name).parts for name in names)
+        if not all(parts and not {'/', '//', '..'} & {*parts} for parts in inside):
             raise ValueError
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise UserError(
@@ -357,11 +355,6 @@ def _noted(marker: Path) -> dict[str, Any]:
         return {}
     facts = json.loads(marker.read_text(encoding='utf-8')).get('facts')
     return facts if isinstance(facts, dict) else {}
-
-
-def _stays_inside(name: str) -> bool:
-    parts = PurePosixPath(name)
-    return bool(parts.parts) and not parts.is_absolute() and '..' not in parts.parts
 
 
 def _files(folder: Path, prefix: str = '') -> Iterator[str]:

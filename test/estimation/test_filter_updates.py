@@ -12,7 +12,6 @@ from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
 from wheel_terra_estimator.estimation.filter.consistency import correlated_cycles
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
-from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import FLOOR_VARIANCE, SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
@@ -531,7 +530,7 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
 
     def entries(**changes):
         given = {'settled': True, 'opposes_rims': False, 'unread': []}
-        return set(considered_entries(layout, **(given | changes)))
+        return set(layout.considered(**(given | changes)))
 
     assert entries() == set()
     assert entries(settled=False) == entries(opposes_rims=True) == {SPEED}

@@ -8,7 +8,7 @@ import pytest
 from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.filter.initial_state import (
-    PriorTuning,
+    PRIORS,
     SoilPriors,
     bounds,
     layout_of,
@@ -71,7 +71,7 @@ def test_the_prior_of_a_soil_that_nobody_states_is_the_spread_of_the_shipped_one
 def test_a_soil_that_somebody_states_is_known_as_well_as_he_says():
     stated = reader.from_parameters({**TEN_LINES, 'soil.shear_modulus': 0.02})
     assert SoilPriors.from_configuration(stated).shear_modulus_std == pytest.approx(
-        PriorTuning().least_shear_modulus_std
+        PRIORS.least_shear_modulus_std
     )
     named = reader.from_parameters({**TEN_LINES, 'soil.name': 'beach'})
     assert not named.soil_stated
@@ -82,7 +82,7 @@ def test_hard_ground_may_be_stiffer_than_any_soil_but_no_ground_gives_way_by_dec
     configuration = reader.from_parameters(TEN_LINES)
     rover = Rover.from_configuration(configuration)
     layout = layout_of(rover, SensorFigures.from_configuration(configuration))
-    limits = bounds(rover, layout, SoilPriors.from_configuration(configuration), PriorTuning())
+    limits = bounds(rover, layout, SoilPriors.from_configuration(configuration))
     low, high = configuration.soil.shear_modulus * np.exp(
         [limit[SHEAR_MODULUS] for limit in limits]
     )

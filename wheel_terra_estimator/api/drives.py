@@ -29,8 +29,6 @@ from wheel_terra_estimator.simulation.drive import SimulatedDrive
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from wheel_terra_estimator.estimation.core import EstimatorCore
-
 
 NANOSECONDS = 1_000_000_000
 AXES = ('x', 'y', 'z')
@@ -103,7 +101,7 @@ def estimate(
     >>> bool(abs(columns[f'slip.{wheel}'][-1]) < 0.3)
     True
     """
-    return _run(drive, rover, parameters, remaps, as_frame, smoothed=False)
+    return _result(_run(drive, rover, parameters, remaps)[0], as_frame)
 
 
 def smooth(
@@ -126,7 +124,7 @@ def smooth(
     >>> columns.keys() == estimate(drive, as_frame=False).keys()
     True
     """
-    return _run(drive, rover, parameters, remaps, as_frame, smoothed=True)
+    return _result(_run(drive, rover, parameters, remaps, smoothed=True)[0], as_frame)
 
 
 def simulate(
@@ -184,11 +182,7 @@ def taught(
     >>> {row.verdict for row in rows} <= {'learned', 'assumed', 'confounded'}
     True
     """
-    configuration, inputs = _inputs(drive, rover, parameters)
-    if isinstance(inputs, Path):
-        return tuple(_replayed(inputs, configuration, remaps or {}).taught)
-    _, core = _estimated(inputs, configuration, smoothed=False)
-    return tuple(core.taught())
+    return _run(drive, rover, parameters, remaps)[1]
 
 
 def _run(
@@ -196,15 +190,19 @@ def _run(
     rover: str | Path | Sequence[str | Path] | Configuration | None,
     parameters: Sequence[str],
     remaps: Mapping[str, str] | None,
-    as_frame: bool,
-    smoothed: bool,
-) -> DataFrame | Columns:
+    *,
+    smoothed: bool = False,
+) -> tuple[Any, tuple[Taught, ...]]:
+    """Return the history of the estimates of a drive, and what it taught."""
     configuration, inputs = _inputs(drive, rover, parameters)
-    if isinstance(inputs, Path):
-        history = _replayed(inputs, configuration, remaps or {}, smooth=smoothed).history
-    else:
-        history, _ = _estimated(inputs, configuration, smoothed)
-    return _result(history, as_frame)
+    if not isinstance(inputs, Path):
+        return _estimated(inputs, configuration, smoothed)
+    from wheel_terra_estimator.bags.replay import Options, replay
+    from wheel_terra_estimator.bags.storage import open_bag
+
+    with open_bag(inputs) as bag:
+        replayed = replay(bag, configuration, remaps or {}, options=Options(smooth=smoothed))
+    return replayed.history, tuple(replayed.taught)
 
 
 def _inputs(
@@ -236,19 +234,9 @@ def _rover(
     return reader.load(files, parameters)
 
 
-def _replayed(
-    path: Path, configuration: Configuration, remaps: Mapping[str, str], **options: Any
-) -> Any:
-    from wheel_terra_estimator.bags.replay import Options, replay
-    from wheel_terra_estimator.bags.storage import open_bag
-
-    with open_bag(path) as bag:
-        return replay(bag, configuration, remaps, options=Options(**options))
-
-
 def _estimated(
     measurements: Iterable[Measurement], configuration: Configuration, smoothed: bool
-) -> tuple[Any, EstimatorCore]:
+) -> tuple[Any, tuple[Taught, ...]]:
     from wheel_terra_estimator.bags.history import HistoryRecorder
     from wheel_terra_estimator.checks.input_judge import InputJudge
     from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -267,7 +255,7 @@ def _estimated(
     if smoother:
         for kept in smoother.sets():
             recorder.add(kept.estimates)
-    return recorder.history(), core
+    return recorder.history(), core.taught()
 
 
 def _result(history: Any, as_frame: bool) -> DataFrame | Columns:

@@ -194,13 +194,9 @@ class Soil(terramechanics_soil.Soil):
     @classmethod
     def _of(cls, configuration: Configuration) -> Soil:
         soil = configuration.soil
-        stated = {
-            name: configuration.soil_std[name]
-            for name in SOIL_NUMBERS
-            if configuration.stated & {f'soil.{name}_std', f'soil.{name}_std_deg'}
-        }
         numbers = {f.name: getattr(soil, f.name) for f in fields(soil)}
-        return cls(**numbers, std=stated, source=configuration.soil_source)
+        source = configuration.soil_source
+        return cls(**numbers, std=configuration.soil_std_stated, source=source)
 
     def __repr__(self) -> str:
         """Return the numbers with their units in four lines."""

@@ -97,7 +97,7 @@ def read_series(
             shortened = True
         elif len(data) <= limits.MESSAGE:
             collector.add(log_time, data)
-    garbage = Counter({collector.topic: collector.damaged for collector in collectors.values()})
+    garbage = Counter({c.topic: len(c.arrivals) - len(c.stamps) for c in collectors.values()})
     if garbage.total() or bag.damaged:
         for collector in collectors.values():
             garbage[collector.topic] += collector.leave_out_strays()
@@ -162,11 +162,6 @@ class _Collector:
             kept.frombytes(values.tobytes())
         self.stamps.append(message.stamp)
         self._log_times.append(log_time)
-
-    @property
-    def damaged(self) -> int:
-        """Messages that could not be read."""
-        return len(self.arrivals) - len(self.stamps)
 
     def leave_out_strays(self) -> int:
         """Leave out what is stamped far from its log time, unless much is; return how many."""

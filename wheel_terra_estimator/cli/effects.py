@@ -109,11 +109,14 @@ def left_aside(effect: Effect) -> list[str]:
 
 
 def _parameter_text(p: EffectParameter) -> list[str]:
+    """Return range and prior of a parameter, in words."""
     note = '' if p.free else '; not fitted'
+    half = p.prior == 'half_normal'
+    prior = 'half-normal, scale ' if half else f'normal, {p.prior_mean:g} ± '
     return _wrapped(
         f'{p.name} [{p.unit}]: ',
         f'{p.meaning}; default {p.default:g}, range {p.lower:g} to {p.upper:g}, '
-        f'prior {prior_in_words(p)}{note}',
+        f'prior {prior}{p.prior_scale:g}{note}',
     )
 
 
@@ -153,13 +156,6 @@ def _law(form: Effect) -> dict[str, Any]:
 def touched(effect: Effect) -> str:
     """Return which quantities an effect touches, in words."""
     return ', '.join(name.replace('_', ' ') for name in TOUCHABLE if name in effect.touches)
-
-
-def prior_in_words(p: EffectParameter) -> str:
-    """Return the prior of a parameter, in words."""
-    if p.prior == 'half_normal':
-        return f'half-normal, scale {p.prior_scale:g}'
-    return f'normal, {p.prior_mean:g} ± {p.prior_scale:g}'
 
 
 def _wrapped(head: str, text: str) -> list[str]:

@@ -15,6 +15,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Container, Sequence
+from contextlib import redirect_stdout
 from functools import cache, partial
 from typing import Any, NoReturn
 
@@ -22,11 +23,11 @@ from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import outputs
 from wheel_terra_estimator.cli.terminal import (
     UNUSABLE_INPUT,
+    Harmless,
     Parser,
     Printing,
     complain,
     discard_output,
-    harmless_output,
     open_closed_streams,
     suggestion,
     termination_as_interrupt,
@@ -109,7 +110,14 @@ def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, Parser]]:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         if name in needed:
-            _add_arguments(sub, command_module(name))
+            module = command_module(name)
+            if examples := getattr(module, 'EXAMPLES', ()):
+                sub.epilog = '\n'.join(('examples:', *(f'  {line}' for line in examples)))
+            module.add_arguments(sub)
+            sub.add_argument(
+                '--debug', action='store_true', default=argparse.SUPPRESS, help=DEBUG_HELP
+            )
+            sub.set_defaults(run=module.run)
     return parser, dict(commands.choices)
 
 
@@ -148,16 +156,6 @@ def _commands_here() -> Container[str]:
         except UserError:
             here.discard(name)
     return here
-
-
-def _add_arguments(parser: argparse.ArgumentParser, module: Any) -> None:
-    """Give the parser of a sub-command what its module declares."""
-    examples = getattr(module, 'EXAMPLES', ())
-    if examples:
-        parser.epilog = '\n'.join(('examples:', *(f'  {line}' for line in examples)))
-    module.add_arguments(parser)
-    parser.add_argument('--debug', action='store_true', default=argparse.SUPPRESS, help=DEBUG_HELP)
-    parser.set_defaults(run=module.run)
 
 
 def _glossary(parser: argparse.ArgumentParser, word: str) -> str:
@@ -203,7 +201,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.debug:  # what is mended in silence is told, too
             logging.basicConfig()
             logging.getLogger('wheel_terra_estimator').setLevel(logging.DEBUG)
-        with harmless_output(), termination_as_interrupt(), warnings.catch_warnings():
+        shown: Any = Harmless(sys.stdout)
+        with redirect_stdout(shown), termination_as_interrupt(), warnings.catch_warnings():
             warnings.simplefilter('always', ConfigurationWarning)
             warnings.showwarning = partial(_show_warning, arguments.command, warnings.showwarning)
             outputs.check(arguments)

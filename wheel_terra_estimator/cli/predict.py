@@ -201,7 +201,10 @@ def _write(
             with fresh.open('w', encoding='utf-8', newline='') as stream:
                 _write_csv(result, stream)
         else:
-            _draw(result, fresh, _title(arguments, configuration))
+            name = str(configuration.flat().get('soil.name') or 'soil as configured')
+            effects = ', '.join(configuration.effects) or 'none'
+            method = arguments.law or arguments.method
+            _draw(result, fresh, f'{name}; effects: {effects}; {method}')
 
 
 def _measured(columns: dict[str, FloatArray], text: str, seed: int) -> dict[str, FloatArray]:
@@ -315,12 +318,6 @@ def _write_csv(columns: Mapping[str, FloatArray], stream: Any) -> None:
     writer.writerow(columns)
     for row in zip(*columns.values(), strict=True):
         writer.writerow(f'{value:.9g}' if np.isfinite(value) else '' for value in row)
-
-
-def _title(arguments: argparse.Namespace, configuration: Configuration) -> str:
-    name = str(configuration.flat().get('soil.name') or 'soil as configured')
-    effects = ', '.join(configuration.effects) or 'none'
-    return f'{name}; effects: {effects}; {arguments.law or arguments.method}'
 
 
 def _draw(columns: Mapping[str, FloatArray], path: Path, title: str) -> None:

@@ -9,7 +9,7 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.cli.outputs import Output, add_output, add_remaps
 from wheel_terra_estimator.configuration import reader as configuration_reader
@@ -98,6 +98,8 @@ def _run_one(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.checks.finding import CheckReport
     from wheel_terra_estimator.fleet.drive import findings_as_lines, replay_drive
+    from wheel_terra_estimator.reporting import truth_scores
+    from wheel_terra_estimator.reporting.drive_summary import as_dict
 
     def print_findings(checked: CheckReport) -> None:
         for line in () if arguments.json else findings_as_lines(checked):
@@ -111,7 +113,10 @@ def _run_one(arguments: argparse.Namespace) -> int:
         bag, configuration, remaps, arguments.output, _options(arguments), print_findings
     )
     if arguments.json:
-        print(json.dumps(_as_dict(drive), indent=2))
+        told = as_dict(drive.summary)
+        told['findings'] = drive.checked.as_dict()['findings']
+        told['truth'] = truth_scores.as_dict(drive.errors) if drive.errors else None
+        print(json.dumps(told, indent=2))
     else:
         print(drive.as_text)
     written = _write_outputs(drive, arguments)
@@ -158,16 +163,6 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
         check_file(arguments.save_soil, arguments.overwrite, foreign=soil_file.why_foreign)
     if arguments.output:
         check_folder(arguments.output, arguments.overwrite)
-
-
-def _as_dict(drive: Drive) -> dict[str, Any]:
-    from wheel_terra_estimator.reporting import truth_scores
-    from wheel_terra_estimator.reporting.drive_summary import as_dict
-
-    told = as_dict(drive.summary)
-    told['findings'] = drive.checked.as_dict()['findings']
-    told['truth'] = truth_scores.as_dict(drive.errors) if drive.errors else None
-    return told
 
 
 def _write_outputs(drive: Drive, arguments: argparse.Namespace) -> dict[str, Path]:

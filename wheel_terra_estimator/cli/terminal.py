@@ -12,7 +12,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout, suppress
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import IO, Any, NoReturn
 
@@ -31,15 +31,6 @@ def harmless(text: str) -> str:
     return _HARMFUL.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
-def one_line(text: str) -> str:
-    """Return an error as a line that can be shown."""
-    line = harmless(text.replace('\n', ' '))
-    if len(line) > LONGEST_LINE:
-        half = LONGEST_LINE // 2
-        line = f'{line[:half]} ... {line[-half:]}'
-    return line
-
-
 def open_closed_streams() -> None:
     """Put what drops everything in the place of output streams that the caller has closed."""
     for name in ('stdout', 'stderr'):
@@ -56,13 +47,14 @@ def discard_output() -> None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-class _Harmless:
+class Harmless:
     """A text stream that writes out control characters and what its encoding does not have."""
 
     def __init__(self, stream: IO[str]) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
+        """Write a text as it can be shown."""
         shown = harmless(text)
         if not shown.isascii():
             encoding = getattr(self._stream, 'encoding', None) or 'utf-8'
@@ -72,14 +64,6 @@ class _Harmless:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
-
-
-@contextmanager
-def harmless_output() -> Iterator[None]:
-    """Keep control characters out of standard output within the block."""
-    stream: Any = _Harmless(sys.stdout)
-    with redirect_stdout(stream):
-        yield
 
 
 @contextmanager
@@ -152,7 +136,10 @@ def suggestion(wrong: str, known: Sequence[str]) -> str:
 
 def complain(line: str) -> None:
     """Print a line on standard error, red on a terminal that wants colours (NO_COLOR: none)."""
-    line = one_line(line)
+    line = harmless(line.replace('\n', ' '))
+    if len(line) > LONGEST_LINE:
+        half = LONGEST_LINE // 2
+        line = f'{line[:half]} ... {line[-half:]}'
     if sys.stderr.isatty() and not os.environ.get('NO_COLOR'):
         line = f'\033[31m{line}\033[0m'
     with suppress(OSError):  # nobody hears it

@@ -150,6 +150,15 @@ class Configuration:
         return str(self._values['soil.source'])
 
     @property
+    def soil_std_stated(self) -> dict[str, float]:
+        """The part of ``soil_std`` that somebody stated number by number."""
+        return {
+            field: std
+            for field, std in self.soil_std.items()
+            if self.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'}
+        }
+
+    @property
     def soil_stated(self) -> bool:
         """Whether anybody stated a soil, or how well it is known; else the default is a guess."""
         return any(key.startswith('soil.') and key not in _SOIL_LABELS for key in self.stated)
@@ -160,12 +169,18 @@ class Configuration:
         effects, effects_std = _effects(values)
         single: dict[str, Any] = {f.name: values[f.name] for f in fields(cls) if f.name in values}
         section = Section(values, 'soil.')
-        soil = _soil(section)
+        soil = Soil(**{field.name: getattr(section, field.name) for field in fields(Soil)})
         return cls(
             wheels=Wheels(values),
             rover=Rover(values),
             soil=soil,
-            soil_std=_soil_std(section, soil),
+            soil_std={
+                name: float(
+                    getattr(section, f'{name}_std')
+                    or section.relative_std * abs(float(getattr(soil, name)))
+                )
+                for name in SOIL_NUMBERS
+            },
             effects=effects,
             effects_std=effects_std,
             sensors=Section(values, 'sensors.'),
@@ -214,20 +229,6 @@ def _number(values: Mapping[str, Value], key: str) -> float:
     value = values[key]
     assert isinstance(value, (int, float))
     return float(value)
-
-
-def _soil(section: Section) -> Soil:
-    return Soil(**{field.name: getattr(section, field.name) for field in fields(Soil)})
-
-
-def _soil_std(section: Section, soil: Soil) -> dict[str, float]:
-    return {
-        field: float(
-            getattr(section, f'{field}_std')
-            or section.relative_std * abs(float(getattr(soil, field)))
-        )
-        for field in SOIL_NUMBERS
-    }
 
 
 def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSettings]:

@@ -147,14 +147,22 @@ def _checked(
             continue
         parameter = spellings.get(key)
         if parameter is None:
-            raise UserError(_unknown(key, source, spellings))
+            close = nearest(key, spellings)
+            raise UserError(
+                f"{source}: unknown parameter '{key}'; the nearest known one is '{close}' "
+                f'({spellings[close].allowed})'
+            )
         before = seen.setdefault((source, parameter.key), key)
         if before != key:
             raise UserError(f'{source}: {before} and {key} are the same parameter; give one')
         stated[parameter.key] = (value, source)
     sources = ', '.join(dict.fromkeys(source for _, source, _ in sourced)) or 'no configuration'
-    if complete:
-        _require(table, stated, sources)
+    missing = [key for key, item in table.items() if item.required and key not in stated]
+    if complete and missing:
+        raise UserError(
+            f'{sources}: {", ".join(missing)} not stated; give a rover file '
+            '(--config or --params-file), such as the shipped generic_six_wheel'
+        )
     values: dict[str, Value] = {}
     names = table['wheels.names']
     wheels = len(checked_value(names, stated, 0))
@@ -195,23 +203,6 @@ def _load_effect_file(sourced: Sequence[tuple[str, str, Any]], allowed: bool) ->
             except ValueError as error:
                 raise UserError(f'{source}: effect_file: {error}') from None
             return
-
-
-def _unknown(key: str, source: str, spellings: Mapping[str, Parameter]) -> str:
-    close = nearest(key, spellings)
-    return (
-        f"{source}: unknown parameter '{key}'; the nearest known one is '{close}' "
-        f'({spellings[close].allowed})'
-    )
-
-
-def _require(table: Mapping[str, Parameter], stated: _Sourced, sources: str) -> None:
-    missing = [key for key, item in table.items() if item.required and key not in stated]
-    if missing:
-        raise UserError(
-            f'{sources}: {", ".join(missing)} not stated; give a rover file '
-            '(--config or --params-file), such as the shipped generic_six_wheel'
-        )
 
 
 def checked_value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:

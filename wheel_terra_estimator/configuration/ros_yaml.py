@@ -38,13 +38,6 @@ _NOT_FINITE = re.compile(r'([+-]?)\.?(inf(?:inity)?|nan)', re.IGNORECASE)
 _OUR_SECTION = re.compile(rf'/\*\*|(.*/)?{NODE_NAME}')
 
 
-class _Null:
-    """Marks a key without a value, which ROS parameter files cannot hold."""
-
-
-_NO_VALUE = _Null()
-
-
 # That of libyaml where it is compiled in: the parser of ROS itself, and four times as fast.
 _SafeLoader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
@@ -76,13 +69,14 @@ _RosLoader.add_constructor('tag:yaml.org,2002:str', _construct_scalar)
 _RosLoader.add_constructor('tag:yaml.org,2002:map', _construct_mapping)
 
 
-def plain_scalar(text: str) -> Scalar | _Null:
+def plain_scalar(text: str) -> Scalar | None:
     """Return the value that ROS gives to an unquoted scalar.
 
-    Returns the value; numbers as C's ``strtoll`` (base 0) and ``strtod`` read them.
+    Returns the value; numbers as C's ``strtoll`` (base 0) and ``strtod`` read them. None stands for
+    none, which ROS parameter files cannot hold.
     """
     if text in _NULL:
-        return _NO_VALUE
+        return None
     if text in _TRUE or text in _FALSE:
         return text in _TRUE
     if _INTEGER.fullmatch(text):
@@ -119,11 +113,15 @@ def _in_range(read: Callable[[str], float], text: str) -> float | str:
 
 def parse_value(text: str, source: str) -> Value:
     """Return the value of ``text`` as it would be read behind a key; errors name ``source``."""
+    value = _loaded(text, source)
+    return _checked(value if text.strip() else None, source)
+
+
+def _loaded(text: str, source: object) -> Any:
     try:
-        value = bounded_yaml.load(text, _RosLoader)
+        return bounded_yaml.load(text, _RosLoader)
     except yaml.YAMLError as error:
         raise UserError(f'{source}: {in_words(error)}') from None
-    return _checked(value if text.strip() else _NO_VALUE, source)
 
 
 def read(path: Path) -> dict[str, Value]:
@@ -135,11 +133,7 @@ def read(path: Path) -> dict[str, Value]:
     needs the section. Raises UserError if the file cannot be read, is not YAML or not a parameter
     file.
     """
-    text = read_text(path)
-    try:
-        document = bounded_yaml.load(text, _RosLoader)
-    except yaml.YAMLError as error:
-        raise UserError(f'{path}: {in_words(error)}') from None
+    document = _loaded(read_text(path), path)
     if not isinstance(document, Mapping):
         raise UserError(
             f"{path}: no parameters; give lines 'rover.mass: 22.0', or a ROS parameter file, which "
@@ -248,7 +242,7 @@ def _sections(
 
 def _checked(value: Any, source: str) -> Value:
     """Refuse what a ROS parameter cannot be."""
-    if isinstance(value, _Null) or value is None:
+    if value is None:
         raise UserError(f'{source} has no value; ROS parameters know no null')
     if not isinstance(value, list):
         if isinstance(value, (bool, int, float, str)):
@@ -257,7 +251,7 @@ def _checked(value: Any, source: str) -> Value:
     if not value:
         raise UserError(f'{source} is an empty list, which ROS parameter files cannot hold')
     for item in value:
-        if isinstance(item, _Null) or item is None:
+        if item is None:
             raise UserError(f'{source} holds an empty entry; ROS parameters know no null')
         if not isinstance(item, (bool, int, float, str)):
             raise UserError(f'{source} is a nested list; only flat lists are allowed')

@@ -108,22 +108,15 @@ def _parse(path: Path, data: bytes | None) -> ElementTree.Element:
 
 
 def _is_wheel(name: str, joint: ElementTree.Element) -> bool:
-    words = f'{name} {_child(joint)}'.lower()
+    words = f'{name} {_link(joint, "child")}'.lower()
     caster = re.search(r'caster|steer', words)
     return joint.get('type') == 'continuous' and 'wheel' in words and not caster
 
 
-def _child(joint: ElementTree.Element) -> str:
-    return _named(joint, 'child', 'link')
-
-
-def _parent(joint: ElementTree.Element) -> str:
-    return _named(joint, 'parent', 'link')
-
-
-def _named(element: ElementTree.Element, tag: str, attribute: str) -> str:
-    found = element.find(tag)
-    return found.get(attribute, '') if found is not None else ''
+def _link(joint: ElementTree.Element, side: str) -> str:
+    """Return the link on the ``parent`` or ``child`` side of a joint."""
+    found = joint.find(side)
+    return found.get('link', '') if found is not None else ''
 
 
 def _numbers(text: str | None, default: tuple[float, ...], path: Path) -> list[float]:
@@ -170,14 +163,16 @@ class _Robot:
         self.name = root.get('name', path.stem)
         self.joints = {j.get('name', ''): j for j in root.iter('joint') if j.get('type')}
         self._links = {link.get('name', ''): link for link in root.iter('link')}
-        self._above = {_child(joint): joint for joint in self.joints.values()}  # by their children
+        self._above = {
+            _link(joint, 'child'): joint for joint in self.joints.values()
+        }  # by their children
         roots = [name for name in self._links if name not in self._above]
         named = [name for name in BASE_LINKS if name in self._links]
         self.base = next(iter((*named, *roots, *self._links)), '')
 
     def pose(self, joint: ElementTree.Element) -> Pose:
         """Return the pose of the link that hangs on a joint."""
-        pose = self._link_pose(_child(joint))
+        pose = self._link_pose(_link(joint, 'child'))
         if pose is None:
             raise UserError(f'{self.path}: joint {joint.get("name")} does not hang on {self.base}')
         return pose
@@ -198,12 +193,12 @@ class _Robot:
             if link == end or joint is None:
                 return link, pose
             pose = _origin(joint, self.path) @ pose
-            link = _parent(joint)
+            link = _link(joint, 'parent')
         raise UserError(f'{self.path}: the joints of link {start} form a loop')
 
     def cylinder(self, joint: ElementTree.Element) -> tuple[float, float | None]:
         """Return radius and width of a wheel from its collision or visual shape."""
-        link = self._links.get(_child(joint))
+        link = self._links.get(_link(joint, 'child'))
         for kind in ('collision', 'visual'):
             for part in link.iter(kind) if link is not None else ():
                 for cylinder in part.iter('cylinder'):
@@ -225,15 +220,15 @@ class _Robot:
 
         It is the nearest turning joint above the wheel whose axis is upright; '' and 0 for none.
         """
-        joint = self._above.get(_parent(wheel))
+        joint = self._above.get(_link(wheel, 'parent'))
         for _ in range(DEEPEST_CHAIN):
-            if joint is None or _child(joint) == self.base:
+            if joint is None or _link(joint, 'child') == self.base:
                 break
             if joint.get('type') in ('revolute', 'continuous'):
                 up = float((self.pose(joint)[:3, :3] @ _axis(joint, self.path))[2])
                 if abs(up) > _UPRIGHT:
                     return joint.get('name', ''), up
-            joint = self._above.get(_parent(joint))
+            joint = self._above.get(_link(joint, 'parent'))
         return '', 0.0
 
     def mass(self) -> tuple[float, list[float]]:

@@ -85,24 +85,14 @@ class Decision:
         return self.findings.selection.floors[self.floor_index].largest
 
 
-def decide(
-    table: SteadyTable, both: SteadyTable, findings: Findings, allowed_error: float
-) -> Decision:
-    """Decide what is reported of a table; ``both`` has the rows of a reference behind its own.
-
-    ``allowed_error`` is the model error that is no reason for doubt [share of the range].
-    """
-    return _Decider(table, both, findings, allowed_error).decision()
-
-
 @dataclass(frozen=True)
-class _Decider:
+class Decider:
     """The loop, and what its rounds share."""
 
     table: SteadyTable
-    both: SteadyTable
+    both: SteadyTable  # with the rows of a reference behind those of the table
     findings: Findings
-    allowed_error: float
+    allowed_error: float  # model error that is no reason for doubt [share of the range]
     # The best law beside each floor, soil held or not: it competes with doubtful names, or is
     # proposed
     laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
@@ -236,13 +226,9 @@ def known_alike(name: str, findings: Findings, known: Mapping[str, Effect]) -> t
     on = set(findings.setting.forward.base_effects)
     own = known[effect_of(name)].confounded_with
     others = (o.base_name for o in known.values() if effect_of(name) in o.confounded_with)
-
-    def might_be(other: str) -> bool:
-        effect = known.get(other)
-        return effect is None or (effect.candidate and not effect.incompatible_with & on)
-
+    aside = {n for n, o in known.items() if not o.candidate or o.incompatible_with & on}
     names = dict.fromkeys((*own, *others))
-    return tuple(other for other in names if other not in findings.tried and might_be(other))
+    return tuple(name for name in names if name not in aside and name not in findings.tried)
 
 
 def _what_rows_show(

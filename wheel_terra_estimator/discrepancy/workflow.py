@@ -13,7 +13,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.readings import Readings
-from wheel_terra_estimator.discrepancy.decision import Decision, decide
+from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     Coordinate,
     base_coordinates,
@@ -83,7 +83,7 @@ def diagnose(
     forward = Forward(
         points, configuration.soil, configuration.effects, known, active=active, readings=readings
     )
-    configured = _check_soil_carries(both, forward, configuration)
+    configured = _check_soil_carries(both, forward)
     check_pull_against_model(both, configured[:, 1])
     nuisance = nuisance_coordinates(configuration, known, chosen.soil_known_to)
     floors = default_floors(chosen.floor) if reference is None else shared_floors()
@@ -92,7 +92,7 @@ def diagnose(
         model: Forward, free: tuple[Coordinate, ...], more: Mapping[str, Effect]
     ) -> Decision:
         findings = search(both, model, free, {**effects, **more}, floors)
-        return decide(table, both, findings, chosen.allowed_error)
+        return Decider(table, both, findings, chosen.allowed_error).decision()
 
     decision = decided(forward, nuisance, {})
     notes: tuple[str, ...] = ()
@@ -121,12 +121,8 @@ def nuisance_coordinates(
 ) -> tuple[Coordinate, ...]:
     """Return the soil parameters and the stated uncertain parameters of effects that are on."""
     # soil.relative_std is the estimator's doubt of a soil on its way, not that of a measured soil.
-    stated = {
-        field: value
-        for field, value in configuration.soil_std.items()
-        if configuration.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'}
-    }
-    soil = deviations(configuration.soil, stated, configuration.soil_source, known_to)
+    stated, source = configuration.soil_std_stated, configuration.soil_source
+    soil = deviations(configuration.soil, stated, source, known_to)
     return (
         *soil_coordinates(configuration.soil, soil),
         *base_coordinates(configuration.effects, configuration.effects_std, known),
@@ -192,12 +188,9 @@ def _measured_from(decision: Decision, configured: Decision) -> Decision:
     return replace(decision, gap=gap, curves=curves)
 
 
-def _check_soil_carries(
-    table: SteadyTable, forward: Forward, configuration: Configuration
-) -> FloatArray:
+def _check_soil_carries(table: SteadyTable, forward: Forward) -> FloatArray:
     """Return (N, 4) values as configured; raise where the soil lets the wheel sink to its hub."""
-    nothing = soil_coordinates(configuration.soil, deviations(configuration.soil, {}))
-    state = forward.solve([nothing], [np.zeros(len(nothing))], jacobian=False)
+    state = forward.solve([()], [np.zeros(0)], jacobian=False)
     sunk = state.angle[0] > 1.45
     if sunk.any():
         row = int(np.flatnonzero(sunk)[0])

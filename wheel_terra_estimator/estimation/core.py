@@ -331,17 +331,13 @@ def _time_settings(configuration: Configuration) -> TimeSettings:
         silence=_nanoseconds(tuning.silence),
         heartbeat=max(_nanoseconds(1.0 / tuning.heartbeat_rate), 1),
         reference_period=_nanoseconds(1.0 / rate) if rate else 0,
-        rerun_rate=_rerun_rate(configuration),
+        # Where every stamp is a set, any number of steps may be run again.
+        rerun_rate=float(tuning.rerun_rate) if configuration.output_rate > 0.0 else 0.0,
     )
 
 
 def _max_lag(configuration: Configuration) -> int:
     return _nanoseconds(configuration.max_lag) if configuration.max_lag >= 0.0 else -1
-
-
-def _rerun_rate(configuration: Configuration) -> float:
-    """Return the steps that may be run again per second; any number where every stamp is one."""
-    return float(configuration.filter.rerun_rate) if configuration.output_rate > 0.0 else 0.0
 
 
 def _nanoseconds(seconds: float) -> int:

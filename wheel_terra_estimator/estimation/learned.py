@@ -16,7 +16,7 @@ from wheel_terra_estimator.estimation.contacts.contact_models import contact_mod
 from wheel_terra_estimator.estimation.contacts.demand import Climbed
 from wheel_terra_estimator.estimation.contacts.usual_slip import steady_pull
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
-from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning
+from wheel_terra_estimator.estimation.filter.initial_state import PRIORS
 from wheel_terra_estimator.estimation.filter.state import (
     GRAVITY_BIAS,
     SHEAR_MODULUS,
@@ -77,8 +77,9 @@ class Learned:
         mean[SHEAR_STRENGTH] = self._strength_that_carried(mean, climbed)
         names, soil, stds = self._named_soil(mean, self._widened(covariance))
         for key, value, std in zip(names, soil.tolist(), stds.tolist(), strict=True):
+            name = key.removesuffix('_deg')
             found[key] = value
-            found[_deviation(key)] = std
+            found[f'{name}_std{key.removeprefix(name)}'] = std
         sensors = self._configuration.sensors
         force = sensors.specific_force_bias + np.array([self._force_bias(mean), 0.0, 0.0])
         rate = sensors.angular_rate_bias + np.array([0.0, zero.pitch, zero.yaw])
@@ -148,13 +149,5 @@ class Learned:
             learned, before = float(covariance[entry].mean()), float(self._start[entry].mean())
             wide[entry] = max(learned, min(learned + spread**2, before))
         # What wheels have of their own a start adds again.
-        wide[stiffness, stiffness] /= (
-            1.0 + PriorTuning().own_stiffness_share ** 2 / self._layout.wheel_count
-        )
+        wide[stiffness, stiffness] /= 1.0 + PRIORS.own_stiffness_share**2 / self._layout.wheel_count
         return wide
-
-
-def _deviation(key: str) -> str:
-    """Return the key of the standard deviation of a key."""
-    name = key.removesuffix('_deg')
-    return f'{name}_std_deg' if name != key else f'{key}_std'

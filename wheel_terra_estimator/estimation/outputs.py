@@ -30,7 +30,7 @@ from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import TINY
 from wheel_terra_estimator.estimation.sideways import Sideways
 from wheel_terra_estimator.estimation.taught import with_model_errors
-from wheel_terra_estimator.estimation.words import MissingInputs, faults_in_words, reasons_in_words
+from wheel_terra_estimator.estimation.words import reasons_in_words
 
 _UNKNOWN_STD = 1.0  # of a slip velocity [m/s]
 _UNLOADED_STD = 1.0  # of the pull of a wheel in the air [N]
@@ -93,8 +93,8 @@ class Outputs:
         self._rim_std = tuple(sensors.wheel_rate_std * r for r in rover.slip_radius)
         self._sinkage_zero = sensors.sinkage_zero_std
 
-    def estimate_set(self, given: Sources, missing: MissingInputs) -> EstimateSet:
-        """Return the outputs of a stamp."""
+    def estimate_set(self, given: Sources, faults: dict[str, str]) -> EstimateSet:
+        """Return the outputs of a stamp; `faults` are those of the inputs, in words."""
         layout, rover, n = self._layout, self._rover, self._rover.wheel_count
         slip_velocity, slip_velocity_std = self._slip_velocity(given)
         variance = np.diagonal(given.covariance)[layout.sinkage]
@@ -140,7 +140,7 @@ class Outputs:
             stuck_direction=given.assessment.direction,
             stuck_confirmed=given.assessment.confirmed,
             reasons=reasons_in_words(given.rims, given.slips, given.assessment),
-            faults=faults_in_words(missing),
+            faults=faults,
             slip_on_slope=given.slip_on_slope,
             sideways=given.sideways,
             **dict(zip(per_wheel, rows, strict=True)),

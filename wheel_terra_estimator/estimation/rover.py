@@ -70,6 +70,7 @@ class Rover:
         spread = x - x.mean()
         tilt = -spread / max(float(spread @ spread), 1e-9) if np.ptp(x) > 1e-6 else 0.0 * x
         rest_speed = configuration.rest_speed
+        shares = np.asarray(rover.load_shares, dtype=float)
         return cls(
             wheel_count=wheels.count,
             slip_radius=_floats(wheels.slip_radius),
@@ -80,7 +81,17 @@ class Rover:
             torque_limit=_floats(wheels.torque_limit),
             mass=float(rover.mass),
             gravity=float(rover.gravity),
-            load=_load_distribution(configuration),
+            load=load_distribution(
+                mass=float(rover.mass),
+                position=np.column_stack([wheels.x, wheels.y]).astype(float),
+                centre_of_gravity=[float(c) for c in rover.centre_of_gravity],
+                contact_height=float(np.mean(np.asarray(wheels.z) - np.asarray(wheels.radius))),
+                suspension=rover.suspension,
+                shares=shares if shares.any() else np.ones(wheels.count),
+                rocker_pivot=rover.rocker_pivot,
+                bogie_pivot=rover.bogie_pivot,
+                bogie_wheels=rover.bogie_wheels,
+            ),
             load_std=_load_std(configuration),
             open_load_std=_open_load_std(configuration),
             rut_tilt=_floats(tilt),
@@ -182,19 +193,3 @@ def _leaders(x: np.ndarray, y: np.ndarray, width: np.ndarray) -> tuple[int | Non
         before = np.flatnonzero((x > x[i] + _SAME_AXLE) & (np.abs(y - y[i]) < half))
         found.append(int(before[np.argmin(x[before])]) if len(before) else None)
     return tuple(found)
-
-
-def _load_distribution(configuration: Configuration) -> LoadDistribution:
-    wheels, rover = configuration.wheels, configuration.rover
-    shares = np.asarray(rover.load_shares, dtype=float)
-    return load_distribution(
-        mass=float(rover.mass),
-        position=np.column_stack([wheels.x, wheels.y]).astype(float),
-        centre_of_gravity=[float(c) for c in rover.centre_of_gravity],
-        contact_height=float(np.mean(np.asarray(wheels.z) - np.asarray(wheels.radius))),
-        suspension=rover.suspension,
-        shares=shares if shares.any() else np.ones(wheels.count),
-        rocker_pivot=rover.rocker_pivot,
-        bogie_pivot=rover.bogie_pivot,
-        bogie_wheels=rover.bogie_wheels,
-    )

@@ -187,7 +187,12 @@ def after_estimates(
     count = len(estimates.slip_class)
     if not count == len(estimates.slip) == len(estimates.rim_travel_left):
         return state
-    known = [_is_known(estimates, i) for i in range(count)]
+    known = [
+        grade != SlipClass.UNKNOWN and math.isfinite(slip) and math.isfinite(travel)
+        for grade, slip, travel in zip(
+            estimates.slip_class, estimates.slip, estimates.rim_travel_left, strict=True
+        )
+    ]
     offset = _clock_offset(state, now, estimates.delay, tuning)
     state = replace(state, judged_at=now, delay=estimates.delay, clock_offset=offset)
     at = now - _late(state)
@@ -293,14 +298,6 @@ def _late(state: LimiterState) -> float:
     return max(state.delay - (state.clock_offset or 0.0), 0.0)
 
 
-def _is_known(estimates: Estimates, wheel: int) -> bool:
-    return (
-        estimates.slip_class[wheel] != SlipClass.UNKNOWN
-        and math.isfinite(estimates.slip[wheel])
-        and math.isfinite(estimates.rim_travel_left[wheel])
-    )
-
-
 def _counted_slips(
     state: LimiterState, known: Sequence[bool], now: float, tuning: LimiterTuning
 ) -> list[float]:
@@ -377,7 +374,9 @@ def _decide_free(state: LimiterState, now: float, tuning: LimiterTuning) -> Deci
     if is_fresh(state, now, tuning):
         return state.judgement
     scale = min(tuning.stale_scale, state.judgement.scale)
-    words = f'no fresh estimate{_why_stale(state, now, tuning)}: cut to {scale:.2f}'
+    come = now - state.judged_at <= tuning.stale_after
+    old = f' (they come {_late(state):.1f} s old)' if come else ''
+    words = f'no fresh estimate{old}: cut to {scale:.2f}'
     return Decision(scale, 'no estimate', words)
 
 
@@ -405,12 +404,6 @@ def _still_time(state: LimiterState, now: float) -> float:
     if state.sent == ZERO:
         return now - state.still_since
     return max(now - state.sent_at - COMMAND_TIMEOUT, 0.0)
-
-
-def _why_stale(state: LimiterState, now: float, tuning: LimiterTuning) -> str:
-    """Say so where estimates come, but old ones."""
-    come = now - state.judged_at <= tuning.stale_after
-    return f' (they come {_late(state):.1f} s old)' if come else ''
 
 
 def _ramped(

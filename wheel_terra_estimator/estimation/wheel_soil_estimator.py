@@ -50,7 +50,6 @@ from wheel_terra_estimator.estimation.filter.initial_state import (
     layout_of,
     with_soil_of,
 )
-from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
@@ -89,7 +88,7 @@ from wheel_terra_estimator.estimation.scalars import NAN, NANOSECOND, known, med
 from wheel_terra_estimator.estimation.sideways import SidewaysInputs, SidewaysMotion
 from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 from wheel_terra_estimator.estimation.taught import Taught, Teaching, with_model_errors
-from wheel_terra_estimator.estimation.words import MissingInputs
+from wheel_terra_estimator.estimation.words import COST
 
 _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
@@ -289,13 +288,15 @@ class WheelSoilEstimator:
         self._unloaded.update(cycle)
         forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
         if cycle.still:
-            self._forget_contacts()
+            # They form anew.
+            self._contact_age.stop()
+            self._linearisation.reset()
+            self._sinkage_process.forget_slopes()
         else:
             forces, total, stationary, force_rows = self._force_rows(cycle)
             if self._contact_age.settled or cycle.reference_known:
                 rows += force_rows
-        considered = considered_entries(
-            layout,
+        considered = layout.considered(
             settled=self._contact_age.settled,
             opposes_rims=cycle.yaw_compensated.oppose(float(ekf.mean[SPEED])),
             unread=self._sinkage.unread(time),
@@ -466,12 +467,6 @@ class WheelSoilEstimator:
             fastest_rim=self._wheels.fastest(),
             variance=noise,
         )
-
-    def _forget_contacts(self) -> None:
-        """Let the contacts form anew: all wheels stand."""
-        self._contact_age.stop()
-        self._linearisation.reset()
-        self._sinkage_process.forget_slopes()
 
     def _force_rows(
         self, cycle: Cycle
@@ -665,17 +660,18 @@ class WheelSoilEstimator:
         time = self._clock.time
         inertial = self._inertial.state
         silent = time - inertial.time > self._rover.silence
-        missing = MissingInputs(
-            wheel_odometry=self._wheels.silent(time),
-            imu=silent,
-            orientation=not silent and not inertial.attitude.reported,
-            torque=not self._wheels.torque_known(time),
-            sinkage=len(self._sinkage.unread(time)) == self._rover.wheel_count,
-            acceleration=not silent and time - inertial.force_time > self._rover.silence,
-            angular_rate=not silent and time - inertial.rate_time > self._rover.silence,
-            reference=not self._reference.fresh(time),
-        )
-        return self._outputs.estimate_set(self._sources(), missing)
+        missing = {
+            'wheel_odometry': self._wheels.silent(time),
+            'imu': silent,
+            'orientation': not silent and not inertial.attitude.reported,
+            'torque': not self._wheels.torque_known(time),
+            'sinkage': len(self._sinkage.unread(time)) == self._rover.wheel_count,
+            'acceleration': not silent and time - inertial.force_time > self._rover.silence,
+            'angular_rate': not silent and time - inertial.rate_time > self._rover.silence,
+            'reference': not self._reference.fresh(time),
+        }
+        faults = {name: words for name, words in COST.items() if missing[name]}
+        return self._outputs.estimate_set(self._sources(), faults)
 
     def _sources(self) -> Sources:
         """Return what the outputs of the present stamp follow from."""

@@ -5,37 +5,24 @@
 from __future__ import annotations
 
 from math import isnan
-from typing import NamedTuple
 
 from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.judgement.slip import WheelSlip
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment
 
-
-class MissingInputs(NamedTuple):
-    """Which inputs are missing at a stamp."""
-
-    wheel_odometry: bool
-    imu: bool
-    acceleration: bool
-    angular_rate: bool
-    orientation: bool
-    torque: bool
-    sinkage: bool
-    reference: bool
-
-
-_COST = (
-    'no wheel odometry: slip held',
-    'no IMU: loads of level ground, turning from the wheels, no balance of forces',
-    'no acceleration: no balance of forces, loads of level ground or by the orientation',
-    'no angular rate: turning from the wheels',
-    'no orientation: slope from gyro and specific force',
-    'no torque: pull from the balance of forces and the soil model',
-    'no sinkage: held by its model',
-    'no reference velocity: slip from forces and soil model',
-)
-"""What each of `MissingInputs` costs."""
+COST = {
+    'wheel_odometry': 'no wheel odometry: slip held',
+    'imu': 'no IMU: loads of level ground, turning from the wheels, no balance of forces',
+    'acceleration': (
+        'no acceleration: no balance of forces, loads of level ground or by the orientation'
+    ),
+    'angular_rate': 'no angular rate: turning from the wheels',
+    'orientation': 'no orientation: slope from gyro and specific force',
+    'torque': 'no torque: pull from the balance of forces and the soil model',
+    'sinkage': 'no sinkage: held by its model',
+    'reference': 'no reference velocity: slip from forces and soil model',
+}
+"""Input that may be missing at a stamp -> that it is, and what that costs."""
 
 
 def reasons_in_words(
@@ -56,12 +43,3 @@ def reasons_in_words(
             text = f'slip {wheel.slip:.2f} +- {wheel.std:.2f}'
         words.append(text + warning)
     return tuple(words)
-
-
-def faults_in_words(missing: MissingInputs) -> dict[str, str]:
-    """Return what is missing, and what that costs."""
-    return {
-        name: words
-        for name, absent, words in zip(MissingInputs._fields, missing, _COST, strict=True)
-        if absent
-    }

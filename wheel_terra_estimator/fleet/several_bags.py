@@ -170,19 +170,15 @@ def _digest(settings: Settings, path: Path) -> str:
         else:
             files += [path, *(p for p in [path.with_name(f'{path.name}-wal')] if p.is_file())]
         for file in files:
-            _add_file(digest, file)
+            if not file.is_file():
+                raise UserError(f'{file}: there is no such recording')
+            digest.update(f'{file.suffix} {file.stat().st_size}\n'.encode())
+            with file.open('rb') as stream:
+                while block := stream.read(READ_AT_ONCE):
+                    digest.update(block)
     except OSError as error:
         raise UserError(f'{path}: cannot be read ({error.strerror or error})') from None
     return digest.hexdigest()
-
-
-def _add_file(digest: Any, file: Path) -> None:
-    if not file.is_file():
-        raise UserError(f'{file}: there is no such recording')
-    digest.update(f'{file.suffix} {file.stat().st_size}\n'.encode())
-    with file.open('rb') as stream:
-        while block := stream.read(READ_AT_ONCE):
-            digest.update(block)
 
 
 def _replay(settings: Settings, task: _Task) -> DriveRow:

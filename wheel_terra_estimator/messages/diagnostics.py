@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.words import MissingInputs
+from wheel_terra_estimator.estimation.words import COST
 from wheel_terra_estimator.messages.fault_log import FaultLog
 
 OK, WARN, ERROR, STALE = range(4)
@@ -26,7 +26,7 @@ START = 1_000_000_000  # in the first second inputs may be on their way [ns]
 SMALLEST = 1e-12
 """Smaller numbers are written as 0: no unit of this package makes them anything else."""
 
-INPUTS = frozenset(MissingInputs._fields)
+INPUTS = frozenset(COST)
 _NEEDED = frozenset({'wheel_odometry', 'imu'})  # that no rover does without
 
 _CLASS_WORDS = {
@@ -145,15 +145,9 @@ class Diagnostics:
             return [node, *(s._replace(level=STALE) for s in self._wheel_statuses(unknown))]
         values = _values({'stuck_probability': 0.0, 'time_to_stuck_s': NO_TIME_TO_STUCK})
         values.append(('reason', words))
-        names = self._names
-        hardware = (_hardware(self.node_name, name) for name in names)
-        return [
-            node,
-            *(
-                Status(STALE, f'{self.node_name}: {name}', words, identity, values)
-                for name, identity in zip(names, hardware, strict=True)
-            ),
-        ]
+        own = self.node_name
+        wheels = ((f'{own}: {name}', _hardware(own, name)) for name in self._names)
+        return [node, *(Status(STALE, name, words, identity, values) for name, identity in wheels)]
 
     def _level(self, estimates: EstimateSet) -> int:
         if estimates.stuck:
@@ -212,10 +206,11 @@ def _hardware(node_name: str, wheel: str) -> str:
 
 def _values(counters: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
-        (key, f'{_no_dust(value):.6g}' if isinstance(value, float) else str(value))
+        (
+            key,
+            f'{0.0 if abs(value) < SMALLEST else value:.6g}'
+            if isinstance(value, float)
+            else str(value),
+        )
         for key, value in counters.items()
     ]
-
-
-def _no_dust(value: float) -> float:
-    return 0.0 if abs(value) < SMALLEST else value

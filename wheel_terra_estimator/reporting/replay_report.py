@@ -14,7 +14,6 @@ from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.reporting import truth_scores
 from wheel_terra_estimator.reporting.drive_figure import (
     STRENGTHS,
@@ -68,7 +67,7 @@ def write_replay_report(
         findings=findings,
         warnings=_warnings(summary, errors),
         errors=[_error_row(error) for error in errors.quantities] if errors else [],
-        taught=[_taught_row(row) for row in summary.taught],
+        taught=summary.taught,
         slopes=slopes_figure(history.slip_on_slope) if history.slip_on_slope else None,
         way=way_figure(track) if track else None,
         strengths=[(words, colour) for words, _, _, colour in STRENGTHS],
@@ -80,15 +79,6 @@ def write_replay_report(
         sources=[(name, effects[name].source) for name in configuration.effects],
     )
     write_page(path, page, overwrite)
-
-
-def _taught_row(row: Taught) -> dict[str, str]:
-    return {
-        'name': row.name,
-        'prior': row.with_unit(row.prior_std),
-        'std': row.with_unit(row.std),
-        'words': row.in_words(),
-    }
 
 
 def _error_row(error: QuantityError) -> dict[str, str]:

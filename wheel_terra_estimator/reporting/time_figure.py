@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
-from wheel_terra_estimator.reporting.style import DARK, thin
+from wheel_terra_estimator.reporting.style import thin
 
 LINE_POINTS, BAND_POINTS, TRUTH_POINTS = 2000, 300, 600
 """Points of a line in the page: what a wide screen shows, and a file below 4 MB."""
@@ -67,11 +67,6 @@ class Curve:
     name: str = ''
     light: str = ''
     width: float = 1.4
-
-    @property
-    def dark(self) -> str:
-        """Colour on a dark page."""
-        return DARK.get(self.light, self.light)
 
 
 @dataclass(frozen=True)

@@ -40,11 +40,6 @@ class WheelFaults:
     torque_factor: FloatArray  # (n,) factor on the torque limit: 0 a wheel that coasts
     load_factor: FloatArray  # (n,) factor on the load: near 0 a wheel that is lifted off
 
-    @classmethod
-    def none(cls, count: int) -> WheelFaults:
-        """Return a set without faults."""
-        return cls(np.ones(count), np.ones(count), np.ones(count))
-
 
 class WheelForces(NamedTuple):
     """Forces and torques at hub speeds, shape (..., n), body frame."""
@@ -97,8 +92,8 @@ class RoverPlant:
         self._ahead = np.where(apart < wheels.width, ahead, 0.0)
         self._straight = 0.0  # way since the last turn [m]
 
-        self.faults = WheelFaults.none(n)
-        self._time = 0.0
+        self.faults = WheelFaults(*np.ones((3, n)))
+        self.time = 0.0  # since the start [s]
         self._speeds = np.zeros(3)
         self._rate = np.zeros(n)
         self._angle = np.zeros(n)
@@ -106,11 +101,6 @@ class RoverPlant:
         self._load = np.full(n, rover.mass * rover.gravity / n)
         self._attitude = np.zeros(2)  # pitch (nose up) and roll (left up) of the chassis
         self._set_down()
-
-    @property
-    def time(self) -> float:
-        """Time since the start [s]."""
-        return self._time
 
     def step(self, command: Command, duration: float) -> Truth:
         """Drive for ``duration`` [s] under a command and return the truth at its end."""
@@ -126,7 +116,7 @@ class RoverPlant:
         rim = self._rate * wheels.slip_radius
         along, across = (np.einsum('jn,j->n', lever, self._speeds) for lever in self._lever)
         return Truth(
-            time=self._time,
+            time=self.time,
             slip=np.asarray(slip_ratio(along, rim, self._rest_speed)),
             slip_velocity=rim - along,
             steering=self._steering.angle,
@@ -236,7 +226,7 @@ class RoverPlant:
         self._speeds, self._rate = speeds, rate
         self._move(dt)
         self._balance(dt)
-        self._time += dt
+        self.time += dt
 
     def _newton_step(
         self, speeds: FloatArray, rate: FloatArray, dt: float
@@ -353,7 +343,7 @@ class RoverPlant:
                 and np.abs(self._load - self._carried).max() < 0.01
             ):
                 break
-        self._time = 0.0
+        self.time = 0.0
         self._position = np.zeros(3)
         self._straight = 0.0
         self._angle = np.zeros_like(zero)

@@ -73,8 +73,9 @@ class SensorSuite:
             else figures.reference_delay
         )
         reference_rate = scenario.sensors.reference_rate or figures.reference_rate
+        self.odometry_period = 1.0 / figures.wheel_odometry_rate  # [s] between two messages
         self._periods = {
-            'odometry': 1.0 / figures.wheel_odometry_rate,
+            'odometry': self.odometry_period,
             'imu': 1.0 / figures.imu_rate,
             'sinkage': 1.0 / figures.sinkage_rate,
             'reference': 1.0 / reference_rate,
@@ -90,11 +91,6 @@ class SensorSuite:
         self._held_sinkage = np.zeros(n)
         self._last_stamp = dict.fromkeys(self._periods, START)
         self._last_arrival: dict[type, int] = {}  # of each topic
-
-    @property
-    def odometry_period(self) -> float:
-        """Time between two messages of the wheel odometry [s]."""
-        return self._periods['odometry']
 
     def measure(self, truth: Truth) -> list[Arrival]:
         """Return what was measured since the last call, in the order of stamps.
@@ -131,7 +127,7 @@ class SensorSuite:
             return
         n = angle.size
         noise = self._random.standard_normal((2, n))
-        rate = (angle - counted) / self._periods['odometry']
+        rate = (angle - counted) / self.odometry_period
         # The mean rate of the period is that of its middle; drives report a filtered value too.
         rate = rate + self._scale * self._figures.wheel_rate_std * noise[0]
         torque = _between(before.torque, truth.torque, part)

@@ -40,8 +40,8 @@ class Suspension:
         return (self.y > 0).astype(float), (self.y <= 0).astype(float)
 
     @cached_property
-    def _rows(self) -> FloatArray:
-        """Coefficients of the loads in the balances, one row each."""
+    def _solution(self) -> FloatArray:
+        """Loads by the balances: the inverse of the coefficients of the loads, one row each."""
         left, right = self._sides
         rows = [np.ones_like(self.x), self.x, self.y]
         if self.rocker_pivot is not None:
@@ -50,11 +50,7 @@ class Suspension:
         if self.bogie_pivot is not None and self.bogie_wheels is not None:
             on_bogie = self.bogie_wheels * (self.x - self.bogie_pivot[0])
             rows += [left * on_bogie, right * on_bogie]
-        return np.array(rows)
-
-    @cached_property
-    def _solution(self) -> FloatArray:
-        return np.asarray(np.linalg.pinv(self._rows), dtype=np.float64)
+        return np.asarray(np.linalg.pinv(np.array(rows)), dtype=np.float64)
 
     def normal_loads(
         self, mass: float, specific_force: FloatArray, pull: FloatArray, load_moment: FloatArray

@@ -174,7 +174,7 @@ class McapFile:
                     return False
                 definitions.add(content, item)
                 if item.opcode == mcap.CHUNK_INDEX:
-                    pieces.append(self._indexed_piece(mcap.indexed_chunk(content, item)))
+                    pieces.append(self._indexed_piece(item))
                 elif item.opcode == mcap.STATISTICS:
                     counts = mcap.channel_counts(content, item)
             except ValueError:
@@ -185,14 +185,14 @@ class McapFile:
         self._declare(counts)
         return True
 
-    def _indexed_piece(self, chunk: mcap.IndexedChunk) -> Piece:
-        end = chunk.begin + chunk.length
+    def _indexed_piece(self, record: mcap.Record) -> Piece:
+        begin, end, channels = mcap.indexed_chunk(self._map, record)
         if end > self._size:
             raise ValueError('the index points behind the file')
-        head = mcap.chunk_head(self._map, chunk.begin, self._size)
+        head = mcap.chunk_head(self._map, begin, self._size)
         if head is None or head.begin + head.packed != end:
             raise ValueError('the index points to no chunk')
-        return Piece(chunk.begin, end, head, head.start, head.end, chunk.channels)
+        return Piece(begin, end, head, head.start, head.end, channels)
 
     # --- The way of every other file: from front to end. ---
 
@@ -236,15 +236,15 @@ class McapFile:
                 self._add_chunk(item)
             elif item.opcode == mcap.MESSAGE:
                 self._add_loose(item)
-            elif item.opcode == mcap.STATISTICS:
-                try:
-                    self._statistics = mcap.channel_counts(content, item)
-                except ValueError:
-                    gaps.append(mcap.Gap(item.begin, item.end))
             elif item.opcode == mcap.MESSAGE_INDEX:
                 self._add_message_index(item, gaps)
             else:
-                self._define(item, gaps)
+                try:
+                    if item.opcode == mcap.STATISTICS:
+                        self._statistics = mcap.channel_counts(content, item)
+                    self._definitions.add(content, item)
+                except ValueError:
+                    gaps.append(mcap.Gap(item.begin, item.end))
 
     def _take_headless_chunks(self, gaps: list[mcap.Gap]) -> None:
         """Note packed chunks in gaps: they say themselves where they begin and end."""
@@ -305,12 +305,6 @@ class McapFile:
             last.start, last.last = min(last.start, time), max(last.last, time)
         else:
             self._pieces.append(Piece(at, record.end, None, time, time))
-
-    def _define(self, record: mcap.Record, gaps: list[mcap.Gap]) -> None:
-        try:
-            self._definitions.add(self._map, record)
-        except ValueError:
-            gaps.append(mcap.Gap(record.begin, record.end))
 
     def _count(self, piece: Piece, again: bool) -> bool:
         """Count the messages of a piece and take its definitions.
@@ -419,12 +413,6 @@ class McapFile:
             best.lost_between.append((None, None))
         return best
 
-    def _too_much(self) -> UserError:
-        return UserError(
-            f'{self.path}: more than {in_words(limits.HELD)} of messages would be held to '
-            'bring them into order; sort it first (ros2 bag convert)'
-        )
-
     def _pass(
         self,
         place: int,
@@ -457,7 +445,10 @@ class McapFile:
                     rows.append((time, place + begin, channel, data[begin:end]))
                     allowed -= end - begin + _ROW_SIZE
                     if allowed < 0:
-                        raise self._too_much()
+                        raise UserError(
+                            f'{self.path}: more than {in_words(limits.HELD)} of messages would be '
+                            'held to bring them into order; sort it first (ros2 bag convert)'
+                        )
             else:
                 found.definitions.append(item)
         if gap_after:

@@ -316,36 +316,31 @@ def channel(content: Buffer, record: Record) -> tuple[int, int, str]:
 
 def channel_counts(content: Buffer, record: Record) -> dict[int, int]:
     """Return the number of messages of each channel, out of a statistics record."""
-    at = record.begin + 46
-    if record.end < at or _uint32(content, at - 4) != record.end - at or (record.end - at) % 10:
-        raise ValueError('a statistics record is damaged')
-    return dict(struct.iter_unpack('<HQ', bytes(content[at : record.end])))
+    return dict(_listed(content, record, _MAPS[STATISTICS], '<HQ'))
 
 
 def indexed_times(content: Buffer, record: Record) -> list[int]:
     """Return the log times [ns] of the messages that a message index record lists."""
-    at = record.begin + 6
-    if record.end < at or _uint32(content, at - 4) != record.end - at or (record.end - at) % 16:
-        raise ValueError('a message index record is damaged')
-    return [time for time, _ in struct.iter_unpack('<QQ', bytes(content[at : record.end]))]
+    return [time for time, _ in _listed(content, record, _MAPS[MESSAGE_INDEX], '<QQ')]
 
 
-class IndexedChunk(NamedTuple):
-    """A chunk as the index knows it: where it stands, its length, the channels in it."""
+def _listed(content: Buffer, record: Record, skipped: int, row: str) -> Iterator[tuple[int, int]]:
+    """Return the rows of the list that fills a record behind some bytes."""
+    at = record.begin + skipped
+    length = record.end - at
+    if length < 0 or _uint32(content, at - 4) != length or length % struct.calcsize(row):
+        raise ValueError('the list in a record is damaged')
+    return struct.iter_unpack(row, bytes(content[at : record.end]))
 
-    begin: int
-    length: int
-    channels: frozenset[int]
 
-
-def indexed_chunk(content: Buffer, record: Record) -> IndexedChunk:
-    """Return what a chunk index record says."""
+def indexed_chunk(content: Buffer, record: Record) -> tuple[int, int, frozenset[int]]:
+    """Return where the chunk of a chunk index record begins and ends, and the channels in it."""
     at = record.begin + 36
     if record.end < at or at + _uint32(content, at - 4) > record.end:
         raise ValueError('a chunk index record is damaged')
     begin, length, size = struct.unpack_from('<QQI', content, record.begin + 16)
     channels = struct.iter_unpack('<HQ', bytes(content[at : at + size - size % 10]))
-    return IndexedChunk(begin, length, frozenset(number for number, _ in channels))
+    return begin, begin + length, frozenset(number for number, _ in channels)
 
 
 def _strings_fill(content: Buffer, at: int, end: int, count: int) -> bool:

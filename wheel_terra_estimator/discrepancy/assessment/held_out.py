@@ -9,15 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
-from wheel_terra_estimator.discrepancy.fitting.coordinates import bounds
-from wheel_terra_estimator.discrepancy.fitting.gauss_newton import (
-    LEAST_DAMPING,
-    Fit,
-    bounded_step,
-    has_settled,
-    next_damping,
-)
-from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Descent, Fit
 from wheel_terra_estimator.discrepancy.result import Curves, QuantityGap
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.weights import Setting
@@ -45,17 +37,17 @@ def hold_out(
     and some at a bound, where one linear step ends far from the best.
     """
     problem = setting.problem
-    inverse = _inverse(problem, variance)
+    inverse = (problem.rotation.T / variance) @ problem.rotation  # (m, m), without free parameters
     labels = np.unique(groups[groups >= 0])
     weights = [_without(inverse, np.flatnonzero(groups[problem.row] == k)) for k in labels]
     tasks = [_Refit(setting, fitted, kept) for fitted in fits for kept in weights]
     for _ in range(_REFITS):
-        going = [task for task in tasks if task.going]
+        going = [task for task in tasks if task.way.going]
         if not going:
             break
         state = setting.forward.solve(
             [task.fitted.coordinates for task in going],
-            [task.trial for task in going],
+            [task.way.trial for task in going],
             np.array([task.fitted.angle for task in going]),
         )
         for k, task in enumerate(going):
@@ -71,40 +63,24 @@ def hold_out(
 
 
 class _Refit:
-    """One hypothesis fitted to the cells that are kept, by damped Gauss-Newton steps."""
+    """One hypothesis fitted to the cells that are kept."""
 
     def __init__(self, setting: Setting, fitted: Fit, kept: FloatArray) -> None:
         self.fitted = fitted
+        self.way = Descent(fitted.coordinates, fitted.u)
         self._setting = setting
         self._kept = kept  # (m, m) inverse covariance of the kept cells, 0 at the others
-        self._damping = LEAST_DAMPING
-        self._objective = np.inf
-        self.trial = fitted.u
         self.look(fitted.outputs, fitted.sensitivity)
 
     def look(self, outputs: FloatArray, sensitivity: FloatArray) -> None:
         """Take the model at the trial point, if it is better, and choose the next one."""
-        problem, prior = self._setting.problem, self.fitted.prior
-        residual = self._setting.observed - problem.flat(outputs)
+        residual = self._setting.observed - self._setting.problem.flat(outputs)
         weighted = self._kept @ residual
-        objective = 0.5 * float(residual @ weighted + self.trial @ (prior * self.trial))
-        gain = self._objective - objective
-        if gain >= 0.0:
-            self._u, self.outputs, self._objective = self.trial, outputs, objective
-            self._gradient = sensitivity.T @ weighted - prior * self.trial
-            self._precision = sensitivity.T @ self._kept @ sensitivity + np.diag(prior)
-        self._damping = next_damping(self._damping, gain >= 0.0)
-        limits = bounds(self.fitted.coordinates)
-        step, expected = bounded_step(
-            self._precision, self._gradient, self._u, prior, limits, self._damping
-        )
-        self.trial = self._u + step
-        self.going = not has_settled(expected, gain)
-
-
-def _inverse(problem: Problem, variance: FloatArray) -> FloatArray:
-    """(m, m) inverse covariance of the cells around a model without free parameters."""
-    return (problem.rotation.T / variance) @ problem.rotation
+        if self.way.is_better(float(residual @ weighted)):
+            self.outputs = outputs
+            self._gradient = sensitivity.T @ weighted
+            self._precision = sensitivity.T @ self._kept @ sensitivity + np.diag(self.way.prior)
+        self.way.step(self._precision, self._gradient)
 
 
 def _without(inverse: FloatArray, out: IndexArray) -> FloatArray:

@@ -20,8 +20,7 @@ from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 
 _LONGEST_STEP = 2.0  # prior standard deviations
 _CLOSE_ENOUGH = 0.02  # in the objective
-LEAST_DAMPING = 1e-6
-"""Share of the precision that is added to its diagonal, at the start."""
+_LEAST_DAMPING = 1e-6  # share of the precision that is added to its diagonal, at the start
 
 
 @dataclass
@@ -63,6 +62,46 @@ class Fit:
         return {c.key: float(c.value(x)) for c, x in zip(self.coordinates, self.u, strict=True)}
 
 
+class Descent:
+    """One hypothesis on its way down the objective, by damped Gauss-Newton steps inside bounds."""
+
+    def __init__(self, coordinates: Sequence[Coordinate], start: FloatArray) -> None:
+        self.prior = loose_precision(coordinates)  # (P,) precision of u
+        self._limits = bounds(coordinates)
+        self._damping = _LEAST_DAMPING
+        self.objective = np.inf  # half of chi-square plus prior, at the best point
+        self.trial = np.clip(np.asarray(start, dtype=float), *self._limits)  # to be looked at next
+        self.going = True
+
+    def is_better(self, square: float) -> bool:
+        """Take the trial point, with its sum of squares, where the objective is no higher."""
+        objective = 0.5 * float(square + self.trial @ (self.prior * self.trial))
+        self._gain = self.objective - objective
+        better = self._gain >= 0.0
+        if better:
+            self._u, self.objective = self.trial, objective
+        damping = self._damping
+        self._damping = max(0.1 * damping, _LEAST_DAMPING) if better else max(30.0 * damping, 1.0)
+        return better
+
+    def step(self, precision: FloatArray, gradient: FloatArray) -> FloatArray:
+        """Set the next trial point; return the way there.
+
+        At the best point, (P, P) precision, and gradient of the squares alone: where they fall.
+        """
+        step, expected = _bounded_step(
+            precision,
+            gradient - self.prior * self._u,
+            self._u,
+            self.prior,
+            self._limits,
+            self._damping,
+        )
+        self.trial = self._u + step
+        self.going = expected >= _CLOSE_ENOUGH and not 0.0 <= self._gain < _CLOSE_ENOUGH
+        return step
+
+
 def fit(
     forward: Forward,
     problem: Problem,
@@ -78,78 +117,47 @@ def fit(
     Each of the B hypotheses, (names, coordinates), has a start (P,), and entrance angles (N,) near
     its end.
     """
-    count = len(hypotheses)
-    limits = [bounds(coordinates) for _, coordinates in hypotheses]
-    priors = [loose_precision(coordinates) for _, coordinates in hypotheses]
-    trial = [
-        np.clip(np.asarray(s, dtype=float), *limit) for s, limit in zip(starts, limits, strict=True)
-    ]
-    best: list[Fit | None] = [None] * count
-    damping = np.full(count, LEAST_DAMPING)
+    best: dict[int, Fit] = {}
+    ways = [Descent(h[1], start) for h, start in zip(hypotheses, starts, strict=True)]
     angle = None if angles is None else np.array(angles, dtype=float)
-    active = list(range(count))
     for _ in range(iterations):
+        active = [b for b, way in enumerate(ways) if way.going]
+        if not active:
+            break
         state = forward.solve(
             [hypotheses[b][1] for b in active],
-            [trial[b] for b in active],
+            [ways[b].trial for b in active],
             None if angle is None else angle[active],
         )
         if angle is None:
-            angle = np.empty((count, state.angle.shape[1]))
-        going = []
+            angle = np.empty((len(ways), state.angle.shape[1]))
         for index, b in enumerate(active):
-            u = trial[b]
+            way, angle[b] = ways[b], state.angle[index]
             residual = problem.rotate(observed - problem.flat(state.outputs[index]))
-            objective = 0.5 * float(residual @ (residual / variance) + u @ (priors[b] * u))
-            previous = best[b]
-            angle[b] = state.angle[index]
-            improved = previous is None or objective <= previous.objective
-            gain = np.inf if previous is None else previous.objective - objective
-            if improved:
+            better = way.is_better(float(residual @ (residual / variance)))
+            if better:
                 sensitivity = problem.flat(state.jacobian[index])
                 best[b] = Fit(
                     *hypotheses[b],
-                    u,
+                    way.trial,
                     state.outputs[index],
                     state.angle[index],
                     sensitivity,
                     residual,
                     problem.rotate(sensitivity),
                     variance,
-                    objective,
-                    priors[b],
+                    way.objective,
+                    way.prior,
                 )
-            damping[b] = next_damping(damping[b], improved)
-            current = best[b]
-            assert current is not None
-            gradient = current.jacobian.T @ (current.residual / variance) - priors[b] * current.u
-            step, expected = bounded_step(
-                current.precision(), gradient, current.u, priors[b], limits[b], damping[b]
-            )
-            if has_settled(expected, gain):
-                continue
-            trial[b] = current.u + step
-            if improved:
+            gradient = best[b].jacobian.T @ (best[b].residual / variance)
+            step = way.step(best[b].precision(), gradient)
+            if better and way.going:
                 slope = state.angle_slope[index] @ step
                 angle[b] = np.clip(state.angle[index] + slope, 2e-3, 1.5)
-            going.append(b)
-        active = going
-        if not active:
-            break
-    return [f for f in best if f is not None]
+    return [best[b] for b in range(len(ways))]
 
 
-def next_damping(damping: float, improved: bool) -> float:
-    """Return the damping of the step that follows one that made the fit better, or worse."""
-    return max(0.1 * damping, LEAST_DAMPING) if improved else max(30.0 * damping, 1.0)
-
-
-def has_settled(expected: float, gain: float) -> bool:
-    """Tell whether the next step would fall by too little, or the last one did (< 0: it rose)."""
-    return expected < _CLOSE_ENOUGH or 0.0 <= gain < _CLOSE_ENOUGH
-
-
-def bounded_step(
+def _bounded_step(
     precision: FloatArray,
     gradient: FloatArray,
     u: FloatArray,

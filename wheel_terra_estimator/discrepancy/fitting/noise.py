@@ -77,14 +77,11 @@ def repeats(table: SteadyTable, quantity: int) -> tuple[float, int]:
         if len(mine) > 1:
             # The median resists an outlier among three or more repeats.
             centre = np.median(mine) if len(mine) > 2 else mine.mean()
-            square += float(np.minimum((mine - centre) ** 2, _clip(mine)).sum())
+            spread = 1.4826 * float(np.median(np.abs(mine - np.median(mine))))
+            clip = (5.0 * spread) ** 2 if spread else np.inf
+            square += float(np.minimum((mine - centre) ** 2, clip).sum())
             freedom += len(mine) - 1
     return (float(np.sqrt(square / freedom)), freedom) if freedom else (np.nan, 0)
-
-
-def _clip(values: FloatArray) -> float:
-    spread = 1.4826 * float(np.median(np.abs(values - np.median(values))))
-    return np.inf if spread == 0.0 else (5.0 * spread) ** 2
 
 
 def estimate_noise(noise: Noise, fitted: Fit, problem: Problem, observed: FloatArray) -> Noise:
@@ -175,10 +172,10 @@ def find_outliers(
     # Several cells of one quantity: outliers, or a feature that they share?
     plain = np.linalg.inv(chosen)
     for quantity, amplitude in itertools.product(np.flatnonzero(counts >= 2), NARROW):
-        shared = _shared_features(problem, narrow, amplitude, int(quantity))
-        score, cells = _rejected_cells(
-            problem, np.asarray(np.linalg.inv(plain + shared), dtype=float), target
-        )
+        size = amplitude * problem.scale[quantity] * (problem.quantity == quantity)
+        shared = narrow[np.ix_(problem.row, problem.row)] * np.outer(size, size)
+        inverse = np.asarray(np.linalg.inv(plain + shared), dtype=float)
+        score, cells = _rejected_cells(problem, inverse, target)
         if score > best:
             best, found = score, cells
     return _scattered(problem, found)
@@ -241,14 +238,6 @@ def _rejected_cells(
         share = extra[worst] / (1.0 + extra[worst] / own[worst])
         inverse = inverse - share * np.outer(column, column)
     return score, found
-
-
-def _shared_features(
-    problem: Problem, narrow: FloatArray, amplitude: float, quantity: int
-) -> FloatArray:
-    """(m, m) covariance of the cells by features of one quantity that are narrow in slip."""
-    scale = np.where(problem.quantity == quantity, amplitude * problem.scale[quantity], 0.0)
-    return narrow[np.ix_(problem.row, problem.row)] * np.outer(scale, scale)
 
 
 def inverse_covariance(variance: FloatArray, jacobian: FloatArray) -> FloatArray:

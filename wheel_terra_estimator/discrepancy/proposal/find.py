@@ -31,6 +31,7 @@ from wheel_terra_estimator.discrepancy.selection.weights import (
     Explanation,
     Setting,
     explain_fewer,
+    explained,
     linear_starts,
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -249,7 +250,7 @@ def gain_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
     found = {name: term for name, term in _terms(table).items() if pair_of(name)[1] not in late}
     terms = replace(setting, effects=found)
     starts = linear_starts(terms, fitted, tuple(terms.effects))
-    return max((expected_gain for expected_gain, _, _ in starts), default=0.0)
+    return max((expected_gain for expected_gain, _ in starts), default=0.0)
 
 
 def _terms(table: SteadyTable) -> dict[str, Effect]:
@@ -275,7 +276,7 @@ def _levels(table: SteadyTable, column: str) -> FloatArray:
     return np.unique(np.round(values[np.isfinite(values)], 9))
 
 
-def _search(setting: Setting, nothing: Explanation, begun: Sequence[str] = ()) -> list[Explanation]:
+def _search(setting: Setting, nothing: Explanation, begun: Sequence[str]) -> list[Explanation]:
     """Return laws of one, two, ... terms, each with the greatest evidence, not with `begun`."""
     price = _description_lengths(setting.effects)
 
@@ -286,9 +287,8 @@ def _search(setting: Setting, nothing: Explanation, begun: Sequence[str] = ()) -
     for _ in range(MOST_TERMS):
         others = [name for name in setting.effects if name not in {*best.names, *begun}]
         starts = linear_starts(setting, best.fitted, others)
-        starts = sorted(starts, key=lambda s: price[s[1][-1]] - s[0])[:_TRIED]
-        fits = setting.fit([n for _, n, _ in starts], [u for _, _, u in starts], best.fitted.angle)
-        top = max((setting.explain(f) for f in fits), key=worth, default=None)
+        starts = sorted(starts, key=lambda s: price[s[1][0][-1]] - s[0])[:_TRIED]
+        top = max(explained(setting, [s for _, s in starts]), key=worth, default=None)
         if top is None or worth(top) < worth(best):
             break
         best = top

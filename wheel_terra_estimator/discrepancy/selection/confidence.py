@@ -91,11 +91,6 @@ def _squash(value: float) -> float:
     return float(4.0 * np.tanh(value / 8.0))
 
 
-def _loosened(squashed: float) -> float:
-    """Undo `_squash`."""
-    return 8.0 * float(np.arctanh(np.clip(squashed / 4.0, -0.999, 0.999)))
-
-
 def confidence(values: Mapping[str, float], alike: int = 0, odds: float = 1.0) -> Confidence:
     """Map features to probabilities.
 
@@ -107,7 +102,8 @@ def confidence(values: Mapping[str, float], alike: int = 0, odds: float = 1.0) -
     vector = np.array([values[name] for name in FEATURES])
     of_name = float(expit(vector @ np.array(weights['name']) + np.log(odds)))
     # Never more than the rows themselves say: two names that fit alike share what there is.
-    of_name = min(of_name, float(expit(_loosened(values['margin']) / _TEMPERATURE)))
+    margin = 8.0 * np.arctanh(np.clip(values['margin'] / 4.0, -0.999, 0.999))  # before `_squash`
+    of_name = min(of_name, float(expit(margin / _TEMPERATURE)))
     of_set = float(expit(vector @ np.array(weights['set']) + np.log(odds)))
     share = 1.0 / (1.0 + alike)
     return Confidence(min(of_name, share), min(max(of_name, of_set), share))

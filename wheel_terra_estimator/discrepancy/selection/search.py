@@ -37,8 +37,9 @@ from wheel_terra_estimator.discrepancy.selection.weights import (
     Selection,
     Setting,
     explain_more,
-    explain_singles,
     explain_swaps,
+    explained,
+    linear_starts,
     weigh,
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -163,7 +164,8 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
     its place; where that changes it, once more from there. The best sets are those that would be
     if no misfit asked for a name, though none of them may be good enough yet.
     """
-    singles = explain_singles(setting, nothing)
+    starts = [start for _, start in linear_starts(setting, nothing, tuple(setting.effects))]
+    singles = [setting.explain(nothing), *explained(setting, starts)]
     selection = weigh(singles, setting.floors, setting.effects)
     ranked = sorted((e for e in singles if e.names), key=lambda e: -e.log_evidence)
     seeds, extended = ranked[:_FIRST_SEEDS], set[tuple[str, ...]]()

@@ -106,10 +106,12 @@ class Setting:
         return Explanation(fitted, posterior, float(log_sum(posterior.log_joint)))
 
 
-def linear_starts(
-    setting: Setting, base: Fit, names: Sequence[str]
-) -> list[tuple[float, tuple[str, ...], FloatArray]]:
-    """Return (promised fall of the objective, names, start) for ``base`` plus each effect.
+Start: TypeAlias = tuple[tuple[str, ...], FloatArray, FloatArray]
+"""Effects of a set, coordinates and entrance angles from which it is fitted."""
+
+
+def linear_starts(setting: Setting, base: Fit, names: Sequence[str]) -> list[tuple[float, Start]]:
+    """Return (promised fall of the objective, start) for ``base`` plus each effect.
 
     It comes from the signatures at the base fit. An effect's second parameter (an onset, a
     depth) has no gradient while its strength is nil, so a few values of it compete.
@@ -121,35 +123,19 @@ def linear_starts(
             trials.append((name, own, shape))
     if not trials:
         return []
-    coordinates = [(*base.coordinates, *own) for _, own, _ in trials]
-    responses = _strength_responses(setting, base, trials)
-    problem, fixed = setting.problem, len(base.u)
-    best: dict[str, tuple[float, tuple[str, ...], FloatArray]] = {}
-    for index, (name, own, shape) in enumerate(trials):
-        outputs, angle, column = responses[index]
-        own_column = problem.flat(column)
-        sensitivity = np.concatenate([base.sensitivity, own_column], axis=1)
+    problem, responses = setting.problem, _strength_responses(setting, base, trials)
+    best: dict[str, tuple[float, Start]] = {}
+    for (name, own, shape), (outputs, column) in zip(trials, responses, strict=True):
+        # By the strength only: the shape has no gradient here.
+        jacobian = problem.rotate(np.concatenate([base.sensitivity, problem.flat(column)], axis=1))
+        prior = loose_precision([*base.coordinates, own[0]])
+        precision = jacobian.T @ (jacobian / base.variance[:, None]) + np.diag(prior)
         residual = problem.rotate(setting.observed - problem.flat(outputs))
-        keep = [*range(fixed), fixed]  # the strength only: the shape has no gradient here
-        reduced = Fit(
-            (name,),
-            tuple(coordinates[index][k] for k in keep),
-            np.concatenate([base.u, shape])[keep],
-            outputs,
-            angle,
-            sensitivity,
-            residual,
-            problem.rotate(sensitivity),
-            base.variance,
-            0.0,
-            loose_precision([coordinates[index][k] for k in keep]),
-        )
-        precision = reduced.precision()
-        target = reduced.residual + reduced.jacobian @ reduced.u
-        mean = np.linalg.solve(precision, reduced.jacobian.T @ (target / base.variance))
+        target = residual + jacobian @ np.append(base.u, shape[0])
+        mean = np.linalg.solve(precision, jacobian.T @ (target / base.variance))
         strength = np.clip(mean[-1], own[0].lower, own[0].upper)
         # Fall of the objective that the linear signature promises inside the bounds.
-        fall = (mean[-1] - reduced.u[-1]) ** 2 - (mean[-1] - strength) ** 2
+        fall = (mean[-1] - shape[0]) ** 2 - (mean[-1] - strength) ** 2
         score = 0.5 * fall / np.linalg.inv(precision)[-1, -1]
         neutral = own[0].coordinate(own[0].neutral)
         away = strength - neutral
@@ -160,9 +146,9 @@ def linear_starts(
         start = shape.copy()
         # Terms whose prior sits away from neutral (a full tilt of the weight) start at the prior.
         start[0] = neutral + side * size if neutral == 0.0 else 0.0
-        full = np.concatenate([np.clip(mean[:fixed], base.u - 1.5, base.u + 1.5), start])
+        full = np.concatenate([np.clip(mean[:-1], base.u - 1.5, base.u + 1.5), start])
         if name not in best or score > best[name][0]:
-            best[name] = (score, (*base.names, name), full)
+            best[name] = score, ((*base.names, name), full, base.angle)
     return list(best.values())
 
 
@@ -172,8 +158,8 @@ Trial = tuple[str, tuple[Coordinate, ...], FloatArray]
 
 def _strength_responses(
     setting: Setting, base: Fit, trials: Sequence[Trial]
-) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Return outputs (N, 4), entrance angle (N,) and derivative (N, 4, 1) by strength of each.
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return outputs (N, 4) and their derivative (N, 4, 1) by strength of each.
 
     Terms of a sparse law have nothing but a strength, so that all of them stand in one model side
     by side.
@@ -184,17 +170,15 @@ def _strength_responses(
         starts = np.concatenate([base.u, *(shape for _, _, shape in trials)])
         by = [range(fixed, len(together))]
         state = setting.forward.solve([together], [starts], base.angle[None], by=by)
-        return [
-            (state.outputs[0], state.angle[0], state.jacobian[0][..., k : k + 1])
-            for k in range(len(trials))
-        ]
+        jacobian = state.jacobian[0]
+        return [(state.outputs[0], jacobian[..., k : k + 1]) for k in range(len(trials))]
     state = setting.forward.solve(
         [(*base.coordinates, *own) for _, own, _ in trials],
         [np.concatenate([base.u, shape]) for _, _, shape in trials],
         base.angle,
         by=[[fixed]] * len(trials),
     )
-    return list(zip(state.outputs, state.angle, state.jacobian, strict=True))
+    return list(zip(state.outputs, state.jacobian, strict=True))
 
 
 # Prior probabilities: nothing missing, one effect, two effects.
@@ -215,9 +199,6 @@ _FURTHER = 8  # sets with one effect more that are fitted, at most
 _COMPETITORS = 2  # other effects that are put in the place of each effect of a set
 # A further effect must promise so many nats over the best set without: its prior costs four.
 _PROMISE = 1.5
-
-Start: TypeAlias = tuple[tuple[str, ...], FloatArray, FloatArray]
-"""Effects of a set, coordinates and entrance angles from which it is fitted."""
 
 
 def _everywhere(amplitude: float) -> tuple[float, ...]:
@@ -323,13 +304,6 @@ def weigh(
     )
 
 
-def explain_singles(setting: Setting, nothing: Fit) -> list[Explanation]:
-    """Fit nothing and every visible effect; return their explanations."""
-    starts = linear_starts(setting, nothing, tuple(setting.effects))
-    fits = setting.fit([n for _, n, _ in starts], [u for _, _, u in starts], nothing.angle)
-    return [setting.explain(f) for f in (nothing, *fits)]
-
-
 def _compatible(setting: Setting, names: Sequence[str]) -> list[str]:
     """Return the effects that may stand beside a set; never two forms of one effect."""
     effects, taken = setting.effects, {effect_of(key) for key in names}
@@ -346,16 +320,16 @@ def explain_more(setting: Setting, seeds: Sequence[Explanation]) -> list[Explana
     starts: dict[frozenset[str], tuple[float, Start]] = {}
     for seed in seeds:
         others = _compatible(setting, seed.names)
-        for gain, names, start in linear_starts(setting, seed.fitted, others):
-            expected_gain, key = gain - seed.fitted.objective, frozenset(names)
+        for gain, start in linear_starts(setting, seed.fitted, others):
+            expected_gain, key = gain - seed.fitted.objective, frozenset(start[0])
             if key not in starts or starts[key][0] < expected_gain:
-                starts[key] = expected_gain, (names, start, seed.fitted.angle)
+                starts[key] = expected_gain, start
     enough = _PROMISE - min((e.fitted.objective for e in seeds), default=0.0)
     worth = sorted((s for s in starts.values() if s[0] > enough), key=lambda s: -s[0])
-    return _explained(setting, [start for _, start in worth[:_FURTHER]])
+    return explained(setting, [start for _, start in worth[:_FURTHER]])
 
 
-def _explained(setting: Setting, starts: Sequence[Start]) -> list[Explanation]:
+def explained(setting: Setting, starts: Sequence[Start]) -> list[Explanation]:
     """Fit sets of effects, each from its own start and entrance angles, and weigh them."""
     names, values, angles = zip(*starts, strict=True) if starts else ((), (), ())
     return [setting.explain(f) for f in setting.fit(names, values, np.array(angles))]
@@ -370,7 +344,7 @@ def explain_fewer(setting: Setting, best: Explanation) -> list[Explanation]:
         kept = [u for c, u in zip(fitted.coordinates, fitted.u, strict=True) if c.key not in own]
         left = tuple(n for n in best.names if n != name)
         starts.append((left, np.array(kept), fitted.angle))
-    return _explained(setting, starts)
+    return explained(setting, starts)
 
 
 def explain_swaps(setting: Setting, best: Explanation) -> list[Explanation]:
@@ -381,8 +355,7 @@ def explain_swaps(setting: Setting, best: Explanation) -> list[Explanation]:
         (left_out,) = set(best.names) - set(reduced.names)
         others = [key for key in _compatible(setting, reduced.names) if key != left_out]
         found = sorted(linear_starts(setting, reduced.fitted, others), key=lambda s: -s[0])
-        forms = [s for s in found if effect_of(s[1][-1]) == effect_of(left_out)]
-        competitors = [s for s in found if effect_of(s[1][-1]) != effect_of(left_out)]
-        kept = [*forms, *competitors[:_COMPETITORS]]
-        starts += [(names, start, reduced.fitted.angle) for _, names, start in kept]
-    return [*fewer, *_explained(setting, starts)]
+        forms = [s for _, s in found if effect_of(s[0][-1]) == effect_of(left_out)]
+        competitors = [s for _, s in found if effect_of(s[0][-1]) != effect_of(left_out)]
+        starts += [*forms, *competitors[:_COMPETITORS]]
+    return [*fewer, *explained(setting, starts)]

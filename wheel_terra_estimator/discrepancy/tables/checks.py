@@ -332,18 +332,15 @@ def _without_copies(table: SteadyTable) -> tuple[SteadyTable, int]:
     return table.select(np.sort(first)), len(everything) - len(first)
 
 
-def _rows(count: int) -> str:
-    return 'one row' if count == 1 else f'{count} different rows'
-
-
 def _check_range_of_design(table: SteadyTable, remarks: list[str]) -> None:
     """Raise where the rows are too few or too alike to tell anything.
 
     A drive (its slip is uncertain) cannot choose its slips, and may still show a wrong radius.
     """
     if len(table) < MINIMUM_ROWS:
+        rows = 'one row' if len(table) == 1 else f'{len(table)} different rows'
         raise UserError(
-            f'{table.name}: {_rows(len(table))}; at least {MINIMUM_ROWS} are needed, best '
+            f'{table.name}: {rows}; at least {MINIMUM_ROWS} are needed, best '
             '8 slips from 0.05 to 0.8 at 2 loads'
         )
     slip, load = table.columns['slip'], table.columns['normal_load']

@@ -100,8 +100,11 @@ class Turning(Component[TurningState]):
         if known(rims):
             by_wheels = self._skid_share * headings.yaw_rate(rims)
         if window.rates:
-            yaw_rate = self._yaw_rate(window, by_wheels - state.by_wheels)
-            std = self._gyro_std(window)
+            # Of a message of the gyro [rad/s].
+            noise = window.stated.angular_rate_std or self._sensors.angular_rate_std
+            yaw_rate = self._yaw_rate(window, by_wheels - state.by_wheels, noise)
+            left = _LEAST_YAW_NOISE_SHARE * (noise / math.sqrt(self._per_cycle))
+            std = math.hypot(left, self._sensors.angular_rate_bias_std)
         elif gyro_silent and known(rims):
             yaw_rate = by_wheels
             std = math.hypot(self._wheel_doubt * yaw_rate, _LEAST_WHEEL_YAW_STD)
@@ -118,7 +121,11 @@ class Turning(Component[TurningState]):
             travel=keep * state.travel + travel,
         )
         turning = fastest_rim > self._rover.low_rim
-        side = self._side_speed(speed, yaw_rate, headings)
+        # How fast the wheel is pushed sideways that is pushed most; wheels that do not steer are
+        # all taken as the outermost.
+        side = abs(yaw_rate) * self._rover.curvature_length
+        if headings.steered:
+            side = max(abs(side) for side in headings.side_speeds(speed, yaw_rate))
         motion = min(side / fastest_rim, 1.0) if turning else 0.0
         self.state = state = state._replace(lateral_motion=motion)
         return state
@@ -133,26 +140,7 @@ class Turning(Component[TurningState]):
         doubt = self._sensors.angular_rate_bias_std / max(abs(speed), _LEAST_SPEED)
         return curvature / (1.0 + (doubt / _COMMON_CURVATURE) ** 2)
 
-    def _side_speed(self, speed: float, yaw_rate: float, headings: Headings) -> float:
-        """Return how fast the wheel is pushed sideways that is pushed most [m/s].
-
-        Wheels that do not steer are all taken as the outermost.
-        """
-        if not headings.steered:
-            return abs(yaw_rate) * self._rover.curvature_length
-        return max(abs(side) for side in headings.side_speeds(speed, yaw_rate))
-
-    def _noise(self, window: InertialWindow) -> float:
-        """Return the noise of a message of the gyro [rad/s]."""
-        return window.stated.angular_rate_std or self._sensors.angular_rate_std
-
-    def _gyro_std(self, window: InertialWindow) -> float:
-        """Return the deviation of the smoothed yaw rate [rad/s]."""
-        noise = self._noise(window) / math.sqrt(self._per_cycle)
-        left = _LEAST_YAW_NOISE_SHARE * noise
-        return math.hypot(left, self._sensors.angular_rate_bias_std)
-
-    def _yaw_rate(self, window: InertialWindow, change: float) -> float:
+    def _yaw_rate(self, window: InertialWindow, change: float, noise: float) -> float:
         """Return the yaw rate: carried on by its `change` by the wheels, set right by the gyro.
 
         What may be noise of the gyro is smoothed, what is more is followed: the smoothing makes
@@ -160,6 +148,6 @@ class Turning(Component[TurningState]):
         """
         expected = self.state.yaw_rate + change
         now = window.yaw_rate / window.rates
-        noise = max(self._noise(window) / math.sqrt(window.rates), _LEAST_NOISE)
+        noise = max(noise / math.sqrt(window.rates), _LEAST_NOISE)
         gain = clipped(_LEAST_GAIN * abs(now - expected) / noise, _LEAST_GAIN, 1.0)
         return expected + gain * (now - expected)

@@ -159,13 +159,6 @@ class GatedFilter:
             residuals, jacobians, variances = zip(*rows, strict=True)
             self.update(np.array(residuals), np.array(jacobians), np.array(variances), considered)
 
-    def fuse_entry(self, index: int, value: float, variance: float) -> None:
-        """Fuse a direct reading of one entry of the state."""
-        H = np.zeros((1, len(self.mean)))
-        H[0, index] = 1.0
-        residual = np.array([value - float(self.mean[index])])
-        self.update(residual, H, np.array([variance]))
-
     def set(self, index: int, value: float, variance: float) -> None:
         """Give one entry a value known from elsewhere and cut its correlations."""
         before = self._present()

@@ -84,6 +84,9 @@ class PriorTuning:
     highest: float = 0.02  # a wheel above the surface, of the radius
 
 
+PRIORS = PriorTuning()
+
+
 @dataclass(frozen=True)
 class SoilPriors:
     """Prior standard deviations of the soil [ln], and of the errors of the shear model; n1."""
@@ -96,12 +99,10 @@ class SoilPriors:
     slip_sinkage: float  # n1 as configured [-]
 
     @classmethod
-    def from_configuration(
-        cls, configuration: Configuration, tuning: PriorTuning = PriorTuning()
-    ) -> SoilPriors:
+    def from_configuration(cls, configuration: Configuration) -> SoilPriors:
         """Derive them from the deviations of the configured soil, if anybody stated one."""
         figures = configuration.filter
-        strength, modulus, stiffness = _soil_deviations(configuration, tuning)
+        strength, modulus, stiffness = _soil_deviations(configuration)
         return cls(
             strength_std=strength,
             shear_modulus_std=modulus,
@@ -113,21 +114,14 @@ class SoilPriors:
             slip_sinkage=float(configuration.effects.get(_BY_SLIP, {}).get('n1', 0.0)),
         )
 
-    def shear_error_covariance(self, wheel_count: int) -> FloatArray:
-        """Return the (n, n) covariance of what the shear model gets wrong at each wheel."""
-        own = np.eye(wheel_count) * self.shear_error_std**2
-        return own + self.shear_error_common_std**2
 
-
-def _soil_deviations(
-    configuration: Configuration, tuning: PriorTuning
-) -> tuple[float, float, float]:
+def _soil_deviations(configuration: Configuration) -> tuple[float, float, float]:
     """Return the deviations of strength, shear modulus and stiffness [ln]."""
     if not configuration.soil_stated:
         return (
-            tuning.unstated_strength_std,
-            tuning.unstated_shear_modulus_std,
-            tuning.unstated_stiffness_std,
+            PRIORS.unstated_strength_std,
+            PRIORS.unstated_shear_modulus_std,
+            PRIORS.unstated_stiffness_std,
         )
     soil, std = configuration.soil, configuration.soil_std
     phi = float(soil.friction_angle)
@@ -136,9 +130,9 @@ def _soil_deviations(
     stiffness = std['frictional_modulus'] / max(float(soil.frictional_modulus), 1.0)
     modulus = std['shear_modulus'] / float(soil.shear_modulus)
     return (
-        max(strength, tuning.least_strength_std),
-        max(modulus, tuning.least_shear_modulus_std),
-        max(stiffness, tuning.least_stiffness_std),
+        max(strength, PRIORS.least_strength_std),
+        max(modulus, PRIORS.least_shear_modulus_std),
+        max(stiffness, PRIORS.least_stiffness_std),
     )
 
 
@@ -164,74 +158,72 @@ def initial_filter(
     layout: StateLayout,
     models: WheelModels,
     loads: tuple[float, ...],
-    tuning: PriorTuning = PriorTuning(),
 ) -> GatedFilter:
     """Return the filter at the start of a run: the nominal soil, wheels at their sinkage at rest.
 
     `loads` are those of each wheel on level ground [N].
     """
-    priors = SoilPriors.from_configuration(configuration, tuning)
+    priors = SoilPriors.from_configuration(configuration)
     n = rover.wheel_count
     mean = np.zeros(layout.size)
     deviations = {
-        SPEED: tuning.speed_std,
+        SPEED: PRIORS.speed_std,
         GRAVITY_BIAS: gravity_bias_std(rover, sensors, sensors.orientation_std),
         SHEAR_STRENGTH: priors.strength_std,
         SHEAR_MODULUS: priors.shear_modulus_std,
-        SLIP_SINKAGE: tuning.slip_sinkage_std,
-        CENTROID: tuning.centroid_std,
-        MOUND: tuning.mound_std,
-        SLIP_PER_DEMAND: tuning.slip_per_demand_std,
-        RUT_SHARE: tuning.rut_share_std,
-        SHEAR_RADIUS: tuning.shear_radius_std,
+        SLIP_SINKAGE: PRIORS.slip_sinkage_std,
+        CENTROID: PRIORS.centroid_std,
+        MOUND: PRIORS.mound_std,
+        SLIP_PER_DEMAND: PRIORS.slip_per_demand_std,
+        RUT_SHARE: PRIORS.rut_share_std,
+        SHEAR_RADIUS: PRIORS.shear_radius_std,
     }
     P = np.zeros((layout.size, layout.size))
     for index, std in deviations.items():
         P[index, index] = std**2
-    mean[MOUND] = 0.0 if 'soil_mound' in configuration.effects else tuning.mound_mean
-    mean[RUT_SHARE] = tuning.rut_share_mean
-    mean[SLIP_PER_DEMAND] = tuning.slip_per_demand_mean
+    mean[MOUND] = 0.0 if 'soil_mound' in configuration.effects else PRIORS.mound_mean
+    mean[RUT_SHARE] = PRIORS.rut_share_mean
+    mean[SLIP_PER_DEMAND] = PRIORS.slip_per_demand_mean
     level = WheelStates(1.0, 0.0, np.array(loads))
     z = steady_sinkage(models, level, np.array(rover.rim_radius))
     mean[layout.sinkage] = z
-    spread = tuning.sinkage_share * z + tuning.sinkage_floor
+    spread = PRIORS.sinkage_share * z + PRIORS.sinkage_floor
     P[layout.sinkage, layout.sinkage] = np.diag(spread**2)
-    own = tuning.own_stiffness_share * priors.stiffness_std
+    own = PRIORS.own_stiffness_share * priors.stiffness_std
     P[layout.stiffness, layout.stiffness] = priors.stiffness_std**2 + np.eye(n) * own**2
-    P[layout.shear_error, layout.shear_error] = priors.shear_error_covariance(n)
+    own_error = np.eye(n) * priors.shear_error_std**2
+    P[layout.shear_error, layout.shear_error] = own_error + priors.shear_error_common_std**2
     zeros = range(layout.size)[layout.torque_zero]
     P[zeros, zeros] = sensors.torque_zero_std**2
     if layout.reference_error is not None:
         P[layout.reference_error, layout.reference_error] = sensors.reference_wander_std**2
-    return GatedFilter(mean, P, *bounds(rover, layout, priors, tuning))
+    return GatedFilter(mean, P, *bounds(rover, layout, priors))
 
 
-def bounds(
-    rover: Rover, layout: StateLayout, priors: SoilPriors, tuning: PriorTuning = PriorTuning()
-) -> tuple[FloatArray, FloatArray]:
+def bounds(rover: Rover, layout: StateLayout, priors: SoilPriors) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds of the state, (size,) each."""
     upper = np.zeros(layout.size)
-    most = tuning.most_deviations
-    upper[[SPEED, GRAVITY_BIAS]] = tuning.most_speed, tuning.most_gravity_bias
-    upper[SHEAR_STRENGTH] = max(tuning.most_strength, most * priors.strength_std)
-    upper[SHEAR_MODULUS] = tuning.most_shear_modulus
-    upper[SLIP_SINKAGE] = tuning.most_slip_sinkage
-    upper[[CENTROID, MOUND]] = tuning.most_centroid, tuning.most_mound
-    upper[[RUT_SHARE, SHEAR_RADIUS]] = tuning.most_rut_share, tuning.most_shear_radius
-    upper[SLIP_PER_DEMAND] = tuning.most_slip_per_demand
-    upper[layout.stiffness] = max(tuning.most_stiffness, most * priors.stiffness_std)
-    upper[layout.shear_error] = tuning.most_shear_error
-    upper[layout.torque_zero] = tuning.most_torque_zero
+    most = PRIORS.most_deviations
+    upper[[SPEED, GRAVITY_BIAS]] = PRIORS.most_speed, PRIORS.most_gravity_bias
+    upper[SHEAR_STRENGTH] = max(PRIORS.most_strength, most * priors.strength_std)
+    upper[SHEAR_MODULUS] = PRIORS.most_shear_modulus
+    upper[SLIP_SINKAGE] = PRIORS.most_slip_sinkage
+    upper[[CENTROID, MOUND]] = PRIORS.most_centroid, PRIORS.most_mound
+    upper[[RUT_SHARE, SHEAR_RADIUS]] = PRIORS.most_rut_share, PRIORS.most_shear_radius
+    upper[SLIP_PER_DEMAND] = PRIORS.most_slip_per_demand
+    upper[layout.stiffness] = max(PRIORS.most_stiffness, most * priors.stiffness_std)
+    upper[layout.shear_error] = PRIORS.most_shear_error
+    upper[layout.torque_zero] = PRIORS.most_torque_zero
     if layout.reference_error is not None:
-        upper[layout.reference_error] = tuning.most_speed
+        upper[layout.reference_error] = PRIORS.most_speed
     lower = -upper
     lower[[SLIP_PER_DEMAND, RUT_SHARE]] = 0.0
     # Slip makes a wheel sink, never rise: else wheels that leave soft ground tell of slip.
     lower[SLIP_SINKAGE] = -max(priors.slip_sinkage, 0.0)
     # Ground may be harder than any soil. K of decimetres is none: it makes every slope a trap.
-    lower[SHEAR_MODULUS] = -max(tuning.most_shear_modulus, most * priors.shear_modulus_std)
+    lower[SHEAR_MODULUS] = -max(PRIORS.most_shear_modulus, most * priors.shear_modulus_std)
     upper[layout.sinkage] = rover.rim_radius
-    lower[layout.sinkage] = [-tuning.highest * r for r in rover.rim_radius]
+    lower[layout.sinkage] = [-PRIORS.highest * r for r in rover.rim_radius]
     return lower, upper
 
 
@@ -243,7 +235,7 @@ def with_soil_of(old: FilterMemory, start: FilterMemory, layout: StateLayout) ->
     kept += range(layout.size)[layout.torque_zero]
     block = np.ix_(kept, kept)
     covariance, mean = start.covariance.copy(), start.mean.copy()
-    share = PriorTuning().kept_share
+    share = PRIORS.kept_share
     covariance[block] = share * old.covariance[block] + (1.0 - share) * covariance[block]
     mean[kept] = old.mean[kept]
     return FilterMemory(mean, covariance, start.restarts)

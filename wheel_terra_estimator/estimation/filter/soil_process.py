@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning, SoilPriors
+from wheel_terra_estimator.estimation.filter.initial_state import PRIORS, SoilPriors
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     MOUND,
@@ -53,49 +53,50 @@ class SoilTuning:
     the shear model."""
 
 
+_TUNING = SoilTuning()
+
+
 class SoilProcess:
     """Predicts soil and errors of the shear model; it has no memory of its own."""
 
-    def __init__(
-        self, configuration: Configuration, layout: StateLayout, tuning: SoilTuning = SoilTuning()
-    ) -> None:
+    def __init__(self, configuration: Configuration, layout: StateLayout) -> None:
         priors = SoilPriors.from_configuration(configuration)
         n = layout.wheel_count
-        self._layout, self._tuning = layout, tuning
+        self._layout = layout
         self._walk = float(configuration.filter.soil_walk) ** 2
         self._error_length = float(configuration.filter.shear_error_length)
         self._error_variance = priors.shear_error_std**2
-        self._shear_radius_variance = PriorTuning().shear_radius_std ** 2
+        self._shear_radius_variance = PRIORS.shear_radius_std**2
         self._each = np.eye(n)
         self._mean = np.full((n, n), 1.0 / n)
         self._mean_variance = self._error_variance + n * priors.shear_error_common_std**2
-        self._stiffness = tuning.stiffness_walk**2 + self._each * tuning.own_stiffness_walk**2
+        self._stiffness = _TUNING.stiffness_walk**2 + self._each * _TUNING.own_stiffness_walk**2
 
     def predict(self, prediction: Prediction, travel: float, *, torque_known: bool) -> None:
         """Add the soil to a prediction over a `travel` [m]."""
-        tuning, layout = self._tuning, self._layout
+        layout = self._layout
         mean, F, Q = prediction
         walk = self._walk * travel
-        forget = math.exp(-travel / tuning.memory)
+        forget = math.exp(-travel / _TUNING.memory)
         for index, std in (
-            (SHEAR_STRENGTH, tuning.strength_walk),
-            (SHEAR_MODULUS, tuning.shear_modulus_walk),
-            (SLIP_SINKAGE, tuning.slip_sinkage_walk),
-            (CENTROID, tuning.centroid_walk),
+            (SHEAR_STRENGTH, _TUNING.strength_walk),
+            (SHEAR_MODULUS, _TUNING.shear_modulus_walk),
+            (SLIP_SINKAGE, _TUNING.slip_sinkage_walk),
+            (CENTROID, _TUNING.centroid_walk),
         ):
             mean[index] *= forget
             F[index, index] = forget
             Q[index, index] = std**2 * walk
-        Q[MOUND, MOUND] = tuning.mound_walk**2 * walk
-        Q[RUT_SHARE, RUT_SHARE] = tuning.rut_share_walk**2 * walk
-        keep = math.exp(-travel / tuning.shear_radius_length)
+        Q[MOUND, MOUND] = _TUNING.mound_walk**2 * walk
+        Q[RUT_SHARE, RUT_SHARE] = _TUNING.rut_share_walk**2 * walk
+        keep = math.exp(-travel / _TUNING.shear_radius_length)
         mean[SHEAR_RADIUS] *= keep
         F[SHEAR_RADIUS, SHEAR_RADIUS] = keep
         Q[SHEAR_RADIUS, SHEAR_RADIUS] = self._shear_radius_variance * (1.0 - keep * keep)
         k, e = layout.stiffness, layout.shear_error
         Q[k, k] = self._stiffness * walk
         hold = math.exp(-travel / self._error_length)
-        common = math.exp(-travel / tuning.common_error_length)
+        common = math.exp(-travel / _TUNING.common_error_length)
         mean[e] = hold * mean[e] + (common - hold) * mean[e].mean()
         F[e, e] = hold * self._each + (common - hold) * self._mean
         own = self._error_variance * (1.0 - hold * hold)
@@ -103,6 +104,6 @@ class SoilProcess:
         Q[e, e] = own * self._each + (shared - own) * self._mean
         if not torque_known:
             # Softer ground is weaker ground: where no torque says how weak, the sinkage does.
-            Q[e, e] += (tuning.strength_spread**2 - 1.0) * own * self._each
-            both = tuning.own_stiffness_walk * math.sqrt(walk * own) * tuning.strength_spread
-            Q[k, e] = Q[e, k] = tuning.soft_is_weak * both * self._each
+            Q[e, e] += (_TUNING.strength_spread**2 - 1.0) * own * self._each
+            both = _TUNING.own_stiffness_walk * math.sqrt(walk * own) * _TUNING.strength_spread
+            Q[k, e] = Q[e, k] = _TUNING.soft_is_weak * both * self._each

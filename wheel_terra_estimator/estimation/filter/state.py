@@ -49,6 +49,7 @@ observable at the same time as the soil: they enter the published deviations).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -95,6 +96,24 @@ class StateLayout:
         object.__setattr__(self, 'shear_error', slice(_COMMON + 2 * n, errors))
         object.__setattr__(self, 'torque_zero', slice(errors, each))
         object.__setattr__(self, 'reference_error', each if self.reference_wanders else None)
+
+    def considered(self, *, settled: bool, opposes_rims: bool, unread: Sequence[int]) -> list[int]:
+        """Return the entries that measurements must not teach (Schmidt 1966: considered).
+
+        Their uncertainty counts, but they keep mean and variance: else what the models get wrong
+        would end up there. The rut that forms at a start, or is left behind after a spin on the
+        spot (contacts that are not `settled`), tells no speed. Where the rover moves against its
+        wheels (`opposes_rims`), their forces are the same at any such speed. Of wheels without a
+        sinkage reading (`unread`), sinkage and errors of the shear model are not told apart.
+        """
+        entries = []
+        if not settled or opposes_rims:
+            entries.append(SPEED)
+        for part in (self.sinkage, self.stiffness):
+            entries += [part.start + i for i in unread]
+        if len(unread) == self.wheel_count:
+            entries.append(SLIP_SINKAGE)
+        return entries
 
 
 class Prediction(NamedTuple):

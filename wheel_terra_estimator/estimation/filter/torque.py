@@ -13,11 +13,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
-from wheel_terra_estimator.estimation.filter.consistency import (
-    SAME_GROUND,
-    excess,
-    smoothed_nis,
-)
+from wheel_terra_estimator.estimation.filter.consistency import SAME_GROUND, excess, smoothed_nis
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover

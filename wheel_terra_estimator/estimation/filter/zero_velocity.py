@@ -7,9 +7,11 @@ from __future__ import annotations
 from math import isnan
 from typing import NamedTuple
 
+import numpy as np
+
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
-from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_gate
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import GyroZero
 from wheel_terra_estimator.estimation.scalars import NAN
@@ -70,7 +72,9 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         if settled < _COASTING_TIME:
             speed, P = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
             variance += chi_square_gate(speed, P + variance, _COASTING_GATE)
-        ekf.fuse_entry(SPEED, 0.0, variance)
+        row = np.zeros(len(ekf.mean))
+        row[SPEED] = 1.0
+        ekf.fuse([Row(0.0 - float(ekf.mean[SPEED]), row, variance)])
         turning = abs(yaw_rate) >= _MOST_YAW_RATE
         if settled > _GYRO_SETTLING_TIME and window.rates and not turning:
             self._learn_zero(yaw_rate, window.pitch_rate / window.rates)

@@ -49,7 +49,6 @@ from wheel_terra_estimator.estimation.smoothing.history_buffer import (
 )
 from wheel_terra_estimator.estimation.smoothing.window import Moment, centred
 from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant, WheelSoilEstimator
-from wheel_terra_estimator.estimation.words import MissingInputs
 
 _OF_THE_FILTER = (
     'stuck',
@@ -64,7 +63,6 @@ _OF_THE_FILTER = (
     'faults',
 )
 """Fields of a set that stay the filter's."""
-_NOTHING_MISSING = MissingInputs(*(False,) * len(MissingInputs._fields))
 
 
 # Tuned on simulated drives of both worlds, seeds 1021 to 1024 and 2180.
@@ -225,7 +223,7 @@ class _Judges:
                 yaw_rate=moment.yaw_rate,
                 slips=slips,
             ),
-            _NOTHING_MISSING,
+            {},
         )
         # Where the filter alone knew the slip too badly, the smoother may know it.
         unjudged = (live.slip_class == SlipClass.UNKNOWN) & (live.slip_std <= self._most_std)

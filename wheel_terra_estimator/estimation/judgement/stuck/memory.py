@@ -67,8 +67,9 @@ class StuckMemory:
         if self._restored and self._is_clear(estimates):
             self._restored = False
         if self._restored:
-            words = f'rover: warned{self._age(estimates.stamp)} before {self._before}: '
-            held = f'; {words}{self.state.reason}'
+            age = (estimates.stamp - self.state.stamp) * NANOSECOND
+            when = f' {age:.0f} s ago,' if self.state.stamp > 0 and age >= 0.0 else ''
+            held = f'; rover: warned{when} before {self._before}: {self.state.reason}'
             reasons = tuple(
                 reason if estimates.stuck else reason + held for reason in estimates.reasons
             )
@@ -79,10 +80,6 @@ class StuckMemory:
                 estimates.stuck, _reason(estimates), estimates.stamp, estimates.stuck_direction
             )
         return estimates
-
-    def _age(self, stamp: int) -> str:
-        age = (stamp - self.state.stamp) * NANOSECOND
-        return f' {age:.0f} s ago,' if self.state.stamp > 0 and age >= 0.0 else ''
 
     def _is_clear(self, estimates: EstimateSet) -> bool:
         """Whether the rover has moved with little slip for long enough; rest proves nothing."""

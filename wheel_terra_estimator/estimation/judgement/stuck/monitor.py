@@ -77,7 +77,9 @@ class StuckMonitor(Component[StuckState]):
         old, settings = self.state, self._settings
         situation = observe(old.memory, time, motion)
         ahead = outlook(situation, settings)
-        likely = ahead.probability > settings.threshold or _digs(situation)
+        digs = situation.settled and situation.slip > _DIGGING_SLIP
+        digs = digs and situation.slip_std < USUAL_STD
+        likely = ahead.probability > settings.threshold or digs
         there = likely and not situation.braked, situation.standing
         since = tuple(
             (time if isnan(begun) else begun) if met else NAN
@@ -105,10 +107,6 @@ class StuckMonitor(Component[StuckState]):
             situation.digging,
             state.stuck and _confirmed(situation),
         )
-
-
-def _digs(s: Situation) -> bool:
-    return s.settled and s.slip > _DIGGING_SLIP and s.slip_std < USUAL_STD
 
 
 def _confirmed(s: Situation) -> bool:
