@@ -190,6 +190,15 @@ def test_a_rover_that_ends_a_turn_opens_its_speed():
     assert straight.state.inflation == 0.0
 
 
+def test_the_slip_of_a_start_walks_farther():
+    made = process([0.05] * 6)
+    walks = []
+    for travel in (0.0, 0.1, 10.0):
+        made.follow_contacts(travel, NAN, reference_known=True)
+        walks.append(made.state.ratio_walk)
+    assert walks == pytest.approx([0.4, 0.4 * np.exp(-0.5), 0.1])
+
+
 @pytest.mark.parametrize(
     ('digging', 'reference_known', 'walk'),
     [
@@ -203,7 +212,7 @@ def test_a_rover_that_ends_a_turn_opens_its_speed():
 )
 def test_the_slip_walks_farther_where_most_wheels_sink(digging, reference_known, walk):
     made = process([0.05] * 6)
-    made.follow_contacts(digging, reference_known=reference_known)
+    made.follow_contacts(10.0, digging, reference_known=reference_known)
     assert made.state.ratio_walk == pytest.approx(walk)
 
 

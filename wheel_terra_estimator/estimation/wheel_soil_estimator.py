@@ -487,6 +487,7 @@ class WheelSoilEstimator:
         )
         read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
         self._speed.follow_contacts(
+            self._contact_age.state.travel,
             self._clock.assessment.digging if read else NAN,
             reference_known=cycle.reference_known,
         )

@@ -72,10 +72,13 @@ _COAST_WALK = 0.02  # [m/s/sqrt(s)]
 _RIM_CHANGE = 0.2
 """Error of a change of rim speed as a change of speed, over that change [-]."""
 _FLOOR_WALK = 1e-8  # [(m/s)^2/s]
+_START_WALK = 0.4
+"""Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
+_START_WALK_TRAVEL = 0.2  # [m] with which it decays
 _DIGGING_WALK = 12.0
-"""Random walk of v / rim speed over the sinkage that most wheels gain per rim travel [1/sqrt(m)]:
-where contacts change, the slip does."""
-_MOST_WALK = 0.6  # of it there [1/sqrt(m)]
+"""The same over the sinkage that most wheels gain per rim travel [1/sqrt(m)]: where contacts
+change, the slip does."""
+_MOST_WALK = 0.6  # of it where contacts change [1/sqrt(m)]
 _WATCHED_SHARE = 0.5
 """Of ``filter.ratio_walk`` where sinkages would show such a change."""
 _DEMAND_ERROR = 0.3  # of what the demand changes, over that change [-]
@@ -234,18 +237,19 @@ class SpeedProcess(Component[SpeedState]):
             other_direction=ended,
         )
 
-    def follow_contacts(self, digging: float, *, reference_known: bool) -> None:
-        """Note how far the slip may walk: farther where contacts change.
+    def follow_contacts(self, travel: float, digging: float, *, reference_known: bool) -> None:
+        """Note how far the slip may walk: farther where contacts change, `travel` [m] from a start.
 
         `digging` is the sinkage that most wheels gain over rim travel [m/m]; nan = most are not
         read. Without a reference the walk between changes is not narrowed.
         """
         walk = self._walk
+        start = _START_WALK * math.exp(-travel / _START_WALK_TRAVEL)
         if not isnan(digging):
             steady = walk * (_WATCHED_SHARE if reference_known else 1.0)
             changing = min(_DIGGING_WALK * max(digging, 0.0), _MOST_WALK)
             walk = math.hypot(steady, changing)
-        self.state = self.state._replace(ratio_walk=walk)
+        self.state = self.state._replace(ratio_walk=max(walk, start))
 
     # -- Prediction ------------------------------------------------------------------------------
 
