@@ -86,12 +86,16 @@ def test_a_zero_of_the_torques_is_no_radius(zero):
         assert 'radius' not in {f.kind for f in found}, [str(f) for f in found]
 
 
-@pytest.mark.parametrize(('since', 'until'), [(20.0, 50.0), (-1.0, np.inf)])
-def test_a_wheel_held_under_torque_is_not_frozen(since, until):
+@pytest.mark.parametrize(
+    ('since', 'until', 'moment'), [(20.0, 50.0, 80.0), (-1.0, np.inf, 80.0), (20.0, 50.0, -1.0)]
+)
+def test_a_wheel_held_under_torque_is_not_frozen(since, until, moment):
+    """By more than the others pull, or, dragged by them, as much against them."""
     whole = rolling.recording()
     rate, torque = whole.joints.rate.copy(), whole.joints.torque.copy()
     held = (whole.joints.seconds > since) & (whole.joints.seconds < until)
-    rate[held, 1], torque[held, 1] = 0.0, 80.0
+    rate[held, 1] = 0.0
+    torque[held, 1] = moment if moment > 0.0 else -torque[held, 0]
     joints = replace(whole.joints, rate=rate, torque=torque)
     found = rolling.checked(whole=whole, joints=joints).findings
     assert 'frozen' not in {f.kind for f in found}

@@ -493,7 +493,10 @@ def _exchanged(evidence: Evidence, chosen: _Chosen) -> tuple[Finding, Evidence]:
 
 
 def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return a gyro in degrees per second, told by the turns of the wheels."""
+    """Return a gyro in degrees per second, told by the turns of the wheels.
+
+    It turns faster than about a side that stands: what is slower may be sides that slip apart.
+    """
     imu, facts = evidence.recording.imu, evidence.facts
     if imu is None or evidence.gyro is None or not facts.known or not facts.has_sides():
         return [], evidence
@@ -502,7 +505,10 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [untold('unit', 'gyro_no_turn')], evidence
     # Of exchanged wheels the sides turn alike, but not the wheels of a side.
     scaled = GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]
-    if not scaled or left_in_turns(evidence) > MOST_SCALED:
+    moving = evidence.moving
+    turned = np.quantile(np.abs(evidence.yaw[moving]), 0.95) * np.ptp(facts.lateral)
+    slips = turned < np.nanquantile(np.abs(evidence.speed[moving]), 0.95)
+    if not scaled or slips or left_in_turns(evidence) > MOST_SCALED:
         return [], evidence
     return _in_degrees(evidence, 1.0 / abs(ratio), 'turning of the wheels')
 

@@ -38,6 +38,7 @@ WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0  # wild change over the greatest and usual v
 LEAST_WILD, MOST_WILD = 3, 0.1  # number and share of single wild values that are told
 LONG_FROZEN_TIME = 10.0  # time that a coarse encoder does not repeat itself [s]
 HELD_TORQUE = 1.5  # torque of a held wheel over that of the others, at least [-]
+DRAGGED_TORQUE = 0.5  # the same against theirs, of one that the others drag [-]
 NOISE_FACTOR = 5.0
 LEAST_NOISE_SHARE = 0.08  # noise of a rate that matters, as a share of the working rate
 COUNTING_STD = 1.0 / math.sqrt(6.0)  # of a rate from two counts, in counts
@@ -104,12 +105,16 @@ def _stays(evidence: Evidence, index: int) -> float:
 
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:
-    """Return whether the torque says that a standing wheel is stalled, not its encoder dead."""
-    size = np.abs(evidence.torque[rows])
-    own, others = size[:, index], np.delete(size, index, axis=1)
+    """Return whether the torque says that a wheel stands: stalled, or dragged by the others."""
+    rate = np.delete(evidence.rate[rows], index, axis=1)
+    drive = evidence.torque[rows] * np.sign(row_medians(rate))[:, None]
+    own, others = drive[:, index], np.delete(drive, index, axis=1)
     if not np.isfinite(own).any() or not np.isfinite(others).any():
         return False
-    return bool(np.nanmedian(own) > HELD_TORQUE * max(float(np.nanmedian(others)), 1e-9))
+    typical = max(float(np.nanmedian(np.abs(others))), 1e-9)
+    stalled = np.nanmedian(np.abs(own)) > HELD_TORQUE * typical
+    dragged = np.nanmedian(own) * np.sign(np.nanmedian(others)) < -DRAGGED_TORQUE * typical
+    return bool(stalled or dragged)
 
 
 def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
