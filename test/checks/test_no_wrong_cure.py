@@ -277,6 +277,16 @@ def test_exchanged_wheels_are_no_gyro_in_degrees(degrees):
     assert [finding.fault for finding in told] == ['gyro_degrees'] * degrees
 
 
+def test_sides_that_slip_apart_are_no_gyro_in_degrees():
+    """The rover turns 22 times as fast as its wheels say, and slower than about a side at rest."""
+    drive = rolling.ten_minute_drive()
+    whole = rolling.recording(replace(drive, yaw_rate=drive.yaw_rate / 22.0))
+    whole = replace(whole, imu=replace(whole.imu, rate=whole.imu.rate * [1.0, 1.0, 22.0]))
+    evidence = gather(whole, from_configuration(rolling.rover()), np.eye(3), {})
+    assert 0.004 < abs(turning.track_ratio(evidence)) < 0.07
+    assert turning.check_gyro_unit(evidence)[0] == []
+
+
 def test_a_gyro_that_no_rest_tells_the_zero_of_exchanges_no_wheels():
     """Turns of 0.2 rad/s with a zero of a third of that, and never a standstill."""
     time = np.arange(0.0, 60.0, 0.1)

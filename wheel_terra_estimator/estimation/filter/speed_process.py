@@ -308,8 +308,9 @@ class SpeedProcess(Component[SpeedState]):
         mean = 0.5 * (abs(before) + abs(now))
         variance = mean * mean * state.ratio_walk**2 * mean * dt
         # Sides against each other slip apart, and the body moves by half of the difference.
-        opposed = max(rims.magnitude**2 - now**2, 0.0)
-        variance += 0.5 * opposed * _MOST_WALK**2 * rims.magnitude * dt
+        magnitude = rims.magnitude
+        opposed = max(magnitude**2 - now**2, 0.0)
+        variance += 0.5 * opposed * _MOST_WALK**2 * magnitude * dt
         variance += (_RIM_CHANGE * change) ** 2 + _FLOOR_WALK * dt
         apart = self.disagreement(rims)
         variance += _INFLATION_RATE * inflation * inflation * dt + apart * apart
