@@ -31,7 +31,7 @@ from wheel_terra_estimator.estimation.contacts.linearisation import (
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.measured_wheels import (
     SpeedAndVariance,
-    intersected,
+    pooled,
     slip_of_torque,
 )
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
@@ -41,7 +41,7 @@ from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.estimation.filter.consistency import correlated_cycles, excess
+from wheel_terra_estimator.estimation.filter.consistency import correlated_cycles
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance, SumOfPulls, rut_tilt
 from wheel_terra_estimator.estimation.filter.initial_state import (
@@ -617,17 +617,11 @@ class WheelSoilEstimator:
         return Instant(time, body, sources, cycle, self._usual_speed(rims))
 
     def _present_speed(self, rims: Floats) -> SpeedAndVariance:
-        """Return speed [m/s] and variance at the present stamp.
-
-        Without a reference velocity, torques that no soil of the filter explains widen it.
-        """
+        """Return speed [m/s] and variance at the present stamp."""
         rolling = self._yaw_compensated(rims)
         filtered = self._filtered_speed(rolling)
-        if self._reference.known(self._clock.time):
-            return filtered
         usual = self._usual_speed(rolling)
-        speed, variance = filtered if usual is None else intersected(filtered, usual)
-        return SpeedAndVariance(speed, variance * excess(self._torque.nis))
+        return filtered if usual is None else pooled(filtered, usual)
 
     def _yaw_compensated(self, rims: Floats) -> RimSpeeds:
         return RimSpeeds.of(rims, self._turning.state.yaw_rate, self._steering.state.headings)

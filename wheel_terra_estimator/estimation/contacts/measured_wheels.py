@@ -53,12 +53,14 @@ class SpeedAndVariance(NamedTuple):
     variance: float
 
 
-def intersected(one: SpeedAndVariance, other: SpeedAndVariance) -> SpeedAndVariance:
+def pooled(one: SpeedAndVariance, other: SpeedAndVariance) -> SpeedAndVariance:
     """Return what two estimates that rest on the same readings say together.
 
-    Covariance intersection with equal weights (Julier and Uhlmann 1997): consistent however
-    strongly their errors are correlated.
+    The mean and variance of both, weighted by their inverse variances, as of two experts (linear
+    opinion pool, Stone 1961): never below the variance of covariance intersection, consistent
+    however strongly the errors are correlated, and larger by what the two differ by.
     """
     both = one.variance + other.variance
-    mean = (one.speed * other.variance + other.speed * one.variance) / both
-    return SpeedAndVariance(mean, 2.0 * one.variance * other.variance / both)
+    weight, apart = other.variance / both, one.speed - other.speed
+    variance = 2.0 * weight * one.variance + weight * (1.0 - weight) * apart**2
+    return SpeedAndVariance(other.speed + weight * apart, variance)

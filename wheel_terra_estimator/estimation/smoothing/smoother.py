@@ -26,7 +26,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
-from wheel_terra_estimator.estimation.contacts.measured_wheels import SpeedAndVariance, intersected
+from wheel_terra_estimator.estimation.contacts.measured_wheels import SpeedAndVariance, pooled
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.filter.force_balance import rut_tilt
@@ -191,7 +191,7 @@ class _Judges:
         carried = max(given.speed_variance - instant.cycle.variance, 0.0)
         variance = float(now.covariance[SPEED, SPEED]) + carried
         if instant.usual is not None:
-            speed, variance = intersected(SpeedAndVariance(speed, variance), instant.usual)
+            speed, variance = pooled(SpeedAndVariance(speed, variance), instant.usual)
         heard = known(given.rims)
         typical = sum(map(abs, heard)) / len(given.rims)
         least = max(typical * LEAST_SLIP_STD, _LEAST_SHARE * instant.motion.speed_std)
