@@ -92,6 +92,11 @@ def test_what_is_no_urdf(tmp_path, capsys, text, word):
     assert not (tmp_path / 'o').exists()
 
 
+def test_a_number_of_wheels_is_no_name(tmp_path, capsys):
+    assert main(['init', '--wheels', '6', '-o', str(tmp_path / 'o')]) == 2
+    assert 'names of the wheel joints' in capsys.readouterr().err
+
+
 def test_from_a_recording_then_checked_and_calibrated(tmp_path, capsys):
     output = tmp_path / 'rover.yaml'
     measures = ['--radius', '0.11', '--track', '0.6', '--wheelbase', '0.5', '--mass', '22']

@@ -129,6 +129,20 @@ def test_two_references_on_standing_wheels_say_that_the_rover_slides(parts, ekf)
         assert ekf.mean[SPEED] == pytest.approx(0.03 if sliding else 0.0, abs=0.003)
 
 
+def test_neither_a_rejected_reference_nor_one_at_rest_tells_of_slip(parts, ekf):
+    update = reference_update(parts)
+    ekf.set(SPEED, 0.0, 0.0005**2)
+    hear(parts, update, ekf, 0.0, 0.0, still=True, fastest_rim=0.0)
+    assert not update.known(0.1)
+    ekf.set(SPEED, 0.045, 0.001**2)
+    hear(parts, update, ekf, 1.0, 0.02)  # beyond its gate, and alone
+    assert not update.known(1.1)
+    hear(parts, update, ekf, 2.0, 0.02)
+    assert update.known(2.1)
+    hear(parts, update, ekf, 3.0, 0.5)  # wild
+    assert update.known(3.1) and update.known(6.9) and not update.known(7.1)
+
+
 def wandering(rng, count, dt, std, time):
     """Return a first-order Gauss-Markov error at `count` times."""
     hold, values = np.exp(-dt / time), [std * rng.standard_normal()]

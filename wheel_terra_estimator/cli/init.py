@@ -110,7 +110,10 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
 
 
 def _names(text: str | None) -> list[str]:
-    return [name.strip() for name in (text or '').split(',') if name.strip()]
+    names = [name.strip() for name in (text or '').split(',') if name.strip()]
+    if len(names) == 1 and names[0].isdigit():
+        raise UserError(f'--wheels {text}: give the names of the wheel joints, comma between')
+    return names
 
 
 def _description_of(arguments: argparse.Namespace) -> RoverSketch | None:

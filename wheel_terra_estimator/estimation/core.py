@@ -258,7 +258,7 @@ ReferenceVelocity
             self._late[channel] += 1
             self._deferred |= fate is Fate.DEFERRED
         elif fate is Fate.TOO_OLD:
-            self._checks.refuse(channel, 'stamp older than the history')
+            self._checks.refuse(channel, 'stamp older than `history` (raise it)')
         elif fate is Fate.FULL:
             self._checks.refuse(channel, 'more inputs than can be sorted')
         return [] if due is None else [self._published(due)]

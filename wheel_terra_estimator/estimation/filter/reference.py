@@ -54,6 +54,8 @@ class ReferenceState(NamedTuple):
     """What is remembered of the references."""
 
     time: float = -math.inf  # of the last one [s]
+    told_time: float = -math.inf
+    """Of the last one that told of slip [s]: the rover moved, and it was not rejected."""
     gap: float = 10.0  # between them, smoothed [s]
     sliding_until: float = -1.0  # a slide on standing wheels is believed until then [s]
     rejected: int = 0
@@ -102,8 +104,8 @@ class ReferenceUpdate(Component[ReferenceState]):
         return reference.forward - state, variance
 
     def known(self, time: float) -> bool:
-        """Say whether a reference is young enough to tell slip and soil apart."""
-        return time - self.state.time < _KNOWN_TIME
+        """Say whether a reference that told of slip is young enough to tell it and soil apart."""
+        return time - self.state.told_time < _KNOWN_TIME
 
     def fresh(self, time: float) -> bool:
         """Say whether the present speed rests on a reference."""
@@ -178,6 +180,9 @@ class ReferenceUpdate(Component[ReferenceState]):
         else:
             state = state._replace(rejected_in_a_row=0)
         ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
+        rests = still and time >= state.sliding_until
+        if not rests and not state.rejected_in_a_row:
+            state = state._replace(told_time=time)
         self.state = state
         return opened
 
