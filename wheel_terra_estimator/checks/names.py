@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.faults import found, untold
 from wheel_terra_estimator.checks.finding import Finding, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
@@ -69,11 +70,7 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         return [untold('missing_wheel', 'no_joints')], facts
     if not facts.known:
         return [], facts
-    silent = {
-        name
-        for name, column in zip(joints.names, joints.rate.T, strict=True)
-        if not np.isfinite(column).any()
-    }
+    silent = _mute(joints.names, joints.rate, joints.names)
     absent = [name for name in facts.names if name not in joints.names]
     spare = [name for name in wheel_names(joints.names) if name not in facts.names]
     renamed = _pairs(absent, spare)
@@ -96,6 +93,32 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
             outcomes.append(found('spare_joint', joints.topic, 0.7, wheel=name))
     return [*outcomes, *_steering(joints, facts)], replace(facts, names=names)
+
+
+def check_readings(recording: Recording, facts: RoverFacts) -> list[Outcome]:
+    """Return wheels without any torque or sinkage beside others that have it, and a dead topic."""
+    joints, sinkage, own = recording.joints, recording.sinkage, facts.names
+    outcomes: list[Outcome] = []
+    if joints is not None:
+        mute = [name for name in _mute(joints.names, joints.torque, own) if name in joints.names]
+        if mute and len(mute) < len(own):
+            outcomes.append(found('torque_nan', joints.topic, 0.9, wheel=', '.join(mute)))
+    if sinkage is not None:
+        stated = facts.configuration.wheels.names if facts.known else own
+        pairs = zip(own, stated, strict=True)  # named as the joints are, or as in the rover file
+        wanted = [now if now in sinkage.names else before for now, before in pairs]
+        mute = _mute(sinkage.names, sinkage.sinkage, wanted)
+        if mute:
+            outcomes.append(found('sinkage_nan', sinkage.topic, 0.9, wheel=', '.join(mute)))
+    return outcomes
+
+
+def _mute(names: Sequence[str], table: FloatArray, wanted: Sequence[str]) -> list[str]:
+    """Return the wanted joints of which a table (k, n) of some names has no number."""
+    heard = {
+        name for name, known in zip(names, np.isfinite(table).any(axis=0), strict=True) if known
+    }
+    return [name for name in wanted if name not in heard]
 
 
 def _steering(joints: JointSeries, facts: RoverFacts) -> list[Outcome]:

@@ -134,6 +134,8 @@ def _examined(
     mended('unknown_name', None, lambda: names.check_topics(recording, remapped))
     stated = facts
     facts = mended('missing_wheel', facts, lambda: names.check_wheel_names(recording, stated))
+    named = facts
+    mended('placeholder', None, lambda: names.check_readings(recording, named))
     arrived = recording
     stamped = mended(
         'order', arrived, lambda: transport.check_transport(arrived, stated, report.figures)
@@ -243,7 +245,10 @@ def _whole_rows(recording: Recording) -> tuple[list[Outcome], Recording]:
             outcomes.append(found('imu_nan', imu.topic, 0.99, share=share, field=field))
         imu = _known(imu, known[:, there])
     if velocity is not None:
-        velocity = _known(velocity, np.isfinite(velocity.velocity))
+        left = _known(velocity, np.isfinite(velocity.velocity))
+        if left is None:
+            outcomes.append(found('reference_nan', velocity.topic, 0.97))
+        velocity = left
     return outcomes, replace(recording, imu=imu, reference=velocity)
 
 
