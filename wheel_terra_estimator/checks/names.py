@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -115,9 +116,7 @@ def check_readings(recording: Recording, facts: RoverFacts) -> list[Outcome]:
 
 def _mute(names: Sequence[str], table: FloatArray, wanted: Sequence[str]) -> list[str]:
     """Return the wanted joints of which a table (k, n) of some names has no number."""
-    heard = {
-        name for name, known in zip(names, np.isfinite(table).any(axis=0), strict=True) if known
-    }
+    heard = set(itertools.compress(names, np.isfinite(table).any(axis=0)))
     return [name for name in wanted if name not in heard]
 
 
