@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import difflib
-import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -116,7 +115,8 @@ def check_readings(recording: Recording, facts: RoverFacts) -> list[Outcome]:
 
 def _mute(names: Sequence[str], table: FloatArray, wanted: Sequence[str]) -> list[str]:
     """Return the wanted joints of which a table (k, n) of some names has no number."""
-    heard = set(itertools.compress(names, np.isfinite(table).any(axis=0)))
+    columns = zip(names, table.T, strict=True)
+    heard = {name for name, column in columns if np.isfinite(column).any()}
     return [name for name in wanted if name not in heard]
 
 
