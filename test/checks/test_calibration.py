@@ -222,3 +222,16 @@ def test_the_file_is_accepted_and_says_where_numbers_come_from(tmp_path):
     ]
     assert 'before [0.188' in above and '+-' in above and '/reference_odom' in above
     assert math.isfinite(radius[0])
+
+
+@pytest.mark.parametrize('unit', [1.0, math.degrees(1.0)])
+def test_no_zero_of_a_gyro_whose_unit_no_turn_tells(unit):
+    """On a straight a gyro in degrees per second looks like one with a large zero."""
+    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
+    imu = replace(straight.imu, rate=unit * (straight.imu.rate + 0.002))
+    calibration = calibrate(replace(straight, imu=imu), rolling.rover())
+    assert 'sensors.angular_rate_bias' not in {change.key for change in calibration.changes}
+    assert any('unit' in entry.reason for entry in calibration.not_seen if entry.kind == 'zero')
+    zeros = [f for f in calibration.findings if f.fault == 'gyro_bias']
+    assert len(zeros) == (unit > 1.0)
+    assert all(f.confidence <= 0.5 and 'degrees per second' in f.words for f in zeros)

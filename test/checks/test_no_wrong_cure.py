@@ -326,3 +326,14 @@ def test_a_specific_force_a_little_off_gravity_is_reported():
     report = checked(imu=replace(WHOLE.imu, force=WHOLE.imu.force + 0.6 * np.eye(3)[2]))
     assert not [f for f in report.findings if f.kind in ('gravity', 'unit', 'zero')]
     assert any('z zero' in e.reason for e in report.not_checked if e.kind == 'gravity')
+
+
+def test_a_crawl_below_the_noise_of_the_rates_is_no_standstill_that_tells_a_zero():
+    """One wheel rubs with 5 N m while the rover drives, part of the time at a crawl."""
+    time = np.arange(0.0, 90.0, 0.1)
+    speed = np.interp(time, [2, 3, 30, 31, 60, 61], [0.0, 0.3, 0.3, 0.05, 0.05, 0.3])
+    crawls = rolling.recording(rolling.Motion(time, speed, 0.0 * time, 0.0 * time))
+    noise = 0.7 * np.random.default_rng(1).standard_normal(crawls.joints.rate.shape)
+    rubs = crawls.joints.torque + np.outer(speed > 0.0, [0.0, 5.0, 0.0, 0.0])
+    joints = replace(crawls.joints, rate=crawls.joints.rate + noise, torque=rubs)
+    assert 'torque_zero' not in faults(checked(whole=crawls, joints=joints))

@@ -230,7 +230,9 @@ class _Imu(_Collector):
         force, rate, attitude, stated = np.split(table, (3, 6, 10), axis=1)
         for field, values in enumerate((force, rate, attitude)):
             values[stated[:, field] == -1.0] = math.nan  # there is none
-        return ImuSeries(self.topic, *self.times, force, rate, attitude)
+        none = (stated == -1.0).all(axis=0)
+        absent = tuple(name for name, said in zip(('force', 'rate'), none, strict=False) if said)
+        return ImuSeries(self.topic, *self.times, force, rate, attitude, absent)
 
 
 class _Velocity(_Collector):

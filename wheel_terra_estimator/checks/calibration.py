@@ -63,7 +63,7 @@ def calibrate(
         if read_off and told.parameter and told.value is not None:
             changes.add(told.parameter, told.value, told.std, told.words)
     _mounting(changes, evidence, report)
-    _biases(changes, evidence)
+    _biases(changes, evidence, report)
     _noises_and_rates(changes, report)
     evidence = _radius(changes, evidence, report)
     if np.isfinite(evidence.torque).any(axis=0).all():
@@ -128,9 +128,11 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
             changes.add(key, round(new, 3), std, source)
 
 
-def _biases(changes: _Changes, evidence: Evidence) -> None:
+def _biases(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
     seen = imu.gyro_bias(evidence)
-    if seen is not None:
+    if seen is not None and not turning.gyro_unit_known(evidence):
+        report.not_checked.append(untold('zero', 'gyro_unit'))
+    elif seen is not None:
         whole = (seen[0] + evidence.facts.sensors.angular_rate_bias).round(6).tolist()
         source = 'mean of the gyro at rest'
         changes.add('sensors.angular_rate_bias', whole, float(np.max(seen[1])), source)

@@ -111,6 +111,17 @@ class Evidence:
         return _shared(self.size > 0.2 * max(self.working_rate, 1e-9))
 
     @cached_property
+    def rate_noise(self) -> float:
+        """Noise of the rates [rad/s]."""
+        return bend_noise(np.nan_to_num(self.rate)) if self.rate.shape[0] > 2 else 0.0
+
+    @cached_property
+    def rest_rate(self) -> float:
+        """Mean rate over `SHORTEST_REST` up to which a wheel may stand, for its noise [rad/s]."""
+        noisy = 4.0 * self.rate_noise / math.sqrt(self.rows_in(SHORTEST_REST))
+        return max(REST_RATE * self.working_rate, noisy, 1e-9)
+
+    @cached_property
     def at_rest(self) -> Mask:
         """Rows in which every wheel has stood still for a while."""
         rate = np.nan_to_num(self.rate)
@@ -120,11 +131,9 @@ class Evidence:
         total = np.vstack([np.zeros(rate.shape[1]), np.cumsum(rate, axis=0)])
         mean = np.zeros_like(rate)
         mean[width - 1 :] = (total[width:] - total[:-width]) / width
-        noise = bend_noise(rate) if rate.shape[0] > 2 else 0.0
-        noisy = 4.0 * noise / math.sqrt(width)
-        limit = max(REST_RATE * self.working_rate, noisy, 1e-9)
+        limit = self.rest_rate
         still = (np.abs(mean) <= limit).all(axis=1)
-        still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * noise)
+        still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * self.rate_noise)
         still &= np.isfinite(self.rate).any(axis=1)
         still[: width - 1] = False
         return _shared(self._after(still, SHORTEST_REST) & self.heard)

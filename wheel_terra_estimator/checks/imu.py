@@ -35,7 +35,12 @@ from wheel_terra_estimator.checks.statistics import (
     runs,
     step_of,
 )
-from wheel_terra_estimator.checks.turning import IN_DEGREES, ordinary_track, track_ratio
+from wheel_terra_estimator.checks.turning import (
+    IN_DEGREES,
+    gyro_unit_known,
+    ordinary_track,
+    track_ratio,
+)
 from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
 
 GRAVITY_TOLERANCE = 0.1  # of the mean specific force (slopes, bias, vibration) [-]
@@ -161,7 +166,9 @@ def _placeholders(state: ImuState) -> Judged:
         ('force', 'linear_acceleration', 'gravity', 'slope and load'),
         ('rate', 'angular_velocity', 'sign', 'turns'),
     ):
-        if not state.has(name):  # its covariance may say so
+        if not state.has(name) and name not in imu.absent:
+            outcomes.append(state.found('imu_nan', 0.99, share=100.0, field=field))
+        elif not state.has(name):
             outcomes.append(untold(of, f'{name}_missing', field=field, tells=tells))
         elif not np.nan_to_num(getattr(imu, name)).any():
             outcomes.append(state.found('force_zero', 0.999, field=field))
@@ -566,7 +573,9 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         whole = bias + sensors.angular_rate_bias
         told = {'axis': 'xyz'[worst], 'bias': float(bias[worst]), 'biases': listed(whole, '.5f')}
         told |= {'value': float(f'{whole[worst]:.4g}'), 'std': float(std[worst])}
-        outcomes.append(evidence.found('gyro_bias', 0.99, **told))
+        known = gyro_unit_known(evidence)
+        told['rival'] = '' if known else ', or it is in degrees per second: drive a circle'
+        outcomes.append(evidence.found('gyro_bias', 0.99 if known else 0.5, **told))
     return outcomes
 
 

@@ -243,7 +243,10 @@ def _whole_rows(recording: Recording) -> tuple[list[Outcome], Recording]:
             outcomes.append(found('imu_nan', imu.topic, 0.99, share=share, field=field))
         imu = _known(imu, known[:, there])
     if velocity is not None:
-        velocity = _known(velocity, np.isfinite(velocity.velocity))
+        left = _known(velocity, np.isfinite(velocity.velocity))
+        if left is None:
+            outcomes.append(found('reference_nan', velocity.topic, 0.97))
+        velocity = left
     return outcomes, replace(recording, imu=imu, reference=velocity)
 
 

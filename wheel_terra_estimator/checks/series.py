@@ -75,6 +75,7 @@ class ImuSeries(Channel):
     force: FloatArray  # (k, 3)
     rate: FloatArray  # (k, 3)
     orientation: FloatArray  # (k, 4) x, y, z, w; nan where the message says that there is none
+    absent: tuple[str, ...] = ()  # of force and rate, what every message says is not there
 
 
 @dataclass(frozen=True)

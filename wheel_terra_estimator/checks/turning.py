@@ -531,6 +531,18 @@ def track_ratio(evidence: Evidence) -> float | None:
     return fits_of([nothing], stretch_of(evidence, there, rows))[0].clear_track or None
 
 
+def gyro_unit_known(evidence: Evidence) -> bool:
+    """Return whether turns of the wheels or of an orientation say what the gyro counts in."""
+    if track_ratio(evidence) is not None:
+        return True
+    imu = evidence.recording.imu
+    heading = None if imu is None else _heading(evidence, imu)
+    if heading is None:
+        return False
+    gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
+    return correlation(_turns(evidence, heading), gyro) > LEAST_CORRELATION
+
+
 def skids(evidence: Evidence) -> bool:
     """Return whether wheels do not roll as the track says in turns: several rows not steered."""
     wheels = evidence.facts.configuration.wheels
