@@ -35,7 +35,6 @@ STEP = 0.05  # time between the values that are compared [s]
 LONGEST = {'imu': 2.0, 'reference': 3.0}  # greatest lag that is looked for [s]
 IN_A_DRIVE = 15.0  # length of a drive over the greatest lag that it tells [-]
 LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
-LEAST_PERIODS = 0.35  # the same in periods of the reference: between its stamps nothing is known
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
 FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part with it, at most
 LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1}  # of chassis and filters [s]
@@ -67,8 +66,9 @@ class Lag(NamedTuple):
 
     def counts(self, evidence: Evidence, name: str) -> bool:
         """Whether it is a lag of a channel and stood its trial."""
-        periods = LEAST_PERIODS * _channel(evidence, name).period if name == 'reference' else 0.0
-        clear = max(LEAST_OFFSET, 1.5 * evidence.period, periods, SIGMAS * self.std)
+        # Between the stamps of a reference nothing is known: two deviations.
+        between = 2.0 * BETWEEN * _channel(evidence, name).period if name == 'reference' else 0.0
+        clear = max(LEAST_OFFSET, 1.5 * evidence.period, between, SIGMAS * self.std)
         sharp = abs(self.value) > SHARP_SIGMAS * self.std  # what else is unlike, no stamp mends
         falls = self.trial.after < (1.0 if sharp else FALLS[self.by]) * self.trial.before
         return abs(self.value) > clear and falls
