@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.configuration.readings import Readings
+from wheel_terra_estimator.configuration.configuration import Configuration, Readings
 from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     Coordinate,

@@ -66,8 +66,7 @@ from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
 from wheel_terra_estimator.estimation.inputs.contact_sensors import LeavingAngleInput, SinkageInput
 from wheel_terra_estimator.estimation.inputs.inertial import InertialInput, InertialWindow
-from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
-from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
+from wheel_terra_estimator.estimation.inputs.noise import NOTHING_STATED, SeenNoise, StatedNoise
 from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge, WheelSlip
