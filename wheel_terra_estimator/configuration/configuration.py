@@ -227,13 +227,7 @@ def _internal(name: str, value: Value) -> Any:
     return value
 
 
-def _number(values: Mapping[str, Value], key: str) -> float:
-    value = values[key]
-    assert isinstance(value, (int, float))
-    return float(value)
-
-
-def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSettings]:
+def _effects(values: Mapping[str, Any]) -> tuple[EffectSettings, EffectSettings]:
     enabled = [
         key.split('.')[1]
         for key, value in values.items()
@@ -248,8 +242,8 @@ def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSetting
             continue
         form = str(values.get(f'{prefix}.form', effect.form))
         chosen = effect.in_form(form).parameters
-        settings[name] = {p.name: _number(values, f'{prefix}.{p.name}') for p in chosen}
-        deviations[name] = {p.name: _number(values, f'{prefix}.{p.name}_std') for p in chosen}
+        settings[name] = {p.name: float(values[f'{prefix}.{p.name}']) for p in chosen}
+        deviations[name] = {p.name: float(values[f'{prefix}.{p.name}_std']) for p in chosen}
         if form != effect.form:
             settings[name]['form'] = form
     return settings, deviations
