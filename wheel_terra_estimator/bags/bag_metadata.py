@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from yaml import YAMLError
 
-from wheel_terra_estimator.configuration.ros_yaml import load_texts
+from wheel_terra_estimator.configuration.ros_yaml import TEXTS, load
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import read_text
 
@@ -42,7 +42,7 @@ def read(folder: Path) -> Metadata:
         return Metadata(fault=f'{NAME} is missing')
     try:
         # All values as text: no merge keys, no numbers of thousands of digits.
-        document = load_texts(read_text(path, LARGEST), MOST_VALUES)
+        document = load(read_text(path, LARGEST), TEXTS, aliases=True, most=MOST_VALUES)
         information = _a(dict, _a(dict, document)['rosbag2_bagfile_information'])
         counts: Counter[str] = Counter()
         for entry in _a(list, information['topics_with_message_count']):

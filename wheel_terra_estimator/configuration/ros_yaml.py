@@ -24,7 +24,7 @@ DEEPEST = 32  # levels of a document; ROS parameter files have about five
 
 MOST_VALUES = 20_000  # keys and values of a document; the largest of ours has about 400
 
-_EVENTS: Any = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)
+TEXTS: Any = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)  # scalars as they stand there
 
 
 def load(text: str, loader: Any, aliases: bool = False, most: int = MOST_VALUES) -> Any:
@@ -35,7 +35,7 @@ def load(text: str, loader: Any, aliases: bool = False, most: int = MOST_VALUES)
     Raises yaml.YAMLError for no YAML, too deep a nest, too many values, or an alias.
     """
     depth = 0
-    for count, event in enumerate(yaml.parse(text, Loader=_EVENTS)):  # however deep
+    for count, event in enumerate(yaml.parse(text, Loader=TEXTS)):  # however deep
         if count > most:
             raise _error(event, f'more than {most} keys and values')
         if isinstance(event, yaml.CollectionStartEvent):
@@ -47,11 +47,6 @@ def load(text: str, loader: Any, aliases: bool = False, most: int = MOST_VALUES)
         elif isinstance(event, yaml.AliasEvent) and not aliases:
             raise _error(event, f'*{event.anchor} is an alias, which ROS refuses; write it out')
     return yaml.load(text, Loader=loader)
-
-
-def load_texts(text: str, most: int = MOST_VALUES) -> Any:
-    """Return the document in a text, every scalar as it stands there; aliases are allowed."""
-    return load(text, _EVENTS, True, most)
 
 
 def _error(event: Any, problem: str) -> yaml.YAMLError:
