@@ -10,8 +10,8 @@ import pytest
 import yaml
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
+from wheel_terra_estimator.bags.salvage import RawMessage
 from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
-from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import jazzy_types, open_bag
 from wheel_terra_estimator.errors import UserError
 

@@ -19,10 +19,10 @@ from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from wheel_terra_estimator.bags import bag_metadata
+from wheel_terra_estimator.bags.salvage import RawMessage, Topic
 from wheel_terra_estimator.bags.salvage.compression import ZSTD_MAGIC, unpack_file, unpack_message
 from wheel_terra_estimator.bags.salvage.losses import Losses
 from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
-from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.bags.salvage.sqlite_file import SqliteFile
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import check_regular
