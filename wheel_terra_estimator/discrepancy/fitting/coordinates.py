@@ -10,8 +10,8 @@ How well each soil number is known: as stated, as the user says, or by the class
 A soil that somebody measured beside the wheel is known better than one out of a table of another
 laboratory, and that better than a proxy. The deviations of the classes of published numbers are the
 scatter between such numbers and the soils of ``config/soils/*_fit.yaml``, which were fitted to
-wheels (docs/diagnose.md); few fits, so that they are rounded and shared by
-numbers of one kind of test.
+wheels (docs/diagnose.md); few fits, so that they are rounded and shared by numbers of one kind of
+test.
 """
 
 from __future__ import annotations

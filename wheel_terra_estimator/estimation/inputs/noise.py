@@ -65,9 +65,7 @@ class StatedNoise(NamedTuple):
 
 NOTHING_STATED = StatedNoise()
 
-
 _LINE = 6.0  # variance of x1 - 2 x2 + x3 over that of each
-
 
 # How slowly it is learned, and within which bounds.
 _ONE_SECOND_IN = 4  # is learned from; the noise of sensors changes slowly
