@@ -25,7 +25,7 @@ from retries import pytest_sessionfinish, pytest_terminal_summary  # noqa: F401
 from rosbags.rosbag2 import writer as bag_writer
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.bags.storage import jazzy_types
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.messages.convert import INPUT_TYPES

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.bags.storage import jazzy_types
 from wheel_terra_estimator.messages.convert import JOINT_STATE
 from wheel_terra_estimator.messages.diagnostics import Status
 from wheel_terra_estimator.messages.pack import BASE_FRAME

@@ -9,8 +9,7 @@ from typing import Any
 from message_factory import serialised
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.message_types import jazzy_types
-from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.storage import jazzy_types, open_bag
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter
 from wheel_terra_estimator.messages.unpack import Message, unpack
 

@@ -38,7 +38,7 @@ from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import read_estimates
 from wheel_terra_estimator.bags.reader import MeasurementReader, parse_remaps
 from wheel_terra_estimator.bags.replay import Replay
-from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
+from wheel_terra_estimator.bags.salvage import RawMessage
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.bags.writer import (

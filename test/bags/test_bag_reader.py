@@ -10,11 +10,15 @@ import pytest
 from rosbags.interfaces import ConnectionExtRosbag2
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from wheel_terra_estimator.bags.message_types import jazzy_types
-from wheel_terra_estimator.bags.reader import MeasurementReader, in_one_line, parse_remaps, read
-from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.reader import MeasurementReader, in_one_line, parse_remaps
+from wheel_terra_estimator.bags.storage import jazzy_types, open_bag
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
+
+
+def read(path, remaps, configuration):
+    with open_bag(path) as bag:
+        yield from MeasurementReader(bag, remaps, configuration).measurements()
 
 
 def kinds(measurements: Any) -> Counter[str]:

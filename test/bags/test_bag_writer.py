@@ -13,8 +13,7 @@ import yaml
 from estimate_sets import STAMP, some_estimates
 
 from wheel_terra_estimator.bags.history import WHEEL_FIELDS, HistoryRecorder, read_estimates
-from wheel_terra_estimator.bags.message_types import jazzy_types
-from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.storage import jazzy_types, open_bag
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.frames import unit_of

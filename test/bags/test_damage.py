@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from wheel_terra_estimator.bags.salvage import limits
-from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
+from wheel_terra_estimator.bags.salvage import RawMessage, limits
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError

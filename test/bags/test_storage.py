@@ -10,10 +10,9 @@ import pytest
 import yaml
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.bags.salvage import RawMessage
 from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
-from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
-from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.storage import jazzy_types, open_bag
 from wheel_terra_estimator.errors import UserError
 
 

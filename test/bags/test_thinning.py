@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from estimate_sets import some_estimates as estimate_set
 
-from wheel_terra_estimator.bags.history import HistoryRecorder
-from wheel_terra_estimator.bags.thinning import ThinnedRows
+from wheel_terra_estimator.bags.history import HistoryRecorder, ThinnedRows
 from wheel_terra_estimator.reporting.drive_summary import summarise
 
 

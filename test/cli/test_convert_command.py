@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from wheel_terra_estimator.bags import reader as bag_reader
+from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.series_reader import read_series
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
@@ -87,11 +87,9 @@ def test_steering_angles_reach_the_measurements(files):
         },
         complete=False,
     )
-    odometry = [
-        measured
-        for _, measured in bag_reader.read(files / 'bag', {}, rover)
-        if isinstance(measured, WheelOdometry)
-    ]
+    with open_bag(files / 'bag') as bag:
+        measured = [m for _, m in MeasurementReader(bag, {}, rover).measurements()]
+    odometry = [m for m in measured if isinstance(m, WheelOdometry)]
     assert odometry[0].steering[0] == pytest.approx(math.radians(-30.0))
     assert math.isnan(odometry[0].steering[1])
     assert np.allclose(odometry[0].rate, 2.0 * math.pi)

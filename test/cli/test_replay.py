@@ -12,8 +12,7 @@ import pytest
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
-from wheel_terra_estimator.bags.message_types import messages_of
-from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.storage import messages_of, open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import read_values

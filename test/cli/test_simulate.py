@@ -5,10 +5,9 @@
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.bags.message_types import jazzy_types, messages_of
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.simulated_drive import TRUTH_TOPICS, write_simulated_drive
-from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.storage import jazzy_types, messages_of, open_bag
 from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.estimation.measurements import WheelOdometry

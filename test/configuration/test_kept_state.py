@@ -12,7 +12,7 @@ from wheel_terra_estimator.errors import UserError
 
 
 def read(folder, text):
-    path = soil_file.state_path(folder / 'soil.yaml')
+    path = folder / f'soil.yaml{soil_file.STATE}'
     path.write_text(text)
     return soil_file.read_state(path)
 

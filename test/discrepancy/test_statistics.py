@@ -24,6 +24,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     WORSE_SHARE,
     Coordinate,
     bounds,
+    deviations,
     effect_coordinates,
     soil_coordinates,
 )
@@ -36,7 +37,6 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
     kernel,
     slip_features,
 )
-from wheel_terra_estimator.discrepancy.fitting.soil_deviations import deviations
 from wheel_terra_estimator.discrepancy.report.words import _repeatability
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import confidence
@@ -132,7 +132,7 @@ def test_batched_model_is_the_package_model(forward):
 def linear_fit(rng, problem, columns, coordinates, at=0.0):
     """A linear model, linearised where all parameters are `at`."""
     sensitivity = rng.standard_normal((problem.size, columns)) * problem.std[:, None]
-    rotated = problem.rotate(sensitivity)
+    rotated = problem.rotation @ sensitivity
     u, outputs = np.full(columns, at), np.zeros((problem.size // 3, 4))
     outputs[problem.row, problem.quantity] = sensitivity @ u
     return Fit(
@@ -142,7 +142,7 @@ def linear_fit(rng, problem, columns, coordinates, at=0.0):
         outputs,
         np.zeros(problem.size // 3),
         sensitivity,
-        problem.rotate(problem.observed - sensitivity @ u),
+        problem.rotation @ (problem.observed - sensitivity @ u),
         rotated,
         np.ones(problem.size),
         0.0,
@@ -211,10 +211,10 @@ def test_gap_test_is_calibrated(forward, setting):
     for _ in range(200):
         shift = at_truth.sensitivity @ rng.standard_normal(len(soil))
         cells = problem.observed + shift + problem.std * rng.standard_normal(problem.size)
-        case = replace(at_truth, residual=problem.rotate(cells - problem.observed))
+        case = replace(at_truth, residual=problem.rotation @ (cells - problem.observed))
         squares.append(gap_test.chi_square_p_value(case, one))
     assert kstest(squares, 'uniform').pvalue > 1e-3
-    digging = problem.rotate(problem.flat(np.outer(0.004 * forward.points.slip, [1.0, 0, 0])))
+    digging = problem.rotation @ problem.flat(np.outer(0.004 * forward.points.slip, [1.0, 0, 0]))
     real = replace(at_truth, residual=digging)
     assert gap_test.chi_square_p_value(real, one) < 1e-3
 
@@ -409,7 +409,7 @@ def test_chi_square_is_that_of_the_best_parameters(setting):
     model = linear_fit(rng, problem, 2, coordinates, at=0.4)
     variance = np.full(problem.size, 1.3)
     rows = np.vstack([model.jacobian / np.sqrt(1.3), [1.0, 0.0]])
-    right = np.append(problem.rotate(problem.observed) / np.sqrt(1.3), 0.0)
+    right = np.append(problem.rotation @ problem.observed / np.sqrt(1.3), 0.0)
     rest = right - rows @ np.linalg.lstsq(rows, right, rcond=None)[0]
     expected = chi2.sf(float(rest @ rest), problem.size - 1)
     assert gap_test.chi_square_p_value(model, variance) == pytest.approx(expected, rel=1e-6)

@@ -9,8 +9,7 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
-from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
+from wheel_terra_estimator.estimation.inputs.noise import SeenNoise, StatedNoise
 from wheel_terra_estimator.estimation.measurements import StepInputs, WheelOdometry
 
 NAN = float('nan')

@@ -14,8 +14,11 @@ from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.smoothing.backward import smoothed_states
-from wheel_terra_estimator.estimation.smoothing.disk_buffer import DiskBuffer
-from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
+from wheel_terra_estimator.estimation.smoothing.history_buffer import (
+    DiskBuffer,
+    Gaussian,
+    HistoryBuffer,
+)
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 from wheel_terra_estimator.estimation.smoothing.window import Moment, centred
 from wheel_terra_estimator.simulation.drive import simulate

@@ -15,7 +15,7 @@ from wheel_terra_estimator.estimation.filter.speed_process import (
 )
 from wheel_terra_estimator.estimation.filter.state import SLIP_PER_DEMAND, SPEED, Prediction
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
-from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
+from wheel_terra_estimator.estimation.inputs.noise import StatedNoise
 
 NAN = float('nan')
 

@@ -11,7 +11,7 @@ import pytest
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
-from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
+from wheel_terra_estimator.estimation.inputs.noise import StatedNoise
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     InertialVariance,

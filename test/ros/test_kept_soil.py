@@ -15,10 +15,9 @@ from test_estimator_node import ROVER, hear
 
 from wheel_terra_estimator import output_folder
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.configuration.soil_file import HEADER, StuckState, write_values
+from wheel_terra_estimator.configuration.soil_file import HEADER, KeptSoil, StuckState, write_values
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog, why_no_arrival_log
-from wheel_terra_estimator.ros.kept_soil import KeptSoil
 
 LEARNED = {'soil.cohesion': 400.0, 'soil.cohesion_std': 100.0}
 STUCK = StuckState(True, 'wheels dig in', 90, 1)

@@ -20,7 +20,7 @@ DEMO = Path(__file__).resolve().parents[2] / 'data' / 'demo'
 
 def numbers(folder):
     """Return (topic, stamp or index) -> all fields of the message, of a bag of estimates."""
-    from wheel_terra_estimator.bags.message_types import jazzy_types
+    from wheel_terra_estimator.bags.storage import jazzy_types
 
     store = jazzy_types()
     found = {}

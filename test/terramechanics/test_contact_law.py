@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.estimation.contacts.resistive_table import rim_forces
+from wheel_terra_estimator.estimation.contacts.contact_models import rim_forces
 from wheel_terra_estimator.terramechanics.contact_law import (
     ResistiveForce,
     contact_law,

@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from wheel_terra_estimator.api.soils import Soil, configuration_of
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.configuration.readings import Readings
+from wheel_terra_estimator.configuration.configuration import Configuration, Readings
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import Columns, to_frame, unit_of
 from wheel_terra_estimator.terramechanics import soil as terramechanics_soil

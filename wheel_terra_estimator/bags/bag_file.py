@@ -14,9 +14,9 @@ from types import TracebackType
 from typing import Any, TypeVar
 from zlib import crc32
 
-from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.salvage import mcap_records as mcap
 from wheel_terra_estimator.bags.salvage.compression import unpack
+from wheel_terra_estimator.bags.storage import jazzy_types
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 
 Self = TypeVar('Self', bound='BagFile')

@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any, TypeVar
 
-from wheel_terra_estimator.configuration import bounded_yaml
+from yaml import YAMLError
+
+from wheel_terra_estimator.configuration.ros_yaml import TEXTS, load
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import read_text
 
@@ -40,7 +42,7 @@ def read(folder: Path) -> Metadata:
         return Metadata(fault=f'{NAME} is missing')
     try:
         # All values as text: no merge keys, no numbers of thousands of digits.
-        document = bounded_yaml.load_texts(read_text(path, LARGEST), MOST_VALUES)
+        document = load(read_text(path, LARGEST), TEXTS, aliases=True, most=MOST_VALUES)
         information = _a(dict, _a(dict, document)['rosbag2_bagfile_information'])
         counts: Counter[str] = Counter()
         for entry in _a(list, information['topics_with_message_count']):
@@ -56,7 +58,7 @@ def read(folder: Path) -> Metadata:
         return Metadata(fault=f'{NAME} was set aside (it has no {error.args[0]})')
     except UserError as error:
         return Metadata(fault=f'{NAME} was set aside ({str(error).removeprefix(f"{path}: ")})')
-    except (bounded_yaml.YAMLError, ValueError, TypeError, RecursionError):
+    except (YAMLError, ValueError, TypeError, RecursionError):
         return Metadata(fault=f'{NAME} was set aside (it cannot be understood)')
 
 

@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 
 from wheel_terra_estimator.bags.salvage import limits
-from wheel_terra_estimator.bags.storage import Bag, open_bag
+from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
 from wheel_terra_estimator.errors import UserError
@@ -22,18 +21,6 @@ from wheel_terra_estimator.messages.convert import (
     names_in_words,
 )
 from wheel_terra_estimator.messages.unpack import DamagedMessageError, Message, unpack
-
-
-def read(
-    path: str | Path, remaps: Mapping[str, str], configuration: Configuration
-) -> Iterator[tuple[int, Measurement]]:
-    """Yield (log time [ns], measurement) of all used topics of a bag, in the order of log times.
-
-    See `MeasurementReader` for the parameters and errors.
-    """
-    with open_bag(path) as bag:
-        yield from MeasurementReader(bag, remaps, configuration).measurements()
-
 
 NO_INPUTS = ('/wheel_terra_estimator/', '/ground_truth/')
 """Topics that look like inputs and are estimates or truth."""

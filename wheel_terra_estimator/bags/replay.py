@@ -16,10 +16,9 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
-from wheel_terra_estimator.bags.history import EstimateHistory, HistoryRecorder
+from wheel_terra_estimator.bags.history import MOST_ROWS, EstimateHistory, HistoryRecorder
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
-from wheel_terra_estimator.bags.thinning import MOST_ROWS
 from wheel_terra_estimator.bags.track import Track, TrackRecorder
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration

@@ -11,20 +11,22 @@ from __future__ import annotations
 import heapq
 import stat
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Protocol
+from typing import Any, Protocol
 
 from wheel_terra_estimator.bags import bag_metadata
+from wheel_terra_estimator.bags.salvage import RawMessage, Topic
 from wheel_terra_estimator.bags.salvage.compression import ZSTD_MAGIC, unpack_file, unpack_message
 from wheel_terra_estimator.bags.salvage.losses import Losses
 from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
-from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.bags.salvage.sqlite_file import SqliteFile
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import check_regular
+from wheel_terra_estimator.messages.unpack import TYPES, DamagedMessageError, unpack
 
 STORAGE_SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 
@@ -221,3 +223,33 @@ def _normal_type(name: str) -> str:
     """``sensor_msgs/Imu`` and ``sensor_msgs::msg::dds_::Imu_`` are ``sensor_msgs/msg/Imu``."""
     package, _, rest = name.replace('::', '/').partition('/')
     return f'{package}/msg/{rest.rpartition("/")[2].rstrip("_")}' if rest else name
+
+
+@cache
+def jazzy_types() -> Any:
+    """Return the types, which nobody changes: their (de)serialisers are compiled once a process."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def messages_of(bag: Bag, types: Mapping[str, str]) -> Iterator[tuple[int, str, Any]]:
+    """Yield log time [ns], topic and message of topics with their types; damaged ones left out.
+
+    A message is a `Message`, of types that the estimator does not hear one of rosbags.
+    """
+    for log_time, topic, data in bag.messages(tuple(types)):
+        try:
+            message = _message(types[topic], data)
+        except DamagedMessageError:
+            continue
+        yield log_time, topic, message
+
+
+def _message(kind: str, data: bytes) -> Any:
+    if kind in TYPES:
+        return unpack(kind, data)
+    try:
+        return jazzy_types().deserialize_cdr(data, kind)
+    except Exception as error:  # the library lets many kinds through on damaged bytes
+        raise DamagedMessageError(str(error)) from None

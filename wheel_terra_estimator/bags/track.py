@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IntArray
-from wheel_terra_estimator.bags.thinning import ThinnedRows
+from wheel_terra_estimator.bags.history import ThinnedRows
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading, Measurement, heading_of

@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IntArray
-from wheel_terra_estimator.bags.message_types import messages_of
+from wheel_terra_estimator.bags.history import ThinnedRows
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.series_reader import credible
-from wheel_terra_estimator.bags.storage import Bag
-from wheel_terra_estimator.bags.thinning import ThinnedRows
+from wheel_terra_estimator.bags.storage import Bag, messages_of
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.steering import headings
 from wheel_terra_estimator.estimation.estimates import SlipClass

@@ -289,7 +289,7 @@ def _of_sides(evidence: Evidence) -> Estimate:
 
     On the straight the sides differ by what the gyro sees, times the track that turns need.
     """
-    rows, turns = evidence.straight, track_ratio(evidence)
+    rows, turns = evidence.straight, told_track(evidence)
     unknown = not evidence.facts.has_sides() or (
         isinstance(turns, NotChecked) and turning.skids(evidence)
     )
@@ -322,7 +322,7 @@ def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
     gain, off = (evidence.figures.get(f'torque.gain{end}', math.nan) for end in ('', '_std'))
     # The torque over the radius is what slopes ask for; a track of the rims is what they turn by.
     told = [(Estimate(gain, off), ratio.value)]
-    turns = None if turning.skids(evidence) else track_ratio(evidence)
+    turns = None if turning.skids(evidence) else told_track(evidence)
     if isinstance(turns, Told):
         std = math.hypot(turns.ratio.std, TRACK_STD, ratio.std)
         rolling = 1.0 / evidence.figures['rover.speed_over_rim_speed']
@@ -340,7 +340,7 @@ def stated_track(evidence: Evidence) -> float:
     return float(lateral[side > 0].mean() - lateral[side < 0].mean())
 
 
-def track_ratio(evidence: Evidence) -> Told | NotChecked:
+def told_track(evidence: Evidence) -> Told | NotChecked:
     """Return effective over configured track from the gyro and the difference of the sides."""
     facts, difference = evidence.facts, evidence.side_difference
     if evidence.gyro is None or not facts.known or not facts.has_sides():
@@ -372,7 +372,7 @@ def rolling_track(evidence: Evidence) -> Told | NotChecked:
 
     Slip and a wrong radius widen the track of the turns as they slow the straights.
     """
-    told = track_ratio(evidence)
+    told = told_track(evidence)
     if isinstance(told, NotChecked):
         return told
     soft = evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
@@ -391,7 +391,7 @@ def check_track(evidence: Evidence) -> list[Outcome]:
         return [untold('track', 'counts')]
     if rounding(evidence) > MOST_ROUNDING:
         return [untold('track', 'rounded')]
-    told = track_ratio(evidence)
+    told = told_track(evidence)
     if isinstance(told, NotChecked):
         return [told]
     (ratio, trial, alone), stated = told, stated_track(evidence)

@@ -50,12 +50,12 @@ CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES = (30.0, 110.0)  # gyro over orientation if in degrees per second [-]
+IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # the same over wheels, which slip and skid in turns [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
 LEAST_TURNED = 0.1  # turn in that time, which no rolling of a pitched body is [rad]
 LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
 TIE = 1e-3  # residuals [-] that differ by less are the same
 NOISE_FLOOR = 0.02  # residual [-] by which hypotheses must differ at least
-GYRO_DEGREES = (0.004, 0.07)  # effective over stated track by a gyro in degrees [-]
 MOST_SCALED = 0.2  # residual in turns beside such a gyro, at most [-]
 
 
@@ -504,13 +504,14 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if ratio is None:
         return [untold('unit', 'gyro_no_turn')], evidence
     # Of exchanged wheels the sides turn alike, but not the wheels of a side.
-    scaled = GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]
+    times = 1.0 / abs(ratio)
+    scaled = IN_DEGREES_BY_WHEELS[0] < times < IN_DEGREES_BY_WHEELS[1]
     moving = evidence.moving
     turned = np.quantile(np.abs(evidence.yaw[moving]), 0.95) * np.ptp(facts.lateral)
     slips = turned < np.nanquantile(np.abs(evidence.speed[moving]), 0.95)
     if not scaled or slips or left_in_turns(evidence) > MOST_SCALED:
         return [], evidence
-    return _in_degrees(evidence, 1.0 / abs(ratio), 'turning of the wheels')
+    return _in_degrees(evidence, times, 'turning of the wheels')
 
 
 def _in_degrees(evidence: Evidence, times: float, how: str) -> tuple[list[Outcome], Evidence]:

@@ -181,7 +181,11 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
         arguments.soil_known_to,
     )
     diagnosis = diagnose(table, configuration, reference, options)
-    diagnosis = _with_effect_file(diagnosis, own)
+    # The model file names the file of a named effect, so that it is accepted as it is.
+    files = {own[effect.name] for effect in diagnosis.effects if effect.name in own}
+    if len(files) == 1:  # two: the user has to put them into one
+        named = diagnosis.configuration.replace({'effect_file': str(files.pop())})
+        diagnosis = replace(diagnosis, configuration=named)
     if not configuration.soil_stated:
         note = 'no soil was stated (--config): the default sand was taken for the model believed in'
         diagnosis = replace(diagnosis, notes=(*diagnosis.notes, note))
@@ -268,15 +272,6 @@ def _load_effects(files: list[Path]) -> dict[str, Path]:
         except ValueError as error:
             raise UserError(f'--effects {error}') from None
     return found
-
-
-def _with_effect_file(diagnosis: Diagnosis, own: dict[str, Path]) -> Diagnosis:
-    """Let the model file name the file of a named effect, so that it is accepted as it is."""
-    files = {own[effect.name] for effect in diagnosis.effects if effect.name in own}
-    if len(files) != 1:
-        return diagnosis  # two files: the user has to put them into one
-    configuration = diagnosis.configuration.replace({'effect_file': str(files.pop())})
-    return replace(diagnosis, configuration=configuration)
 
 
 def _read(path: Path, arguments: argparse.Namespace, configuration: Configuration) -> SteadyTable:

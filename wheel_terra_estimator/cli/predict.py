@@ -18,7 +18,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.configuration import reader as configuration_reader
-from wheel_terra_estimator.configuration.readings import Readings
+from wheel_terra_estimator.configuration.configuration import Readings
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,

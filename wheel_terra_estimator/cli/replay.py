@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -137,20 +136,26 @@ def _options(arguments: argparse.Namespace) -> Options:
     )
 
 
+_ENDINGS = {
+    'report': (('.html', '.htm'), 'a report is an HTML page; give it a name that ends in .html'),
+    'table': (('.csv', '.parquet'), 'a table ends in .csv or .parquet'),
+    'track': (('.csv',), 'a track ends in .csv'),
+}
+"""Option that names a file -> how it may end, and what is said of another."""
+
+
 def _check_kinds(arguments: argparse.Namespace) -> list[Path]:
     """Refuse files whose names promise another format; return all that are to be written."""
-    from wheel_terra_estimator.reporting import estimates_table
-    from wheel_terra_estimator.reporting.html import check_page
+    from wheel_terra_estimator.reporting.estimates_table import PARQUET, pandas_for
 
-    kinds: tuple[tuple[Path | None, Callable[[Path], None]], ...] = (
-        (arguments.report, check_page),
-        (arguments.table, estimates_table.check_table),
-        (arguments.track, estimates_table.check_track),
-    )
-    for path, check in kinds:
-        if path:
-            check(path)
-    return [path for path, _ in kinds if path]
+    paths: dict[str, Path] = {o: p for o in _ENDINGS if (p := getattr(arguments, o))}
+    for option, path in paths.items():
+        endings, words = _ENDINGS[option]
+        if path.suffix.lower() not in endings:
+            raise UserError(f'{path}: {words}')
+        if path.suffix.lower() == PARQUET:
+            pandas_for(path)
+    return list(paths.values())
 
 
 def _check_outputs(arguments: argparse.Namespace) -> None:

@@ -13,8 +13,7 @@ from typing import Any
 
 import yaml
 
-from wheel_terra_estimator.configuration import bounded_yaml
-from wheel_terra_estimator.configuration.ros_yaml import in_words
+from wheel_terra_estimator.configuration.ros_yaml import in_words, load
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import read_text
 
@@ -102,7 +101,7 @@ def read_map(path: Path) -> Mapping[Any, Any]:
     Raises UserError where it cannot be read, or is no map.
     """
     try:
-        document = bounded_yaml.load(read_text(path), yaml.SafeLoader)
+        document = load(read_text(path), yaml.SafeLoader)
     except yaml.YAMLError as error:
         raise UserError(f'{path}: {in_words(error)}') from None
     except ValueError as error:

@@ -12,10 +12,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration import ros_yaml
 from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
+from wheel_terra_estimator.terramechanics.model import SteadyState
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS
 from wheel_terra_estimator.terramechanics.wheel import Wheel
@@ -225,13 +227,7 @@ def _internal(name: str, value: Value) -> Any:
     return value
 
 
-def _number(values: Mapping[str, Value], key: str) -> float:
-    value = values[key]
-    assert isinstance(value, (int, float))
-    return float(value)
-
-
-def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSettings]:
+def _effects(values: Mapping[str, Any]) -> tuple[EffectSettings, EffectSettings]:
     enabled = [
         key.split('.')[1]
         for key, value in values.items()
@@ -246,8 +242,8 @@ def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSetting
             continue
         form = str(values.get(f'{prefix}.form', effect.form))
         chosen = effect.in_form(form).parameters
-        settings[name] = {p.name: _number(values, f'{prefix}.{p.name}') for p in chosen}
-        deviations[name] = {p.name: _number(values, f'{prefix}.{p.name}_std') for p in chosen}
+        settings[name] = {p.name: float(values[f'{prefix}.{p.name}']) for p in chosen}
+        deviations[name] = {p.name: float(values[f'{prefix}.{p.name}_std']) for p in chosen}
         if form != effect.form:
             settings[name]['form'] = form
     return settings, deviations
@@ -269,3 +265,38 @@ def law(values: Mapping[str, Value], prefix: str) -> tuple[dict[str, float], dic
         stds = stds * len(lists['coefficients'])
     pairs = lists['targets'], lists['features']
     return coefficients_of(*pairs, lists['coefficients']), coefficients_of(*pairs, stds)
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Stated gains and zeros of sinkage [m], drawbar pull [N] and torque [N m].
+
+    A sensor reads ``gain * true + zero`` where the model says what is true.
+    """
+
+    # ``gain``, ``zero``: (3,), or (N, 3) where rows differ
+    gain: FloatArray
+    zero: FloatArray
+
+    @classmethod
+    def of(cls, configuration: Configuration, wheel: int = 0) -> Readings:
+        """Return the errors that ``sensors.*`` states for one wheel; of the pull it states none."""
+        sensors = configuration.sensors
+        return cls(
+            np.array([sensors.sinkage_gain[wheel], 1.0, sensors.torque_gain[wheel]]),
+            np.array([sensors.sinkage_zero[wheel], 0.0, sensors.torque_zero[wheel]]),
+        )
+
+    def true_on(self, rows: BoolArray) -> Readings:
+        """Return (N, 3) errors, none on the given rows: theirs were taken off before."""
+        true = rows[:, None]
+        return Readings(np.where(true, 1.0, self.gain), np.where(true, 0.0, self.zero))
+
+    def read(self, true: FloatArray) -> FloatArray:
+        """Return the readings of true values; quantities on the last axis."""
+        return true * self.gain + self.zero
+
+    def of_answer(self, state: SteadyState) -> dict[str, FloatArray]:
+        """Return the readings (N,) of each of `OUTPUTS` where the model gives an answer."""
+        true = np.column_stack([getattr(state, name) for name in OUTPUTS])
+        return dict(zip(OUTPUTS, self.read(true).T, strict=True))

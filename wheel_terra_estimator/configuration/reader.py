@@ -25,10 +25,10 @@ from wheel_terra_estimator.configuration.parameters import (
     nearest,
 )
 from wheel_terra_estimator.configuration.ros_yaml import Value
-from wheel_terra_estimator.configuration.soil_units import doubtful_units
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
 from wheel_terra_estimator.terramechanics.contact_law import RESISTIVE_FORCE
 from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.soil import doubtful_units
 
 # Parameters that every ROS node has; they may stand in the same file.
 STANDARD_PARAMETERS = ('use_sim_time', 'start_type_description_service')

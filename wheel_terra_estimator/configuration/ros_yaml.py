@@ -4,7 +4,7 @@
 
 PyYAML follows YAML 1.1, ROS follows C: ``1.8e6`` is a number there, ``010`` is eight, ``1_000`` a
 string. The rules of ROS are applied to every plain scalar, by a loader class of our own; PyYAML's
-global loaders stay as they are.
+global loaders stay as they are. No document can blow up: `load` bounds depth and number of values.
 """
 
 from __future__ import annotations
@@ -17,9 +17,41 @@ from typing import Any, TypeAlias
 
 import yaml
 
-from wheel_terra_estimator.configuration import bounded_yaml
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import read_text
+
+DEEPEST = 32  # levels of a document; ROS parameter files have about five
+
+MOST_VALUES = 20_000  # keys and values of a document; the largest of ours has about 400
+
+TEXTS: Any = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)  # scalars as they stand there
+
+
+def load(text: str, loader: Any, aliases: bool = False, most: int = MOST_VALUES) -> Any:
+    """Return the document in a text.
+
+    ``text``: the document; its size is bounded by whoever read it. ``aliases``: whether ``*name``
+    is allowed. ROS parameter files have none, and a few of them can stand for billions of values.
+    Raises yaml.YAMLError for no YAML, too deep a nest, too many values, or an alias.
+    """
+    depth = 0
+    for count, event in enumerate(yaml.parse(text, Loader=TEXTS)):  # however deep
+        if count > most:
+            raise _error(event, f'more than {most} keys and values')
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > DEEPEST:
+                raise _error(event, f'nested deeper than {DEEPEST} levels')
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        elif isinstance(event, yaml.AliasEvent) and not aliases:
+            raise _error(event, f'*{event.anchor} is an alias, which ROS refuses; write it out')
+    return yaml.load(text, Loader=loader)
+
+
+def _error(event: Any, problem: str) -> yaml.YAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
+
 
 NODE_NAME = 'wheel_terra_estimator'
 
@@ -119,7 +151,7 @@ def parse_value(text: str, source: str) -> Value:
 
 def _loaded(text: str, source: object) -> Any:
     try:
-        return bounded_yaml.load(text, _RosLoader)
+        return load(text, _RosLoader)
     except yaml.YAMLError as error:
         raise UserError(f'{source}: {in_words(error)}') from None
 

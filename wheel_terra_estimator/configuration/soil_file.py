@@ -5,16 +5,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.configuration import ros_yaml
+from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import read_text
-from wheel_terra_estimator.output_folder import new_file
+from wheel_terra_estimator.output_folder import cannot_write, check_target, new_file, try_to_write
 
 _LATEST_STAMP = 2**63 - 1  # [ns]
 HEADER = 'Learned by the estimator on the drive; read at its next start.'
@@ -34,11 +35,6 @@ class StuckState:
     # ``~/stuck_direction``: of the rims that led to it, 1 forward, -1 backward, 0 none, both or
     # unknown
     direction: int = 0
-
-
-def state_path(soil_file: Path) -> Path:
-    """Return where the warning is kept beside a soil file."""
-    return soil_file.with_name(f'{soil_file.name}{STATE}')
 
 
 def read_values(soil_file: Path) -> dict[str, Any]:
@@ -126,3 +122,75 @@ def _why_no_state(path: Path) -> str:
 def _in_range(value: Any, lower: float, upper: float) -> bool:
     values = value if isinstance(value, (list, tuple)) else [value]
     return all(lower <= item <= upper for item in values)
+
+
+class KeptSoil:
+    """Soil, sensor biases and stuck warning of one node in the file of its ``soil_file``.
+
+    A file that may never be written to is refused; what may change (a disk that is full) is told in
+    `fault`.
+
+    ``inputs``: other files that the node reads. Raises UserError where the file is none of this
+    program, or one of `inputs`.
+    """
+
+    def __init__(self, path: Path, inputs: Iterable[Path] = ()) -> None:
+        self.path = path.resolve()
+        self.fault = ''  # why nothing is kept, in words; empty where it is
+        self._unusable = ''
+        try:
+            check_target(self.path, True, inputs, foreign=why_foreign)
+        except UserError as error:
+            raise UserError(
+                f'soil_file: {error}, or leave it out of the files that the node reads: it is '
+                'read at the start without that'
+            ) from None
+        self._state_path = self.path.with_name(f'{self.path.name}{STATE}')
+        try:
+            try_to_write(self.path)
+        except UserError as error:
+            self.fault = str(error)
+
+    def values(self, configuration: Configuration) -> dict[str, Any]:
+        """Return the parameters that were kept; those that do not suit the rover are left alone."""
+        try:
+            kept = read_values(self.path)
+            configuration.replace(kept)
+        except UserError as error:
+            self._unusable = f'not used, and not written to before it is removed: {error}'
+            self.fault = self._unusable
+            return {}
+        return kept
+
+    def warning(self) -> StuckState:
+        """Return the stuck warning that was kept."""
+        try:
+            return read_state(self._state_path)
+        except UserError as error:
+            self.fault = str(error)
+            return StuckState()
+
+    def save(self, learned: Mapping[str, Any], warning: StuckState) -> None:
+        """Write what was learned, if anything, and the warning.
+
+        Raises UserError where it cannot be written, or must not be; also in `fault`.
+        """
+        try:
+            try:
+                if learned and self._unusable:
+                    raise UserError(self._unusable)
+                if learned:
+                    write_values(self.path, learned)
+            finally:
+                write_state(self._state_path, warning)
+        except UserError as error:
+            self.fault = str(error)
+            raise
+        self.fault = self._unusable
+
+    def forget_warning(self) -> None:
+        """Remove the warning that was kept."""
+        try:
+            self._state_path.unlink(missing_ok=True)
+        except OSError as error:
+            self.fault = str(cannot_write(self._state_path, error))

@@ -11,16 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.configuration.readings import Readings
+from wheel_terra_estimator.configuration.configuration import Configuration, Readings
 from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     Coordinate,
     base_coordinates,
+    deviations,
     soil_coordinates,
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
-from wheel_terra_estimator.discrepancy.fitting.soil_deviations import deviations
 from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
 from wheel_terra_estimator.discrepancy.selection.search import search

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Typed measurements: what the estimator hears, whatever brought it (a topic, a bag row, a test).
 
-All stamps are integer nanoseconds; all vectors are in ``base_link`` (REP 103: x forward, y left,
-z up) in SI units. ``nan`` marks a wheel that the message did not hold or could not measure.
+All stamps are integer nanoseconds, of the time of measurement; all vectors are in ``base_link``
+(REP 103: x forward, y left, z up) in SI units. ``nan`` marks a wheel that the message did not hold
+or could not measure.
 """
 
 from __future__ import annotations
@@ -19,25 +20,14 @@ from wheel_terra_estimator.arrays import FloatArray
 
 @dataclass(frozen=True)
 class WheelOdometry:
-    """Wheel rates and drive torques, one entry per wheel in the order of ``wheels.names``.
-
-    Attributes
-    ----------
-    stamp : int
-        Time of the measurement [ns].
-    rate : numpy.ndarray
-        (n,) wheel rate, positive forward after the wheel's direction was applied [rad/s]; nan
-        where the message did not hold the wheel.
-    torque : numpy.ndarray
-        (n,) drive torque, positive when it drives the wheel forward [N m]; nan where unknown.
-    steering : numpy.ndarray or None
-        (n,) steering angle, positive left [rad]; nan where the message did not hold it or the wheel
-        is not steered; None where it held none.
-    """
+    """Wheel rates and drive torques, (n,) in the order of ``wheels.names``."""
 
     stamp: int
+    # Positive forward after the wheel's direction was applied [rad/s]; nan: not in the message
     rate: FloatArray
-    torque: FloatArray
+    torque: FloatArray  # positive when it drives the wheel forward [N m]; nan where unknown
+    # Positive left [rad]; nan where the message did not hold it or the wheel is not steered; None
+    # where it held none
     steering: FloatArray | None = None
 
 
@@ -54,27 +44,14 @@ NO_VARIANCE = InertialVariance()
 
 @dataclass(frozen=True)
 class InertialReading:
-    """One IMU message, already turned into ``base_link``; a vector that is unknown is nan.
-
-    Attributes
-    ----------
-    stamp : int
-        Time of the measurement [ns].
-    specific_force : numpy.ndarray
-        (3,) specific force, +g on z at rest [m/s^2] (REP 145).
-    angular_rate : numpy.ndarray
-        (3,) angular rate [rad/s].
-    orientation : numpy.ndarray or None
-        (4,) unit quaternion x, y, z, w of ``base_link`` in the world; None when not reported.
-    variance : InertialVariance
-        As the message states it.
-    """
+    """One IMU message, already turned into ``base_link``; a vector that is unknown is nan."""
 
     stamp: int
-    specific_force: FloatArray
-    angular_rate: FloatArray
+    specific_force: FloatArray  # (3,) +g on z at rest [m/s^2] (REP 145)
+    angular_rate: FloatArray  # (3,) [rad/s]
+    # (4,) unit quaternion x, y, z, w of ``base_link`` in the world; None when not reported
     orientation: FloatArray | None
-    variance: InertialVariance = NO_VARIANCE
+    variance: InertialVariance = NO_VARIANCE  # as the message states it
 
 
 def heading_of(orientation: FloatArray) -> Any:
@@ -101,27 +78,13 @@ class LeavingAngleReading:
 
 @dataclass(frozen=True)
 class ReferenceVelocity:
-    """Body velocity from a slip-free source (visual odometry, GNSS).
-
-    Attributes
-    ----------
-    stamp : int
-        Time of the measurement [ns].
-    forward : float
-        Velocity of ``base_link`` along its x axis [m/s].
-    variance : float
-        Variance of ``forward`` [(m/s)^2]; 0 or less = not stated.
-    lateral : float
-        Velocity along its y axis [m/s]; nan = not told.
-    lateral_variance : float
-        Variance of ``lateral`` [(m/s)^2]; 0 or less = not stated.
-    """
+    """Body velocity from a slip-free source (visual odometry, GNSS)."""
 
     stamp: int
-    forward: float
-    variance: float
-    lateral: float = math.nan
-    lateral_variance: float = 0.0
+    forward: float  # velocity of ``base_link`` along its x axis [m/s]
+    variance: float  # of ``forward`` [(m/s)^2]; 0 or less = not stated
+    lateral: float = math.nan  # velocity along its y axis [m/s]; nan = not told
+    lateral_variance: float = 0.0  # of ``lateral`` [(m/s)^2]; 0 or less = not stated
 
 
 Measurement: TypeAlias = (

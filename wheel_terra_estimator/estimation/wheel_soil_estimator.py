@@ -64,10 +64,13 @@ from wheel_terra_estimator.estimation.filter.state import (
 )
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
-from wheel_terra_estimator.estimation.inputs.contact_sensors import LeavingAngleInput, SinkageInput
+from wheel_terra_estimator.estimation.inputs.contact_sensors import (
+    SMOOTHED_NOISE,
+    LeavingAngleInput,
+    SinkageInput,
+)
 from wheel_terra_estimator.estimation.inputs.inertial import InertialInput, InertialWindow
-from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
-from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
+from wheel_terra_estimator.estimation.inputs.noise import NOTHING_STATED, SeenNoise, StatedNoise
 from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge, WheelSlip
@@ -147,7 +150,7 @@ class WheelSoilEstimator:
         self._demand = Demand()
         self._torque_coefficient = Demand()
         self._climb = SteepestClimb()
-        angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
+        angle_std = sensors.leaving_angle_std * SMOOTHED_NOISE
         self._linearisation = Linearisation(rover, layout, models, angle_std)
         self._stationary = StationaryWheels(rover, sensors, layout, models)
         self._pulls = Pulls(rover, sensors, level)

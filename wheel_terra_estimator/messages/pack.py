@@ -131,8 +131,8 @@ def imu(
 def slip_classes(classes: Sequence[int]) -> bytes:
     """Return a ``std_msgs/msg/UInt8MultiArray`` of one dimension, ``wheel``."""
     count, no_offset = len(classes), 0
-    label = _padded(struct.pack('<I', 1) + _string('wheel'), 4)
-    return _HEAD + label + struct.pack('<4I', count, count, no_offset, count) + bytes(classes)
+    layout = struct.pack('<4I', count, count, no_offset, count)
+    return _HEAD + _ONE_DIMENSION + layout + bytes(classes)
 
 
 def flag(value: bool) -> bytes:
@@ -202,3 +202,7 @@ def _string(text: str) -> bytes:
 def _padded(content: bytes, size: int) -> bytes:
     """Fill up bytes behind the stamp (or the head) to a multiple of ``size``, which divides 8."""
     return content + bytes(-len(content) % size)
+
+
+_ONE_DIMENSION = _padded(struct.pack('<I', 1) + _string('wheel'), 4)
+"""Number and name of the dimensions of the slip classes."""

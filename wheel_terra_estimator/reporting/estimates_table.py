@@ -16,15 +16,7 @@ from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
 
-SUFFIXES = ('.csv', '.parquet')
-
-
-def check_table(path: Path) -> None:
-    """Refuse, before anything is computed, a table that cannot be written."""
-    if path.suffix not in SUFFIXES:
-        raise UserError(f'{path}: a table ends in .csv or .parquet')
-    if path.suffix == '.parquet':
-        _pandas(path)
+PARQUET = '.parquet'
 
 
 def columns_of(history: EstimateHistory) -> dict[str, Any]:
@@ -45,13 +37,14 @@ def columns_of(history: EstimateHistory) -> dict[str, Any]:
 def write_table(history: EstimateHistory, path: Path) -> None:
     """Write the table as CSV, or as Parquet by the ending of ``path``."""
     table = columns_of(history)
-    if path.suffix == '.parquet':
-        _pandas(path).DataFrame(table).to_parquet(path, index=False)
+    if path.suffix.lower() == PARQUET:
+        pandas_for(path).DataFrame(table).to_parquet(path, index=False)
         return
     write_csv(path, table, zip(*(column.tolist() for column in table.values()), strict=True))
 
 
-def _pandas(path: Path) -> Any:
+def pandas_for(path: Path) -> Any:
+    """Return pandas, by which Parquet is written; refuse where it is missing."""
     try:
         pandas = importlib.import_module('pandas')
         importlib.import_module('pyarrow')  # pandas writes Parquet with it
@@ -65,12 +58,6 @@ def _pandas(path: Path) -> Any:
 
 WHOLE = ('slip_class', 'stuck')  # columns of whole numbers
 DIGITS = 6  # significant ones in a table
-
-
-def check_track(path: Path) -> None:
-    """Refuse, before anything is computed, a map that cannot be written."""
-    if path.suffix != '.csv':
-        raise UserError(f'{path}: a track ends in .csv')
 
 
 def write_track(track: Track, path: Path) -> None:

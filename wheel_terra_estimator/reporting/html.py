@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.glossary import used_in
 from wheel_terra_estimator.output_folder import new_file
 
@@ -64,12 +63,6 @@ def write_page(path: Path, page: str, overwrite: bool) -> None:
     """Write a page, whole or not at all."""
     with new_file(path, overwrite) as fresh:
         fresh.write_text(page, encoding='utf-8')
-
-
-def check_page(path: Path) -> None:
-    """Refuse, before anything is computed, a page whose name promises another format."""
-    if path.suffix.lower() not in ('.html', '.htm'):
-        raise UserError(f'{path}: a report is an HTML page; give it a name that ends in .html')
 
 
 def picture(figure: Figure) -> str:

@@ -34,7 +34,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import declared
-from wheel_terra_estimator.configuration.soil_file import StuckState
+from wheel_terra_estimator.configuration.soil_file import KeptSoil, StuckState
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages.convert import DAMAGED, INPUT_TYPES
@@ -44,7 +44,6 @@ from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
 from wheel_terra_estimator.ros import parameters
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
-from wheel_terra_estimator.ros.kept_soil import KeptSoil
 from wheel_terra_estimator.ros.outputs import EstimatePublisher
 from wheel_terra_estimator.ros.qos import FREQUENT, OVERRIDABLE, check_overrides, input_profile
 

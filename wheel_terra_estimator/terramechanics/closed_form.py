@@ -89,7 +89,15 @@ class BranchForces:
         self._drift = contact.lateral_ratio / self._modulus
         self._roll = contact.velocity_ratio / self._modulus
         self._turn = turn = R / self._modulus
-        self._set_skid(contact.velocity_ratio / R - 1.0, contact.lateral_ratio / R)
+        skid = contact.velocity_ratio / R - 1.0
+        self._turns_back = bool(np.any(skid > 0.0))
+        # Where nodes take over from the centroids.
+        share = np.maximum((skid - _TAKE_OVER_AT) / _TAKE_OVER, 0.0)
+        if self._sideways:
+            share = share + np.abs(contact.lateral_ratio / R) / _SIDEWAYS_TAKE_OVER
+        share = np.minimum(share, 1.0)
+        self._skidding = bool(np.any(share > 0.0))
+        self._skid = share * share * (3.0 - 2.0 * share)
         self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
         square_front, square_rear = front * front, rear * rear
         # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
@@ -107,16 +115,6 @@ class BranchForces:
         grip, cling = R * contact.tan_friction, R * contact.cohesion
         self._friction_front, self._friction_rear = grip * front, grip * rear
         self._cohesion_front, self._cohesion_rear = cling * front, cling * rear
-
-    def _set_skid(self, skid: Any, side: Any) -> None:
-        """Note where nodes take over from the centroids: skid [-], lateral speed over w R [-]."""
-        self._turns_back = bool(np.any(skid > 0.0))
-        share = np.maximum((skid - _TAKE_OVER_AT) / _TAKE_OVER, 0.0)
-        if self._sideways:
-            share = share + np.abs(side) / _SIDEWAYS_TAKE_OVER
-        share = np.minimum(share, 1.0)
-        self._skidding = bool(np.any(share > 0.0))
-        self._skid = share * share * (3.0 - 2.0 * share)
 
     @property
     def exponent(self) -> Any:

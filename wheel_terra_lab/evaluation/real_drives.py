@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -180,15 +180,25 @@ def _late_classes(event: SnowEvent, kept: Record) -> tuple[int, int]:
     return late, runs
 
 
+def measurements_of(
+    bag: Path, remaps: Mapping[str, str], configuration: Configuration
+) -> Iterator[Measurement]:
+    """Yield the measurements in a bag, in the order of log times."""
+    from wheel_terra_estimator.bags.reader import MeasurementReader
+    from wheel_terra_estimator.bags.storage import open_bag
+
+    with open_bag(bag) as opened:
+        for _, measurement in MeasurementReader(opened, remaps, configuration).measurements():
+            yield measurement
+
+
 def pathfinder_record(bag: Path, reference_rate: float) -> Record:
     """Run the estimator over the Pathfinder bag; `reference_rate` 0 = without the reference."""
-    from wheel_terra_estimator.bags.reader import read
-
     configuration = reader.load(['pathfinder'], [f'reference_odom_max_rate:={reference_rate}'])
     remaps = {'reference_odom': '/truth/odometry'}
     given = (
         m
-        for _, m in read(bag, remaps, configuration)
+        for m in measurements_of(bag, remaps, configuration)
         if reference_rate > 0.0 or not isinstance(m, ReferenceVelocity)
     )
     return record(*run_estimator(configuration, given))

@@ -32,7 +32,6 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.bags.reader import read
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -47,6 +46,7 @@ from wheel_terra_estimator.estimation.measurements import (
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import Scenario, load
 from wheel_terra_lab.evaluation import kinds
+from wheel_terra_lab.evaluation.real_drives import measurements_of
 from wheel_terra_lab.evaluation.runner import inputs_of_mode
 
 PACKAGE = Path(__file__).resolve().parents[2]
@@ -235,7 +235,7 @@ def recorded_drives(measured: Path | None) -> Iterator[Recording]:
 
 def bag(folder: Path, configuration: Configuration, remaps: dict[str, str]) -> Iterator[Recording]:
     """Yield a recording with its reference velocity, and without where it has one."""
-    given = [m for _, m in read(folder, remaps, configuration)]
+    given = list(measurements_of(folder, remaps, configuration))
     if len(given) > 40_000:  # an IMU at 250 Hz: half of the drive does
         given = given[: len(given) // 2]
     yield Recording(f'{folder.name}/reference', configuration, given)

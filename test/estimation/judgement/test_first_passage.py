@@ -10,17 +10,18 @@ from parts import SAND
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
-from wheel_terra_estimator.estimation.judgement.stuck.forecast import StuckSettings, outlook
-from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
-from wheel_terra_estimator.estimation.judgement.stuck.passage import (
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import (
     DIGGING,
     RETURN_LENGTH,
     SCATTER,
     TRAVELS,
     USUAL_SLIP,
     USUAL_STD,
+    StuckSettings,
+    outlook,
     passage_probability,
 )
+from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     Memory,
     RoverMotion,

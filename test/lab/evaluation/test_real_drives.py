@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.bags.reader import read
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_lab.evaluation import real_drives
 from wheel_terra_lab.evaluation.runner import run_estimator
@@ -74,7 +73,7 @@ def test_a_shaking_husky_on_firm_ground_is_not_stuck():
     """Wheel rates and an IMU of 1 m/s^2 of vibration are all that tells: no slip is told."""
     configuration = reader.from_parameters(HUSKY)
     bag = MEASURED / 'bags' / 'boreal_husky_flooring_00_mcap'
-    measurements = [m for _, m in read(bag, {}, configuration)]
+    measurements = list(real_drives.measurements_of(bag, {}, configuration))
     end = measurements[0].stamp + 20 * 10**9
     sets, _ = run_estimator(configuration, [m for m in measurements if m.stamp < end])
     assert len(sets) > 120

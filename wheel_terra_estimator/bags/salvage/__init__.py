@@ -4,3 +4,23 @@
 
 It knows nothing of rovers: of the package it imports nothing but its error.
 """
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class RawMessage(NamedTuple):
+    """A message as it lies in the bag; ``log_time`` in ns, ``data`` in CDR."""
+
+    log_time: int
+    topic: str
+    data: bytes
+
+
+class Topic(NamedTuple):
+    """A topic of the bag, ``type`` as in ``sensor_msgs/msg/Imu``."""
+
+    name: str
+    type: str
+    message_count: int

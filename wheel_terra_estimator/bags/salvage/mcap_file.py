@@ -24,12 +24,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
 
-from wheel_terra_estimator.bags.salvage import limits
+from wheel_terra_estimator.bags.salvage import RawMessage, Topic, limits
 from wheel_terra_estimator.bags.salvage import mcap_records as mcap
 from wheel_terra_estimator.bags.salvage.compression import MAGICS, bomb, unpack
 from wheel_terra_estimator.bags.salvage.limits import MEGABYTE, in_words
 from wheel_terra_estimator.bags.salvage.losses import Losses
-from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.errors import UserError
 
 _FOOTER = mcap.HEAD + 20 + len(mcap.MAGIC)  # [byte], with the closing magic

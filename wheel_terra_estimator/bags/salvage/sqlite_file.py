@@ -20,9 +20,8 @@ from urllib.parse import quote
 
 import numpy as np
 
-from wheel_terra_estimator.bags.salvage import limits
+from wheel_terra_estimator.bags.salvage import RawMessage, Topic, limits
 from wheel_terra_estimator.bags.salvage.losses import Losses
-from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.errors import UserError
 
 # Damaged text may stand in the library's own message, which is decoded as UTF-8.

@@ -152,7 +152,7 @@ def _distance(
     """Distance d' of the chosen prediction from the competitor's best refit to it (linear)."""
     problem = setting.problem
     scale = 1.0 / np.sqrt(competitor.variance)
-    difference = problem.rotate(problem.flat(chosen.outputs - competitor.outputs)) * scale
+    difference = problem.rotation @ problem.flat(chosen.outputs - competitor.outputs) * scale
     jacobian = competitor.jacobian * scale[:, None]
     if new is not None:
         difference = np.concatenate([difference, new[0]])

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
-from wheel_terra_estimator.configuration.readings import Readings
+from wheel_terra_estimator.configuration.configuration import Readings
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.terramechanics import quadrature

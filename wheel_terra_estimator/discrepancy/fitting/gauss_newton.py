@@ -53,8 +53,8 @@ class Fit:
         """Return the same fit seen through other noise: same cells, another rotation."""
         return replace(
             self,
-            residual=problem.rotate(observed - problem.flat(self.outputs)),
-            jacobian=problem.rotate(self.sensitivity),
+            residual=problem.rotation @ (observed - problem.flat(self.outputs)),
+            jacobian=problem.rotation @ self.sensitivity,
         )
 
     def values(self) -> dict[str, float]:
@@ -133,7 +133,7 @@ def fit(
             angle = np.empty((len(ways), state.angle.shape[1]))
         for index, b in enumerate(active):
             way, angle[b] = ways[b], state.angle[index]
-            residual = problem.rotate(observed - problem.flat(state.outputs[index]))
+            residual = problem.rotation @ (observed - problem.flat(state.outputs[index]))
             better = way.is_better(float(residual @ (residual / variance)))
             if better:
                 sensitivity = problem.flat(state.jacobian[index])
@@ -144,7 +144,7 @@ def fit(
                     state.angle[index],
                     sensitivity,
                     residual,
-                    problem.rotate(sensitivity),
+                    problem.rotation @ sensitivity,
                     variance,
                     way.objective,
                     way.prior,

@@ -158,7 +158,7 @@ def find_outliers(
     rotated axes are for a structural error that is small and one that is large; ``narrow`` (N, N)
     comes from `slip_features`.
     """
-    jacobian = problem.rotate(fitted.sensitivity) / np.sqrt(fitted.prior)
+    jacobian = problem.rotation @ fitted.sensitivity / np.sqrt(fitted.prior)
     target = observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
     best, found, chosen = -np.inf, [], None
     for variance in variances:

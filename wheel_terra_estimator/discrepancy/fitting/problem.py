@@ -37,7 +37,7 @@ class Problem:
     std: FloatArray  # (m,) noise standard deviation, inflated for outliers
     outlier: BoolArray  # (m,) bool
     scale: FloatArray  # (3,) range of each quantity: the unit of the floor
-    rotation: FloatArray  # (m, m) whitening and rotation
+    rotation: FloatArray  # (m, m), by which (m,) or (m, P) cells are whitened and rotated
     # (m,) variance of the floor along each rotated axis at amplitude 1, in noise variances
     roughness: FloatArray
     # (m,) quantity to which each rotated axis belongs; -1 where slip errors mix them
@@ -52,10 +52,6 @@ class Problem:
     def flat(self, values: FloatArray) -> FloatArray:
         """Take the measured cells of an (N, 4, ...) array: (m, ...)."""
         return values[self.row, self.quantity]
-
-    def rotate(self, cells: FloatArray) -> FloatArray:
-        """Whiten and rotate (m,) or (m, P) cells."""
-        return self.rotation @ cells
 
     def variance(self, amplitude: ArrayLike) -> FloatArray:
         """Return (m,) variances of the rotated axes.

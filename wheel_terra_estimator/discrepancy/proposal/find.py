@@ -347,7 +347,7 @@ def _proposal(
 def _resembling(findings: Findings, refit: Fit, law: Fit) -> tuple[str, ...]:
     """Return named effects whose signature points the same way, beyond what the soil can do."""
     problem, nothing = findings.setting.problem, findings.nothing
-    own = problem.rotate(problem.flat(law.outputs - refit.outputs))
+    own = problem.rotation @ problem.flat(law.outputs - refit.outputs)
     weighted = against_soil(nothing, nothing.variance, own)
     size = math.sqrt(max(float(own @ weighted), 1e-30))
     alike: dict[str, float] = {}

@@ -11,15 +11,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.discrepancy.numbers import percent
-from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, Proposal, SoilShift
+from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, Proposal
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -47,70 +48,56 @@ def corrected(
     diagnosis: Diagnosis, proposal: Proposal | None = None
 ) -> tuple[Configuration, list[str]]:
     """Return the configuration with diagnosis, or a proposed law, put in, and the keys it sets."""
-    fitted = proposal or diagnosis
-    changes = _refitted(diagnosis, fitted.soil, fitted.refitted)
+    fitted, believed = proposal or diagnosis, diagnosis.configuration
+    changes: dict[str, Any] = {}
+    for shift in fitted.soil:
+        after = round(shift.after, _DECIMALS)
+        changes |= _soil_keys(shift.name, after, shift.after_std, believed.soil)
+    for key, parameter in fitted.refitted.items():  # of effects that were on already
+        owner, name = key.split('.', 1)
+        changes |= _stated(f'effects.{effect_of(owner)}.{name}', parameter)
     for effect in () if proposal else diagnosis.effects:
         prefix = f'effects.{effect.name}'
         changes[f'{prefix}.enabled'] = True
         if effect.form:
             changes[f'{prefix}.form'] = effect.form
         for name, parameter in effect.parameters.items():
-            changes[f'{prefix}.{name}'] = round(float(parameter.value), _DECIMALS)
-            changes[f'{prefix}.{name}_std'] = float(parameter.std)
+            changes |= _stated(f'{prefix}.{name}', parameter)
     if proposal:
         changes[f'effects.{NAME}.enabled'] = True
         for key in ('targets', 'features', 'coefficients', 'coefficients_std'):
             changes[f'effects.{NAME}.{key}'] = list(getattr(proposal, key))
     changes['provenance'] = provenance(diagnosis, proposal)
-    return _with(diagnosis, changes)
-
-
-def _refitted(
-    diagnosis: Diagnosis, soil: Iterable[SoilShift], refitted: Mapping[str, FittedParameter]
-) -> dict[str, object]:
-    """Return the keys of soil and of effects that were on already, at their fitted values."""
-    changes: dict[str, object] = {}
-    for shift in soil:
-        believed = diagnosis.configuration.soil
-        after = round(shift.after, _DECIMALS)
-        changes.update(_soil_keys(shift.name, after, shift.after_std, believed))
-    for key, parameter in refitted.items():
-        owner, name = key.split('.', 1)
-        prefix = f'effects.{effect_of(owner)}.{name}'
-        changes[prefix] = round(float(parameter.value), _DECIMALS)
-        changes[f'{prefix}_std'] = float(parameter.std)
-    return changes
-
-
-def _with(diagnosis: Diagnosis, changes: dict[str, object]) -> tuple[Configuration, list[str]]:
-    """Return the configuration with the changes, and all keys that its file has to hold."""
-    stated = diagnosis.configuration.flat()
+    stated = believed.flat()
     if stated.get('effect_file'):
         changes.setdefault('effect_file', stated['effect_file'])
-    fitted = diagnosis.configuration.replace(changes)  # type: ignore[arg-type]
-    errors, moved = _sensor_keys(fitted, _turning(diagnosis))
-    off = {f'effects.{name}.enabled': False for name in moved if name in diagnosis.base_effects}
+    errors, moved = _sensor_keys(believed.replace(changes), _turning(diagnosis))
+    off = {f'effects.{name}.enabled': False for name in moved}
     kept = [
         key
         for key in (*stated, *changes)
-        if key in changes or (key.startswith('effects.') and key in diagnosis.configuration.stated)
+        if key in changes or (key.startswith('effects.') and key in believed.stated)
         if not any(key.startswith(f'effects.{name}.') for name in moved)
     ]
-    replaced = {**changes, **{f'effects.{name}.enabled': False for name in moved}, **errors}
-    whole = diagnosis.configuration.replace(replaced)  # type: ignore[arg-type]
-    return whole, [*dict.fromkeys(kept), *off, *errors]
+    kept += [key for key, name in zip(off, moved, strict=True) if name in diagnosis.base_effects]
+    return believed.replace({**changes, **off, **errors}), [*dict.fromkeys([*kept, *errors])]
+
+
+def _stated(key: str, parameter: FittedParameter) -> dict[str, float]:
+    """Return the keys of a fitted parameter of an effect and of its deviation."""
+    return {key: round(float(parameter.value), _DECIMALS), f'{key}_std': float(parameter.std)}
 
 
 def _sensor_keys(
     configuration: Configuration, turning: float
-) -> tuple[dict[str, object], tuple[str, ...]]:
+) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return the keys that say the same as the instrument effects of a model, and those effects.
 
     ``turning`` is +1 or -1 where the wheel turned one way in all rows. 0: both ways; a constant
     friction, which turns with the wheel, is then no zero of the reading and stays an effect.
     """
     effects, stds, sensors = configuration.effects, configuration.effects_std, configuration.sensors
-    keys: dict[str, object] = {}
+    keys: dict[str, Any] = {}
     moved: list[str] = []
     for quantity, name in _GAINS.items():
         gains, zeros = getattr(sensors, name), getattr(sensors, f'{quantity}_zero')
@@ -184,10 +171,9 @@ def write_model(diagnosis: Diagnosis, path: str | Path, proposal: Proposal | Non
     """
     configuration, keys = corrected(diagnosis, proposal)
     comment = provenance(diagnosis, proposal) + (f'\n{proposal.words}' if proposal else '')
-    unique = list(dict.fromkeys(keys))
-    if 'effect_file' in unique:
+    if 'effect_file' in keys:
         comment = f'Runs Python code (effect_file): needs --allow-effect-files\n{comment}'
-    configuration.write(path, unique, comment=comment)
+    configuration.write(path, keys, comment=comment)
 
 
 _CLEAR = 3.0  # nats over the soil alone from which a table favours an effect

@@ -64,18 +64,18 @@ def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, fl
     covered = np.array([bool(inside & e.effects) for e in selection.explanations])
 
     def margin(mine: np.ndarray) -> float:
+        """Log odds; beyond some ten nats only the model family's own error counts."""
         against = total[~mine]
-        if not against.size:
-            return 20.0
-        return float(log_sum(total[mine]) - log_sum(against))
+        odds = float(log_sum(total[mine]) - log_sum(against)) if against.size else 20.0
+        return float(4.0 * np.tanh(odds / 8.0))
 
-    alone = _squash(margin(has))
+    alone = margin(has)
     gain = float(np.log1p(max(total[verdict.index] - total[selection.nothing], 0.0)))
     two = float(len(selection.explanations[verdict.index].names) > 1)
     return {
         'one': 1.0,
         'margin': alone,
-        'margin_of_set': _squash(margin(covered)),
+        'margin_of_set': margin(covered),
         'gain': gain,
         'remainder': float(verdict.left.significant),
         'floor': verdict.left.probability_of_any,
@@ -84,11 +84,6 @@ def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, fl
         'margin_two': alone * two,
         'gain_squared': gain**2,
     }
-
-
-def _squash(value: float) -> float:
-    """Compress large log odds: beyond some ten nats only the model family's own error counts."""
-    return float(4.0 * np.tanh(value / 8.0))
 
 
 def confidence(values: Mapping[str, float], alike: int = 0, odds: float = 1.0) -> Confidence:
@@ -102,7 +97,7 @@ def confidence(values: Mapping[str, float], alike: int = 0, odds: float = 1.0) -
     vector = np.array([values[name] for name in FEATURES])
     of_name = float(expit(vector @ np.array(weights['name']) + np.log(odds)))
     # Never more than the rows themselves say: two names that fit alike share what there is.
-    margin = 8.0 * np.arctanh(np.clip(values['margin'] / 4.0, -0.999, 0.999))  # before `_squash`
+    margin = 8.0 * np.arctanh(np.clip(values['margin'] / 4.0, -0.999, 0.999))  # of the odds
     of_name = min(of_name, float(expit(margin / _TEMPERATURE)))
     of_set = float(expit(vector @ np.array(weights['set']) + np.log(odds)))
     share = 1.0 / (1.0 + alike)

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -45,6 +46,8 @@ from wheel_terra_estimator.discrepancy.selection.weights import (
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
+Outliers: TypeAlias = Sequence[tuple[int, int, float]]  # row, quantity, deviation of a cell
+
 _FLEXIBLE = 0.25  # floor of the first robust pass: wide enough for any effect [share of range]
 _ROBUST_FLOOR = 0.02  # floor of the later ones
 _PASSES = 5
@@ -68,7 +71,7 @@ class Findings:
     signatures: Mapping[str, Signature]  # of all effects that the columns can show
     not_visible: Mapping[str, str]  # effect -> reason
     noise: Noise
-    outliers: tuple[tuple[int, int, float], ...]
+    outliers: Outliers
     # Effects that might have been named, seen or not, and those that were on already
     tried: frozenset[str] = frozenset()
 
@@ -175,8 +178,9 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
         for size in range(1, most):
             extended |= {e.names for e in seeds}
             selection = _joined_by(setting, selection, explain_more(setting, seeds))
-            if _is_enough(selection):
-                return selection
+            single = len(selection.explanations[0].names) < 2
+            if single and selection.misfit < MISFIT and not _seeds(selection, 2):
+                return selection  # one effect or none is enough, and no two come near it
             seeds = [e for e in _seeds(selection, size + 1) if e.names not in extended]
         before = selection.without_misfit(1)[0][1].names
         selection = _with_swaps(setting, selection, swapped)
@@ -185,12 +189,6 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
             break
         seeds = [e for e in _seeds(selection, 1) if e.names not in extended]
     return selection
-
-
-def _is_enough(selection: Selection) -> bool:
-    """Return whether one effect or none leaves no misfit, and no two come near it."""
-    single = len(selection.explanations[0].names) < 2
-    return single and selection.misfit < MISFIT and not _seeds(selection, 2)
 
 
 def _seeds(selection: Selection, size: int) -> list[Explanation]:
@@ -282,15 +280,6 @@ class _Builder:
                 'leaving_angle', nothing.coordinates, nothing.u, nothing.angle
             )
 
-    def _common_errors(self) -> list[CommonError]:
-        found = []
-        if self._by_slip is not None:
-            found.append(CommonError(self._by_slip, self.table.slip_std, self._group))
-        if self._by_angle is not None:
-            rows = np.arange(len(self.table), dtype=np.intp)
-            found.append(CommonError(self._by_angle, self.table.leaving_angle_std, rows))
-        return found
-
     def linearise(self, nothing: Fit, noise_std: FloatArray) -> None:
         """Linearise the slip errors around the most probable slips, given all quantities.
 
@@ -316,18 +305,16 @@ class _Builder:
         angle = self.forward.solve([nothing.coordinates], [nothing.u], jacobian=False).angle[0]
         self._by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, angle)
 
-    def build(
-        self, std: FloatArray, outliers: list[tuple[int, int, float]] | tuple[()]
-    ) -> tuple[Problem, FloatArray]:
+    def build(self, std: FloatArray, outliers: Outliers) -> tuple[Problem, FloatArray]:
         """Return the problem and the cells that the model has to match."""
-        problem = build_problem(
-            self.table.measured,
-            std,
-            self.inputs,
-            self.scale,
-            [(row, quantity) for row, quantity, _ in outliers],
-            self._common_errors(),
-        )
+        common = []
+        if self._by_slip is not None:
+            common.append(CommonError(self._by_slip, self.table.slip_std, self._group))
+        if self._by_angle is not None:
+            rows = np.arange(len(self.table), dtype=np.intp)
+            common.append(CommonError(self._by_angle, self.table.leaving_angle_std, rows))
+        rejected = [(row, quantity) for row, quantity, _ in outliers]
+        problem = build_problem(self.table.measured, std, self.inputs, self.scale, rejected, common)
         observed = problem.observed
         if self._by_slip is not None:
             # The reading lies off the point of linearisation: the tangent takes the cells along.
@@ -337,7 +324,7 @@ class _Builder:
     def fit_nothing(
         self,
         std: FloatArray,
-        outliers: list[tuple[int, int, float]] | tuple[()],
+        outliers: Outliers,
         nuisance: tuple[Coordinate, ...],
         previous: Fit | None,
     ) -> tuple[Problem, FloatArray, Fit]:
@@ -349,9 +336,7 @@ class _Builder:
         found = fit(self.forward, problem, observed, one, [start], variance, angles, 12)[0]
         return problem, observed, found
 
-    def estimate(
-        self, noise: Noise, fitted: Fit, outliers: list[tuple[int, int, float]] | tuple[()]
-    ) -> Noise:
+    def estimate(self, noise: Noise, fitted: Fit, outliers: Outliers) -> Noise:
         """Estimate the noise that was not stated."""
         if 'estimated' not in noise.origin.values():
             return noise

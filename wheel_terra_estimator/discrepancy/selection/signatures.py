@@ -104,7 +104,7 @@ def signatures(
     )
     found: dict[str, Signature] = {}
     for index, (name, own, shape) in enumerate(trials):
-        change = problem.rotate(problem.flat(state.outputs[index] - nothing.outputs))
+        change = problem.rotation @ problem.flat(state.outputs[index] - nothing.outputs)
         far = distance(nothing, nothing.variance, change)
         size = float(own[0].value(shape[0])) - own[0].neutral
         if name not in found or far > found[name].distance:

@@ -127,10 +127,12 @@ def linear_starts(setting: Setting, base: Fit, names: Sequence[str]) -> list[tup
     best: dict[str, tuple[float, Start]] = {}
     for (name, own, shape), (outputs, column) in zip(trials, responses, strict=True):
         # By the strength only: the shape has no gradient here.
-        jacobian = problem.rotate(np.concatenate([base.sensitivity, problem.flat(column)], axis=1))
+        jacobian = problem.rotation @ np.concatenate(
+            [base.sensitivity, problem.flat(column)], axis=1
+        )
         prior = loose_precision([*base.coordinates, own[0]])
         precision = jacobian.T @ (jacobian / base.variance[:, None]) + np.diag(prior)
-        residual = problem.rotate(setting.observed - problem.flat(outputs))
+        residual = problem.rotation @ (setting.observed - problem.flat(outputs))
         target = residual + jacobian @ np.append(base.u, shape[0])
         mean = np.linalg.solve(precision, jacobian.T @ (target / base.variance))
         strength = np.clip(mean[-1], own[0].lower, own[0].upper)

@@ -20,7 +20,7 @@ from wheel_terra_estimator.configuration.column_map import (
     is_unit,
     read_map,
 )
-from wheel_terra_estimator.configuration.parameters import nearest
+from wheel_terra_estimator.configuration.parameters import nearest, plain_table
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     COLUMNS,
     INPUT_UNITS,
@@ -30,67 +30,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
 from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS as QUANTITY_UNITS
 from wheel_terra_estimator.errors import UserError
 
-_WORDS: dict[str, tuple[str, ...]] = {
-    'slip': ('slip ratio', 'wheel slip', 'longitudinal slip', 'schlupf'),
-    'normal_load': (
-        'load',
-        'vertical load',
-        'wheel load',
-        'normal force',
-        'vertical force',
-        'radlast',
-    ),
-    'sinkage': ('wheel sinkage', 'rim sinkage', 'sinkage depth', 'einsinkung'),
-    'drawbar_pull': ('drawbar', 'drawbar force', 'pull', 'net traction', 'zugkraft'),
-    'torque': ('drive torque', 'driving torque', 'wheel torque', 'drehmoment'),
-    'slope': ('slope angle', 'inclination', 'incline'),
-    'slip_angle': ('sideslip angle', 'side slip angle'),
-    'lateral_force': ('side force', 'cornering force', 'seitenkraft'),
-    'wheel_radius': ('rim radius',),
-    'wheel_width': ('rim width',),
-    'lug_height': ('grouser height',),
-    'lug_count': ('number of lugs', 'lugs', 'grouser count', 'number of grousers'),
-    'angular_velocity': ('angular speed', 'wheel rate', 'rotational speed'),
-    'pass_number': ('pass', 'pass no'),
-    'leaving_angle': ('exit angle', 'rear angle'),
-}
-"""Names of the field that mean one thing only."""
-_SYMBOLS: dict[str, tuple[str, ...]] = {
-    'slip': ('s', 'i', 'sr'),
-    'normal_load': ('fn',),
-    'drawbar_pull': ('dp', 'dbp', 'fdp'),
-    'torque': ('t', 'm', 'md', 'moment'),
-    'wheel_radius': ('r',),
-    'wheel_width': ('b',),
-    'gravity': ('g',),
-    'angular_velocity': ('omega', 'rpm', 'wheel rpm', 'wheel speed', 'rim speed'),
-}
-"""Abbreviations: read where a unit of their kind stands beside them, else asked for."""
-_ASKED: dict[str, tuple[tuple[str, ...], str]] = {
-    'sinkage': (
-        ('z', 'depth', 'rut depth', 'vertical displacement', 'settlement'),
-        'the depth of the rim below the undisturbed surface, positive down',
-    ),
-    'drawbar_pull': (
-        ('fx', 'force x', 'horizontal force', 'traction', 'tractive force', 'thrust', 'force'),
-        'the net force of the soil on the wheel along the slope, positive forward',
-    ),
-    'torque': (('my', 'mz', 'torque y', 'moment y'), 'positive when it drives the wheel forward'),
-    'normal_load': (
-        ('w', 'fz', 'weight', 'force z'),
-        'the load perpendicular to the slope, positive',
-    ),
-    'slip': (('slippage', 'skid', 'slide'), 'the slip ratio, positive when driving'),
-    'slope': (('alpha', 'theta', 'angle', 'tilt', 'pitch'), 'positive uphill'),
-    'slip_angle': (('beta', 'sideslip'), 'positive where the wheel slides left'),
-    'lateral_force': (
-        ('fy', 'force y', 'lateral'),
-        'the force of the soil on the wheel, positive left',
-    ),
-    'wheel_radius': (('radius',), 'that of the rim, lugs not counted'),
-    'wheel_width': (('width',), 'that of the rim'),
-}
-"""Names that may mean it, with another sign or axis, or something else; and what it has to be."""
+_TITLES = plain_table(Path(__file__).with_name('titles.yaml'))
 _STD_ENDS = ('std', 'sd', 'stddev', 'stdev', 'sigma')
 _HARMLESS = frozenset(
     {'time', 'timestamp', 'stamp', 'duration', 'index', 'id', 'no', 'nr', 'number', 'run', 'test'}
@@ -193,9 +133,9 @@ def _keys(names: Mapping[str, Sequence[str]]) -> dict[str, str]:
 
 
 _OWN = {_key(name): name for name in COLUMNS}
-_SURE = {**_keys(_WORDS), **_OWN}
-_SHORT = {key: name for key, name in _keys(_SYMBOLS).items() if key not in _SURE}
-_OPEN = {_key(word): name for name, (words, _) in _ASKED.items() for word in words}
+_SURE = {**_keys(_TITLES['words']), **_OWN}
+_SHORT = {key: name for key, name in _keys(_TITLES['symbols']).items() if key not in _SURE}
+_OPEN = {_key(word): name for name, words in _TITLES['asked'].items() for word in words}
 
 
 def meaning_of(title: str) -> Title | None:
@@ -375,7 +315,8 @@ def _hint(title: str, free: Sequence[str]) -> tuple[str, str]:
     if meaning is not None:
         name = meaning.name
         unit = f' [{unit_of(name)}]' if unit_of(name) != '-' else ''
-        holds = f', {_ASKED[name][1]}' if name in _ASKED else ''
+        has_to_be = _TITLES['has_to_be'].get(name)
+        holds = f', {has_to_be}' if has_to_be else ''
         return name, f'{name}{unit}{holds}?'
     keys = {key: name for key, name in _SURE.items() if name in free}
     for base, _ in _readings(title):

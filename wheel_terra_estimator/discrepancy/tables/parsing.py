@@ -144,27 +144,23 @@ def _read_rows(
     ]
     others = {place: _Other() for place, _ in header.unused}
     width = len(header.titles)
-    for line, cells in rows:
+    for line, row in rows:
+        cells = [*row, *[''] * (width - len(row))]
         if not lines:
-            _check_first_row(source, line, [_cell(cells, column.place) for column, _ in values])
+            _check_first_row(source, line, [cells[column.place] for column, _ in values])
         check_width(cells, width, f'{source}, line {line}')
         for column, found in values:
             where = f'{source}, line {line}, column {column.name}'
-            cell = _cell(cells, column.place)
-            found.append(column.factor * number(cell, where, decimal_comma))
+            found.append(column.factor * number(cells[column.place], where, decimal_comma))
         for _, place, texts in ordered:
-            texts.append(_cell(cells, place))
+            texts.append(cells[place])
         for place, other in others.items():
-            other.take(len(lines), _cell(cells, place), decimal_comma)
+            other.take(len(lines), cells[place], decimal_comma)
         lines.append(line)
     header.check_unused([place for place, other in others.items() if other.holds_numbers])
     columns = {column.name: np.array(found) for column, found in values}
     columns |= {name: _ordered(texts) for name, _, texts in ordered}
     return np.array(lines, dtype=np.intp), columns
-
-
-def _cell(cells: Sequence[Any], place: int) -> Any:
-    return cells[place] if place < len(cells) else ''
 
 
 class _Other:

@@ -103,7 +103,8 @@ class Pulls(Component[PullState]):
                 std[i] = known * load + _FLOOR_STD
                 own[i] = std[i] ** 2
             else:
-                excess[i] = self._smoothed_excess(excess[i], readings[i], torques[i])
+                if not isnan(readings[i]):  # what its torque says beyond its model, smoothed
+                    excess[i] += _EXCESS_GAIN * (readings[i] - torques[i] - excess[i])
                 beyond = self._believed(excess[i], readings[i])
                 if beyond and torque_by_strength[i]:
                     torques[i] += beyond
@@ -161,12 +162,6 @@ class Pulls(Component[PullState]):
             + (_MODEL_STD * load) ** 2
             + (_LEVEL_STD * load if level else 0.0) ** 2
         )
-
-    def _smoothed_excess(self, excess: float, reading: float, model: float) -> float:
-        """Return what a wheel's torque says beyond its model, smoothed [N m]."""
-        if isnan(reading):
-            return excess
-        return excess + _EXCESS_GAIN * (reading - model - excess)
 
     def _believed(self, excess: float, reading: float) -> float:
         """Return what of the excess is beyond the sensor's errors [N m].

@@ -34,7 +34,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     Prediction,
 )
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
-from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
+from wheel_terra_estimator.estimation.inputs.noise import StatedNoise
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import (
     NAN,

@@ -45,6 +45,8 @@ class SinkageInput(Component[SinkageSums]):
 
 # Smoothing of the rear cameras' angles.
 _GAIN = 0.3  # per reading
+SMOOTHED_NOISE = math.sqrt(_GAIN / (2.0 - _GAIN))
+"""Deviation of a smoothed leaving angle over that of one reading [-]."""
 _LONGEST_AGE = 1.0
 """An older angle [s] is forgotten: half a wheel's turn of a slow rover."""
 
@@ -72,12 +74,6 @@ class LeavingAngleInput(Component[LeavingAngleState]):
                 angle[i] = old + _GAIN * (value - old)
                 when[i] = time
         self.state = LeavingAngleState(tuple(angle), tuple(when))
-
-    @property
-    def noise_share(self) -> float:
-        """Deviation of a smoothed angle over that of one reading [-]: sqrt(g / (2 - g))."""
-        gain = _GAIN
-        return math.sqrt(gain / (2.0 - gain))
 
     def angles(self, time: float) -> Floats:
         """Return the leaving angle of each wheel [rad]; nan where there is none of late."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.inputs.stated_noise import KEYS, NOTHING_STATED, StatedNoise
+from wheel_terra_estimator.estimation.inputs.noise import KEYS, NOTHING_STATED, StatedNoise
 from wheel_terra_estimator.estimation.measurements import InertialReading
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of
 

@@ -40,8 +40,8 @@ from wheel_terra_estimator.estimation.outputs import Outputs
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import known
 from wheel_terra_estimator.estimation.smoothing.backward import smoothed_states
-from wheel_terra_estimator.estimation.smoothing.disk_buffer import DiskBuffer
 from wheel_terra_estimator.estimation.smoothing.history_buffer import (
+    DiskBuffer,
     Gaussian,
     HistoryBuffer,
     packed,

@@ -17,7 +17,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration import Configuration
-from wheel_terra_estimator.estimation.inputs.stated_noise import credible
+from wheel_terra_estimator.estimation.inputs.noise import credible
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     LeavingAngleReading,

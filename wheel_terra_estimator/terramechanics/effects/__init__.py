@@ -87,7 +87,7 @@ class Catalogue(Mapping[str, Effect]):
 
 def catalogue() -> Catalogue:
     """Return all effects by name: the built-in ones, then the registered ones."""
-    return Catalogue({**_built_in(), **_registered} if _registered else _built_in())
+    return Catalogue({**_built_in(), **_registered}) if _registered else _built_in()
 
 
 def by_variant(settings: EffectSettings) -> dict[str, dict[str, Any]]:

@@ -60,6 +60,38 @@ class EffectParameter:
             )
 
 
+def strength(
+    name: str,
+    unit: str,
+    default: float,
+    lower: float,
+    upper: float,
+    scale: float,
+    meaning: str,
+    *,
+    free: bool = True,
+) -> EffectParameter:
+    """Return a parameter that is the size of a term: half-normal, with its default's sign."""
+    limits = default, lower, upper, scale
+    return EffectParameter(name, unit, *limits, 'half_normal', meaning, free=free)
+
+
+def shape(
+    name: str,
+    unit: str,
+    default: float,
+    lower: float,
+    upper: float,
+    scale: float,
+    meaning: str,
+    *,
+    free: bool = True,
+) -> EffectParameter:
+    """Return a parameter that shapes a term (an onset, a depth): normal about its default."""
+    limits = default, lower, upper, scale
+    return EffectParameter(name, unit, *limits, 'normal', meaning, default, free=free)
+
+
 @dataclass(frozen=True)
 class Form:
     """Another law for the same effect, beside the one that the effect itself states."""

@@ -10,7 +10,13 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.effects.base import (
+    Effect,
+    EffectParameter,
+    Form,
+    shape,
+    strength,
+)
 
 SMALLEST_ROOM = 1e-12
 """Height left below the hub over r [-]; contact that leaves above the hub has none."""
@@ -43,9 +49,7 @@ def _raise(contact: Contact[Quantity], rise: Quantity) -> None:
     contact.leaving_angle = np.where(rise > 0.0, raised, contact.leaving_angle)
 
 
-_KAPPA = EffectParameter(
-    'kappa', '-', 1.0, 0.0, 8.0, 1.0, 'half_normal', 'height of the mound at s = 1 over the sinkage'
-)
+_KAPPA = strength('kappa', '-', 1.0, 0.0, 8.0, 1.0, 'height of the mound at s = 1 over the sinkage')
 
 SOIL_MOUND = Effect(
     name='soil_mound',
@@ -55,9 +59,7 @@ SOIL_MOUND = Effect(
     'x = (s - onset)+/(1 - onset); about r (1 - cos t_2) += kappa z x^2 while small',
     parameters=(
         _KAPPA,
-        EffectParameter(
-            'onset', '-', 0.4, 0.0, 0.9, 0.15, 'normal', 'slip at which it starts', prior_mean=0.4
-        ),
+        shape('onset', '-', 0.4, 0.0, 0.9, 0.15, 'slip at which it starts'),
     ),
     needs=('slip',),
     confounded_with={'stress_peak_shift': 'a rear camera: measured leaving angle'},
@@ -73,16 +75,14 @@ SOIL_MOUND = Effect(
             'b = 1 - cos(c_3 t_1), x = q/(q + z), q = (h + band) s/(1 - s)',
             parameters=(
                 _KAPPA,
-                EffectParameter(
+                shape(
                     'band',
                     'm',
                     0.003,
                     0.0,
                     0.03,
                     0.003,
-                    'normal',
                     'layer that a smooth rim drags along',
-                    prior_mean=0.003,
                     free=False,
                 ),
             ),
@@ -111,7 +111,7 @@ STRESS_PEAK_SHIFT = Effect(
     form='forward',
     symbol='t_m = (c1 + c2 s) t_1 (+ skid |s| t_1 where s < 0)',
     parameters=(
-        EffectParameter('c2', '-', 0.2, -0.5, 0.8, 0.2, 'half_normal', 'shift at s = 1'),
+        strength('c2', '-', 0.2, -0.5, 0.8, 0.2, 'shift at s = 1'),
         EffectParameter(
             'skid',
             '-',
@@ -139,11 +139,7 @@ STRESS_PEAK_SHIFT = Effect(
             name='backward',
             claim='the angle of greatest stress moves backward with slip',
             symbol='t_m = (c1 - retreat s) t_1',
-            parameters=(
-                EffectParameter(
-                    'retreat', '-', 0.1, 0.0, 0.8, 0.2, 'half_normal', 'shift back at s = 1'
-                ),
-            ),
+            parameters=(strength('retreat', '-', 0.1, 0.0, 0.8, 0.2, 'shift back at s = 1'),),
             validity='c1 - retreat s between 0 and 1; clamped inside the contact',
             source='the same law with the other sign, as fits to small wheels give it '
             '(docs/models/validation.md)',

@@ -11,7 +11,13 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.effects.base import (
+    Effect,
+    EffectParameter,
+    Form,
+    shape,
+    strength,
+)
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio, speed_ratio
 
 
@@ -151,11 +157,7 @@ DRIVETRAIN_FRICTION = Effect(
     claim='torque is lost before the wheel: the reading is higher by a constant',
     form='constant',
     symbol='T += torque sgn(w)',
-    parameters=(
-        EffectParameter(
-            'torque', 'N m', 0.3, 0.0, 20.0, 0.5, 'half_normal', 'friction torque of the drive'
-        ),
-    ),
+    parameters=(strength('torque', 'N m', 0.3, 0.0, 20.0, 0.5, 'friction torque of the drive'),),
     touches=frozenset({'torque'}),
     instrument=True,
     confounded_with={'lug_shear_radius': 'torque of the wheel in the air; pull'},
@@ -168,9 +170,7 @@ DRIVETRAIN_FRICTION = Effect(
             claim='torque is lost before the wheel in proportion to what the wheel takes',
             symbol='T += share |T| sgn(w)',
             parameters=(
-                EffectParameter(
-                    'share', '-', 0.1, 0.0, 2.0, 0.15, 'half_normal', 'torque lost over torque used'
-                ),
+                strength('share', '-', 0.1, 0.0, 2.0, 0.15, 'torque lost over torque used'),
             ),
             validity='a turning wheel; one gear stage loses a few per cent, a worm drive half',
             source='efficiency of a gear, 1/(1 + share) while the motor drives',
@@ -181,9 +181,7 @@ DRIVETRAIN_FRICTION = Effect(
             claim='torque is lost before the wheel in proportion to its rate',
             symbol='T += damping w',
             parameters=(
-                EffectParameter(
-                    'damping', 'N m s/rad', 0.5, 0.0, 100.0, 0.5, 'half_normal', 'viscous friction'
-                ),
+                strength('damping', 'N m s/rad', 0.5, 0.0, 100.0, 0.5, 'viscous friction'),
             ),
             needs=('angular_velocity',),
             validity='a turning wheel; nothing where the rate is not recorded',
@@ -242,16 +240,14 @@ SLOPE_GRAVITY = Effect(
     'left at the hitch is smaller by W sin(slope)',
     symbol='W_n = W - share W (1 - cos a);  F -= share W sin a',
     parameters=(
-        EffectParameter(
+        shape(
             'share',
             '-',
             1.0,
             0.0,
             1.5,
             0.15,
-            'normal',
             'share of the weight that tilts with the slope (1: all of it)',
-            prior_mean=1.0,
         ),
     ),
     needs=('slope',),

@@ -15,6 +15,8 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     EffectParameter,
     Form,
     relative_pressure,
+    shape,
+    strength,
 )
 
 
@@ -94,19 +96,15 @@ RIM_FRICTION = Effect(
     claim='soil slides on a smooth rim at less than its internal friction; lugs restore it',
     symbol='tan(phi) *= 1 - loss exp(-h/ring_height)',
     parameters=(
-        EffectParameter(
-            'loss', '-', 0.25, 0.0, 0.9, 0.25, 'half_normal', 'share of the friction lost at h = 0'
-        ),
-        EffectParameter(
+        strength('loss', '-', 0.25, 0.0, 0.9, 0.25, 'share of the friction lost at h = 0'),
+        shape(
             'ring_height',
             'm',
             0.003,
             0.0005,
             0.05,
             0.002,
-            'normal',
             'lug height at which a ring of soil begins to move with the wheel',
-            prior_mean=0.003,
             free=False,
         ),
     ),

@@ -1,18 +1,95 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Outlook of a rover: probability of an entrapment, time and rim travel left."""
+"""Outlook of a rover: probability of an entrapment, time and rim travel left.
+
+The probability is that the slip first passes 0.9 within a rim travel.
+Over the rim travel x the slip goes as an Ornstein-Uhlenbeck process
+
+    ds = -(s - k z' s_0) / L dx + sigma dW
+
+What soil and ground vary pushes it (sigma), it returns (L), and wheels that sink by z' as they slip
+by s_0 dig themselves in, since what they climb grows (k). The border 0.9 absorbs. The probability
+of having been there follows backwards, step by step, from the transitions between the cells of a
+grid (Chapman-Kolmogorov); it is tabulated once over the slip, k z' s_0 and the travel.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT
-from wheel_terra_estimator.estimation.judgement.stuck.passage import TRAVELS, passage_probability
+from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.stuck.situation import Situation
-from wheel_terra_estimator.estimation.scalars import median
+from wheel_terra_estimator.estimation.scalars import clipped, median
+
+_LOWEST = -0.5
+"""Lower end of the grid: what comes below stays in its last cell [-]."""
+_CELLS = 48
+_EDGES = np.linspace(_LOWEST, ENTRAPPED_SLIP, _CELLS + 1)
+_STEP = 0.05
+"""Rim travel of a step [m]: a second at 5 cm/s, for which an entrapment must last."""
+_STEPS = 80
+TRAVELS = _STEP * np.arange(_STEPS + 1)
+"""Rim travels at which the probability is told [m]."""
+_LEVELS = np.linspace(0.0, 1.6, 9) * ENTRAPPED_SLIP
+_LEAST_STD = 1e-3
+
+# Near the greatest likelihood of what came, on tuning drives of simulators A, B and C.
+RETURN_LENGTH = 0.3  # L [m]
+SCATTER = 0.8  # sigma [1/sqrt(m)]
+DIGGING = 45.0  # k [1]: over the present slip and the sinkage gained per rim travel
+USUAL_SLIP = 0.06  # of a rover in loose soil
+USUAL_STD = 0.28
+"""Deviation of slips around it: a slip that is hardly known is worth no more than this."""
+
+
+def passage_probability(
+    slip: Sequence[float], std: Sequence[float], deepening: float
+) -> FloatArray:
+    """Return the probability within each of the `TRAVELS` for each of n wheels, (n, travels).
+
+    `slip` and `std` are those of the wheels now [-], `deepening` is the sinkage that the rover
+    gains over rim travel [m/m]; s_0 is the median slip.
+    """
+    variance = np.square(np.maximum(std, _LEAST_STD))
+    known = USUAL_STD**2 / (USUAL_STD**2 + variance)
+    mean = USUAL_SLIP + known * (np.asarray(slip) - USUAL_SLIP)
+    below = ndtr((_EDGES - mean[:, None]) / np.sqrt(known * variance)[:, None])
+    weights = np.diff(below, axis=1)
+    weights[:, 0] += below[:, 0]
+    level = DIGGING * max(deepening, 0.0) * clipped(median(mean.tolist()), 0.0, 1.0)
+    place = min(level / _LEVELS[1], len(_LEVELS) - 1 - 1e-9)
+    i = int(place)
+    table = _table()
+    ahead = (1.0 - place + i) * table[i] + (place - i) * table[i + 1]
+    return np.asarray(1.0 - below[:, -1:] + weights @ ahead.T)
+
+
+@cache
+def _table() -> FloatArray:
+    """Return (levels, travels, cells) the probability from the middle of each cell."""
+    middle = 0.5 * (_EDGES[1:] + _EDGES[:-1])
+    kept = math.exp(-_STEP / RETURN_LENGTH)
+    std = SCATTER * math.sqrt(0.5 * RETURN_LENGTH * (1.0 - kept * kept))
+    found = np.zeros((len(_LEVELS), _STEPS + 1, _CELLS))
+    for level, rows in zip(_LEVELS, found, strict=True):
+        mean = level + (middle - level) * kept
+        below = ndtr((_EDGES - mean[:, None]) / std)
+        absorbed = 1.0 - below[:, -1]
+        below[:, 0] = 0.0
+        moves = np.diff(below, axis=1)
+        for step in range(_STEPS):
+            rows[step + 1] = absorbed + moves @ rows[step]
+    return found
+
 
 LONGEST_TIME = 600.0
 """Time to entrapment that is said where none is in sight [s]."""

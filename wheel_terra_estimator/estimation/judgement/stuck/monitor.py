@@ -15,12 +15,12 @@ from typing import NamedTuple
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.stuck.forecast import (
+    USUAL_STD,
     Outlook,
     StuckSettings,
     WheelForecast,
     outlook,
 )
-from wheel_terra_estimator.estimation.judgement.stuck.passage import USUAL_STD
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     NEAR_LIMIT,
     Memory,

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How noisy the sensors are seen to be, beside what their file or their messages state.
+"""Noise of sensors: as an IMU's messages state it where no file does, and as it is seen.
 
 Three readings in step differ from a straight line by their noise and by how the quantity bends:
 x1 - 2 x2 + x3 has six times the variance of white noise, and hardly any of slow motion. A reference
@@ -17,13 +17,55 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
-from wheel_terra_estimator.estimation.measurements import StepInputs
+from wheel_terra_estimator.estimation.measurements import InertialVariance, StepInputs
 from wheel_terra_estimator.estimation.rover import SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped
 
-_LINE = 6.0  # variance of x1 - 2 x2 + x3 over that of each
+_Range = tuple[float, float]
 
+KEYS = ('sensors.specific_force_std', 'sensors.angular_rate_std', 'sensors.orientation_std_deg')
+"""Where a file states each entry of `StatedNoise`."""
+_CREDIBLE: tuple[_Range, ...] = ((5e-5, 5.0), (1e-5, 0.3), (1e-4, 0.1))
+"""Least and greatest deviation of each that is no placeholder.
+
+Specific force [m/s^2]: a tactical-grade accelerometer resolves 7 micro-g in 1 Hz (Safran MS1002
+datasheet, 2016); rovers vibrate with up to 3 m/s^2. Angular rate [rad/s]: a fibre-optic gyro of
+0.012 deg/sqrt(h) at 10 Hz; sixty times the 0.005 of a common one. Orientation [rad]: 0.006 deg, as
+of survey-grade systems; 6 deg, beyond which an inclination says nothing of the ground.
+"""
+
+
+def credible(variance: InertialVariance) -> InertialVariance:
+    """Return the variances without placeholders: 0 stands for what no sensor has."""
+    kept = [
+        value if least**2 <= value <= most**2 else 0.0
+        for value, (least, most) in zip(variance, _CREDIBLE, strict=True)
+    ]
+    return InertialVariance(*kept)
+
+
+class StatedNoise(NamedTuple):
+    """Standard deviations that count in place of the defaults; 0 = that of ``sensors.*`` counts."""
+
+    specific_force_std: float = 0.0  # [m/s^2], per message
+    angular_rate_std: float = 0.0  # [rad/s], per message
+    orientation_std: float = 0.0  # roll and pitch [rad]
+
+    def completed(self, variance: InertialVariance, given: Container[str]) -> StatedNoise:
+        """Return it with what a message states and neither a file nor a message before it did.
+
+        `variance` holds no placeholders; `given` are the keys that a file states.
+        """
+        stds = list(self)
+        for i, key in enumerate(KEYS):
+            if not stds[i] and key not in given:
+                stds[i] = math.sqrt(variance[i])
+        return StatedNoise(*stds)
+
+
+NOTHING_STATED = StatedNoise()
+
+_LINE = 6.0  # variance of x1 - 2 x2 + x3 over that of each
 
 # How slowly it is learned, and within which bounds.
 _ONE_SECOND_IN = 4  # is learned from; the noise of sensors changes slowly
