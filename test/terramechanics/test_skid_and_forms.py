@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A skidding wheel digs in; an effect has several forms, of which settings choose one."""
 
-
 import numpy as np
 import pytest
 from terra_tools import SAND, points, state
