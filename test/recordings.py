@@ -10,9 +10,16 @@ from message_factory import serialised
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter
 from wheel_terra_estimator.messages.unpack import Message, unpack
+
+
+def contents(path: Path) -> tuple[list[RawMessage], list[str]]:
+    """Return all messages of a recording, and what is said of its state."""
+    with open_bag(path) as bag:
+        return list(bag.messages(tuple(bag.topics))), bag.notes
 
 
 def beginning(source: Path, target: Path, seconds: float) -> Path:

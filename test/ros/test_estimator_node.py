@@ -224,7 +224,7 @@ def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, paramete
 
 def test_wrong_parameters_end_the_node_with_one_line(start, parameters):
     """Which are wrong is tested where they are read, in configuration."""
-    status, said = start('estimator_node', *ROVER, parameters, '-p', 'rover.mas:=20.0').end()
+    status, said = start('estimator_node', *ROVER, parameters, '-p', 'rover.mas:=20.0').stop()
     assert status == 2
     assert 'rover.mass' in said
     assert 'Traceback' not in said
