@@ -44,6 +44,10 @@ NOT_ENDED = None
 class NodeProcess:
     """What the tests ask of a node, however it was started."""
 
+    returncode: Any
+    send_signal: Any
+    communicate: Any
+
     def stop(self, *signals: int) -> tuple[int, str]:
         """Send signals, one after the other; wait for the end, return exit status and words."""
         for number in signals:
