@@ -174,6 +174,13 @@ def rover() -> Configuration:
     )
 
 
+@pytest.fixture
+def config(tmp_path: Path, rover: Configuration) -> list[str]:
+    """Options of a command for that cart."""
+    rover.write(tmp_path / 'rover.yaml')
+    return ['--config', str(tmp_path / 'rover.yaml')]
+
+
 @pytest.fixture(scope='session')
 def drive(factory: MessageFactory) -> list[tuple[str, Any, int]]:
     """(topic, message, log time) of a straight drive at constant rate on level ground."""

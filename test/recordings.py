@@ -9,9 +9,16 @@ from typing import Any
 from message_factory import serialised
 
 from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.salvage import RawMessage
 from wheel_terra_estimator.bags.storage import jazzy_types, open_bag
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter
 from wheel_terra_estimator.messages.unpack import Message, unpack
+
+
+def contents(path: Path) -> tuple[list[RawMessage], list[str]]:
+    """Return all messages of a recording, and what is said of its state."""
+    with open_bag(path) as bag:
+        return list(bag.messages(tuple(bag.topics))), bag.notes
 
 
 def beginning(source: Path, target: Path, seconds: float) -> Path:

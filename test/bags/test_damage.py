@@ -11,9 +11,9 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from recordings import contents
 
 from wheel_terra_estimator.bags.salvage import RawMessage, limits
-from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.studies.fuzzing import sqlite_maker
@@ -32,9 +32,15 @@ def samples(count: int = 90) -> list[Sample]:
     ]
 
 
-def read(path: Path) -> tuple[list[RawMessage], list[str]]:
-    with open_bag(path) as bag:
-        return list(bag.messages(tuple(bag.topics))), bag.notes
+@pytest.fixture
+def read_mcap(tmp_path):
+    """Write bytes as an MCAP file; return the messages that are found, and what is said."""
+
+    def read(content: bytes) -> tuple[list[RawMessage], list[str]]:
+        (tmp_path / 'a.mcap').write_bytes(content)
+        return contents(tmp_path / 'a.mcap')
+
+    return read
 
 
 def damaged(folder: Path, source: Path, at: int, count: int = 512) -> Path:
@@ -51,8 +57,8 @@ def damaged(folder: Path, source: Path, at: int, count: int = 512) -> Path:
 
 def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path):
     """The sector lies in the first of four chunks, which alone holds schemas and channels."""
-    found, notes = read(damaged(tmp_path, DEMO, 100_000))
-    whole, _ = read(DEMO)
+    found, notes = contents(damaged(tmp_path, DEMO, 100_000))
+    whole, _ = contents(DEMO)
     assert len(whole) == 10_190
     assert len(found) >= 7_205
     assert not Counter(found) - Counter(whole)
@@ -68,9 +74,7 @@ def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path):
     assert last - first < gone[-1] - gone[0] + 0.2
 
 
-def test_every_command_says_what_is_damaged(make_bag, rover, tmp_path, capsys):
-    rover.write(tmp_path / 'rover.yaml')
-    config = ['--config', str(tmp_path / 'rover.yaml')]
+def test_every_command_says_what_is_damaged(make_bag, config, tmp_path, capsys):
     bag = make_bag()
     estimates = str(tmp_path / 'estimates')
     assert main(['replay', str(bag), *config, '-o', estimates]) == 0
@@ -94,138 +98,115 @@ def test_every_command_says_what_is_damaged(make_bag, rover, tmp_path, capsys):
 
 @pytest.mark.parametrize('closed', [True, False])
 @pytest.mark.parametrize('chunk_size', [0, 900])
-def test_a_file_by_topic_without_index_gives_all_topics_in_order(tmp_path, chunk_size, closed):
+def test_a_file_by_topic_without_index_gives_all_topics_in_order(read_mcap, chunk_size, closed):
     layout = Layout(chunk_size, summary=False, by_topic=True, closed=closed)
-    (tmp_path / 'a.mcap').write_bytes(make(samples(), TYPES, layout).content)
-    found, notes = read(tmp_path / 'a.mcap')
+    found, notes = read_mcap(make(samples(), TYPES, layout).content)
     assert [tuple(m) for m in found] == [tuple(s) for s in samples()]
     assert bool(notes) is not closed
 
 
 @pytest.mark.parametrize('codec', ['', 'zstd', 'lz4'])
-def test_channels_from_the_summary_and_chunks_behind_the_damage(tmp_path, codec):
+def test_channels_from_the_summary_and_chunks_behind_the_damage(read_mcap, codec):
     made = make(samples(), TYPES, Layout(900, codec))
     begin, end, lost = made.parts[0]
     content = made.content[:begin] + bytes(end - begin) + made.content[end:]
-    (tmp_path / 'a.mcap').write_bytes(content)
-    found, notes = read(tmp_path / 'a.mcap')
+    found, notes = read_mcap(content)
     assert [tuple(m) for m in found] == [tuple(s) for s in samples()[len(lost) :]]
     assert f'lost: {(len(lost) + 1) // 2} of 45 on /joint_states' in notes[0]
 
 
-def test_records_behind_a_damage_within_a_chunk_are_found(tmp_path):
+def test_records_behind_a_damage_within_a_chunk_are_found(read_mcap):
     made = make(samples(), TYPES, Layout(100_000))
     at = made.content.index(struct.pack('<Q', 40) * 8)
     content = made.content[: at - 3] + b'\xff' * 8 + made.content[at + 5 :]
-    (tmp_path / 'a.mcap').write_bytes(content)
-    found, notes = read(tmp_path / 'a.mcap')
+    found, notes = read_mcap(content)
     # Only the values are damaged: the message is there, and that its chunk is doubtful is said.
     assert len(found) == 90
     assert '90 of them stand in a chunk with a wrong checksum' in notes[0]
     head = at - 4 - 31
     content = made.content[:head] + bytes(31) + made.content[head + 31 :]
-    (tmp_path / 'a.mcap').write_bytes(content)
-    found, notes = read(tmp_path / 'a.mcap')
+    found, notes = read_mcap(content)
     assert [tuple(m) for m in found] == [tuple(s) for i, s in enumerate(samples()) if i != 40]
     assert 'lost: 1 of 45 on /joint_states; from 0.4 s to 0.4 s' in notes[0]
 
 
-def test_damaged_names_are_no_traceback(tmp_path):
+def test_damaged_names_are_no_traceback(read_mcap):
     made = make(samples(), TYPES, Layout(900, summary=False))
     content = made.content.replace(b'/imu/data', b'/imu\xff\xfe\xfa\xf0a')
-    (tmp_path / 'a.mcap').write_bytes(content)
-    found, notes = read(tmp_path / 'a.mcap')
+    found, notes = read_mcap(content)
     assert {m.topic for m in found} == {'/joint_states'}
     assert len(found) == 45
     assert 'messages of channels that are not described' in notes[0]
 
 
-def test_loose_messages_are_read_behind_a_damaged_beginning(tmp_path):
+def test_loose_messages_are_read_behind_a_damaged_beginning(read_mcap):
     whole = samples()
     made = make(whole, TYPES, Layout(chunk_size=0, closed=False))
-    path = tmp_path / 'a.mcap'
-    path.write_bytes(b'?' + made.content)
-    assert read(path)[0] == [RawMessage(*sample) for sample in whole]
+    assert read_mcap(b'?' + made.content)[0] == [RawMessage(*sample) for sample in whole]
 
 
-def test_a_chunk_that_seems_to_end_with_another_does_not_hide_it(tmp_path):
+def test_a_chunk_that_seems_to_end_with_another_does_not_hide_it(read_mcap):
     """As many bytes are missing as bring the end of a later chunk to where this one should end."""
     dice = random.Random(1)
     whole = [sample._replace(data=dice.randbytes(200)) for sample in samples()]
     made = make(whole, TYPES, Layout(900, 'zstd', checksums=False, definitions=False))
     (begin, end, _), (first, last, _) = made.parts[2], made.parts[-1]
     inside = begin + 80
-    path = tmp_path / 'a.mcap'
-    path.write_bytes(made.content[:inside] + made.content[inside + last - end :])
     assert inside + last - end <= first  # the last chunk is whole
-    found = Counter(read(path)[0])
+    found = Counter(read_mcap(made.content[:inside] + made.content[inside + last - end :])[0])
     intact = [part for _, _, part in (*made.parts[:2], made.parts[-1])]
     assert all(RawMessage(*sample) in found for part in intact for sample in part)
 
 
-def test_two_copies_of_a_channel_that_differ_are_said(tmp_path):
+def test_two_copies_of_a_channel_that_differ_are_said(read_mcap):
     """No checksum tells which of them is right."""
     made = make(samples(), TYPES, Layout(checksums=False))
     content = made.content.replace(b'/joint_states', b'/joint_statas', 1)
-    path = tmp_path / 'a.mcap'
-    path.write_bytes(content)
-    found, notes = read(path)
+    found, notes = read_mcap(content)
     assert len(found) == 90
     assert 'copies of channel 1 differ: /joint_statas or /joint_states' in notes[0]
 
 
 @pytest.mark.parametrize('codec', ['zstd', 'lz4'])
-def test_a_channel_in_a_chunk_that_unpacks_decides(tmp_path, codec):
+def test_a_channel_in_a_chunk_that_unpacks_decides(read_mcap, codec):
     made = make(samples(), TYPES, Layout(codec=codec, checksums=False))
     at = made.content.rindex(b'/joint_states')
     content = made.content[:at] + b'/joint_statas' + made.content[at + 13 :]
-    path = tmp_path / 'a.mcap'
-    path.write_bytes(content)
-    found, notes = read(path)
+    found, notes = read_mcap(content)
     assert found == [RawMessage(*sample) for sample in samples()]
     # Damaged bytes may unpack as well: without a checksum it is no proof.
     assert 'copies of channel 1 differ: /joint_statas or /joint_states' in notes[0]
 
 
-def test_a_channel_in_a_chunk_with_a_wrong_checksum_yields(tmp_path):
+def test_a_channel_in_a_chunk_with_a_wrong_checksum_yields(read_mcap):
     made = make(samples(), TYPES, Layout(900, 'lz4'))
     content = bytearray(made.content.replace(b'imu/data', b'imu/datc', 1))
     assert content.index(b'imu/datc') < made.parts[0][1]
     content[-20] ^= 1  # in the footer: the index is not relied on, its definitions are read
-    path = tmp_path / 'a.mcap'
-    path.write_bytes(content)
-    found, notes = read(path)
+    found, notes = read_mcap(content)
     assert found == [RawMessage(*sample) for sample in samples()]
     assert 'copies of channel 2 differ' in notes[0]
 
 
-def left_out(tmp_path: Path, begin: int, end: int, content: bytes) -> tuple[int, list[str]]:
-    path = tmp_path / 'a.mcap'
-    path.write_bytes(content[:begin] + content[end:])
-    found, notes = read(path)
-    assert not Counter(found) - Counter(RawMessage(*sample) for sample in samples())
-    return len(found), notes
-
-
-def test_messages_whose_chunk_lost_its_head_are_said(tmp_path):
+def test_messages_whose_chunk_lost_its_head_are_said(read_mcap):
     """Bytes are missing, by chance so many that a record ends where another begins."""
     made = make(samples(), TYPES, Layout(900, checksums=False, summary=False))
     begin, _, part = made.parts[2]
     third = made.content.index(part[2].data) - 31
-    count, notes = left_out(tmp_path, begin, third, made.content)
-    assert count == 88
+    found, notes = read_mcap(made.content[:begin] + made.content[third:])
+    assert not Counter(found) - Counter(RawMessage(*sample) for sample in samples())
+    assert len(found) == 88
     assert 'lost from' in notes[0]
 
 
-def test_the_index_alone_decides_nothing(tmp_path):
+def test_the_index_alone_decides_nothing(read_mcap):
     """A chunk index entry that points elsewhere, in a file without checksums."""
     made = make(samples(), TYPES, Layout(900, checksums=False))
     content = bytearray(made.content)
     begin = made.parts[2][0]
     entry = content.index(struct.pack('<Q', begin), made.definitions[-1][1])
     content[entry : entry + 8] = struct.pack('<Q', begin + 5)
-    (tmp_path / 'a.mcap').write_bytes(content)
-    found, _ = read(tmp_path / 'a.mcap')
+    found, _ = read_mcap(content)
     assert [tuple(m) for m in found] == [tuple(s) for s in samples()]
 
 
@@ -247,12 +228,12 @@ def lying(text: str, old: str, new: str) -> str:
 )
 def test_metadata_that_lie_are_set_aside_and_said(make_bag, old, new):
     folder = make_bag()
-    whole, notes = read(folder)
+    whole, notes = contents(folder)
     assert len(whole) == 84
     assert not notes
     metadata = folder / 'metadata.yaml'
     metadata.write_text(lying(metadata.read_text(), old, new))
-    found, notes = read(folder)
+    found, notes = contents(folder)
     assert found == whole
     assert 'metadata.yaml was set aside' in notes[0]
 
@@ -265,12 +246,12 @@ def big_sqlite(tmp_path: Path, count: int = 4000) -> tuple[Path, list[RawMessage
 
 def test_rows_behind_damaged_pages_of_sqlite_are_read(tmp_path):
     path, whole = big_sqlite(tmp_path)
-    assert read(path) == (whole, [])
+    assert contents(path) == (whole, [])
     content = bytearray(path.read_bytes())
     middle = content.index(struct.pack('<Q', 2000) * 8) // 4096 * 4096
     content[middle : middle + 8192] = bytes(8192)
     path.write_bytes(content)
-    found, notes = read(path)
+    found, notes = contents(path)
     assert not Counter(found) - Counter(whole)
     assert len(found) > len(whole) - 200
     assert 'is damaged' in notes[0]
@@ -289,7 +270,7 @@ def test_a_damaged_row_number_of_sqlite_hides_no_row_behind(tmp_path):
         content[begin + place : begin + place + 5] = b'\x02\xe0\x37\x02\x00'
     content[begin + places[-1] : begin + places[-1] + 9] = b'\xff' * 9
     path.write_bytes(content)
-    found, notes = read(path)
+    found, notes = contents(path)
     assert Counter(found) == Counter(
         message for message, page in zip(whole, pages, strict=True) if page != begin
     )
@@ -305,7 +286,7 @@ def test_pages_that_sqlite_does_not_miss_are_said(tmp_path):
     assert count > 20
     content[interior + 3 : interior + 5] = (count - 9).to_bytes(2, 'big')
     path.write_bytes(content)
-    found, notes = read(path)
+    found, notes = contents(path)
     assert not Counter(found) - Counter(whole)
     assert f'is damaged: {len(found)} whole messages recovered' in notes[0]
     assert 'of the recording' in notes[0]
@@ -318,7 +299,7 @@ def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path):
         connection.execute("DELETE FROM sqlite_master WHERE name='timestamp_idx'")
         connection.execute('PRAGMA writable_schema=OFF')
     connection.close()
-    assert read(path)[0] == whole
+    assert contents(path)[0] == whole
 
 
 def test_rows_of_sqlite_out_of_order_are_sorted(tmp_path):
@@ -326,7 +307,7 @@ def test_rows_of_sqlite_out_of_order_are_sorted(tmp_path):
     with sqlite3.connect(path) as connection:
         connection.execute('UPDATE messages SET timestamp = ? WHERE id = 30', (START - 5,))
     connection.close()
-    found, _ = read(path)
+    found, _ = contents(path)
     assert found[0].log_time == START - 5
     assert [m.log_time for m in found] == sorted(m.log_time for m in found)
     assert len(found) == len(whole)
@@ -346,36 +327,34 @@ def test_the_write_ahead_log_of_a_recorder_that_died_is_read(tmp_path):
     live.close()
     (other / 'a.db3-shm').unlink(missing_ok=True)
     before = sorted(p.name for p in other.iterdir())
-    found, _ = read(other / 'a.db3')
+    found, _ = contents(other / 'a.db3')
     assert found[-1].data == b'last'
     assert len(found) == len(whole) + 1
     assert sorted(p.name for p in other.iterdir()) == before
 
 
-def test_a_chunk_above_the_limit_is_left_out_and_said(tmp_path, monkeypatch):
+def test_a_chunk_above_the_limit_is_left_out_and_said(read_mcap, monkeypatch):
     few = samples()
     few.insert(45, Sample(few[44].log_time + 1, '/imu/data', bytes(50_000)))
-    (tmp_path / 'a.mcap').write_bytes(make(few, TYPES, Layout(900, 'zstd')).content)
     monkeypatch.setattr(limits, 'CHUNK', 20_000)
-    found, notes = read(tmp_path / 'a.mcap')
+    found, notes = read_mcap(make(few, TYPES, Layout(900, 'zstd')).content)
     assert 80 <= len(found) < 90
     assert 'was left out' in notes[0]
 
 
-def test_more_than_can_be_held_is_refused_not_swapped(tmp_path, monkeypatch):
+def test_more_than_can_be_held_is_refused_not_swapped(read_mcap, monkeypatch):
     layout = Layout(900, by_topic=True)
-    (tmp_path / 'a.mcap').write_bytes(make(samples(900), TYPES, layout).content)
     monkeypatch.setattr(limits, 'HELD', 5_000)
     with pytest.raises(UserError, match='sort it first'):
-        read(tmp_path / 'a.mcap')
+        read_mcap(make(samples(900), TYPES, layout).content)
 
 
-def test_garbage_in_a_damaged_recording_is_not_put_down_to_the_driver(make_bag, tmp_path, capsys):
+def test_garbage_in_a_damaged_recording_is_not_put_down_to_the_driver(make_bag, capsys):
     """Stamps of 0 on four messages, in a file that was cut off."""
     folder = make_bag()
     (file,) = folder.glob('*.mcap')
     content = bytearray(file.read_bytes()[:-200])
-    messages, _ = read(folder)
+    messages, _ = contents(folder)
     for message in [m for m in messages if m.topic == '/imu/data'][5:9]:
         at = content.index(message.data)
         content[at + 4 : at + 12] = bytes(8)

@@ -23,15 +23,13 @@ from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 
 
-def test_stamps_that_stand_still_are_counted(make_bag, factory, rover, tmp_path, capsys):
+def test_stamps_that_stand_still_are_counted(make_bag, factory, config, capsys):
     header = factory.header(1_700_000_000_000_000_000)
     rows = [
         ('/joint_states', factory.joint_state(header, ('left', 'right'), velocity=(2.0, -2.0)), i)
         for i in range(50)
     ]
-    rover.write(tmp_path / 'rover.yaml')
-    bag = make_bag(messages=rows)
-    assert main(['replay', str(bag), '--config', str(tmp_path / 'rover.yaml')]) == 0
+    assert main(['replay', str(make_bag(messages=rows)), *config]) == 0
     assert re.search(r'joint_states +50 +49 x stamp repeated, merged', capsys.readouterr().out)
 
 

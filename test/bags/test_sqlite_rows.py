@@ -9,8 +9,8 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from recordings import contents
 
-from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.studies.fuzzing import sqlite_maker
 from wheel_terra_lab.studies.fuzzing.mcap_maker import Sample
@@ -34,8 +34,8 @@ def made(path: Path, count: int = 600) -> list[Sample]:
 
 
 def read(path: Path) -> tuple[Counter[tuple[int, str, bytes]], list[str]]:
-    with open_bag(path) as bag:
-        return Counter(map(tuple, bag.messages(tuple(bag.topics)))), bag.notes
+    found, notes = contents(path)
+    return Counter(map(tuple, found)), notes
 
 
 def zeroed(path: Path, begin: int, count: int) -> None:

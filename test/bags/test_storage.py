@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import yaml
+from recordings import contents
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from wheel_terra_estimator.bags.salvage import RawMessage
@@ -16,14 +17,13 @@ from wheel_terra_estimator.bags.storage import jazzy_types, open_bag
 from wheel_terra_estimator.errors import UserError
 
 
-def contents(path: Path) -> list[RawMessage]:
-    with open_bag(path) as bag:
-        return list(bag.messages(tuple(bag.topics)))
+def messages(path: Path) -> list[RawMessage]:
+    return contents(path)[0]
 
 
 @pytest.fixture
 def whole(make_bag):
-    return contents(make_bag(name='whole'))
+    return messages(make_bag(name='whole'))
 
 
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
@@ -31,23 +31,22 @@ def test_folder_single_file_and_folder_without_metadata_are_the_same(make_bag, w
     folder = make_bag(storage=storage)
     (file,) = (p for p in folder.iterdir() if p.suffix in ('.mcap', '.db3'))
     assert len(whole) == 84
-    assert contents(folder) == whole
-    assert contents(file) == whole
+    assert messages(folder) == whole
+    assert messages(file) == whole
     (folder / 'metadata.yaml').unlink()
-    with open_bag(folder) as bag:
-        assert list(bag.messages(tuple(bag.topics))) == whole
-        assert 'metadata.yaml is missing' in bag.notes[0]
+    found, notes = contents(folder)
+    assert found == whole and 'metadata.yaml is missing' in notes[0]
 
 
 def test_a_sound_file_is_read_by_its_index(make_bag, whole, monkeypatch):
     monkeypatch.setattr(McapFile, '_survey', lambda _: pytest.fail('read from front to end'))
-    assert contents(make_bag()) == whole
+    assert messages(make_bag()) == whole
 
 
 def test_unreadable_metadata_is_set_aside(make_bag, whole):
     folder = make_bag()
     (folder / 'metadata.yaml').write_text('rosbag2_bagfile_information: {version: 9}\n')
-    assert contents(folder) == whole
+    assert messages(folder) == whole
 
 
 @pytest.mark.parametrize('mode', ['FILE', 'MESSAGE', 'STORAGE'])
@@ -62,9 +61,9 @@ def test_compressed_bags(tmp_path, drive, whole, mode):
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
             writer.write(connections[topic], log_time, store.serialize_cdr(message, kind))
-    assert contents(tmp_path / 'bag') == whole
+    assert messages(tmp_path / 'bag') == whole
     (tmp_path / 'bag' / 'metadata.yaml').unlink()
-    assert contents(tmp_path / 'bag') == whole
+    assert messages(tmp_path / 'bag') == whole
 
 
 def test_truncated_mcap_gives_the_messages_before_the_cut(make_bag, whole, tmp_path):
@@ -74,9 +73,7 @@ def test_truncated_mcap_gives_the_messages_before_the_cut(make_bag, whole, tmp_p
     counts = []
     for size in range(len(content) // 3, len(content), len(content) // 40):
         cut.write_bytes(content[:size])
-        with open_bag(cut) as bag:
-            found = list(bag.messages(tuple(bag.topics)))
-            notes = bag.notes
+        found, notes = contents(cut)
         assert found == whole[: len(found)]
         assert notes or len(found) == len(whole)
         counts.append(len(found))
@@ -123,13 +120,13 @@ def test_split_bag_is_read_as_one(make_bag, drive, whole):
     for file in second.glob('*.mcap'):
         shutil.copy(file, first)
     (first / 'metadata.yaml').unlink()
-    assert contents(first) == whole
+    assert messages(first) == whole
 
 
 @pytest.mark.shared
 def test_measured_bag_in_both_storages_is_the_same(shared):
-    mcap = contents(shared / 'bags' / 'frostyboy_event_1_6_mcap')
-    sqlite = contents(shared / 'bags' / 'frostyboy_event_1_6_db3')
+    mcap = messages(shared / 'bags' / 'frostyboy_event_1_6_mcap')
+    sqlite = messages(shared / 'bags' / 'frostyboy_event_1_6_db3')
     assert len(mcap) == 2570
     assert sorted(mcap) == sorted(sqlite)
 
@@ -141,5 +138,5 @@ def test_bags_of_the_tests_are_closed_as_the_library_does_it(make_bag, request):
             request.getfixturevalue('library_metadata')
         folder = make_bag(name=f'{number}')
         text = (folder / 'metadata.yaml').read_text()
-        stated.append((yaml.safe_load(text.replace(f'{number}.mcap', 'x')), contents(folder)))
+        stated.append((yaml.safe_load(text.replace(f'{number}.mcap', 'x')), messages(folder)))
     assert stated[0] == stated[1]

@@ -31,11 +31,6 @@ def test_without_a_rover_file_it_proposes_one(capsys):
     assert 'wheels.names: [front_left_wheel_joint, front_right_wheel_joint, rear_left' in said
 
 
-def test_what_cannot_be_used(tmp_path, capsys):
-    assert main(['check', str(tmp_path / 'nothing')]) == 2
-    assert 'no such bag' in capsys.readouterr().err
-
-
 def test_a_remap_to_nothing_names_the_topic_that_is_not_there(make_bag, drive, capsys):
     topics = {'/imu/data': 'sensor_msgs/msg/Imu', '/joint_states': 'sensor_msgs/msg/JointState'}
     bag = make_bag(messages=[row for row in drive if row[0] in topics], topics=topics)

@@ -23,12 +23,6 @@ REAL = ('--remap', 'odom:=/wheel/odometry', '--remap', 'reference_odom:=/truth/o
 THINNED = ('-p', 'reference_odom_max_rate:=1.0')
 
 
-@pytest.fixture
-def config(tmp_path, rover):
-    rover.write(tmp_path / 'rover.yaml')
-    return ['--config', str(tmp_path / 'rover.yaml')]
-
-
 def assert_slip_follows_the_reference(history: EstimateHistory) -> None:
     """Rim speed 0.42 m/s, reference 0.36 m/s: slip 1/7 on both wheels when it was just heard."""
     seconds = history.seconds

@@ -76,10 +76,14 @@ SOURCES = ('wheel_terra_estimator', 'wheel_terra_lab', 'config', 'launch', 'tool
 
 
 def test_no_source_that_readers_cannot_open():
-    for page in PAGES:
-        text = text_without_code(page)
+    """Neither on the pages nor in the code and its files."""
+    files = [file for folder in SOURCES for file in (ROOT / folder).rglob('*.*')]
+    sources = [file for file in files if file.suffix in ('.py', '.yaml', '.md')]
+    assert len(sources) > 300
+    texts = {file: file.read_text(encoding='utf-8') for file in sources}
+    for file, text in (texts | {page: text_without_code(page) for page in PAGES}).items():
         for words in CLOSED:
-            assert not re.search(words, text), f'{page.relative_to(DOCS)}: {words}'
+            assert not re.search(words, text), f'{file.relative_to(ROOT)}: {words}'
 
 
 def test_the_map_of_the_code_is_short_and_leads_to_files():
@@ -129,13 +133,3 @@ def test_python_of_a_page_runs(page, tmp_path, monkeypatch):
     for block in python_blocks(page):
         exec(compile(block, page.name, 'exec'), {})
     pyplot.close('all')
-
-
-def test_nor_in_the_code_and_its_files():
-    files = [file for folder in SOURCES for file in (ROOT / folder).rglob('*.*')]
-    sources = [file for file in files if file.suffix in ('.py', '.yaml', '.md')]
-    assert len(sources) > 300
-    for file in sources:
-        text = file.read_text(encoding='utf-8')
-        for words in CLOSED:
-            assert not re.search(words, text), f'{file.relative_to(ROOT)}: {words}'

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
 from types import SimpleNamespace
 
 import numpy as np
@@ -177,15 +178,9 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
     turned = drive.truth.stamp[0] + round(6.6e9)  # the commands cross zero at 6.5 s
 
     def slips(until):
-        smoother = DriveSmoother(drive.configuration)
-        core = EstimatorCore(drive.configuration, smoother.estimator)
-        for arrival in drive.arrivals:
-            if arrival.measurement.stamp > until:
-                break
-            for estimates in core.add(arrival.measurement):
-                smoother.keep(estimates)
-        sets = [kept.estimates for kept in smoother.sets()]
-        return {s.stamp: s.slip for s in sets if s.stamp < turned - round(2e9)}
+        heard = (a.measurement for a in drive.arrivals)
+        sets = run(drive, takewhile(lambda m: m.stamp <= until, heard))
+        return {s.stamp: s.slip for s, _ in sets if s.stamp < turned - round(2e9)}
 
     whole, climb = slips(drive.truth.stamp[-1]), slips(turned)
     assert len(whole) > 40

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from parts import step_inputs
 
 from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -21,6 +22,7 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_lab.evaluation.runner import run_estimator
 from wheel_terra_lab.evaluation.simulators import SIMULATORS
 
@@ -189,11 +191,18 @@ def test_loads_that_a_file_states_are_believed(stated):
     ],
 )
 def test_loads_are_open_where_no_balance_gives_them(wheels, stated, std):
+    """Published with the loads, as the balance's own deviation is."""
     rover = {k: v[:wheels] if isinstance(v, list) else v for k, v in TEN_LINES.items()}
-    told = Rover.from_configuration(reader.from_parameters({**rover, **stated}))
+    configuration = reader.from_parameters({**rover, **stated})
+    told = Rover.from_configuration(configuration)
     assert told.open_load_std == pytest.approx(std)
+    estimator = WheelSoilEstimator(configuration)
+    estimator.step(*step_inputs(0.0, np.ones(wheels), np.ones(wheels)))
+    published = estimator.estimates().normal_load_std / (MASS * GRAVITY / wheels)
+    assert published == pytest.approx(np.full(wheels, np.hypot(std, told.load_std)), rel=0.02)
 
 
+@pytest.mark.slow
 def test_published_loads_of_a_rigid_chassis_hold_on_uneven_ground():
     """Simulator C: there they are off by 0.15 of the mean load."""
     drive = SIMULATORS['C'].simulate('climb', 5142, 9.0, None)

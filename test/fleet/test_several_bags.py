@@ -18,12 +18,6 @@ from wheel_terra_estimator.output_folder import MARKER
 
 
 @pytest.fixture
-def config(tmp_path, rover):
-    rover.write(tmp_path / 'rover.yaml')
-    return ['--config', str(tmp_path / 'rover.yaml')]
-
-
-@pytest.fixture
 def bags(make_bag, drive):
     """Drives of three lengths, and what is none."""
     paths = [make_bag(drive[: len(drive) * k // 3], name=f'drive{k}') for k in (3, 2, 1)]

@@ -7,14 +7,13 @@ import gc
 import importlib.util
 import os
 import random
-import subprocess
-import sys
+import signal
 import tempfile
 import time
 from pathlib import Path
 
 import pytest
-from node_server import NodeServer
+from node_server import InterpretedProcess, NodeServer
 
 ATTEMPTS = 3
 """A test over DDS fails when it fails this often: where processes share few cores, the machine
@@ -22,6 +21,12 @@ alone can hold one up or lose its messages, and that says nothing about the node
 
 LOOK = 0.02
 """Between two looks at a condition [s]: one that publishes keeps nobody busy."""
+SOON = {
+    'wheel_terra_estimator.messages.fault_log:MEMORY': 10**9,
+    'wheel_terra_estimator.ros.lifecycle_node:DISCOVERY': 1.5,
+}
+"""Constants of a node that tells sooner what it waits for (5 s), and for less time (10 s): how long
+faults are told is tested in messages."""
 HAS_ROS = importlib.util.find_spec('rclpy') is not None
 
 
@@ -59,51 +64,6 @@ def no_node_stays():
     gc.collect()
 
 
-class NodeProcess:
-    """An executable of the package in a process of its own."""
-
-    def __init__(self, process):
-        self._process = process
-
-    @property
-    def pid(self):
-        return self._process.pid
-
-    def signal(self, *numbers):
-        """Send signals, one after the other."""
-        for number in numbers:
-            self._process.send_signal(number)
-
-    def said(self):
-        """Return what it has said so far."""
-        return self._process.said()
-
-    def stop(self, number):
-        """Send a signal; return exit status and what the process said."""
-        self.signal(number)
-        return self.end()
-
-    def end(self, timeout=60.0):
-        """Wait for the end; return exit status and what the process said."""
-        said, _ = self._process.communicate(timeout=timeout)
-        return self._process.returncode, said
-
-    def kill(self):
-        if self._process.poll() is None:
-            self._process.kill()
-            self._process.communicate(timeout=60.0)
-
-
-def interpreter(module, arguments):
-    """Start an executable as `ros2 run` does, by an interpreter that has imported nothing yet."""
-    return subprocess.Popen(
-        [sys.executable, '-m', f'wheel_terra_estimator.ros.{module}', *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-
-
 @pytest.fixture(scope='session')
 def node_server(own_domain):
     server = NodeServer()
@@ -114,13 +74,20 @@ def node_server(own_domain):
 def _starter(make):
     running = []
 
-    def start(module, *arguments):
-        running.append(NodeProcess(make(module, arguments)))
+    def start(module, *arguments, **more):
+        running.append(make(module, arguments, **more))
         return running[-1]
 
     yield start
     for process in running:
-        process.kill()
+        if process.poll() is None:
+            process.stop(signal.SIGKILL)
+
+
+@pytest.fixture
+def soon():
+    """Constants for `start`."""
+    return {'constants': SOON}
 
 
 @pytest.fixture
@@ -132,7 +99,7 @@ def start(node_server):
 @pytest.fixture
 def start_interpreter():
     """Start nodes that do not outlive the test, from nothing: for what happens at the start."""
-    yield from _starter(interpreter)
+    yield from _starter(InterpretedProcess)
 
 
 @pytest.fixture
@@ -153,9 +120,9 @@ def running_estimator(node_server, tmp_path_factory):
     path = tmp_path_factory.mktemp('estimator') / 'rover.yaml'
     reader.load(['pathfinder']).write(path)
     arguments = ['--ros-args', '--params-file', str(path)]
-    process = NodeProcess(node_server.start('estimator_node', arguments))
+    process = node_server.start('estimator_node', arguments)
     yield process
-    process.kill()
+    process.stop(signal.SIGKILL)
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -41,7 +41,30 @@ LOOK_UP = 0.02  # [s] between two looks whether a process has ended
 NOT_ENDED = None
 
 
-class ForkedProcess:
+class NodeProcess:
+    """What the tests ask of a node, however it was started."""
+
+    returncode: Any
+    send_signal: Any
+    communicate: Any
+
+    def stop(self, *signals: int) -> tuple[int, str]:
+        """Send signals, one after the other; wait for the end, return exit status and words."""
+        for number in signals:
+            self.send_signal(number)
+        said, _ = self.communicate(timeout=60.0)
+        return self.returncode, said
+
+
+class InterpretedProcess(NodeProcess, subprocess.Popen):
+    """As `ros2 run` starts an executable: by an interpreter that has imported nothing yet."""
+
+    def __init__(self, module: str, arguments: Sequence[str]) -> None:
+        command = [sys.executable, '-m', f'{PACKAGE}.{module}', *arguments]
+        super().__init__(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+class ForkedProcess(NodeProcess):
     """A process that the server forked; what of `subprocess.Popen` the tests use."""
 
     def __init__(self, server: NodeServer, pid: int, output: IO[str]) -> None:
@@ -98,13 +121,24 @@ class NodeServer:
         )
         theirs.close()
 
-    def start(self, module: str, arguments: Sequence[str], package: str = PACKAGE) -> ForkedProcess:
-        """Start a node as ``python -m PACKAGE.MODULE ARGUMENTS`` would."""
+    def start(
+        self,
+        module: str,
+        arguments: Sequence[str],
+        package: str = PACKAGE,
+        constants: Mapping[str, float] | None = None,
+    ) -> ForkedProcess:
+        """Start a node as ``python -m PACKAGE.MODULE ARGUMENTS`` would.
+
+        ``constants``: module, colon and name -> value in this node; how long it waits before it
+        tells, say.
+        """
         # A file, not a pipe: nobody has to read it while the node runs.
         output = tempfile.TemporaryFile('w+')  # noqa: SIM115 - closed when it was read
         request = {
             'start': f'{package}.{module}',
             'arguments': list(arguments),
+            'constants': dict(constants or {}),
             'environment': dict(os.environ),
             'folder': str(Path.cwd()),
         }
@@ -162,6 +196,11 @@ def _become(request: dict[str, Any], output: int) -> None:
     os.environ.update(request['environment'])
     os.chdir(request['folder'])
     sys.argv = [request['start'], *request['arguments']]
+    for place, value in request['constants'].items():
+        module, _, name = place.partition(':')
+        owner = importlib.import_module(module)
+        assert hasattr(owner, name), place
+        setattr(owner, name, value)
     random.seed()
 
 

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node as other nodes see it."""
 
-import signal
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -219,12 +218,12 @@ def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, paramete
             said('wheel rates unknown') and said('/drive/joints: never received (no publishers)')
         )
     )
-    assert 'listening to /drive/joints, /imu/data' in process.stop(signal.SIGTERM)[1]
+    until(lambda: 'listening to /drive/joints, /imu/data' in process.said())
 
 
 def test_wrong_parameters_end_the_node_with_one_line(start, parameters):
     """Which are wrong is tested where they are read, in configuration."""
-    status, said = start('estimator_node', *ROVER, parameters, '-p', 'rover.mas:=20.0').end()
+    status, said = start('estimator_node', *ROVER, parameters, '-p', 'rover.mas:=20.0').stop()
     assert status == 2
     assert 'rover.mass' in said
     assert 'Traceback' not in said

@@ -189,8 +189,7 @@ def catches_signals(process):
 
 
 def assert_two_signals_end(process, number):
-    process.signal(number, number)
-    status, words = process.end()
+    status, words = process.stop(number, number)
     assert status == 0, words
     assert 'Traceback' not in words
 
@@ -244,8 +243,9 @@ def test_a_closing_that_hangs_is_cut_short(monkeypatch):
 def test_a_broken_parameter_file_ends_it_with_one_line(start, tmp_path):
     path = tmp_path / 'broken.yaml'
     path.write_text('/**:\n  ros__parameters:\n    rover.mass: [1, "a"\n')
-    for name in (path, tmp_path / 'missing.yaml'):
-        status, words = start('estimator_node', *ROVER, str(name)).end()
+    files = (path, tmp_path / 'missing.yaml')
+    for process in [start('estimator_node', *ROVER, str(file)) for file in files]:
+        status, words = process.stop()
         assert status == 2
         assert 'Traceback' not in words
         assert len(words.strip().splitlines()) <= 2, words

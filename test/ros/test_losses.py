@@ -40,8 +40,8 @@ def drive(start, tmp_path):
             due = rover.publish_due()
             executor.spin_once(timeout_sec=max(due - time.monotonic(), 0.0))
 
-    def start_node():
-        return start('estimator_node', '--ros-args', '--params-file', str(path))
+    def start_node(**more):
+        return start('estimator_node', '--ros-args', '--params-file', str(path), **more)
 
     yield rover, until, start_node
     executor.shutdown()
@@ -69,14 +69,14 @@ def test_a_process_that_stood_tells_each_loss_with_its_count(drive):
     until(lambda: rover.sets > 20)
     until(lambda: rover.said == 'running')
     for missed in (MISSED, 3 * MISSED, 9 * MISSED):  # until queues and buffers are full
-        process.signal(signal.SIGSTOP)
+        process.send_signal(signal.SIGSTOP)
         before = dict(rover.count)  # a busy machine sends fewer a second
         for topic in fast:
             rover.publish_at(topic, 400.0)  # the buffers are full sooner
         until(lambda n=missed, b=before: all(rover.count[t] - b[t] > n for t in fast))
         for topic in fast:
             rover.publish_at(topic, 20.0)
-        process.signal(signal.SIGCONT)
+        process.send_signal(signal.SIGCONT)
         over = lasts(10.0)
         until(lambda over=over: fast <= lost(rover).keys() or over())
         if fast <= lost(rover).keys():
@@ -98,9 +98,9 @@ def test_a_process_that_stood_and_lost_nothing_is_behind_and_no_topic_silent(dri
     until(lambda: rover.sets > 20)
     until(lambda: rover.said == 'running')
     until(lasts(1.5))  # the first second of a process may be late
-    process.signal(signal.SIGSTOP)
+    process.send_signal(signal.SIGSTOP)
     until(lasts(1.5))
-    process.signal(signal.SIGCONT)
+    process.send_signal(signal.SIGCONT)
     sets, said = rover.sets, set()
     until(lambda: 'late' in rover.said)
     assert re.search(r'inputs: taken [12]\.\d s late', rover.said), rover.said
@@ -123,9 +123,9 @@ def test_an_orderly_life_is_quiet(drive):
     assert 'OK: ' in said
 
 
-def test_a_node_without_inputs_waits_at_first_and_warns_then(drive):
+def test_a_node_without_inputs_waits_at_first_and_warns_then(drive, soon):
     _, _, start = drive
-    process, too_long = start(), lasts(60.0)
+    process, too_long = start(**soon), lasts(60.0)
     while '[WARN]' not in process.said() and not too_long():  # nothing is published
         time.sleep(0.1)
     _, said = process.stop(signal.SIGINT)

@@ -52,9 +52,9 @@ def joint_states(node, stamp, *, topic='joint_states'):
     return publisher, send
 
 
-def test_two_nodes_of_one_name_are_told(start, heard, rover):
+def test_two_nodes_of_one_name_are_told(start, heard, rover, soon):
     _, until, statuses = heard
-    start('estimator_node', *rover)
+    start('estimator_node', *rover, **soon)
     until(lambda: statuses)
     assert not any('another node' in s.message for s in statuses)
     second = start('estimator_node', *rover)
@@ -64,12 +64,14 @@ def test_two_nodes_of_one_name_are_told(start, heard, rover):
     until(lambda: 'another node' not in statuses[-1].message)
 
 
-def test_sim_time_without_a_clock_is_told_until_it_comes_and_estimates_go_on(start, heard, rover):
+def test_sim_time_without_a_clock_is_told_until_it_comes_and_estimates_go_on(
+    start, heard, rover, soon
+):
     node, until, statuses = heard
     sets = []
     node.create_subscription(ros.JointState, f'{NODE}/slip', sets.append, 10)
     publisher, send = joint_states(node, [100_000_000_000])
-    start('estimator_node', *rover, '-p', 'use_sim_time:=true')
+    start('estimator_node', *rover, '-p', 'use_sim_time:=true', **soon)
     until(lambda: publisher.get_subscription_count() and node.count_publishers(f'{NODE}/slip'))
     until(lambda: (send(), len(sets) > 3)[1])
     words = 'nothing comes on /clock'

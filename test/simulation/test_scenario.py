@@ -5,11 +5,8 @@
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.configuration import shipped
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.simulation import scenario as scenarios
-
-NAMES = [n.removeprefix('scenarios/') for n in shipped.files() if n.startswith('scenarios/')]
 
 
 @pytest.mark.parametrize(
@@ -69,11 +66,6 @@ def test_changes_and_parameters_win_over_the_file():
 def test_degrees_become_radians():
     scenario = scenarios.load({'slope.angle_deg': [10.0]})
     np.testing.assert_allclose(scenario.slope.angle, np.radians([10.0]))
-
-
-def test_every_scenario_file_is_listed():
-    found = [key for key in shipped.files() if key.startswith('scenarios/')]
-    assert len(found) == len(NAMES)
 
 
 def test_another_rover_in_a_shipped_scenario():

@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A skidding wheel digs in; an effect has several forms, of which settings choose one."""
 
-import math
-
 import numpy as np
 import pytest
-from terra_tools import SAND, WHEEL, points, state
+from terra_tools import SAND, points, state
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.errors import UserError
@@ -66,18 +64,6 @@ def test_lyasko_multiplies_the_sinkage_at_rest():
     z = model.steady_state(points(slip)).sinkage
     s = np.abs(slip)
     assert z / z[0] == pytest.approx((1.0 + s) / (1.0 - 0.5 * s), rel=2e-3)
-
-
-def test_exponent_that_grows_with_pressure_is_the_soil_s_at_three_kilopascal():
-    load = np.array([3000.0, 6000.0]) * WHEEL.width * WHEEL.radius
-    settings = {SKID: {'form': 'load', 'nw': 0.2, 'n1': 0.0}}
-    z = state(0.2, load, effects=settings).sinkage
-    assert z[0] == pytest.approx(state(0.2, load[0]).sinkage[0], rel=1e-9)
-    heavier = Soil(
-        **{**SAND.__dict__, 'sinkage_exponent': SAND.sinkage_exponent + 0.2 * math.log(2.0)}
-    )
-    other = WheelSoilModel(heavier).steady_state(points(0.2, load[1])).sinkage
-    assert z[1] == pytest.approx(other[0], rel=1e-9)
 
 
 # The mechanism ---------------------------------------------------------------------------------

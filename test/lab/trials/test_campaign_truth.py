@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -23,77 +24,14 @@ from wheel_terra_lab.trials.hidden import LISTED, OTHER, OUTSIDE, SmoothError
 from wheel_terra_lab.trials.other_worlds import WORLDS, hump_share, resistive_stress
 from wheel_terra_lab.trials.truth import OUTPUTS, TrueSoil, solve
 
-# Main parameter of each effect and form in the package's catalogue.
-PARAMETERS = {
-    'pull_zero': 'offset',
-    'pull_gain': 'gain',
-    'torque_gain': 'gain',
-    'sinkage_gain': 'gain',
-    'slip_sinkage_exponent': 'n1',
-    'lug_digging': 'kd',
-    'lug_support': 'dz4',
-    'lug_shear_radius': 'lam',
-    'soil_mound': 'kappa',
-    'stress_peak_shift': 'c2',
-    'slope_gravity': 'share',
-    'bulldozing': 'kb',
-    'cohesion': 'delta',
-    'multipass': 'stiffening',
-    'rate_dependence': 'bearing',
-    'hard_layer': 'stiffness',
-    'drivetrain_friction': 'torque',
-    'wheel_radius_bias': 'bias',
-    'sinkage_offset': 'offset',
-    'pitch_bias': 'bias',
-    'slip_sinkage_exponent:lyasko': 'gain',
-    'slip_sinkage_exponent:load': 'nw',
-    'lug_digging:saturating': 'kd',
-    'lug_support:by_height': 'share',
-    'bulldozing:terzaghi': 'kb',
-    'multipass:rut': 'rut',
-    'hard_layer:bearing': 'stiffness',
-    'stress_peak_shift:backward': 'retreat',
-    'drivetrain_friction:proportional': 'share',
-    'drivetrain_friction:viscous': 'damping',
-    'grouser_thrust': 'share',
-    'grouser_thrust:textbook': 'share',
-    'rim_friction': 'loss',
-    'wheel_flexibility': 'compliance',
-    'soil_adhesion': 'thickness',
-    'soil_transport': 'fill',
-    'shear_deformation:pressure': 'growth',
-}
-
 
 def package(rows, soil: TrueSoil, effects) -> dict[str, np.ndarray]:
-    fields = (
-        'cohesive_modulus',
-        'frictional_modulus',
-        'sinkage_exponent',
-        'cohesion',
-        'friction_angle',
-        'shear_modulus',
-        'peak_stress_ratio',
-        'leaving_angle_ratio',
-        'density',
-    )
-    wheel = Wheel(
-        radius=rows['wheel_radius'],
-        width=rows['wheel_width'],
-        lug_height=rows['lug_height'],
-        lug_count=rows['lug_count'],
-    )
+    wheel = Wheel(*(rows[k] for k in ('wheel_radius', 'wheel_width', 'lug_height', 'lug_count')))
+    motion = ('slope', 'gravity', 'angular_velocity', 'pass_number')
     points = OperatingPoints(
-        slip=rows['slip'],
-        normal_load=rows['normal_load'],
-        wheel=wheel,
-        slope=rows['slope'],
-        gravity=rows['gravity'],
-        angular_velocity=rows['angular_velocity'],
-        pass_number=rows['pass_number'],
+        rows['slip'], rows['normal_load'], wheel, **{name: rows[name] for name in motion}
     )
-    model = WheelSoilModel(Soil(**{name: getattr(soil, name) for name in fields}), effects)
-    state = model.steady_state(points)
+    state = WheelSoilModel(Soil(**vars(soil)), effects).steady_state(points)
     return {key: getattr(state, key) for key in OUTPUTS}
 
 
@@ -162,7 +100,8 @@ def test_package_agrees_with_each_effect_and_form(key):
     size = kind.typical(rows, soil)
     hidden = kind.make(size, 0.4, rows, soil)
     name, _, form = key.partition(':')
-    values = {PARAMETERS[key]: size, **hidden.second, **({'form': form} if form else {})}
+    main = catalogue()[key].parameters[0].name
+    values = {main: size, **hidden.second, **({'form': form} if form else {})}
     base, with_it = solve(rows, soil), solve(rows, soil, (hidden,))
     change = max(np.max(np.abs(with_it[key] - base[key])) for key in OUTPUTS)
     assert change > 1e-4, 'it does nothing'
@@ -178,8 +117,8 @@ def test_strangers_and_other_formulas_change_the_outputs():
     soil = random_soil(rng)
     rows = random_rows('full56', rng, soil)
     base = solve(rows, soil)
-    for catalogue in (OTHER, OUTSIDE):
-        for name, kind in catalogue.items():
+    for strangers in (OTHER, OUTSIDE):
+        for name, kind in strangers.items():
             effect = kind.make(kind.typical(rows, soil), 0.6, rows, soil)
             out = solve(rows, soil, (effect,))
             changed = [np.max(np.abs(out[key] - base[key])) > 1e-6 for key in OUTPUTS]
