@@ -31,6 +31,7 @@ class SoilTuning:
     Tuned on simulated drives, seeds 1000 to 1019.
     """
 
+    memory: float = 100.0  # [m] over which soil returns to the nominal one
     strength_walk: float = 0.1  # [ln]
     shear_modulus_walk: float = 0.1  # [ln]
     slip_sinkage_walk: float = 0.05
@@ -66,15 +67,6 @@ class SoilProcess:
         self._error_length = float(configuration.filter.shear_error_length)
         self._error_variance = priors.shear_error_std**2
         self._shear_radius_variance = PRIORS.shear_radius_std**2
-        self._returns = [
-            (index, std**2, walk**2 / (2.0 * std**2))
-            for index, std, walk in (
-                (SHEAR_STRENGTH, priors.strength_std, _TUNING.strength_walk),
-                (SHEAR_MODULUS, priors.shear_modulus_std, _TUNING.shear_modulus_walk),
-                (SLIP_SINKAGE, PRIORS.slip_sinkage_std, _TUNING.slip_sinkage_walk),
-                (CENTROID, PRIORS.centroid_std, _TUNING.centroid_walk),
-            )
-        ]
         self._each = np.eye(n)
         self._mean = np.full((n, n), 1.0 / n)
         self._mean_variance = self._error_variance + n * priors.shear_error_common_std**2
@@ -85,12 +77,16 @@ class SoilProcess:
         layout = self._layout
         mean, F, Q = prediction
         walk = self._walk * travel
-        for index, variance, rate in self._returns:
-            # It returns to what is configured as fast as it walks: its spread stays that.
-            keep = math.exp(-rate * walk)
-            mean[index] *= keep
-            F[index, index] = keep
-            Q[index, index] = variance * (1.0 - keep * keep)
+        forget = math.exp(-travel / _TUNING.memory)
+        for index, std in (
+            (SHEAR_STRENGTH, _TUNING.strength_walk),
+            (SHEAR_MODULUS, _TUNING.shear_modulus_walk),
+            (SLIP_SINKAGE, _TUNING.slip_sinkage_walk),
+            (CENTROID, _TUNING.centroid_walk),
+        ):
+            mean[index] *= forget
+            F[index, index] = forget
+            Q[index, index] = std**2 * walk
         Q[MOUND, MOUND] = _TUNING.mound_walk**2 * walk
         Q[RUT_SHARE, RUT_SHARE] = _TUNING.rut_share_walk**2 * walk
         keep = math.exp(-travel / _TUNING.shear_radius_length)
