@@ -22,7 +22,7 @@ alone can hold one up or lose its messages, and that says nothing about the node
 LOOK = 0.02
 """Between two looks at a condition [s]: one that publishes keeps nobody busy."""
 SOON = {
-    'wheel_terra_estimator.messages.fault_log:MEMORY': 10**9,
+    'wheel_terra_estimator.messages.diagnostics:MEMORY': 10**9,
     'wheel_terra_estimator.ros.lifecycle_node:DISCOVERY': 1.5,
 }
 """Constants of a node that tells sooner what it waits for (5 s), and for less time (10 s): how long
