@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
@@ -60,7 +60,8 @@ class EffectParameter:
             )
 
 
-def strength(
+def _of_prior(
+    prior: str,
     name: str,
     unit: str,
     default: float,
@@ -71,25 +72,16 @@ def strength(
     *,
     free: bool = True,
 ) -> EffectParameter:
-    """Return a parameter that is the size of a term: half-normal, with its default's sign."""
+    """Return a parameter with a normal prior about its default, or a half-normal one from 0."""
+    centre = default if prior == 'normal' else 0.0
     limits = default, lower, upper, scale
-    return EffectParameter(name, unit, *limits, 'half_normal', meaning, free=free)
+    return EffectParameter(name, unit, *limits, prior, meaning, centre, free=free)
 
 
-def shape(
-    name: str,
-    unit: str,
-    default: float,
-    lower: float,
-    upper: float,
-    scale: float,
-    meaning: str,
-    *,
-    free: bool = True,
-) -> EffectParameter:
-    """Return a parameter that shapes a term (an onset, a depth): normal about its default."""
-    limits = default, lower, upper, scale
-    return EffectParameter(name, unit, *limits, 'normal', meaning, default, free=free)
+magnitude = partial(_of_prior, 'half_normal')
+"""A parameter that is the size of a term, with the sign of its default."""
+shape = partial(_of_prior, 'normal')
+"""A parameter that shapes a term (an onset, a depth)."""
 
 
 @dataclass(frozen=True)

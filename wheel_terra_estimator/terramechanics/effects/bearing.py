@@ -14,9 +14,9 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
     EffectParameter,
     Form,
+    magnitude,
     relative_pressure,
     shape,
-    strength,
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 
@@ -43,7 +43,7 @@ def _support(contact: Contact[Quantity], angle: Quantity, p: SimpleNamespace) ->
 
 
 _PARAMETERS = (
-    strength('stiffness', 'Pa/m', 3e6, 0.0, 1e9, 1e7, 'added bearing stiffness'),
+    magnitude('stiffness', 'Pa/m', 3e6, 0.0, 1e9, 1e7, 'added bearing stiffness'),
     shape('depth', 'm', 0.02, 0.0, 0.3, 0.02, 'depth of its top'),
 )
 
@@ -105,7 +105,7 @@ MULTIPASS = Effect(
     claim='later wheels or passes run in soil that the earlier ones compacted',
     form='stiffening',
     symbol='k_i = k [1 + 2 stiffening (1 - 2^(1-i))], i = pass number',
-    parameters=(strength('stiffening', '-', 0.5, -0.3, 5.0, 0.5, 'gain of stiffness of pass 2'),),
+    parameters=(magnitude('stiffening', '-', 0.5, -0.3, 5.0, 0.5, 'gain of stiffness of pass 2'),),
     needs=('pass_number',),
     confounded_with={
         'rate_dependence': 'the same pass at another speed',
@@ -120,7 +120,7 @@ MULTIPASS = Effect(
             claim='later wheels start at the bottom of the rut, where the soil has borne its '
             'pressure already',
             symbol='p = k (z + z_r)^N below the rut, sinkage z + z_r, z_r = 2 rut (1 - 2^(1-i))',
-            parameters=(strength('rut', 'm', 0.005, 0.0, 0.2, 0.01, 'depth that pass 1 leaves'),),
+            parameters=(magnitude('rut', 'm', 0.005, 0.0, 0.2, 0.01, 'depth that pass 1 leaves'),),
             validity='the same rut, its walls not counted; soil that does not spring back',
             source='Wong 1989 (book, no DOI), repetitive loading: at the depth of before, the '
             'pressure of before',
@@ -166,7 +166,7 @@ def _with_load(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.sinkage_exponent = contact.sinkage_exponent + growth
 
 
-_N1 = strength('n1', '-', 0.3, -0.5, 2.0, 0.4, 'growth of the exponent with |slip|')
+_N1 = magnitude('n1', '-', 0.3, -0.5, 2.0, 0.4, 'growth of the exponent with |slip|')
 
 SLIP_SINKAGE_EXPONENT = Effect(
     name='slip_sinkage_exponent',
@@ -188,7 +188,7 @@ SLIP_SINKAGE_EXPONENT = Effect(
             'what the coefficient of a skidding wheel has beyond n1',
             free=False,
         ),
-        strength(
+        magnitude(
             'side',
             '-',
             0.0,
@@ -216,7 +216,7 @@ SLIP_SINKAGE_EXPONENT = Effect(
             claim='slip or skid multiplies the sinkage at rest; the exponent stays',
             symbol='z = z0 [1 + gain ((1 + |s|)/(1 - |s|/2) - 1)] by k *= [...]^-(N + 1/2)',
             parameters=(
-                strength('gain', '-', 1.0, 0.0, 8.0, 1.0, 'share of the published growth'),
+                magnitude('gain', '-', 1.0, 0.0, 8.0, 1.0, 'share of the published growth'),
             ),
             validity='slip 0 to 0.5; the factor is exact for small angles without shear',
             source='Lyasko 2010, Slip sinkage effect in soil-vehicle mechanics, J. Terramech. 47, '

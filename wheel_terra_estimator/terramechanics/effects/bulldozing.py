@@ -10,7 +10,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, Form, strength
+from wheel_terra_estimator.terramechanics.effects.base import Effect, Form, magnitude
 from wheel_terra_estimator.terramechanics.stresses import mobilised_share
 
 _LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it
@@ -65,7 +65,7 @@ def _earth_pressure(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 
-_KB = strength('kb', '-', 0.5, 0.0, 5.0, 0.5, 'share of the full passive resistance')
+_KB = magnitude('kb', '-', 0.5, 0.0, 5.0, 0.5, 'share of the full passive resistance')
 
 BULLDOZING = Effect(
     name='bulldozing',
@@ -150,7 +150,7 @@ def _plate(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.torque = contact.torque + contact.direction * _CENTRE * r * rub
 
 
-_KS = strength('ks', '-', 1.0, 0.0, 5.0, 0.5, 'share of the full passive resistance')
+_KS = magnitude('ks', '-', 1.0, 0.0, 5.0, 0.5, 'share of the full passive resistance')
 
 SIDE_BULLDOZING = Effect(
     name='side_bulldozing',

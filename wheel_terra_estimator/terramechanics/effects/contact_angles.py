@@ -14,8 +14,8 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
     EffectParameter,
     Form,
+    magnitude,
     shape,
-    strength,
 )
 
 SMALLEST_ROOM = 1e-12
@@ -49,7 +49,9 @@ def _raise(contact: Contact[Quantity], rise: Quantity) -> None:
     contact.leaving_angle = np.where(rise > 0.0, raised, contact.leaving_angle)
 
 
-_KAPPA = strength('kappa', '-', 1.0, 0.0, 8.0, 1.0, 'height of the mound at s = 1 over the sinkage')
+_KAPPA = magnitude(
+    'kappa', '-', 1.0, 0.0, 8.0, 1.0, 'height of the mound at s = 1 over the sinkage'
+)
 
 SOIL_MOUND = Effect(
     name='soil_mound',
@@ -111,7 +113,7 @@ STRESS_PEAK_SHIFT = Effect(
     form='forward',
     symbol='t_m = (c1 + c2 s) t_1 (+ skid |s| t_1 where s < 0)',
     parameters=(
-        strength('c2', '-', 0.2, -0.5, 0.8, 0.2, 'shift at s = 1'),
+        magnitude('c2', '-', 0.2, -0.5, 0.8, 0.2, 'shift at s = 1'),
         EffectParameter(
             'skid',
             '-',
@@ -139,7 +141,7 @@ STRESS_PEAK_SHIFT = Effect(
             name='backward',
             claim='the angle of greatest stress moves backward with slip',
             symbol='t_m = (c1 - retreat s) t_1',
-            parameters=(strength('retreat', '-', 0.1, 0.0, 0.8, 0.2, 'shift back at s = 1'),),
+            parameters=(magnitude('retreat', '-', 0.1, 0.0, 0.8, 0.2, 'shift back at s = 1'),),
             validity='c1 - retreat s between 0 and 1; clamped inside the contact',
             source='the same law with the other sign, as fits to small wheels give it '
             '(docs/models/validation.md)',

@@ -15,8 +15,8 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
     EffectParameter,
     Form,
+    magnitude,
     shape,
-    strength,
 )
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio, speed_ratio
 
@@ -157,7 +157,7 @@ DRIVETRAIN_FRICTION = Effect(
     claim='torque is lost before the wheel: the reading is higher by a constant',
     form='constant',
     symbol='T += torque sgn(w)',
-    parameters=(strength('torque', 'N m', 0.3, 0.0, 20.0, 0.5, 'friction torque of the drive'),),
+    parameters=(magnitude('torque', 'N m', 0.3, 0.0, 20.0, 0.5, 'friction torque of the drive'),),
     touches=frozenset({'torque'}),
     instrument=True,
     confounded_with={'lug_shear_radius': 'torque of the wheel in the air; pull'},
@@ -170,7 +170,7 @@ DRIVETRAIN_FRICTION = Effect(
             claim='torque is lost before the wheel in proportion to what the wheel takes',
             symbol='T += share |T| sgn(w)',
             parameters=(
-                strength('share', '-', 0.1, 0.0, 2.0, 0.15, 'torque lost over torque used'),
+                magnitude('share', '-', 0.1, 0.0, 2.0, 0.15, 'torque lost over torque used'),
             ),
             validity='a turning wheel; one gear stage loses a few per cent, a worm drive half',
             source='efficiency of a gear, 1/(1 + share) while the motor drives',
@@ -181,7 +181,7 @@ DRIVETRAIN_FRICTION = Effect(
             claim='torque is lost before the wheel in proportion to its rate',
             symbol='T += damping w',
             parameters=(
-                strength('damping', 'N m s/rad', 0.5, 0.0, 100.0, 0.5, 'viscous friction'),
+                magnitude('damping', 'N m s/rad', 0.5, 0.0, 100.0, 0.5, 'viscous friction'),
             ),
             needs=('angular_velocity',),
             validity='a turning wheel; nothing where the rate is not recorded',

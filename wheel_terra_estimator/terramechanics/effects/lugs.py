@@ -10,7 +10,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, Form, shape, strength
+from wheel_terra_estimator.terramechanics.effects.base import Effect, Form, magnitude, shape
 
 _STEADY = 0.95  # slip above which a steady state is not known; the term grows no further there
 
@@ -27,7 +27,7 @@ def _saturating(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.sinkage = contact.sinkage + p.kd * contact.lug_height * dug
 
 
-_KD = strength('kd', '-', 1.0, 0.0, 4.0, 1.0, 'share of the lug height dug in the end')
+_KD = magnitude('kd', '-', 1.0, 0.0, 4.0, 1.0, 'share of the lug height dug in the end')
 
 LUG_DIGGING = Effect(
     name='lug_digging',
@@ -36,7 +36,7 @@ LUG_DIGGING = Effect(
     symbol='z += kd h s  (rework = 1: kd h s/(1 - s))',
     parameters=(
         _KD,
-        strength(
+        magnitude(
             'rework',
             '-',
             0.0,
@@ -78,7 +78,7 @@ LUG_SHEAR_RADIUS = Effect(
     name='lug_shear_radius',
     claim='shear acts at the radius r + lambda h, not at the rim',
     symbol='R = r + lam h',
-    parameters=(strength('lam', '-', 0.5, 0.0, 1.0, 0.5, 'share of the lug height, lambda'),),
+    parameters=(magnitude('lam', '-', 0.5, 0.0, 1.0, 0.5, 'share of the lug height, lambda'),),
     needs=('lug_height',),
     confounded_with={
         'wheel_radius_bias': 'rows with other lugs or none; roll-out on a hard floor',
@@ -105,7 +105,7 @@ LUG_SUPPORT = Effect(
     claim='lugs carry load: sinkage of a lugged wheel is smaller by a constant',
     form='constant',
     symbol='z -= dz4 where h > 0',
-    parameters=(strength('dz4', 'm', 0.0015, 0.0, 0.02, 0.002, 'sinkage saved by the lugs'),),
+    parameters=(magnitude('dz4', 'm', 0.0015, 0.0, 0.02, 0.002, 'sinkage saved by the lugs'),),
     touches=frozenset({'sinkage'}),
     needs=('lug_height',),
     confounded_with={'sinkage_offset': 'a smooth wheel; the sensor zero on a hard floor'},
@@ -118,7 +118,7 @@ LUG_SUPPORT = Effect(
             claim='lugs carry load: sinkage is smaller by a share of the lug height',
             symbol='z -= share (h - free_height)+',
             parameters=(
-                strength('share', '-', 0.3, 0.0, 2.0, 0.3, 'sinkage saved per lug height'),
+                magnitude('share', '-', 0.3, 0.0, 2.0, 0.3, 'sinkage saved per lug height'),
                 shape(
                     'free_height',
                     'm',
@@ -174,7 +174,7 @@ def _push(contact: Contact[Quantity], share: float, of_surcharge: Quantity, slip
     contact.torque = contact.torque + thrust * (contact.radius + 0.5 * height)
 
 
-_SHARE = strength('share', '-', 0.15, 0.0, 1.5, 0.2, 'share of the full passive thrust')
+_SHARE = magnitude('share', '-', 0.15, 0.0, 1.5, 0.2, 'share of the full passive thrust')
 
 GROUSER_THRUST = Effect(
     name='grouser_thrust',
@@ -221,7 +221,7 @@ SOIL_TRANSPORT = Effect(
     claim='the wheel carries soil round with it: the rut gets deeper, lifting it takes torque',
     symbol='z += fill h s;  T += rho g b (fill h s) 2 r r sgn(w)',
     parameters=(
-        strength('fill', '-', 0.5, 0.0, 2.0, 0.5, 'share of the lug height carried round'),
+        magnitude('fill', '-', 0.5, 0.0, 2.0, 0.5, 'share of the lug height carried round'),
     ),
     touches=frozenset({'sinkage', 'torque'}),
     needs=('slip', 'lug_height'),

@@ -14,9 +14,9 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
     EffectParameter,
     Form,
+    magnitude,
     relative_pressure,
     shape,
-    strength,
 )
 
 
@@ -96,7 +96,7 @@ RIM_FRICTION = Effect(
     claim='soil slides on a smooth rim at less than its internal friction; lugs restore it',
     symbol='tan(phi) *= 1 - loss exp(-h/ring_height)',
     parameters=(
-        strength('loss', '-', 0.25, 0.0, 0.9, 0.25, 'share of the friction lost at h = 0'),
+        magnitude('loss', '-', 0.25, 0.0, 0.9, 0.25, 'share of the friction lost at h = 0'),
         shape(
             'ring_height',
             'm',

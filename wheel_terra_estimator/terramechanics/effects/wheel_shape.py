@@ -10,7 +10,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, strength
+from wheel_terra_estimator.terramechanics.effects.base import Effect, magnitude
 from wheel_terra_estimator.terramechanics.stresses import rolling_sinkage
 
 
@@ -27,7 +27,7 @@ SOIL_ADHESION = Effect(
     name='soil_adhesion',
     claim='soil sticks to the rim: a layer of it rolls with the wheel',
     symbol='r, R += thickness for the soil; z, at the rim, -= thickness',
-    parameters=(strength('thickness', 'm', 0.002, 0.0, 0.05, 0.003, 'thickness of the layer'),),
+    parameters=(magnitude('thickness', 'm', 0.002, 0.0, 0.05, 0.003, 'thickness of the layer'),),
     confounded_with={
         'wheel_radius_bias': 'sinkage, which a misread slip changes less; a look at the rim',
         'lug_shear_radius': 'rows with other lugs or none; sinkage',
@@ -73,7 +73,7 @@ WHEEL_FLEXIBILITY = Effect(
     claim='the wheel flattens under its load: it bears on the soil like a larger rigid one',
     symbol='r* = r (1 + compliance W/z0), z0 = [3 W/((3 - N) b k sqrt(2 r))]^(2/(2N+1));'
     ' T keeps the arm of the hub',
-    parameters=(strength('compliance', 'm/N', 2e-5, 0.0, 1e-3, 5e-5, 'flattening per load'),),
+    parameters=(magnitude('compliance', 'm/N', 2e-5, 0.0, 1e-3, 5e-5, 'flattening per load'),),
     confounded_with={
         'multipass': 'deflection on a hard floor; a load series',
         'hard_layer': 'deflection on a hard floor; a penetrometer',
