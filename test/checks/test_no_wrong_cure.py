@@ -239,6 +239,12 @@ def test_a_recording_without_a_drive_is_said_to_be_one(rows):
     assert faults(checked(**changes)) == ['no_drive']
 
 
+def test_encoders_that_read_nought_all_along_break_no_check():
+    report = checked(joints=replace(WHOLE.joints, rate=np.zeros_like(WHOLE.joints.rate)))
+    assert faults(report) == ['no_drive']
+    assert not any('internal error' in entry.reason for entry in report.not_checked)
+
+
 def test_wheels_wound_up_otherwise_at_each_stop_have_no_zero():
     """Only forward, with stops; one torque holds 25 N m at rest, this way round or that."""
     time = np.arange(0.0, 100.0, 1.0 / rolling.RATE)

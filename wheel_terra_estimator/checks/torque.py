@@ -431,7 +431,8 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None, unsure: bool) -> li
         wound = np.std(apart, axis=0) / math.sqrt(len(stops))
         spread = max(1.5 * float(np.nanmedian(np.abs(level))), stated)
         # A wheel that turns more slowly than the noise of the rates shows takes what driving does.
-        spread = math.hypot(spread, driving * min(evidence.rest_rate / evidence.working_rate, 1.0))
+        hidden = evidence.rest_rate / max(evidence.working_rate, evidence.rest_rate)
+        spread = math.hypot(spread, driving * hidden)
         zeros = [
             Estimate(float(v), max(spread, float(w))) for v, w in zip(level, wound, strict=True)
         ]

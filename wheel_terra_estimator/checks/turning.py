@@ -398,13 +398,10 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
     """Return what makes the wheels turn against the gyro: swapped sides or a reversed gyro."""
     imu, facts = evidence.recording.imu, evidence.facts
     assert imu is not None
-    heading = _heading(evidence, imu)
-    gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
     # Curves are felt as the gyro says where it is right, and orientations turn as it does.
     starts, curves = felt_senses(evidence)
     curves = max(curves, 0) if starts < 1 else curves  # else the IMU may be turned round
-    if not curves and heading is not None:
-        curves = int(correlation(_turns(evidence, heading), gyro) > LEAST_CORRELATION)
+    curves = curves or int(_turns_as_oriented(evidence, imu))
     alone = curves > 0
     mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
     sides = evidence.found(
@@ -426,6 +423,15 @@ def _turns(evidence: Evidence, heading: FloatArray) -> FloatArray:
     """Return by how much a heading (k,) changes over `HEADING_TIME` [rad]."""
     rows = evidence.rows_in(HEADING_TIME)
     return heading[rows:] - heading[:-rows]
+
+
+def _turns_as_oriented(evidence: Evidence, imu: ImuSeries) -> bool:
+    """Return whether the gyro turns as its orientation does; not where there is none."""
+    heading = _heading(evidence, imu)
+    if heading is None:
+        return False
+    gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
+    return correlation(_turns(evidence, heading), gyro) > LEAST_CORRELATION
 
 
 def _heading(evidence: Evidence, imu: ImuSeries) -> FloatArray | None:
@@ -537,11 +543,7 @@ def gyro_unit_known(evidence: Evidence) -> bool:
     if track_ratio(evidence) is not None:
         return True
     imu = evidence.recording.imu
-    heading = None if imu is None else _heading(evidence, imu)
-    if heading is None:
-        return False
-    gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
-    return correlation(_turns(evidence, heading), gyro) > LEAST_CORRELATION
+    return imu is not None and _turns_as_oriented(evidence, imu)
 
 
 def skids(evidence: Evidence) -> bool:
