@@ -126,6 +126,7 @@ def test_two_references_on_standing_wheels_say_that_the_rover_slides(parts, ekf)
         hear(parts, update, ekf, time, speed, still=True, fastest_rim=0.0)
         sliding = time > 3.0
         assert (update.state.sliding_until > time) is sliding
+        assert update.known(time) is sliding
         assert ekf.mean[SPEED] == pytest.approx(0.03 if sliding else 0.0, abs=0.003)
 
 
