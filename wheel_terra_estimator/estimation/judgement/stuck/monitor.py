@@ -93,7 +93,11 @@ class StuckMonitor(Component[StuckState]):
             direction = memory.way if time - memory.way_since > SINKING_HOLD else 0
             reason = _in_words(situation, ahead, settings, held)
             state = state._replace(stuck=True, reason=reason, direction=direction)
-        elif old.stuck and not any(there) and situation.slip_magnitude < settings.clear_slip:
+        elif (
+            old.stuck
+            and not (any(there) or situation.sunk)
+            and situation.slip_magnitude < settings.clear_slip
+        ):
             clear = time if isnan(old.clear_since) else old.clear_since
             free = time - clear >= settings.clear_time
             state = StuckState(situation.memory) if free else state._replace(clear_since=clear)

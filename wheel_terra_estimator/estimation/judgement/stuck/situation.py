@@ -130,6 +130,12 @@ class Situation:
             for wheel, rut in zip(self.motion.wheels, self.memory.ruts, strict=True)
         )
 
+    @property
+    def sunk(self) -> bool:
+        """Whether the wheels are too deep to climb out, and no speed says that they do."""
+        depths = [w.sinkage / w.radius for w in self.motion.wheels]
+        return not self.motion.speed_known and median(depths) > _DEEP
+
     @cached_property
     def travel_until_too_deep(self) -> tuple[float, ...]:
         """Rim travel after which each wheel is in too deep for its lugs to climb out [m].
