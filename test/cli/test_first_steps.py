@@ -1,13 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a stranger has at hand: an expanded URDF, a described bag, a bag of ROS 1, a log."""
+"""What a stranger has at hand: an expanded URDF, a described bag, a bag of ROS 1."""
 
-import math
 import struct
 
 import numpy as np
-import pytest
-import yaml
 from message_factory import serialised
 
 from wheel_terra_estimator.bags.bag_file import BagFile
@@ -85,61 +82,6 @@ def test_a_wheel_without_a_partner_has_a_guessed_place(tmp_path, capsys):
     rover_of([*given, 'a, b, c, d, e'], tmp_path)
     said = capsys.readouterr().out
     assert 'wheels.x is a guess' in said and 'wheels.y is a guess' in said
-
-
-def converted(tmp_path, columns, rows):
-    (tmp_path / 'map.yaml').write_text(yaml.safe_dump(columns))
-    (tmp_path / 'log.csv').write_text('\n'.join(rows))
-    table, map_file, out = (str(tmp_path / name) for name in ('log.csv', 'map.yaml', 'bag'))
-    status = main(['convert', table, '--columns', map_file, '-o', out])
-    if status:
-        return status
-    with open_bag(tmp_path / 'bag') as bag:
-        return read_series(bag, {}, 'bag')
-
-
-RIM = {'column': 'v', 'unit': 'm/s', 'radius': 0.2}
-METRES = {key: {'column': key[-1], 'unit': 'm'} for key in ('position.x', 'position.y')}
-DEGREES = {key: {'column': key[:3], 'unit': 'deg'} for key in ('latitude', 'longitude')}
-
-
-@pytest.mark.parametrize('sense', [1.0, -1.0])
-@pytest.mark.parametrize('reference', [METRES, DEGREES])
-def test_rim_speeds_and_positions_of_a_log(tmp_path, reference, sense):
-    speed, east = 0.5 * sense, math.radians(30.0)
-    metre = 180.0 / math.pi / 6_371_000.0
-    rows = ['t,v,x,y,lat,lon']
-    for t in np.arange(100.0, 105.0, 0.2):
-        x, y = speed * (t - 100.0) * math.cos(east), speed * (t - 100.0) * math.sin(east)
-        lat, lon = 47.0 + metre * y, 8.0 + metre * x / math.cos(math.radians(47.0))
-        rows.append(f'{t},{speed},{x:.9f},{y:.9f},{lat:.12f},{lon:.12f}')
-    columns = {
-        'time': {'column': 't'},
-        'joint_states': {'left': {'velocity': RIM}},
-        'reference_odom': reference,
-    }
-    told = converted(tmp_path, columns, rows)
-    np.testing.assert_allclose(told.joints.rate, speed / 0.2)
-    np.testing.assert_allclose(told.reference.velocity[:, 0], speed, rtol=1e-4)
-    middle = (told.reference.stamp - told.joints.stamp[0]) * 1e-9
-    np.testing.assert_allclose(middle, 0.5 + 0.2 * np.arange(middle.size), atol=1e-6)
-
-
-def test_positions_need_wheels_that_count_one_way(tmp_path, capsys):
-    columns = {
-        'time': {'column': 't', 'unit': 'ms'},
-        'joint_states': {side: {'velocity': {'column': side}} for side in ('left', 'right')},
-        'reference_odom': METRES,
-    }
-    day = 1_700_000_000_000  # [ms]: stamps of a date fall on the grid of the estimates
-    rows = ['t,left,right,x,y', *(f'{day + 50 * i},2.51,-2.5,{0.02 * i},0' for i in range(60))]
-    assert converted(tmp_path, columns, rows) == 2
-    assert 'sign: -1 for each that counts backwards' in capsys.readouterr().err
-    assert not (tmp_path / 'bag').exists()
-    columns['joint_states']['right']['velocity']['sign'] = -1
-    told = converted(tmp_path, columns, rows)
-    np.testing.assert_allclose(told.reference.velocity[:, 0], 0.4, rtol=1e-6)
-    assert set(np.diff(told.joints.stamp)) == {50_000_000}
 
 
 def test_an_imu_that_says_it_has_no_accelerometer(tmp_path, factory):
