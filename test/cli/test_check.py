@@ -6,8 +6,14 @@ import json
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
+from message_factory import serialised
 
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.series_reader import read_series
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.cli.main import main
 
 PATHFINDER = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
@@ -37,6 +43,24 @@ def test_a_remap_to_nothing_names_the_topic_that_is_not_there(make_bag, drive, c
     assert main(['check', str(bag), '--remap', 'joint_states:=/wheels']) == 2
     said = capsys.readouterr().err
     assert 'no wheel rates on /wheels' in said and '/joint_states (sensor_msgs' in said
+
+
+def test_a_bag_of_ros_1_names_its_converter(tmp_path, capsys):
+    (tmp_path / 'drive.bag').write_bytes(b'#ROSBAG V2.0\n')
+    assert main(['check', str(tmp_path / 'drive.bag')]) == 2
+    assert 'rosbags-convert --src' in capsys.readouterr().err
+
+
+def test_an_imu_that_says_it_has_no_accelerometer(tmp_path, factory):
+    with BagFile(tmp_path / 'bag', {'/imu/data': 'sensor_msgs/msg/Imu'}) as bag:
+        for stamp in range(10**9, 4 * 10**9, 10**8):
+            message = factory.imu(factory.header(stamp), [0.0] * 3, [0.1, 0.2, 0.3], None)
+            message.linear_acceleration_covariance[0] = -1.0
+            bag.write('/imu/data', serialised(message), stamp)
+    with open_bag(tmp_path / 'bag') as bag:
+        told = read_series(bag, {}, 'bag')
+    assert np.isnan(told.imu.force).all() and np.allclose(told.imu.rate, [0.1, 0.2, 0.3])
+    assert 'placeholder' not in {f.kind for f in check_recording(told, None).findings}
 
 
 @pytest.mark.parametrize('topic', ['/nothing', '/imu/data'])
