@@ -102,20 +102,17 @@ def test_bag_without_estimates_is_refused(make_bag):
         read_estimates(bag)
 
 
-TOPICS = {
-    '/joint_states': 'sensor_msgs/msg/JointState',
-    '/imu/data': 'sensor_msgs/msg/Imu',
-    '/truth/odometry': 'nav_msgs/msg/Odometry',
-}
+def truth_of(bag, rover):
+    with open_bag(bag) as opened:
+        truth = read_truth(opened, {}, rover)
+    assert truth is not None and truth.slip is not None
+    return truth
 
 
 def test_true_slip_from_a_true_velocity(make_bag, rover, drive):
     """Rim speed 2 rad/s x 0.21 m = 0.42 m/s, velocity 0.36 m/s: slip 1/7."""
     moved = [(t.replace('/reference_odom', '/truth/odometry'), m, time) for t, m, time in drive]
-    bag = make_bag(messages=moved, topics=TOPICS)
-    with open_bag(bag) as opened:
-        truth = read_truth(opened, {}, rover)
-    assert truth is not None and truth.slip is not None
+    truth = truth_of(make_bag(moved), rover)
     assert truth.velocity.value.shape == (4, 1)
     np.testing.assert_allclose(truth.slip.value, np.full((40, 2), 1 / 7), atol=1e-12)
 
@@ -132,11 +129,8 @@ def test_true_slip_of_steered_wheels_is_along_their_headings(make_bag, rover, dr
                 velocity=[*message.velocity, 0.0],
             )
         moved.append((topic.replace('/reference_odom', '/truth/odometry'), message, time))
-    bag = make_bag(messages=moved, topics=TOPICS)
     steered = rover.replace({'wheels.steering_joints': ['steer', 'steer']})
-    with open_bag(bag) as opened:
-        truth = read_truth(opened, {}, steered)
-    assert truth is not None and truth.slip is not None
+    truth = truth_of(make_bag(moved), steered)
     expected = 1.0 - 0.36 / np.cos(0.3) / 0.42
     np.testing.assert_allclose(truth.slip.value, np.full((40, 2), expected), atol=1e-12)
 
@@ -149,10 +143,8 @@ def test_no_truth_in_a_bag_without(make_bag, rover):
 @pytest.mark.shared
 def test_true_slip_of_a_measured_drive_is_that_of_its_table(shared):
     """The table has wheel speeds and the speed of each side, of the author's own making."""
-    configuration = reader.load(['frostyboy'])
-    with open_bag(shared / 'bags' / 'frostyboy_event_1_6_mcap') as bag:
-        truth = read_truth(bag, {}, configuration)
-    assert truth is not None and truth.slip is not None
+    recording = shared / 'bags' / 'frostyboy_event_1_6_mcap'
+    truth = truth_of(recording, reader.load(['frostyboy']))
     with (shared / 'frostyboy_snow' / 'event_1_6.csv').open() as file:
         rows = list(csv.DictReader(file))
     speed = np.array([[float(r['v_X'])] for r in rows])

@@ -14,6 +14,7 @@ from pathlib import Path
 import document_parameters as documentation
 import numpy as np
 import pytest
+from test_ros_yaml import read_by_ros
 
 from wheel_terra_estimator.configuration import parameters, reader, shipped
 from wheel_terra_estimator.configuration.parameters import DECLARED, RETIRED, by_spelling, declared
@@ -391,36 +392,14 @@ def test_a_written_model_is_read_back(tmp_path):
 
 
 @pytest.mark.ros
-def test_every_shipped_file_and_a_written_one_are_loaded_by_ros(tmp_path):
-    rclpy = pytest.importorskip('rclpy')
+def test_every_shipped_file_and_a_written_one_are_loaded_by_ros(tmp_path, proposed_law):
     written = tmp_path / 'model.yaml'
     reader.load(['frostyboy']).write(written, comment='x')
-    proposal = tmp_path / 'proposal.yaml'  # flat lists of one type
-    law = {
-        'enabled': True,
-        'targets': ['torque', 'exponent'],
-        'features': ['rim_speed', 'slip'],
-        'coefficients': [0.04, 0.3],
-        'coefficients_std': [0.01, 0.1],
-    }
-    values = {f'effects.learned_closure.{key}': value for key, value in law.items()}
-    reader.from_parameters(values, complete=False).write(proposal)
     names = [n for n in shipped.files() if n.startswith(('rovers/', 'soils/'))]
-    for file in [written, proposal, *(shipped.find(name) for name in names)]:
-        context = rclpy.Context()
-        rclpy.init(args=['--ros-args', '--params-file', str(file)], context=context)
-        try:
-            node = rclpy.create_node(
-                'wheel_terra_estimator',
-                context=context,
-                automatically_declare_parameters_from_overrides=True,
-            )
-            values = {name: p.value for name, p in node._parameters.items()}
-            node.destroy_node()
-        finally:
-            rclpy.shutdown(context=context)
+    for file in [written, proposed_law, *(shipped.find(name) for name in names)]:
         ours = reader.load([file], complete=False)
-        assert reader.from_parameters(values, complete=False).flat() == ours.flat(), file
+        theirs = reader.from_parameters(read_by_ros(file), complete=False)
+        assert theirs.flat() == ours.flat(), file
 
 
 def test_an_effect_of_ones_own(tmp_path):
