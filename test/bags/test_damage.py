@@ -223,6 +223,7 @@ def lying(text: str, old: str, new: str) -> str:
         ('message_count: [0-9]+', 'message_count: ' + '9' * 5000),
         ('name: /joint_states', 'name: null'),
         ('relative_file_paths:', 'relative_file_paths: [gone.mcap]\n  old:'),
+        ('(?s).+', 'rosbag2_bagfile_information: {version: 9}\n'),
     ],
 )
 def test_metadata_that_lie_are_set_aside_and_said(make_bag, old, new):

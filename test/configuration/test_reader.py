@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files and overrides become a checked configuration, or one line that says what is wrong."""
 
-import argparse
 import copy
 import math
 import pickle
@@ -297,16 +296,6 @@ def test_later_files_win_key_by_key_and_overrides_last(tmp_path):
 @pytest.mark.parametrize('override', ['rover.mass', 'rover.mass=3', ':=3', 'rover.mass:='])
 def test_overrides_that_are_none(override):
     assert complaint(reader.load, ['frostyboy'], [override]).startswith(f'-p {override}')
-
-
-def test_arguments_of_the_commands():
-    parser = argparse.ArgumentParser()
-    reader.add_arguments(parser)
-    arguments = parser.parse_args(
-        ['--config', 'frostyboy', '--config', 'rovers/pathfinder', '-p', 'rover.mass:=3']
-    )
-    c = reader.from_arguments(arguments)
-    assert c.rover.mass == 3.0 and c.rover.name == 'WVU Pathfinder'
 
 
 def test_names_of_shipped_files(tmp_path, monkeypatch):

@@ -220,14 +220,6 @@ def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, paramete
     until(lambda: 'listening to /drive/joints, /imu/data' in process.said())
 
 
-def test_wrong_parameters_end_the_node_with_one_line(start, parameters):
-    """Which are wrong is tested where they are read, in configuration."""
-    status, said = start('estimator_node', *ROVER, parameters, '-p', 'rover.mas:=20.0').stop()
-    assert status == 2
-    assert 'rover.mass' in said
-    assert 'Traceback' not in said
-
-
 def test_a_proposed_law_is_a_further_file_and_an_integer_may_stand_for_a_number(
     start, parameters, proposed_law, listener
 ):

@@ -38,7 +38,7 @@ def answer(model, depth, slip, load, side_slip=0.0, passes=1.0, **factors: float
     )
 
 
-@pytest.mark.parametrize('effects', [{}, dict.fromkeys(EFFECTS, {})], ids=['plain', 'effects'])
+@pytest.mark.parametrize('effects', [{}, {name: {} for name in EFFECTS}], ids=['plain', 'effects'])
 def test_at_the_steady_depth_it_is_the_reference_model(effects):
     random = np.random.default_rng(3)
     count = 200
