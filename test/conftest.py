@@ -118,6 +118,35 @@ def unproposed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decision, 'propose', lambda *_, **__: None)
 
 
+@pytest.fixture
+def printed(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Run a command that ends with a status; return what it prints."""
+    from wheel_terra_estimator.cli.main import main
+
+    def run(command: Iterable[Any], status: int = 0) -> str:
+        capsys.readouterr()
+        assert main([str(part) for part in command]) == status
+        return capsys.readouterr().out
+
+    return run
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Run a command that ends with status 2 and one line, which has words; return the line."""
+    from wheel_terra_estimator.cli.main import main
+
+    def run(command: Iterable[Any], *words: str) -> str:
+        capsys.readouterr()
+        assert main([str(part) for part in command]) == 2
+        said = capsys.readouterr().err
+        assert said.count('\n') == 1, said
+        assert all(word in said for word in words), said
+        return said
+
+    return run
+
+
 class CompiledYaml:
     """What rosbags uses of ruamel.yaml to write metadata, with the compiled writer of PyYAML.
 

@@ -44,6 +44,10 @@ def test_remapped_topics(make_bag, rover, drive):
     assert 'ReferenceVelocity' not in kinds(read(bag, {}, rover))
     remaps = parse_remaps(['reference_odom:=/truth/odometry'])
     assert kinds(read(bag, remaps, rover))['ReferenceVelocity'] == 4
+    # Odometry in place of joint states.
+    by_odometry = rover.replace({'wheel_odometry': 'odom'})
+    found = kinds(read(make_bag(), {'odom': '/reference_odom'}, by_odometry))
+    assert found['WheelOdometry'] == 4
 
 
 def test_missing_wheel_odometry_says_which_and_what_is_there(make_bag, rover, drive):
@@ -88,12 +92,6 @@ def test_wheel_names_that_do_not_match_are_told_with_both_lists(make_bag, rover)
         list(read(make_bag(), {}, other))
     assert 'front_left, front_right' in str(error.value)
     assert 'arm, left, right' in str(error.value)
-
-
-def test_odometry_in_place_of_joint_states(make_bag, rover):
-    by_odometry = rover.replace({'wheel_odometry': 'odom'})
-    found = kinds(read(make_bag(), {'odom': '/reference_odom'}, by_odometry))
-    assert found['WheelOdometry'] == 4
 
 
 def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(

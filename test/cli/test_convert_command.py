@@ -24,9 +24,8 @@ LOG = '\n'.join([HEADER, *ROWS])
 
 
 @pytest.fixture
-def example(capsys):
-    assert main(['convert', '--example']) == 0
-    return capsys.readouterr().out
+def example(printed):
+    return printed(['convert', '--example'])
 
 
 @pytest.fixture

@@ -129,25 +129,20 @@ def test_batched_model_is_the_package_model(forward):
             np.testing.assert_allclose(mine, theirs, atol=2e-3 + 0.02 * np.abs(theirs).max())
 
 
-def linear_fit(rng, problem, columns, coordinates, at=0.0):
-    """A linear model, linearised where all parameters are `at`."""
-    sensitivity = rng.standard_normal((problem.size, columns)) * problem.std[:, None]
-    rotated = problem.rotation @ sensitivity
-    u, outputs = np.full(columns, at), np.zeros((problem.size // 3, 4))
-    outputs[problem.row, problem.quantity] = sensitivity @ u
-    return Fit(
-        ('e',),
-        coordinates,
-        u,
-        outputs,
-        np.zeros(problem.size // 3),
-        sensitivity,
-        problem.rotation @ (problem.observed - sensitivity @ u),
-        rotated,
-        np.ones(problem.size),
-        0.0,
-        np.ones(columns),
+def linear_fit(rng, problem, at=0.0):
+    """A linear model of a soil and an effect's parameter, linearised where both are `at`."""
+    coordinates = (
+        Coordinate('soil', 'a', 0.0, 1.0),
+        Coordinate('e', 'b', 0.0, 1.0, 0.0, 3.0, role='strength'),
     )
+    sensitivity = rng.standard_normal((problem.size, 2)) * problem.std[:, None]
+    residual = problem.rotation @ (problem.observed - sensitivity.sum(axis=1) * at)
+    u, outputs = np.full(2, at), np.zeros((problem.size // 3, 4))
+    outputs[problem.row, problem.quantity] = sensitivity @ u
+    rotated, ones, none = problem.rotation @ sensitivity, np.ones(2), np.zeros(problem.size // 3)
+    variance = np.ones(problem.size)
+    return Fit(('e',), coordinates, u, outputs, none, sensitivity, residual, rotated, variance,
+               0.0, ones)  # fmt: skip
 
 
 def test_evidence_is_the_integral_over_parameters(setting):
@@ -156,11 +151,7 @@ def test_evidence_is_the_integral_over_parameters(setting):
     _, truth, std, inputs, scale = setting
     measured = std * rng.standard_normal(truth.shape)
     problem = build_problem(measured, std, inputs, scale)
-    coordinates = (
-        Coordinate('soil', 'a', 0.0, 1.0),
-        Coordinate('e', 'b', 0.0, 1.0, 0.0, 3.0, role='strength'),
-    )
-    model = linear_fit(rng, problem, 2, coordinates)
+    model = linear_fit(rng, problem)
     amplitude = 0.02
     floor = Floor((amplitude,) * 4, 0.0, False)
     got = evidence(problem, model, (floor,)).log_joint[0]
@@ -308,34 +299,25 @@ def test_outliers_are_found_and_a_hump_is_none(forward, setting):
     assert not cells_apart(hump) & {(3, 1), (11, 1)}
 
 
-def test_noise_is_estimated_beside_an_effect(forward, setting):
+def test_noise_is_estimated_beside_an_effect_and_never_none(forward, setting):
     soil, truth, std, inputs, scale = setting
-    rng = np.random.default_rng(7)
-    bent = truth.copy()
-    bent[:, 0] += 0.006 * forward.points.slip  # an effect of many deviations
-    ratios = []
-    for _ in range(6):
-        measured = bent + std * rng.standard_normal(truth.shape)
+
+    def estimated(measured):
         guess = np.broadcast_to(0.01 * scale, truth.shape)
-        origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
         problem = build_problem(measured, guess, inputs, scale)
         nothing = of_soil(forward, problem, soil, problem.variance(0.1))
-        before = Noise(guess, origin)
-        after = noise.estimate_noise(before, nothing, problem, problem.observed)
-        ratios.append((after.std[0] / std[0])[:3])
+        origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
+        after = noise.estimate_noise(Noise(guess, origin), nothing, problem, problem.observed)
+        return after.std[0, :3]
+
+    rng, bent = np.random.default_rng(7), truth.copy()
+    bent[:, 0] += 0.006 * forward.points.slip  # an effect of many deviations
+    ratios = [
+        estimated(bent + std * rng.standard_normal(truth.shape)) / std[0, :3] for _ in range(6)
+    ]
     assert np.all(np.exp(np.mean(np.log(ratios), axis=0)) == pytest.approx(1.0, rel=0.3))
-
-
-def test_smooth_rows_are_not_taken_for_free_of_noise(forward, setting):
-    """Sixteen rows without scatter, read off a curve: half a per cent of the range at least."""
-    soil, truth, _, inputs, scale = setting
-    guess = np.broadcast_to(0.01 * scale, truth.shape)
-    problem = build_problem(truth, guess, inputs, scale)
-    nothing = of_soil(forward, problem, soil, problem.variance(0.1))
-    origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
-    before = Noise(guess, origin)
-    after = noise.estimate_noise(before, nothing, problem, problem.observed)
-    assert (after.std[0, :3] > 0.005 * scale[:3]).all()
+    # Rows without scatter, read off a curve: half a per cent of the range at least.
+    assert (estimated(truth) > 0.005 * scale[:3]).all()
 
 
 def test_repeats_give_the_noise():
@@ -402,11 +384,7 @@ def test_chi_square_is_that_of_the_best_parameters(setting):
     rng = np.random.default_rng(8)
     _, truth, std, inputs, scale = setting
     problem = build_problem(std * rng.standard_normal(truth.shape), std, inputs, scale)
-    coordinates = (
-        Coordinate('soil', 'a', 0.0, 1.0),
-        Coordinate('e', 'b', 0.0, 1.0, 0.0, 3.0, role='strength'),
-    )
-    model = linear_fit(rng, problem, 2, coordinates, at=0.4)
+    model = linear_fit(rng, problem, at=0.4)
     variance = np.full(problem.size, 1.3)
     rows = np.vstack([model.jacobian / np.sqrt(1.3), [1.0, 0.0]])
     right = np.append(problem.rotation @ problem.observed / np.sqrt(1.3), 0.0)

@@ -48,9 +48,7 @@ def test_the_event_lies_within_the_horizon():
     assert found.came.sum() == pytest.approx(30, abs=1)
     # A crawling rover: 0.3 m of rim travel last 30 s.
     assert drive(slips, rim=0.01).came.sum() == pytest.approx(60, abs=1)
-
-
-def test_rows_whose_outcome_nobody_saw_are_not_scored():
+    # Rows whose outcome nobody saw are not scored.
     found = drive(np.full(600, 0.2))
     assert found.came.size == pytest.approx(70, abs=1)  # 10 s to 45 s of 60 s
     assert not found.came.any()

@@ -160,9 +160,7 @@ def test_lead_is_that_of_the_warning_in_force():
     assert found.lead_travel == pytest.approx(0.25, abs=0.01)
     assert found.false_alarms == 0 or found.false_alarms == 1
     assert len(found.raised) == 2
-
-
-def test_warning_that_nothing_follows_is_false():
+    # A warning that nothing follows is false.
     true = truth(np.full(400, 0.4))
     stuck = np.zeros(400, bool)
     stuck[100:200] = True
