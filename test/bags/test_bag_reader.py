@@ -46,7 +46,7 @@ def test_remapped_topics(make_bag, rover, drive):
     assert kinds(read(bag, remaps, rover))['ReferenceVelocity'] == 4
     # Odometry in place of joint states.
     by_odometry = rover.replace({'wheel_odometry': 'odom'})
-    found = kinds(read(make_bag(), {'odom': '/reference_odom'}, by_odometry))
+    found = kinds(read(make_bag(name='other'), {'odom': '/reference_odom'}, by_odometry))
     assert found['WheelOdometry'] == 4
 
 

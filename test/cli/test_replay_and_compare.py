@@ -4,8 +4,10 @@
 
 import contextlib
 import io
+import itertools
 import json
 import shutil
+import warnings
 
 import numpy as np
 import pytest
@@ -120,3 +122,62 @@ def test_a_report_is_a_page_and_a_remap_leads_to_an_input(drive, tmp_path, refus
     wrong = ['--remap', 'sinkage:=/nothing']
     said = refused(['replay', str(drive), *CONFIG, *wrong])
     assert '--remap sinkage:=/ground_truth' not in said
+
+
+SPANS = (10**10, 10**13, 4 * 10**17)  # [ns]
+WILD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, 5e-324)
+
+
+@pytest.fixture(scope='module')
+def short_drive(tmp_path_factory):
+    path = tmp_path_factory.mktemp('short_drive') / 'short_drive'
+    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=4.0), path)
+    return path
+
+
+def run(command, bag, capsys, *more):
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        status = main([command, str(bag), *CONFIG, *more])
+    out, err = capsys.readouterr()
+    assert status in (0, 1), err
+    assert not err and 'nan' not in out.split() and 'internal error' not in out
+    return out
+
+
+@pytest.mark.parametrize(
+    'seed', [s if s % 4 == 0 else pytest.param(s, marks=pytest.mark.slow) for s in range(9)]
+)
+def test_random_stamps(short_drive, tmp_path, capsys, seed):
+    random = np.random.default_rng(seed)
+
+    def change(topic, message):
+        if hasattr(message, 'header') and random.random() < (1.0, 0.5, 0.02)[seed // 3]:
+            stamp = int(1.7e18) + int(random.integers(0, SPANS[seed % 3]))
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+        return message
+
+    bag = changed(short_drive, tmp_path / 'bag', change)
+    run('check', bag, capsys)
+    run('replay', bag, capsys)
+
+
+def test_wild_numbers_in_the_truth(short_drive, tmp_path, capsys):
+    numbers = itertools.cycle(WILD)
+
+    def change(topic, message):
+        if topic == '/ground_truth/twist':
+            message.twist.twist.linear.x = next(numbers)
+        elif topic.startswith('/ground_truth/s') and hasattr(message, 'position'):
+            message.position = np.array([next(numbers) for _ in message.position])
+        return message
+
+    assert 'against the truth' in run(
+        'replay', changed(short_drive, tmp_path / 'bag', change), capsys
+    )
+
+
+def test_without_an_imu_the_first_finding_says_so(short_drive, tmp_path, printed):
+    bag = changed(short_drive, tmp_path / 'bag', lambda topic, m: None if 'imu' in topic else m)
+    assert 'no IMU in the recording' in printed(['check', str(bag), *CONFIG], 1).splitlines()[1]
+    assert 'no IMU in the recording' in printed(['replay', str(bag), *CONFIG]).splitlines()[0]
