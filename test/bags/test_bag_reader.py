@@ -94,9 +94,7 @@ def test_wheel_names_that_do_not_match_are_told_with_both_lists(make_bag, rover)
     assert 'arm, left, right' in str(error.value)
 
 
-def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(
-    make_bag, rover, drive, tmp_path
-):
+def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(rover, drive, tmp_path):
     """Types that nobody knows are never unpacked; a damaged message costs itself alone."""
     store = jazzy_types()
     path = tmp_path / 'odd'

@@ -150,9 +150,11 @@ def test_inputs_are_packed_as_rosbags_packs_them(frame, attitude, factory):
 
 def test_warnings_and_diagnostics_are_packed_as_rosbags_packs_them(factory):
     for value in (True, False):
-        assert pack.flag(value) == serialised(factory.bool(value))
+        theirs = factory.make('std_msgs/msg/Bool', data=value)
+        assert pack.flag(value) == serialised(theirs)
     for value in (-1, 0, 1):
-        assert pack.direction(value) == serialised(factory.int8(value))
+        theirs = factory.make('std_msgs/msg/Int8', data=value)
+        assert pack.direction(value) == serialised(theirs)
     statuses = [
         Status(2, 'node', 'ü' * length, 'id', [('a', '1'), ('key', '')][:length])
         for length in range(4)

@@ -63,7 +63,7 @@ def test_truth_and_table(drive, live, tmp_path):
     assert main(['replay', str(drive), *CONFIG, '--table', str(tmp_path / 't.xls')]) == 2
 
 
-def test_findings_come_before_anything_else(upside_down, tmp_path, printed):
+def test_findings_come_before_anything_else(upside_down, printed):
     told = json.loads(printed(['replay', str(upside_down), *CONFIG, '--json']))
     assert [f['kind'] for f in told['findings']] == ['mounting']
     assert not told['warnings']

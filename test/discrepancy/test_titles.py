@@ -90,7 +90,7 @@ def test_read(title, name, factor):
 
 
 @pytest.mark.parametrize('title', ASKED)
-def test_asked(title, tmp_path):
+def test_asked(title):
     """It is named, the option is ready to copy, and either answer is accepted."""
     numbers = 3.0 + rows()['slip'] ** 2
     data = BASE | {'sinkage': rows()['sinkage'], title: numbers}

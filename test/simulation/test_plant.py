@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rover obeys mechanics: balances, limits, symmetry, and the steady state of the reference."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
 G = 9.80665
-MakePlant = Callable[..., RoverPlant]
 
 
 @pytest.fixture
