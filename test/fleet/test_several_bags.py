@@ -93,24 +93,6 @@ def test_an_output_that_has_lost_a_file_is_made_anew(bags, config, tmp_path, und
     assert not (out / 'drive1').exists()
 
 
-@pytest.mark.parametrize('taken', ['one replay', 'a file'])
-def test_only_a_folder_of_several_replays_is_continued(
-    bags, config, tmp_path, capsys, refused, taken
-):
-    out = tmp_path / 'out'
-    if taken == 'a file':
-        out.write_text('mine')
-    else:
-        assert main(['replay', bags[3], *config, '-o', str(out)]) == 0
-    before = sorted(tmp_path.rglob('*'))
-    capsys.readouterr()
-    refused(
-        ['replay', bags[0], bags[2], *config, '-o', str(out)],
-        'holds nothing that this command can go on with',
-    )
-    assert sorted(tmp_path.rglob('*')) == before
-
-
 def test_bags_of_one_name_get_folders_of_their_own(bags, config, tmp_path, printed):
     (tmp_path / 'other').mkdir()
     Path(bags[2]).rename(tmp_path / 'other' / 'drive3')

@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -44,41 +42,6 @@ def assert_close(ours, theirs, rows, share):
     }
     for key in OUTPUTS:
         np.testing.assert_array_less(np.abs(ours[key] - theirs[key]) / scale[key], share, key)
-
-
-@pytest.mark.parametrize('row', [0, 5, 40])
-def test_truth_is_the_integral_of_the_printed_stresses(row):
-    """Third derivation: scipy's adaptive quadrature and Brent's root, one scalar at a time."""
-    soil, rows = drawn(3)
-    one = {key: value[row : row + 1] for key, value in rows.items()}
-    got = solve(one, soil)
-    r, b, h, s = (float(one[k][0]) for k in ('wheel_radius', 'wheel_width', 'lug_height', 'slip'))
-    k = soil.cohesive_modulus / b + soil.frictional_modulus
-    advance = (1 - s) * (r + h)
-
-    def normal(t, t1):
-        tm, t2 = soil.peak_stress_ratio * t1, soil.leaving_angle_ratio * t1
-        te = t if t >= tm else t1 - (t - t2) * (t1 - tm) / (tm - t2)
-        return k * (r * max(np.cos(te) - np.cos(t1), 0.0)) ** soil.sinkage_exponent
-
-    def shear(t, t1):
-        j = r * (t1 - t) - advance * (np.sin(t1) - np.sin(t))
-        limit = soil.cohesion + normal(t, t1) * np.tan(soil.friction_angle)
-        return limit * np.sign(j) * (1 - np.exp(-abs(j) / soil.shear_modulus))
-
-    def integral(f, t1):
-        tm, t2 = soil.peak_stress_ratio * t1, soil.leaving_angle_ratio * t1
-        return sum(quad(f, *ends, args=(t1,), limit=200)[0] for ends in ((t2, tm), (tm, t1)))
-
-    def missing_load(t1):
-        up = integral(lambda t, t1: normal(t, t1) * np.cos(t) + shear(t, t1) * np.sin(t), t1)
-        return b * r * up - one['normal_load'][0]
-
-    t1 = brentq(missing_load, 0.01, 1.3, xtol=1e-10)
-    pull = b * r * integral(lambda t, t1: shear(t, t1) * np.cos(t) - normal(t, t1) * np.sin(t), t1)
-    assert got['sinkage'][0] == pytest.approx(r * (1 - np.cos(t1)), rel=1e-6)
-    assert got['drawbar_pull'][0] == pytest.approx(pull, rel=1e-4, abs=1e-4)
-    assert got['torque'][0] == pytest.approx(b * r * r * integral(shear, t1), rel=1e-4, abs=1e-5)
 
 
 @pytest.mark.parametrize('design', DESIGNS)
