@@ -5,16 +5,18 @@
 import re
 import struct
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from recordings import changed
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.rover_template import passes
-from wheel_terra_estimator.configuration.urdf import read_urdf
+from wheel_terra_estimator.configuration.urdf import _origin, read_urdf
 
 PATHFINDER = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
 MEASURES = ('--radius', 0.11, '--track', 0.6, '--wheelbase', 0.5, '--mass', 22)
@@ -102,6 +104,12 @@ def test_wheels_and_base_that_hang_side_by_side_on_one_root(tmp_path):
     assert sketch.z == pytest.approx([0.0, 0.0], abs=1e-5)
     # Without masses the centre of gravity is guessed: 1.4 radii above the ground, hubs one.
     assert sketch.centre_of_gravity == pytest.approx([0.0, 0.0, 0.08])
+
+
+def test_roll_pitch_and_yaw_of_a_joint_are_about_fixed_axes():
+    origin = ElementTree.fromstring('<joint><origin rpy="0.3 -0.5 1.1"/></joint>')
+    turned = Rotation.from_euler('xyz', (0.3, -0.5, 1.1)).as_matrix()
+    assert _origin(origin, PATHFINDER)[:3, :3] == pytest.approx(turned)
 
 
 @pytest.mark.parametrize(('axis', 'told'), [(-1, False), (1, True)])

@@ -43,6 +43,12 @@ def test_closed_form(printed):
     assert (close['drawbar_pull'] != exact['drawbar_pull']).all()
 
 
+def test_the_load_that_nobody_states_is_the_mean_of_the_wheels(printed):
+    rover = reader.load(['frostyboy']).rover
+    got = table(printed(['predict', '--config', 'frostyboy', '--slip', '0.1']))
+    assert got['normal_load'] == pytest.approx(rover.mass * rover.gravity / 4)
+
+
 def test_points_of_a_table(tmp_path, printed, refused):
     path = tmp_path / 'rows.csv'
     path.write_text(

@@ -66,6 +66,15 @@ def test_errors_and_classes():
     assert errors.class_matrix[:, 1:].sum() == 0.0
 
 
+def test_an_angle_is_wrong_by_the_shorter_way():
+    seen = history(np.zeros((100, 2)))
+    seen.values['slip_angle'] = np.full((100, 2), 3.1)
+    true = WheelTruth(STAMP, np.full((100, 2), -3.1))
+    beyond = dataclasses.replace(truth(np.zeros((100, 2))), slip_angle=true)
+    angle = truth_errors(seen, beyond, THRESHOLDS).quantities[-1]
+    assert (angle.name, angle.worst) == ('slip_angle', pytest.approx(2.0 * np.pi - 6.2))
+
+
 def test_lead_of_a_warning_and_one_that_was_wrong():
     true = np.zeros((100, 2))
     true[60:] = 0.95
