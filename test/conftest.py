@@ -12,7 +12,7 @@ import os
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -28,7 +28,7 @@ from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.storage import jazzy_types
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.messages.convert import INPUT_TYPES
+from wheel_terra_estimator.messages.unpack import IMU
 
 # The quick tests draw the same few in each run; `.ci/slow` draws a hundred anew
 # (--hypothesis-profile random).
@@ -118,6 +118,35 @@ def unproposed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decision, 'propose', lambda *_, **__: None)
 
 
+@pytest.fixture
+def printed(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Run a command that ends with a status; return what it prints."""
+    from wheel_terra_estimator.cli.main import main
+
+    def run(command: Iterable[Any], status: int = 0) -> str:
+        capsys.readouterr()
+        assert main([str(part) for part in command]) == status
+        return capsys.readouterr().out
+
+    return run
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Run a command that ends with status 2 and one line, which has words; return the line."""
+    from wheel_terra_estimator.cli.main import main
+
+    def run(command: Iterable[Any], *words: str) -> str:
+        capsys.readouterr()
+        assert main([str(part) for part in command]) == 2
+        said = capsys.readouterr().err
+        assert said.count('\n') == 1, said
+        assert all(word in said for word in words), said
+        return said
+
+    return run
+
+
 class CompiledYaml:
     """What rosbags uses of ruamel.yaml to write metadata, with the compiled writer of PyYAML.
 
@@ -181,6 +210,21 @@ def config(tmp_path: Path, rover: Configuration) -> list[str]:
     return ['--config', str(tmp_path / 'rover.yaml')]
 
 
+@pytest.fixture
+def proposed_law(tmp_path: Path) -> Path:
+    """The file of a law that no listed effect states, as a diagnosis writes it."""
+    law = {
+        'enabled': True,
+        'targets': ['torque', 'exponent'],
+        'features': ['rim_speed', 'slip'],
+        'coefficients': [0.05, 0.4],
+        'coefficients_std': [0.01, 0.1],
+    }
+    values = {f'effects.learned_closure.{key}': value for key, value in law.items()}
+    reader.from_parameters(values, complete=False).write(tmp_path / 'proposal.yaml')
+    return tmp_path / 'proposal.yaml'
+
+
 @pytest.fixture(scope='session')
 def drive(factory: MessageFactory) -> list[tuple[str, Any, int]]:
     """(topic, message, log time) of a straight drive at constant rate on level ground."""
@@ -208,12 +252,6 @@ def drive_messages(factory: MessageFactory, steps: int = 40) -> Iterator[tuple[s
             yield '/reference_odom', factory.odometry(header, twist), stamp + 3_000_000
 
 
-DRIVE_TOPICS = {
-    '/joint_states': INPUT_TYPES['joint_states'],
-    '/imu/data': INPUT_TYPES['imu/data'],
-    '/reference_odom': INPUT_TYPES['reference_odom'],
-}
-
 MakeBag = Callable[..., Path]
 
 
@@ -222,14 +260,12 @@ def make_bag(tmp_path: Path, drive: list[tuple[str, Any, int]]) -> MakeBag:
     """Write a bag, by default that of `drive`."""
 
     def make(
-        messages: Any = None,
-        topics: dict[str, str] | None = None,
-        name: str = 'drive',
-        storage: str = 'mcap',
+        messages: Iterable[Any] | None = None, name: str = 'drive', storage: str = 'mcap'
     ) -> Path:
-        path, told = tmp_path / name, drive if messages is None else messages
+        path, told = tmp_path / name, drive if messages is None else list(messages)
+        topics = {topic: message.__msgtype__ for topic, message, _ in told}
         if storage == 'mcap':
-            with BagFile(path, topics or DRIVE_TOPICS) as file:
+            with BagFile(path, topics or {'/imu/data': IMU}) as file:
                 for topic, message, log_time in told:
                     file.write(topic, serialised(message), log_time)
             return path
@@ -237,7 +273,7 @@ def make_bag(tmp_path: Path, drive: list[tuple[str, Any, int]]) -> MakeBag:
         with bag_writer.Writer(path, version=9, storage_plugin=plugin) as writer:
             connections = {
                 topic: writer.add_connection(topic, kind, typestore=jazzy_types())
-                for topic, kind in (topics or DRIVE_TOPICS).items()
+                for topic, kind in topics.items()
             }
             for topic, message, log_time in told:
                 writer.write(connections[topic], log_time, serialised(message))

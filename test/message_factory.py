@@ -33,7 +33,6 @@ class MessageFactory:
         return self.store.types[kind](**values)
 
     def header(self, stamp: int, frame: str = BASE_FRAME) -> Any:
-        """Return a Header."""
         seconds, nanoseconds = divmod(stamp, 1_000_000_000)
         time = self.make('builtin_interfaces/msg/Time', sec=seconds, nanosec=nanoseconds)
         return self.make('std_msgs/msg/Header', stamp=time, frame_id=frame)
@@ -46,7 +45,6 @@ class MessageFactory:
         velocity: ArrayLike = (),
         effort: ArrayLike = (),
     ) -> Any:
-        """Return a JointState."""
         return self.make(
             JOINT_STATE,
             header=header,
@@ -65,20 +63,10 @@ class MessageFactory:
         layout = self.make('std_msgs/msg/MultiArrayLayout', dim=[dimension], data_offset=0)
         return self.make('std_msgs/msg/UInt8MultiArray', layout=layout, data=data)
 
-    def bool(self, value: bool) -> Any:
-        """Return a Bool."""
-        return self.make('std_msgs/msg/Bool', data=value)
-
-    def int8(self, value: int) -> Any:
-        """Return an Int8."""
-        return self.make('std_msgs/msg/Int8', data=value)
-
     def vector(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
-        """Return a Vector3."""
         return self.make('geometry_msgs/msg/Vector3', x=float(x), y=float(y), z=float(z))
 
     def quaternion(self, x: float, y: float, z: float, w: float) -> Any:
-        """Return a Quaternion."""
         return self.make(
             'geometry_msgs/msg/Quaternion', x=float(x), y=float(y), z=float(z), w=float(w)
         )
@@ -97,7 +85,6 @@ class MessageFactory:
     def twist_stamped(
         self, header: Any, forward: float, yaw_rate: float, covariance: ArrayLike
     ) -> Any:
-        """Return a TwistWithCovarianceStamped."""
         return self.make(
             'geometry_msgs/msg/TwistWithCovarianceStamped',
             header=header,
@@ -150,7 +137,6 @@ class MessageFactory:
         )
 
     def diagnostic_array(self, header: Any, found: Sequence[Status]) -> Any:
-        """Return a DiagnosticArray."""
         return self.make(
             'diagnostic_msgs/msg/DiagnosticArray',
             header=header,

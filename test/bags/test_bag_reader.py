@@ -40,24 +40,20 @@ def test_remapped_topics(make_bag, rover, drive):
         (topic.replace('/reference_odom', '/truth/odometry'), message, time)
         for topic, message, time in drive
     ]
-    topics = {'/joint_states': 'sensor_msgs/msg/JointState', '/imu/data': 'sensor_msgs/msg/Imu'}
-    bag = make_bag(messages=moved, topics={**topics, '/truth/odometry': 'nav_msgs/msg/Odometry'})
+    bag = make_bag(moved)
     assert 'ReferenceVelocity' not in kinds(read(bag, {}, rover))
     remaps = parse_remaps(['reference_odom:=/truth/odometry'])
     assert kinds(read(bag, remaps, rover))['ReferenceVelocity'] == 4
+    # Odometry in place of joint states.
+    by_odometry = rover.replace({'wheel_odometry': 'odom'})
+    found = kinds(read(make_bag(name='other'), {'odom': '/reference_odom'}, by_odometry))
+    assert found['WheelOdometry'] == 4
 
 
 def test_missing_wheel_odometry_says_which_and_what_is_there(make_bag, rover, drive):
     others = [row for row in drive if row[0] != '/joint_states']
     sinkage = [('/sinkage', *row[1:]) for row in drive if row[0] == '/joint_states']
-    bag = make_bag(
-        messages=others + sinkage,  # joint states that are none of the wheels'
-        topics={
-            '/imu/data': 'sensor_msgs/msg/Imu',
-            '/reference_odom': 'nav_msgs/msg/Odometry',
-            '/sinkage': 'sensor_msgs/msg/JointState',
-        },
-    )
+    bag = make_bag(others + sinkage)  # joint states that are none of the wheels'
     with pytest.raises(UserError) as error:
         list(read(bag, {}, rover))
     text = str(error.value)
@@ -76,11 +72,7 @@ def test_topics_of_estimates_are_named_as_such_and_together():
 
 
 def test_what_is_missing_is_told_with_what_it_costs(make_bag, rover, drive):
-    path = make_bag(
-        messages=[row for row in drive if row[0] == '/joint_states'],
-        topics={'/joint_states': 'sensor_msgs/msg/JointState'},
-    )
-    with open_bag(path) as bag:
+    with open_bag(make_bag(row for row in drive if row[0] == '/joint_states')) as bag:
         absent, cost = MeasurementReader(bag, {}, rover).notes
     assert 'imu/data' in absent and 'reference_odom' in absent
     assert 'without a reference velocity slip can be wrong' in cost
@@ -102,15 +94,7 @@ def test_wheel_names_that_do_not_match_are_told_with_both_lists(make_bag, rover)
     assert 'arm, left, right' in str(error.value)
 
 
-def test_odometry_in_place_of_joint_states(make_bag, rover):
-    by_odometry = rover.replace({'wheel_odometry': 'odom'})
-    found = kinds(read(make_bag(), {'odom': '/reference_odom'}, by_odometry))
-    assert found['WheelOdometry'] == 4
-
-
-def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(
-    make_bag, rover, drive, tmp_path
-):
+def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(rover, drive, tmp_path):
     """Types that nobody knows are never unpacked; a damaged message costs itself alone."""
     store = jazzy_types()
     path = tmp_path / 'odd'

@@ -101,14 +101,6 @@ def test_messages_of_a_set_share_stamp_and_log_time(bag):
     assert not by_time
 
 
-def test_slip_class_layout(bag):
-    found = [m for _, topic, m in messages(bag) if topic.endswith('slip_class')]
-    (dimension,) = found[2].layout.dim
-    assert (dimension.label, dimension.size, dimension.stride) == ('wheel', 2, 2)
-    assert found[2].layout.data_offset == 0
-    assert found[2].data.tolist() == [2, 255]
-
-
 @pytest.mark.parametrize(('topic', 'led'), [('stuck', True), ('stuck_direction', -1)])
 def test_stuck_and_its_direction_are_sent_at_start_and_on_change(bag, topic, led):
     found = [(t, m.data) for t, name, m in messages(bag) if name.endswith(f'/{topic}')]

@@ -5,18 +5,17 @@
 import random
 import re
 import shutil
-import sqlite3
 import struct
 from collections import Counter
 from pathlib import Path
+from zlib import crc32
 
 import pytest
 from recordings import contents
 
-from wheel_terra_estimator.bags.salvage import RawMessage, limits
+from wheel_terra_estimator.bags.salvage import RawMessage, limits, mcap_file, mcap_records
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_lab.studies.fuzzing import sqlite_maker
 from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, Sample, make
 
 DEMO = next(Path(__file__).resolve().parents[2].glob('**/demo/entrapment'), Path('absent'))
@@ -224,6 +223,7 @@ def lying(text: str, old: str, new: str) -> str:
         ('message_count: [0-9]+', 'message_count: ' + '9' * 5000),
         ('name: /joint_states', 'name: null'),
         ('relative_file_paths:', 'relative_file_paths: [gone.mcap]\n  old:'),
+        ('(?s).+', 'rosbag2_bagfile_information: {version: 9}\n'),
     ],
 )
 def test_metadata_that_lie_are_set_aside_and_said(make_bag, old, new):
@@ -236,101 +236,6 @@ def test_metadata_that_lie_are_set_aside_and_said(make_bag, old, new):
     found, notes = contents(folder)
     assert found == whole
     assert 'metadata.yaml was set aside' in notes[0]
-
-
-def big_sqlite(tmp_path: Path, count: int = 4000) -> tuple[Path, list[RawMessage]]:
-    path, found = tmp_path / 'a.db3', samples(count)
-    sqlite_maker.write(path, found, TYPES)
-    return path, [RawMessage(*s) for s in found]
-
-
-def test_rows_behind_damaged_pages_of_sqlite_are_read(tmp_path):
-    path, whole = big_sqlite(tmp_path)
-    assert contents(path) == (whole, [])
-    content = bytearray(path.read_bytes())
-    middle = content.index(struct.pack('<Q', 2000) * 8) // 4096 * 4096
-    content[middle : middle + 8192] = bytes(8192)
-    path.write_bytes(content)
-    found, notes = contents(path)
-    assert not Counter(found) - Counter(whole)
-    assert len(found) > len(whole) - 200
-    assert 'is damaged' in notes[0]
-    assert 'from 19.' in notes[0] or 'from 20.' in notes[0]
-
-
-def test_a_damaged_row_number_of_sqlite_hides_no_row_behind(tmp_path):
-    """The rows of a page have great numbers and no data, the last of them cannot be read."""
-    path, whole = big_sqlite(tmp_path)
-    content = bytearray(path.read_bytes())
-    begin = content.index(whole[2000].data) // 4096 * 4096
-    count = int.from_bytes(content[begin + 3 : begin + 5], 'big')
-    places = [int.from_bytes(content[begin + 8 + 2 * i :][:2], 'big') for i in range(count)]
-    pages = [content.index(message.data) // 4096 * 4096 for message in whole]
-    for place in places:  # length 2, number 12343, a head of 2 bytes, nothing
-        content[begin + place : begin + place + 5] = b'\x02\xe0\x37\x02\x00'
-    content[begin + places[-1] : begin + places[-1] + 9] = b'\xff' * 9
-    path.write_bytes(content)
-    found, notes = contents(path)
-    assert Counter(found) == Counter(
-        message for message, page in zip(whole, pages, strict=True) if page != begin
-    )
-    assert 'is damaged' in notes[0]
-
-
-def test_pages_that_sqlite_does_not_miss_are_said(tmp_path):
-    """The page that lists the pages of the table states too few of them, which is no error."""
-    path, whole = big_sqlite(tmp_path)
-    content = bytearray(path.read_bytes())
-    interior = next(at for at in range(4096, len(content), 4096) if content[at] == 5)
-    count = int.from_bytes(content[interior + 3 : interior + 5], 'big')
-    assert count > 20
-    content[interior + 3 : interior + 5] = (count - 9).to_bytes(2, 'big')
-    path.write_bytes(content)
-    found, notes = contents(path)
-    assert not Counter(found) - Counter(whole)
-    assert f'is damaged: {len(found)} whole messages recovered' in notes[0]
-    assert 'of the recording' in notes[0]
-
-
-def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path):
-    path, whole = big_sqlite(tmp_path)
-    with sqlite3.connect(path) as connection:
-        connection.execute('PRAGMA writable_schema=ON')
-        connection.execute("DELETE FROM sqlite_master WHERE name='timestamp_idx'")
-        connection.execute('PRAGMA writable_schema=OFF')
-    connection.close()
-    assert contents(path)[0] == whole
-
-
-def test_rows_of_sqlite_out_of_order_are_sorted(tmp_path):
-    path, whole = big_sqlite(tmp_path, 50)
-    with sqlite3.connect(path) as connection:
-        connection.execute('UPDATE messages SET timestamp = ? WHERE id = 30', (START - 5,))
-    connection.close()
-    found, _ = contents(path)
-    assert found[0].log_time == START - 5
-    assert [m.log_time for m in found] == sorted(m.log_time for m in found)
-    assert len(found) == len(whole)
-
-
-def test_the_write_ahead_log_of_a_recorder_that_died_is_read(tmp_path):
-    path, whole = big_sqlite(tmp_path, 50)
-    live = sqlite3.connect(path)
-    live.execute('PRAGMA journal_mode=WAL')
-    live.execute('PRAGMA wal_autocheckpoint=0')
-    live.execute('INSERT INTO messages VALUES(99, 1, ?, ?)', (START + 10**12, b'last'))
-    live.commit()
-    other = tmp_path / 'copy'
-    other.mkdir()
-    for file in tmp_path.glob('a.db3*'):
-        shutil.copy(file, other)
-    live.close()
-    (other / 'a.db3-shm').unlink(missing_ok=True)
-    before = sorted(p.name for p in other.iterdir())
-    found, _ = contents(other / 'a.db3')
-    assert found[-1].data == b'last'
-    assert len(found) == len(whole) + 1
-    assert sorted(p.name for p in other.iterdir()) == before
 
 
 def test_a_chunk_above_the_limit_is_left_out_and_said(read_mcap, monkeypatch):
@@ -363,3 +268,92 @@ def test_garbage_in_a_damaged_recording_is_not_put_down_to_the_driver(make_bag, 
     said = capsys.readouterr().out
     assert '4 damaged messages on /imu/data were left out' in said
     assert 'stamp each message' not in said
+
+
+FIELDS = {  # of a chunk's record: offset and size [byte]
+    'opcode': (0, 1),
+    'length': (1, 8),
+    'unpacked size': (25, 8),
+    'checksum': (33, 4),
+    'letters of the compression': (37, 4),
+    'packed size': (41, 8),  # without the letters of the compression
+}
+
+
+@pytest.mark.parametrize('value', [b'\0', b'\xff', b'\x11'])
+@pytest.mark.parametrize('summary', [True, False])
+@pytest.mark.parametrize('codec', ['', 'zstd', 'lz4'])
+@pytest.mark.parametrize('name', FIELDS)
+def test_messages_of_a_chunk_with_a_damaged_head(read_mcap, name, codec, summary, value):
+    dice = random.Random(2)
+    whole = [s._replace(data=b'\0\1\0\0' + dice.randbytes(80)) for s in samples(200)]
+    made = make(whole, TYPES, Layout(4000, codec, summary=summary))
+    offset, size = FIELDS[name]
+    if name == 'packed size':
+        offset += len(codec)
+    at = made.parts[1][0] + offset
+    found, notes = read_mcap(made.content[:at] + value * size + made.content[at + size :])
+    assert [tuple(message) for message in found] == [tuple(sample) for sample in whole]
+    assert notes or value == b'\0'  # no checksum, no size stated
+    assert 'GB' not in ' '.join(notes)
+
+
+def test_messages_outside_of_the_times_of_their_chunk_are_said(read_mcap):
+    """No checksum covers them; the head of the chunk states between which times they lie."""
+    whole, layout = samples(200), Layout(4000, 'lz4', checksums=False)
+    first = make(whole, TYPES, layout).parts[1][2][0]
+    whole[60] = whole[60]._replace(log_time=START)
+    made = make(whole, TYPES, layout)
+    begin, _, part = made.parts[1]
+    assert whole[60] in part
+    content = bytearray(made.content)
+    content[begin + 9 : begin + 17] = first.log_time.to_bytes(8, 'little')
+    found, notes = read_mcap(content)
+    assert len(found) == 200
+    assert notes[0].startswith('a.mcap is damaged')
+    assert f'from {(first.log_time - START) * 1e-9:.1f} s' in notes[0]
+
+
+@pytest.mark.parametrize(('most', 'left_out'), [(1, 1), (3, 0)])
+def test_chunks_without_their_heads_are_tried_up_to_a_number(
+    read_mcap, monkeypatch, most, left_out
+):
+    """Two of them, with a sound chunk between: each gap takes from what all of them may."""
+    monkeypatch.setattr(mcap_file, '_MOST_HEADLESS', most)
+    whole = samples(200)
+    made = make(whole, TYPES, Layout(4000, 'zstd', summary=False))
+    content = bytearray(made.content)
+    lost = made.parts[1], made.parts[3]
+    for place, *_ in lost:
+        content[place : place + 29] = bytes(29)
+    found, notes = read_mcap(content)
+    assert len(whole) - len({message[0] for message in found}) == left_out * len(lost[1][2])
+    assert ('pieces without a head left out' in ' '.join(notes)) == bool(left_out)
+
+
+def test_fields_that_reach_beyond_their_record_are_none():
+    short = struct.pack('<HI', 1, 9) + b'eight...'
+    with pytest.raises(ValueError, match='longer than its record'):
+        mcap_records.schema(short, mcap_records.Record(mcap_records.SCHEMA, 0, len(short)))
+    index = bytes(32) + struct.pack('<I', 29) + bytes(28)
+    with pytest.raises(ValueError, match='a chunk index record is damaged'):
+        mcap_records.indexed_chunk(index, mcap_records.Record(8, 0, len(index)))
+
+
+def test_a_last_chunk_that_reaches_behind_the_file_is_read_as_far_as_it_goes(read_mcap):
+    """Chunk and index agree that it is longer, and the checksum of the index is right."""
+    made = make(samples(), TYPES, Layout(900))
+    begin, end, _ = made.parts[-1]
+    content = bytearray(made.content)
+    beyond = len(content) - end + 50
+    entry = content.index(struct.pack('<QQ', begin, end - begin), made.definitions[-1][1]) + 8
+    for at in (begin + 1, begin + 9 + 32, entry):
+        content[at : at + 8] = (int.from_bytes(content[at : at + 8], 'little') + beyond).to_bytes(
+            8, 'little'
+        )
+    foot = len(content) - 37
+    (summary,) = struct.unpack_from('<Q', content, foot + 9)
+    content[foot + 25 : foot + 29] = crc32(content[summary : foot + 25]).to_bytes(4, 'little')
+    found, notes = read_mcap(content)
+    assert [tuple(m) for m in found] == [tuple(s) for s in samples()]
+    assert notes

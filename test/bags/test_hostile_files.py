@@ -11,43 +11,30 @@ from typing import Any
 
 import pytest
 
+from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.salvage import limits, mcap_records
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab.studies.fuzzing.mcap_maker import MAGIC, _pack, _record, _text
 
-MAGIC = b'\x89MCAP0\r\n'
 TIME = 1_700_000_000_000_000_000  # [ns]
 
 
-def zstd() -> Any:
-    try:
-        from compression import zstd
-    except ImportError:
-        from backports import zstd
-    return zstd
-
-
-def record(opcode: int, content: bytes) -> bytes:
-    return struct.pack('<BQ', opcode, len(content)) + content
-
-
 def message(data: bytes = b'') -> bytes:
-    return record(5, struct.pack('<HIQQ', 1, 0, TIME, TIME) + data)
-
-
-def text(words: str) -> bytes:
-    return struct.pack('<I', len(words)) + words.encode()
+    return _record(5, struct.pack('<HIQQ', 1, 0, TIME, TIME) + data)
 
 
 def described() -> bytes:
-    kind = struct.pack('<H', 1) + text('sensor_msgs/msg/Imu') + text('ros2msg') + text('')
-    topic = struct.pack('<HH', 1, 1) + text('/imu/data') + text('cdr') + struct.pack('<I', 0)
-    return record(3, kind) + record(4, topic)
+    kind = struct.pack('<H', 1) + _text('sensor_msgs/msg/Imu') + _text('ros2msg') + _text('')
+    topic = struct.pack('<HH', 1, 1) + _text('/imu/data') + _text('cdr') + struct.pack('<I', 0)
+    return _record(3, kind) + _record(4, topic)
 
 
-def chunk(packed: bytes, size: int, codec: str = 'zstd', checksum: int = 0) -> bytes:
-    head = struct.pack('<QQQI', TIME, TIME + 10, size, checksum) + text(codec)
-    return record(6, head + struct.pack('<Q', len(packed)) + packed)
+def chunk(content: bytes, size: int | None = None) -> bytes:
+    """A packed chunk that states a size."""
+    packed = _pack(content, 'zstd')
+    head = struct.pack('<QQQI', TIME, TIME + 10, len(content) if size is None else size, 0)
+    return _record(6, head + _text('zstd') + struct.pack('<Q', len(packed)) + packed)
 
 
 def mcap(body: bytes, size: int) -> bytes:
@@ -57,21 +44,21 @@ def mcap(body: bytes, size: int) -> bytes:
 
 def zeros(size: int) -> bytes:
     """Bombs of 16 MB in 1.5 kB each."""
-    return mcap(chunk(zstd().compress(bytes(2**24)), 2**24), size)
+    return mcap(chunk(bytes(2**24)), size)
 
 
 def lying_zeros(size: int) -> bytes:
-    return mcap(chunk(zstd().compress(bytes(2**24)), 1000), size)
+    return mcap(chunk(bytes(2**24), 1000), size)
 
 
 def packed_messages(size: int) -> bytes:
     data = message() * (2**24 // len(message()))
-    return mcap(chunk(zstd().compress(data), len(data)), size)
+    return mcap(chunk(data), size)
 
 
 def packed_gaps(size: int) -> bytes:
     data = (message(b'12') + b'\x05') * (2**23 // 34)
-    return mcap(chunk(zstd().compress(data), len(data)), size)
+    return mcap(chunk(data), size)
 
 
 def headless(size: int) -> bytes:
@@ -79,7 +66,7 @@ def headless(size: int) -> bytes:
 
 
 def headless_bombs(size: int) -> bytes:
-    return mcap(zstd().compress(bytes(2**24)), size)
+    return mcap(_pack(bytes(2**24), 'zstd'), size)
 
 
 def nested_chunks(size: int) -> bytes:
@@ -87,7 +74,7 @@ def nested_chunks(size: int) -> bytes:
     parts, left = [], size
     while left > 100:
         content = left - 9
-        head = struct.pack('<QQQI', TIME, TIME, 2**24, 0) + text('zstd')
+        head = struct.pack('<QQQI', TIME, TIME, 2**24, 0) + _text('zstd')
         parts.append(struct.pack('<BQ', 6, content) + head + struct.pack('<Q', content - 44))
         left -= len(parts[-1])
     return MAGIC + described() + b''.join(parts)
@@ -115,14 +102,14 @@ def short_messages(size: int) -> bytes:
 
 
 def metadata(size: int) -> bytes:
-    return mcap(record(12, text('a') + text('b' * 1000)), size)
+    return mcap(_record(12, _text('a') + _text('b' * 1000)), size)
 
 
 def many_topics(size: int) -> bytes:
     parts = [MAGIC]
     for n in range(size // 60):
-        topic = struct.pack('<HH', n % 65536, n % 7) + text(f'/t{n}') + text('cdr')
-        parts.append(record(4, topic + struct.pack('<I', 0)))
+        topic = struct.pack('<HH', n % 65536, n % 7) + _text(f'/t{n}') + _text('cdr')
+        parts.append(_record(4, topic + struct.pack('<I', 0)))
     return b''.join(parts)
 
 
@@ -172,15 +159,30 @@ def test_no_file_costs_much(tmp_path, monkeypatch, make, size):
     assert memory < 1000.0
 
 
+def test_sizes_in_words() -> None:
+    sizes = (300, 5000, 2**28, 3 * 2**29)
+    assert [limits.in_words(size) for size in sizes] == ['300 B', '4.88 kB', '256 MB', '1.5 GB']
+
+
+def test_a_message_that_is_heard_has_a_limit_of_its_own(make_bag, rover, monkeypatch) -> None:
+    monkeypatch.setattr(limits, 'MESSAGE', 200)
+    with open_bag(make_bag()) as bag:
+        reader = MeasurementReader(bag, {}, rover)
+        assert list(reader.measurements())
+    assert reader.rejected['imu/data', 'above 200 B']
+
+
+OF_A_CHUNK = (mcap_records.SCHEMA, mcap_records.CHANNEL, mcap_records.MESSAGE)
+
+
 def test_a_chunk_without_a_checksum_is_read_straight_on() -> None:
     """What stands record behind record is not doubted: dense chunks cost a third."""
     data = message(b'12') * 50
-    possible = mcap_records.Possible(
-        (mcap_records.SCHEMA, mcap_records.CHANNEL, mcap_records.MESSAGE)
-    )
+    possible = mcap_records.Possible(OF_A_CHUNK)
     straight = list(mcap_records.straight_records(data, possible))
-    assert (
-        straight == list(mcap_records.records(data, 0, len(data), possible)) and len(straight) == 50
-    )
-    other = mcap_records.Possible(possible.opcodes, start=straight[0].log_time + 1)
+    assert straight == list(mcap_records.records(data, 0, len(data), possible))
+    assert len(straight) == 50
+    other = mcap_records.Possible(OF_A_CHUNK, start=straight[0].log_time + 1)
     assert list(mcap_records.straight_records(data, other)) == [mcap_records.Gap(0, len(data))]
+    empty = (bytes([mcap_records.SCHEMA]) + bytes(8)) * 1000  # records of no length are not held
+    assert list(mcap_records.straight_records(empty, possible)) == [mcap_records.Gap(0, len(empty))]

@@ -4,33 +4,38 @@
 
 import csv
 import re
+import tracemalloc
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from estimate_sets import STAMP, some_estimates
+from estimate_sets import some_estimates as estimate_set
 from recordings import beginning
 
-from wheel_terra_estimator.bags.history import HistoryRecorder, read_estimates
+from wheel_terra_estimator.bags.history import HistoryRecorder, ThinnedRows, read_estimates
 from wheel_terra_estimator.bags.replay import replay
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.cli.demo import DRIVES
-from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+from wheel_terra_estimator.reporting.drive_summary import summarise
 
 
-def test_stamps_that_stand_still_are_counted(make_bag, factory, config, capsys):
+def test_stamps_that_stand_still_are_counted(make_bag, factory, config, printed):
     header = factory.header(1_700_000_000_000_000_000)
     rows = [
         ('/joint_states', factory.joint_state(header, ('left', 'right'), velocity=(2.0, -2.0)), i)
         for i in range(50)
     ]
-    assert main(['replay', str(make_bag(messages=rows)), *config]) == 0
-    assert re.search(r'joint_states +50 +49 x stamp repeated, merged', capsys.readouterr().out)
+    assert re.search(
+        r'joint_states +50 +49 x stamp repeated, merged',
+        printed(['replay', str(make_bag(messages=rows)), *config]),
+    )
 
 
 @pytest.mark.filter_fails
@@ -102,20 +107,17 @@ def test_bag_without_estimates_is_refused(make_bag):
         read_estimates(bag)
 
 
-TOPICS = {
-    '/joint_states': 'sensor_msgs/msg/JointState',
-    '/imu/data': 'sensor_msgs/msg/Imu',
-    '/truth/odometry': 'nav_msgs/msg/Odometry',
-}
+def truth_of(bag, rover):
+    with open_bag(bag) as opened:
+        truth = read_truth(opened, {}, rover)
+    assert truth is not None and truth.slip is not None
+    return truth
 
 
 def test_true_slip_from_a_true_velocity(make_bag, rover, drive):
     """Rim speed 2 rad/s x 0.21 m = 0.42 m/s, velocity 0.36 m/s: slip 1/7."""
     moved = [(t.replace('/reference_odom', '/truth/odometry'), m, time) for t, m, time in drive]
-    bag = make_bag(messages=moved, topics=TOPICS)
-    with open_bag(bag) as opened:
-        truth = read_truth(opened, {}, rover)
-    assert truth is not None and truth.slip is not None
+    truth = truth_of(make_bag(moved), rover)
     assert truth.velocity.value.shape == (4, 1)
     np.testing.assert_allclose(truth.slip.value, np.full((40, 2), 1 / 7), atol=1e-12)
 
@@ -132,11 +134,8 @@ def test_true_slip_of_steered_wheels_is_along_their_headings(make_bag, rover, dr
                 velocity=[*message.velocity, 0.0],
             )
         moved.append((topic.replace('/reference_odom', '/truth/odometry'), message, time))
-    bag = make_bag(messages=moved, topics=TOPICS)
     steered = rover.replace({'wheels.steering_joints': ['steer', 'steer']})
-    with open_bag(bag) as opened:
-        truth = read_truth(opened, {}, steered)
-    assert truth is not None and truth.slip is not None
+    truth = truth_of(make_bag(moved), steered)
     expected = 1.0 - 0.36 / np.cos(0.3) / 0.42
     np.testing.assert_allclose(truth.slip.value, np.full((40, 2), expected), atol=1e-12)
 
@@ -149,10 +148,8 @@ def test_no_truth_in_a_bag_without(make_bag, rover):
 @pytest.mark.shared
 def test_true_slip_of_a_measured_drive_is_that_of_its_table(shared):
     """The table has wheel speeds and the speed of each side, of the author's own making."""
-    configuration = reader.load(['frostyboy'])
-    with open_bag(shared / 'bags' / 'frostyboy_event_1_6_mcap') as bag:
-        truth = read_truth(bag, {}, configuration)
-    assert truth is not None and truth.slip is not None
+    recording = shared / 'bags' / 'frostyboy_event_1_6_mcap'
+    truth = truth_of(recording, reader.load(['frostyboy']))
     with (shared / 'frostyboy_snow' / 'event_1_6.csv').open() as file:
         rows = list(csv.DictReader(file))
     speed = np.array([[float(r['v_X'])] for r in rows])
@@ -165,3 +162,69 @@ def test_true_slip_of_a_measured_drive_is_that_of_its_table(shared):
     found = truth.slip.value
     assert found.shape == expected.shape
     np.testing.assert_allclose(found[driving], expected[driving], atol=2e-6)
+
+
+@pytest.mark.parametrize('count', [1, 7, 8, 9, 16, 17, 100, 1000, 1023])
+def test_rows_stay_in_order_evenly_spread_and_few(count):
+    rows = ThinnedRows(8)
+    for stamp in range(count):
+        rows.add(stamp, [float(stamp)])
+    stamps = rows.stamps()
+    assert min(count, 4) <= stamps.size <= 8
+    np.testing.assert_array_equal(rows.values(1)[:, 0], stamps)
+    steps = np.diff(stamps)
+    assert stamps[0] == 0
+    assert (steps == steps[:1]).all()
+    assert count - stamps[-1] <= max(steps, default=1)
+
+
+def sets(count: int):
+    dice = np.random.default_rng(3)
+    first = estimate_set()
+    for i in range(count):
+        yield replace(
+            first,
+            stamp=first.stamp + i * 50_000_000,
+            slip=dice.uniform(-1.0, 1.0, first.slip.shape),
+            sinkage=dice.uniform(0.0, 0.1, first.slip.shape),
+            drawbar_pull=dice.uniform(-50.0, 50.0, first.slip.shape),
+            slip_class=dice.choice([0, 1, 2, 3, 255], first.slip.shape).astype(np.uint8),
+        )
+
+
+def test_figures_of_a_thinned_drive_are_those_of_all_sets():
+    names = tuple(f'w{i}' for i in range(estimate_set().slip.size))
+    whole, thinned = HistoryRecorder(names), HistoryRecorder(names, 50)
+    everything = list(sets(700))
+    for each in everything:
+        whole.add(each)
+        thinned.add(each)
+    long, short = whole.history(), thinned.history()
+    assert long.stamp.size == 700
+    assert short.stamp.size <= 50
+    assert summarise('', long, {}, {}, {}, ()) == summarise('', short, {}, {}, {}, ())
+    summary = summarise('', short, {}, {}, {}, ())
+    assert summary.sets == 700
+    classes = np.array([s.slip_class for s in everything])
+    slips = np.abs([s.slip for s in everything])
+    sinkages = np.array([s.sinkage for s in everything])
+    pulls = np.array([s.drawbar_pull for s in everything])
+    for i, wheel in enumerate(summary.wheels):
+        known = classes[:, i] != 255
+        assert wheel.max_slip == slips[known, i].max()
+        assert wheel.max_sinkage == sinkages[:, i].max()
+        assert wheel.mean_pull == pytest.approx(pulls[known, i].mean())
+        assert wheel.seconds['high'] == pytest.approx(0.05 * (classes[:-1, i] == 2).sum())
+
+
+def test_memory_of_a_recorder_does_not_grow():
+    names = tuple(f'w{i}' for i in range(estimate_set().slip.size))
+    recorder = HistoryRecorder(names, 25)
+    sizes = []
+    tracemalloc.start()
+    for number, each in enumerate(sets(600), start=1):
+        recorder.add(each)
+        if number in (50, 600):
+            sizes.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    assert sizes[1] < sizes[0] + 50_000

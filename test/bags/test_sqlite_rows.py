@@ -5,18 +5,21 @@
 import random
 import shutil
 import sqlite3
+import struct
 from collections import Counter
 from pathlib import Path
 
 import pytest
 from recordings import contents
+from test_damage import START, samples
+from test_damage import TYPES as SMALL
 
+from wheel_terra_estimator.bags.salvage import RawMessage
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.studies.fuzzing import sqlite_maker
 from wheel_terra_lab.studies.fuzzing.mcap_maker import Sample
 
 TYPES = {'/joint_states': 'sensor_msgs/msg/JointState', '/camera': 'sensor_msgs/msg/Image'}
-START = 1_700_000_000_000_000_000
 PAGE = sqlite_maker.PAGE
 
 
@@ -44,6 +47,77 @@ def zeroed(path: Path, begin: int, count: int) -> None:
     path.write_bytes(content)
 
 
+def big(tmp_path: Path, count: int = 4000) -> tuple[Path, list[RawMessage]]:
+    """Write small messages alone, on pages of many rows."""
+    path, found = tmp_path / 'a.db3', samples(count)
+    sqlite_maker.write(path, found, SMALL)
+    return path, [RawMessage(*s) for s in found]
+
+
+def executed(path: Path, *statements: str) -> None:
+    with sqlite3.connect(path) as connection:
+        for statement in statements:
+            connection.execute(statement)
+    connection.close()
+
+
+def test_rows_behind_damaged_pages_are_read(tmp_path):
+    path, whole = big(tmp_path)
+    assert contents(path) == (whole, [])
+    zeroed(path, path.read_bytes().index(struct.pack('<Q', 2000) * 8) // PAGE * PAGE, 2 * PAGE)
+    found, notes = contents(path)
+    assert not Counter(found) - Counter(whole)
+    assert len(found) > len(whole) - 200
+    assert 'is damaged' in notes[0]
+    assert 'from 19.' in notes[0] or 'from 20.' in notes[0]
+
+
+def test_a_damaged_row_number_hides_no_row_behind(tmp_path):
+    """The rows of a page have great numbers and no data, the last of them cannot be read."""
+    path, whole = big(tmp_path)
+    content = bytearray(path.read_bytes())
+    begin = content.index(whole[2000].data) // PAGE * PAGE
+    count = int.from_bytes(content[begin + 3 : begin + 5], 'big')
+    places = [int.from_bytes(content[begin + 8 + 2 * i :][:2], 'big') for i in range(count)]
+    pages = [content.index(message.data) // PAGE * PAGE for message in whole]
+    for place in places:  # length 2, number 12343, a head of 2 bytes, nothing
+        content[begin + place : begin + place + 5] = b'\x02\xe0\x37\x02\x00'
+    content[begin + places[-1] : begin + places[-1] + 9] = b'\xff' * 9
+    path.write_bytes(content)
+    found, notes = contents(path)
+    left = (message for message, page in zip(whole, pages, strict=True) if page != begin)
+    assert Counter(found) == Counter(left)
+    assert 'is damaged' in notes[0]
+
+
+def test_pages_that_sqlite_does_not_miss_are_said(tmp_path):
+    """The page that lists the pages of the table states too few of them, which is no error."""
+    path, whole = big(tmp_path)
+    content = bytearray(path.read_bytes())
+    interior = next(at for at in range(PAGE, len(content), PAGE) if content[at] == 5)
+    count = int.from_bytes(content[interior + 3 : interior + 5], 'big')
+    assert count > 20
+    content[interior + 3 : interior + 5] = (count - 9).to_bytes(2, 'big')
+    path.write_bytes(content)
+    found, notes = contents(path)
+    assert not Counter(found) - Counter(whole)
+    assert f'is damaged: {len(found)} whole messages recovered' in notes[0]
+    assert 'of the recording' in notes[0]
+
+
+def test_an_index_that_lies_hides_no_row_and_rows_out_of_order_are_sorted(tmp_path):
+    path, whole = big(tmp_path, 50)
+    gone = "DELETE FROM sqlite_master WHERE name='timestamp_idx'"
+    executed(path, 'PRAGMA writable_schema=ON', gone, 'PRAGMA writable_schema=OFF')
+    assert contents(path)[0] == whole
+    path, whole = big(tmp_path, 50)
+    executed(path, f'UPDATE messages SET timestamp = {START - 5} WHERE id = 30')
+    found, _ = contents(path)
+    assert found[0].log_time == START - 5
+    assert [m.log_time for m in found] == sorted(m.log_time for m in found)
+    assert len(found) == len(whole)
+
+
 @pytest.mark.parametrize('share', [0.4, 0.9])
 def test_all_rows_before_the_cut_are_read(tmp_path, share):
     """The pages of the table stand in the order of its rows."""
@@ -67,11 +141,8 @@ def test_all_rows_before_the_cut_are_read(tmp_path, share):
 def test_numbers_far_apart_behind_damage_cost_no_time(tmp_path):
     path = tmp_path / 'a.db3'
     samples = made(path)
-    with sqlite3.connect(path) as connection:
-        connection.execute('UPDATE messages SET id = id + 4000000000000 WHERE id > 300')
-    connection.close()
-    content = path.read_bytes()
-    zeroed(path, content.index(samples[250].data) // PAGE * PAGE, PAGE)
+    executed(path, 'UPDATE messages SET id = id + 4000000000000 WHERE id > 300')
+    zeroed(path, path.read_bytes().index(samples[250].data) // PAGE * PAGE, PAGE)
     assert read(path)[0].total() > 500
 
 
@@ -88,10 +159,10 @@ def test_a_large_message_whose_page_is_another_s_is_left_out(tmp_path):
     assert tuple(samples[105]) not in found
 
 
-def test_rows_in_the_write_ahead_log_of_a_damaged_file(tmp_path):
-    path = tmp_path / 'live.db3'
-    samples = made(path)
-    live = sqlite3.connect(path)
+@pytest.mark.parametrize('damaged', [False, True])
+def test_the_write_ahead_log_of_a_recorder_that_died_is_read(tmp_path, damaged):
+    samples = made(tmp_path / 'live.db3')
+    live = sqlite3.connect(tmp_path / 'live.db3')
     live.execute('PRAGMA journal_mode=WAL')
     live.execute('PRAGMA wal_autocheckpoint=0')
     live.executemany(
@@ -103,22 +174,21 @@ def test_rows_in_the_write_ahead_log_of_a_damaged_file(tmp_path):
         if not file.name.endswith('-shm'):
             shutil.copy(file, tmp_path / file.name.replace('live', 'a'))
     live.close()
-    broken = tmp_path / 'a.db3'
-    content = broken.read_bytes()
-    page = content.index(samples[100].data) // PAGE * PAGE
-    places = sqlite_maker.message_places(content, samples, TYPES)
-    lost = sum(any(page <= begin < page + PAGE for begin, _ in pieces) for pieces in places)
-    zeroed(broken, page, PAGE)
+    path, lost = tmp_path / 'a.db3', 0
+    if damaged:
+        content = path.read_bytes()
+        page = content.index(samples[100].data) // PAGE * PAGE
+        places = sqlite_maker.message_places(content, samples, TYPES)
+        lost = sum(any(page <= begin < page + PAGE for begin, _ in pieces) for pieces in places)
+        zeroed(path, page, PAGE)
     before = {file: file.read_bytes() for file in tmp_path.glob('a.db3*')}
-    found, _ = read(broken)
+    found, _ = read(path)
     assert found.total() == 900 - lost
     assert {file: file.read_bytes() for file in tmp_path.glob('a.db3*')} == before
 
 
 def test_what_is_left_of_other_files_is_no_recording(tmp_path):
     path = tmp_path / 'a.db3'
-    with sqlite3.connect(path) as connection:
-        connection.execute('CREATE TABLE notes(id INTEGER PRIMARY KEY, text)')
-    connection.close()
+    executed(path, 'CREATE TABLE notes(id INTEGER PRIMARY KEY, text)')
     with pytest.raises(UserError, match='finds no recording in it'):
         read(path)

@@ -43,12 +43,6 @@ def test_a_sound_file_is_read_by_its_index(make_bag, whole, monkeypatch):
     assert messages(make_bag()) == whole
 
 
-def test_unreadable_metadata_is_set_aside(make_bag, whole):
-    folder = make_bag()
-    (folder / 'metadata.yaml').write_text('rosbag2_bagfile_information: {version: 9}\n')
-    assert messages(folder) == whole
-
-
 @pytest.mark.parametrize('mode', ['FILE', 'MESSAGE', 'STORAGE'])
 def test_compressed_bags(tmp_path, drive, whole, mode):
     store = jazzy_types()

@@ -20,25 +20,33 @@ ROWS = [
     '100.0,60,-60,1.5,-1.5,0,0,1,0,0,90,12,0.5',
     '100.1,30,,1.0,,0,0,1,0,0,0,,',
 ]
+LOG = '\n'.join([HEADER, *ROWS])
 
 
 @pytest.fixture
-def files(tmp_path, capsys):
-    assert main(['convert', '--example']) == 0
-    (tmp_path / 'map.yaml').write_text(capsys.readouterr().out)
-    (tmp_path / 'log.csv').write_text('\n'.join([HEADER, *ROWS]))
-    return tmp_path
+def example(printed):
+    return printed(['convert', '--example'])
 
 
-def command(folder):
-    table, columns, out = (str(folder / n) for n in ('log.csv', 'map.yaml', 'bag'))
-    return ['convert', table, '--columns', columns, '-o', out]
+@pytest.fixture
+def convert(tmp_path, example):
+    """Convert a table by a map, the example's unless told; return what is in the bag."""
+
+    def run(log=LOG, columns=example, more=()):
+        text = columns if isinstance(columns, str) else yaml.safe_dump(columns)
+        (tmp_path / 'map.yaml').write_text(text)
+        (tmp_path / 'log.csv').write_text(log)
+        table, map_file, out = (str(tmp_path / name) for name in ('log.csv', 'map.yaml', 'bag'))
+        if status := main(['convert', table, '--columns', map_file, '-o', out, *more]):
+            return status
+        with open_bag(tmp_path / 'bag') as bag:
+            return read_series(bag, {}, 'bag')
+
+    return run
 
 
-def test_the_example_converts_units_and_signs(files):
-    assert main(command(files)) == 0
-    with open_bag(files / 'bag') as bag:
-        told = read_series(bag, {}, 'bag')
+def test_the_example_converts_units_and_signs(convert):
+    told = convert()
     assert told.joints.names == ('front_left', 'front_right')
     assert np.allclose(told.joints.rate[0], 2.0 * math.pi)  # 60 rpm, the right one turned round
     assert told.joints.rate[1, 0] == pytest.approx(math.pi) and np.isnan(told.joints.rate[1, 1])
@@ -48,37 +56,18 @@ def test_the_example_converts_units_and_signs(files):
     assert told.sinkage.sinkage.tolist() == [[0.012]]
     assert told.reference.velocity[:, 0].tolist() == [0.5]
     assert np.diff(told.joints.stamp).tolist() == [100_000_000]
-    assert main(command(files)) == 2  # nothing is overwritten
+    assert convert() == 2  # nothing is overwritten
 
 
-def test_decimal_commas_between_commas_are_refused(files, capsys):
-    rows = [line.replace('.', ',') for line in ROWS]
-    (files / 'log.csv').write_text('\n'.join([HEADER, *rows]))
-    assert main(command(files)) == 2
-    assert 'line 2: 17 cells but 13 columns; use commas between' in capsys.readouterr().err
-    (files / 'log.csv').write_text('\n'.join([HEADER, *(f'{row},,' for row in ROWS)]))
-    assert main(command(files)) == 0  # empty cells beyond the last column are none
-
-
-@pytest.mark.parametrize('entry', ['time', 'joint_states'])
-def test_a_map_without_what_is_needed_says_so(files, capsys, entry):
-    columns = yaml.safe_load((files / 'map.yaml').read_text())
-    del columns[entry]
-    (files / 'map.yaml').write_text(yaml.safe_dump(columns))
-    assert main(command(files)) == 2
-    assert 'time and joint_states are needed' in capsys.readouterr().err
-
-
-def test_steering_angles_reach_the_measurements(files):
-    columns = (files / 'map.yaml').read_text()
-    assert '\n# front_left_steering:' in columns
-    shown = columns.replace('\n# front_left_steering', '\n  front_left_steering').replace(
-        '\n#   position', '\n    position'
-    )
-    (files / 'map.yaml').write_text(shown)
-    rows = [HEADER + ',angle_fl', ROWS[0] + ',-30', ROWS[1] + ',']
-    (files / 'log.csv').write_text('\n'.join(rows))
-    assert main(command(files)) == 0
+def test_steering_angles_and_orientation_of_the_example_reach_the_measurements(
+    convert, example, tmp_path
+):
+    columns = example.replace('\n# front_left_steering:', '\n  front_left_steering:')
+    columns = columns.replace('\n#   position', '\n    position')
+    columns = columns.replace('\n# orientation', '\n  orientation')
+    rows = [f'{HEADER},angle_fl,qx,qy,qz,qw', f'{ROWS[0]},-30,0,0,0.6,0.8', f'{ROWS[1]},,0,0,0,1']
+    told = convert('\n'.join(rows), columns)
+    assert np.allclose(told.imu.orientation, [[0, 0, 0.6, 0.8], [0, 0, 0, 1]])
     rover = reader.from_parameters(
         {
             'wheels.names': ['front_left', 'front_right'],
@@ -87,7 +76,7 @@ def test_steering_angles_reach_the_measurements(files):
         },
         complete=False,
     )
-    with open_bag(files / 'bag') as bag:
+    with open_bag(tmp_path / 'bag') as bag:
         measured = [m for _, m in MeasurementReader(bag, {}, rover).measurements()]
     odometry = [m for m in measured if isinstance(m, WheelOdometry)]
     assert odometry[0].steering[0] == pytest.approx(math.radians(-30.0))
@@ -97,13 +86,8 @@ def test_steering_angles_reach_the_measurements(files):
 
 
 @pytest.mark.parametrize('delimiter', [';', '\t'])
-def test_decimal_commas_between_semicolons_or_tabs(files, delimiter):
-    lines = [HEADER, *ROWS]
-    text = '\n'.join(line.replace(',', delimiter).replace('.', ',') for line in lines)
-    (files / 'log.csv').write_text(text)
-    assert main(command(files)) == 0
-    with open_bag(files / 'bag') as bag:
-        told = read_series(bag, {}, 'bag')
+def test_decimal_commas_between_semicolons_or_tabs(convert, delimiter):
+    told = convert(LOG.replace(',', delimiter).replace('.', ','))
     assert told.reference.velocity[:, 0].tolist() == [0.5]
     assert np.allclose(told.joints.torque[0], 1.5)
     assert np.diff(told.joints.stamp).tolist() == [100_000_000]
@@ -121,77 +105,103 @@ def test_decimal_commas_between_semicolons_or_tabs(files, delimiter):
         ('time: {', '\ttime: {', 'line 3: found character that cannot start any token'),
     ],
 )
-def test_a_map_that_cannot_be_used(files, capsys, old, new, words):
-    text = (files / 'map.yaml').read_text()
-    assert old in text
-    (files / 'map.yaml').write_text(text.replace(old, new, 1))
-    assert main(command(files)) == 2
+def test_a_map_that_cannot_be_used(convert, example, capsys, old, new, words):
+    assert old in example
+    assert convert(columns=example.replace(old, new, 1)) == 2
     assert words in capsys.readouterr().err
 
 
-def test_a_cell_that_is_no_number(files, capsys):
-    (files / 'log.csv').write_text('\n'.join([HEADER, ROWS[0], ROWS[1].replace('30', 'abc')]))
-    assert main(command(files)) == 2
-    assert "log.csv, line 3, column rpm_fl: 'abc' is not a number" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ('log', 'words'),
+    [
+        (LOG.replace('.1,30', '.1,abc'), "line 3, column rpm_fl: 'abc' is not a number"),
+        (LOG.replace('100.0', '1.7e12'), 'column time: 1.7e+12 s is no time from 0 to 2038; is'),
+        ('', 'log.csv: empty; the first line must name the columns'),
+        (LOG.replace('.', ','), 'line 2: 17 cells but 13 columns; use commas between'),
+    ],
+)
+def test_a_table_that_cannot_be_used(convert, capsys, log, words):
+    assert convert(log) == 2
+    assert words in capsys.readouterr().err
 
 
-def test_milliseconds_taken_for_seconds_are_told(files, capsys):
-    (files / 'log.csv').write_text('\n'.join([HEADER, ROWS[0].replace('100.0', '1.7e12')]))
-    assert main(command(files)) == 2
-    assert 'column time: 1.7e+12 s is no time from 0 to 2038; is' in capsys.readouterr().err
+@pytest.mark.parametrize('entry', ['time', 'joint_states'])
+def test_a_map_without_what_is_needed_says_so(convert, example, capsys, entry):
+    columns = {key: value for key, value in yaml.safe_load(example).items() if key != entry}
+    assert convert(columns=columns) == 2
+    assert 'time and joint_states are needed' in capsys.readouterr().err
 
 
-def test_an_empty_table_is_called_empty(files, capsys):
-    (files / 'log.csv').write_text('')
-    assert main(command(files)) == 2
-    assert 'log.csv: empty; the first line must name the columns' in capsys.readouterr().err
-
-
-def test_a_row_that_was_cut_short_is_told(files, capsys):
-    cut = ','.join(ROWS[0].replace('100.0', '100.2').split(',')[:4])
-    (files / 'log.csv').write_text('\n'.join([HEADER, *ROWS]))
-    assert main(command(files)) == 0
+def test_rows_that_are_too_long_or_cut_short(convert, capsys):
+    assert convert('\n'.join([HEADER, *(f'{row},,' for row in ROWS)])) != 2  # empty cells are none
     assert 'note' not in capsys.readouterr().out
-    (files / 'log.csv').write_text('\n'.join([HEADER, *ROWS, cut]))
-    assert main([*command(files), '--overwrite']) == 0
+    cut = ','.join(ROWS[0].replace('100.0', '100.2').split(',')[:4])
+    assert convert(f'{LOG}\n{cut}', more=['--overwrite']) != 2
     said = capsys.readouterr().out
     assert '/joint_states 3, /imu/data 2' in said
     assert 'a row ends before the last column of the map (first: line 4)' in said
 
 
-def test_a_held_reading_is_written_once(files, capsys):
+def test_a_held_reading_is_written_once(convert, capsys):
     """A logger at 20 Hz repeats a speed at 2 Hz; a rounded speed at 20 Hz is no held one."""
     rng = np.random.default_rng(1)
     speeds = 0.4 + 0.05 * rng.standard_normal(40)
     speeds[20:30] = 0.0  # it stands
 
-    def lines(values):
-        rows = [
-            f'{100.0 + 0.05 * k:.2f},60,-60,1,-1,0,0,1,0,0,0,12,{value}'
-            for k, value in enumerate(values)
-        ]
-        return '\n'.join([HEADER, *rows])
+    def read(values):
+        row = '{:.2f},60,-60,1,-1,0,0,1,0,0,0,12,{}'
+        rows = [row.format(100.0 + 0.05 * k, value) for k, value in enumerate(values)]
+        told = convert('\n'.join([HEADER, *rows]), more=['--overwrite'])
+        return told.reference, capsys.readouterr().out
 
-    def read(text):
-        (files / 'log.csv').write_text(text)
-        assert main([*command(files), '--overwrite']) == 0
-        with open_bag(files / 'bag') as bag:
-            return read_series(bag, {}, 'bag').reference, capsys.readouterr().out
-
-    held, said = read(lines(np.repeat(speeds.round(4), 10)))
+    held, said = read(np.repeat(speeds.round(4), 10))
     assert held.velocity[:, 0] == pytest.approx(speeds, abs=1e-4)
     assert np.diff(held.stamp) * 1e-9 == pytest.approx(0.5, abs=1e-6)
     assert 'note: /reference_odom repeats each reading over about 10 rows' in said
-    rounded, said = read(lines((0.4 + 0.05 * rng.standard_normal(400)).round(1)))
+    rounded, said = read((0.4 + 0.05 * rng.standard_normal(400)).round(1))
     assert len(rounded.stamp) == 400 and '/reference_odom repeats' not in said
 
 
-def test_the_orientation_of_the_example_reaches_the_recording(files):
-    columns = (files / 'map.yaml').read_text()
-    (files / 'map.yaml').write_text(columns.replace('\n# orientation', '\n  orientation'))
-    rows = [f'{HEADER},qx,qy,qz,qw', f'{ROWS[0]},0,0,0.6,0.8', f'{ROWS[1]},0,0,0,1']
-    (files / 'log.csv').write_text('\n'.join(rows))
-    assert main(command(files)) == 0
-    with open_bag(files / 'bag') as bag:
-        told = read_series(bag, {}, 'bag').imu.orientation
-    assert np.allclose(told, [[0, 0, 0.6, 0.8], [0, 0, 0, 1]])
+RIM = {'column': 'v', 'unit': 'm/s', 'radius': 0.2}
+METRES = {key: {'column': key[-1], 'unit': 'm'} for key in ('position.x', 'position.y')}
+DEGREES = {key: {'column': key[:3], 'unit': 'deg'} for key in ('latitude', 'longitude')}
+
+
+@pytest.mark.parametrize('sense', [1.0, -1.0])
+@pytest.mark.parametrize('reference', [METRES, DEGREES])
+def test_rim_speeds_and_positions_of_a_log(convert, reference, sense):
+    speed, east = 0.5 * sense, math.radians(30.0)
+    metre = 180.0 / math.pi / 6_371_000.0
+    rows = ['t,v,x,y,lat,lon']
+    for t in np.arange(100.0, 105.0, 0.2):
+        x, y = speed * (t - 100.0) * math.cos(east), speed * (t - 100.0) * math.sin(east)
+        lat, lon = 47.0 + metre * y, 8.0 + metre * x / math.cos(math.radians(47.0))
+        rows.append(f'{t},{speed},{x:.9f},{y:.9f},{lat:.12f},{lon:.12f}')
+    columns = {
+        'time': {'column': 't'},
+        'joint_states': {'left': {'velocity': RIM}},
+        'reference_odom': reference,
+    }
+    told = convert('\n'.join(rows), columns)
+    np.testing.assert_allclose(told.joints.rate, speed / 0.2)
+    np.testing.assert_allclose(told.reference.velocity[:, 0], speed, rtol=1e-4)
+    middle = (told.reference.stamp - told.joints.stamp[0]) * 1e-9
+    np.testing.assert_allclose(middle, 0.5 + 0.2 * np.arange(middle.size), atol=1e-6)
+
+
+def test_positions_need_wheels_that_count_one_way(convert, tmp_path, capsys):
+    columns = {
+        'time': {'column': 't', 'unit': 'ms'},
+        'joint_states': {side: {'velocity': {'column': side}} for side in ('left', 'right')},
+        'reference_odom': METRES,
+    }
+    day = 1_700_000_000_000  # [ms]: stamps of a date fall on the grid of the estimates
+    rows = [f'{day + 50 * i},2.51,-2.5,{0.02 * i},0' for i in range(60)]
+    log = '\n'.join(['t,left,right,x,y', *rows])
+    assert convert(log, columns) == 2
+    assert 'sign: -1 for each that counts backwards' in capsys.readouterr().err
+    assert not (tmp_path / 'bag').exists()
+    columns['joint_states']['right']['velocity']['sign'] = -1
+    told = convert(log, columns)
+    np.testing.assert_allclose(told.reference.velocity[:, 0], 0.4, rtol=1e-6)
+    assert set(np.diff(told.joints.stamp)) == {50_000_000}

@@ -7,15 +7,13 @@ from pathlib import Path
 
 from document_effects import as_markdown
 
-from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_text_names_every_effect_and_parameter(capsys):
-    assert main(['effects']) == 0
-    text = capsys.readouterr().out
+def test_text_names_every_effect_and_parameter(printed):
+    text = printed(['effects'])
     for name, effect in catalogue().items():
         assert f'\n{name}\n' in f'\n{text}'
         if effect.sparse:
@@ -26,20 +24,17 @@ def test_text_names_every_effect_and_parameter(capsys):
     assert max(map(len, text.splitlines())) <= 100
 
 
-def test_json_holds_what_a_program_needs(capsys):
-    assert main(['effects', '--json']) == 0
-    records = {record['name']: record for record in json.loads(capsys.readouterr().out)}
+def test_json_holds_what_a_program_needs(printed):
+    records = {record['name']: record for record in json.loads(printed(['effects', '--json']))}
     assert records.keys() == catalogue().keys()
     digging = records['lug_digging']
     assert digging['touches'] == ['sinkage'] and digging['parameters'][0]['name'] == 'kd'
 
 
-def test_one_effect_and_a_misspelt_one(capsys):
-    assert main(['effects', 'soil_mound']) == 0
-    text = capsys.readouterr().out
+def test_one_effect_and_a_misspelt_one(printed, refused):
+    text = printed(['effects', 'soil_mound'])
     assert text.startswith('soil_mound') and 'lug_digging' not in text
-    assert main(['effects', 'soil_mund']) == 2
-    assert "did you mean 'soil_mound'?" in capsys.readouterr().err
+    refused(['effects', 'soil_mund'], "did you mean 'soil_mound'?")
 
 
 def test_the_page_and_its_pictures_are_up_to_date():

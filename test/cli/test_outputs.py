@@ -84,7 +84,7 @@ def command_line(words: tuple[str, ...], given: dict[str, Path], spare: Path) ->
 
 
 @pytest.mark.parametrize(('words', 'output', 'given'), PAIRS)
-def test_no_output_is_an_input_or_holds_one_or_lies_in_it(words, output, given, tmp_path, capsys):
+def test_no_output_is_an_input_or_holds_one_or_lies_in_it(words, output, given, tmp_path, refused):
     """By whatever name: the path itself, another spelling, a hard link, our own folder."""
     ours = tmp_path / 'ours'
     with new_folder(ours) as folder:
@@ -94,43 +94,36 @@ def test_no_output_is_an_input_or_holds_one_or_lies_in_it(words, output, given, 
     (tmp_path / 'hard.yaml').hardlink_to(mine)
     for target in (mine, ours / '..' / 'ours' / 'mine.yaml', tmp_path / 'hard.yaml', ours):
         line = command_line(words, {given: mine, output: target}, tmp_path / 'spare.yaml')
-        assert main(line) == 2, line
-        said = capsys.readouterr().err
-        assert 'which the command reads' in said, line
-        assert said.count('\n') == 1
+        refused(line, 'which the command reads')
         assert mine.read_bytes() == before
     if next(a for a in inputs(COMMANDS[words]) if a.dest == given).type is Path:
         line = command_line(words, {given: ours, output: mine}, tmp_path / 'spare.yaml')
-        assert main(line) == 2
-        assert 'which the command reads' in capsys.readouterr().err
+        refused(line, 'which the command reads')
     assert [p.name for p in ours.iterdir() if p.name != '.wheel-terra.json'] == ['mine.yaml']
 
 
-def test_the_effect_file_of_a_rover_file_is_an_input(tmp_path, capsys):
+def test_the_effect_file_of_a_rover_file_is_an_input(tmp_path, refused):
     effects = tmp_path / 'effects.py'
     effects.write_text('mine = 1\n')
     rover = tmp_path / 'rover.yaml'
     rover.write_text(f'/**:\n  ros__parameters:\n    {ROVER}    effect_file: effects.py\n')
     line = ['calibrate', 'bag', '--config', str(rover), '-o', str(effects), '--overwrite']
-    assert main(line) == 2
-    assert 'effects.py, which the command reads' in capsys.readouterr().err
+    refused(line, 'effects.py, which the command reads')
     assert effects.read_text() == 'mine = 1\n'
 
 
-def test_one_path_for_two_outputs_is_refused(tmp_path, capsys):
+def test_one_path_for_two_outputs_is_refused(tmp_path, refused):
     out = str(tmp_path / 'out.csv')
-    assert main(['replay', 'bag', '--table', out, '--track', out]) == 2
-    assert 'named for two outputs' in capsys.readouterr().err
+    refused(['replay', 'bag', '--table', out, '--track', out], 'named for two outputs')
 
 
-def test_a_soil_file_replaces_no_file_of_another_kind(tmp_path, capsys):
+def test_a_soil_file_replaces_no_file_of_another_kind(tmp_path, refused):
     """--overwrite is for earlier soil files: a rover file is none."""
     mine = tmp_path / 'my_rover.yaml'
     reader.load(['pathfinder']).write(mine)
     before = mine.read_bytes()
     line = ['replay', 'bag', '--config', 'pathfinder', '--save-soil', str(mine), '--overwrite']
-    assert main(line) == 2
-    assert f"does not begin with '# {soil_file.HEADER}'" in capsys.readouterr().err
+    refused(line, f"does not begin with '# {soil_file.HEADER}'")
     assert mine.read_bytes() == before
 
 

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files and overrides become a checked configuration, or one line that says what is wrong."""
 
-import argparse
 import copy
 import math
 import pickle
@@ -14,6 +13,7 @@ from pathlib import Path
 import document_parameters as documentation
 import numpy as np
 import pytest
+from test_ros_yaml import read_by_ros
 
 from wheel_terra_estimator.configuration import parameters, reader, shipped
 from wheel_terra_estimator.configuration.parameters import DECLARED, RETIRED, by_spelling, declared
@@ -37,6 +37,10 @@ def complaint(call, *arguments, **options):
     message = str(caught.value)
     assert '\n' not in message
     return message
+
+
+def made(changes):
+    return reader.from_parameters({**ROVER, **changes})
 
 
 def parameter_file(tmp_path, name, body):
@@ -116,9 +120,7 @@ def test_degrees_stand_only_behind_deg():
 
 
 def test_units_inside_are_si_and_radians():
-    c = reader.from_parameters(
-        {**ROVER, 'soil.friction_angle_deg': 30, 'sensors.imu_mounting_roll_deg': 180.0}
-    )
+    c = made({'soil.friction_angle_deg': 30, 'sensors.imu_mounting_roll_deg': 180.0})
     assert c.soil.friction_angle == pytest.approx(math.pi / 6)
     assert c.sensors.imu_mounting_roll == pytest.approx(math.pi)
     assert c.rover.mass == 10.0 and isinstance(c.rover.mass, float)
@@ -146,27 +148,22 @@ def test_slip_radius_is_the_tip_unless_the_rim_is_asked_for():
     ],
 )
 def test_both_spellings_of_the_bare_names(alias, key, value):
-    c = reader.from_parameters({**ROVER, alias: value})
+    c = made({alias: value})
     assert getattr(c, key) == value and c.flat()[key] == value
-    assert 'same parameter' in complaint(
-        reader.from_parameters, {**ROVER, alias: value, key: value}
-    )
+    assert 'same parameter' in complaint(made, {alias: value, key: value})
 
 
 def test_the_soil_has_a_deviation_even_where_none_is_stated():
-    c = reader.from_parameters(
-        {**ROVER, 'soil.cohesion': 500.0, 'soil.cohesion_std': 77.0, 'soil.relative_std': 0.2}
-    )
+    c = made({'soil.cohesion': 500.0, 'soil.cohesion_std': 77.0, 'soil.relative_std': 0.2})
     assert c.soil_std['cohesion'] == 77.0
     assert c.soil_std['shear_modulus'] == pytest.approx(0.2 * c.soil.shear_modulus)
-    c = reader.from_parameters({**ROVER, 'soil.friction_angle_std_deg': 2.0})
+    c = made({'soil.friction_angle_std_deg': 2.0})
     assert c.soil_std['friction_angle'] == pytest.approx(math.radians(2.0))
 
 
 def test_effects_that_are_on():
-    c = reader.from_parameters(
+    c = made(
         {
-            **ROVER,
             'effects.lug_digging.enabled': True,
             'effects.lug_digging.kd': 2,
             'effects.lug_digging.kd_std': 0.1,
@@ -180,9 +177,8 @@ def test_effects_that_are_on():
 
 
 def test_arrays_of_any_kind_and_parameters_of_every_node():
-    c = reader.from_parameters(
+    c = made(
         {
-            **ROVER,
             'wheels.radius': array('d', [0.2, 0.3]),
             'wheels.width': np.array([1, 2]),
             'wheels.names': ('a', 'b'),
@@ -298,16 +294,6 @@ def test_overrides_that_are_none(override):
     assert complaint(reader.load, ['frostyboy'], [override]).startswith(f'-p {override}')
 
 
-def test_arguments_of_the_commands():
-    parser = argparse.ArgumentParser()
-    reader.add_arguments(parser)
-    arguments = parser.parse_args(
-        ['--config', 'frostyboy', '--config', 'rovers/pathfinder', '-p', 'rover.mass:=3']
-    )
-    c = reader.from_arguments(arguments)
-    assert c.rover.mass == 3.0 and c.rover.name == 'WVU Pathfinder'
-
-
 def test_names_of_shipped_files(tmp_path, monkeypatch):
     assert shipped.find('frostyboy').name == 'frostyboy.yaml'
     assert shipped.find('rovers/frostyboy') == shipped.find('frostyboy.yaml')
@@ -391,36 +377,14 @@ def test_a_written_model_is_read_back(tmp_path):
 
 
 @pytest.mark.ros
-def test_every_shipped_file_and_a_written_one_are_loaded_by_ros(tmp_path):
-    rclpy = pytest.importorskip('rclpy')
+def test_every_shipped_file_and_a_written_one_are_loaded_by_ros(tmp_path, proposed_law):
     written = tmp_path / 'model.yaml'
     reader.load(['frostyboy']).write(written, comment='x')
-    proposal = tmp_path / 'proposal.yaml'  # flat lists of one type
-    law = {
-        'enabled': True,
-        'targets': ['torque', 'exponent'],
-        'features': ['rim_speed', 'slip'],
-        'coefficients': [0.04, 0.3],
-        'coefficients_std': [0.01, 0.1],
-    }
-    values = {f'effects.learned_closure.{key}': value for key, value in law.items()}
-    reader.from_parameters(values, complete=False).write(proposal)
     names = [n for n in shipped.files() if n.startswith(('rovers/', 'soils/'))]
-    for file in [written, proposal, *(shipped.find(name) for name in names)]:
-        context = rclpy.Context()
-        rclpy.init(args=['--ros-args', '--params-file', str(file)], context=context)
-        try:
-            node = rclpy.create_node(
-                'wheel_terra_estimator',
-                context=context,
-                automatically_declare_parameters_from_overrides=True,
-            )
-            values = {name: p.value for name, p in node._parameters.items()}
-            node.destroy_node()
-        finally:
-            rclpy.shutdown(context=context)
+    for file in [written, proposed_law, *(shipped.find(name) for name in names)]:
         ours = reader.load([file], complete=False)
-        assert reader.from_parameters(values, complete=False).flat() == ours.flat(), file
+        theirs = reader.from_parameters(read_by_ros(file), complete=False)
+        assert theirs.flat() == ours.flat(), file
 
 
 def test_an_effect_of_ones_own(tmp_path):

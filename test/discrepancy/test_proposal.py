@@ -34,14 +34,19 @@ QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
 SHARE = 0.06  # of load times radius per decade of rim speed
 
 
-@pytest.fixture(scope='module')
-def speedy():
-    """Torque that grows with the logarithm of rim speed: in no entry of the catalogue."""
+def with_decades(factor):
+    """A table with torque over load times radius, by its rows' factor per decade of rim speed."""
     table, values, *_ = make('full56')
     decades = np.log10(table['angular_velocity'] * table['wheel_radius'] / REFERENCE_SPEED)
     lever = table['normal_load'] * table['wheel_radius']
-    table['torque'] = table['torque'] + SHARE * lever * decades
+    table['torque'] = table['torque'] + factor(table) * lever * decades
     return table, values, run(table, values)
+
+
+@pytest.fixture(scope='module')
+def speedy():
+    """Torque that grows with the logarithm of rim speed: in no entry of the catalogue."""
+    return with_decades(lambda table: SHARE)
 
 
 def test_the_law_is_found_and_said_in_words(speedy):
@@ -64,11 +69,7 @@ def test_the_law_is_found_and_said_in_words(speedy):
 @pytest.mark.slow
 def test_what_acts_only_where_two_things_meet_is_a_product():
     """Torque that grows with slip, the faster the more: one term, where single ones need three."""
-    table, values, *_ = make('full56')
-    decades = np.log10(table['angular_velocity'] * table['wheel_radius'] / REFERENCE_SPEED)
-    lever = table['normal_load'] * table['wheel_radius']
-    table['torque'] = table['torque'] + 0.2 * lever * np.abs(table['slip']) * decades
-    found = run(table, values)
+    *_, found = with_decades(lambda table: 0.2 * np.abs(table['slip']))
     assert found.verdict in ('unexplained', 'undecided')
     proposal = found.proposal
     pairs = list(zip(proposal.targets, proposal.features, strict=True))

@@ -17,6 +17,7 @@ from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import _strength
 from wheel_terra_estimator.discrepancy.fitting import noise
+from wheel_terra_estimator.discrepancy.fitting import noise as outliers
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     EFFECT_SCALES,
     EFFECT_SHARES,
@@ -129,25 +130,20 @@ def test_batched_model_is_the_package_model(forward):
             np.testing.assert_allclose(mine, theirs, atol=2e-3 + 0.02 * np.abs(theirs).max())
 
 
-def linear_fit(rng, problem, columns, coordinates, at=0.0):
-    """A linear model, linearised where all parameters are `at`."""
-    sensitivity = rng.standard_normal((problem.size, columns)) * problem.std[:, None]
-    rotated = problem.rotation @ sensitivity
-    u, outputs = np.full(columns, at), np.zeros((problem.size // 3, 4))
-    outputs[problem.row, problem.quantity] = sensitivity @ u
-    return Fit(
-        ('e',),
-        coordinates,
-        u,
-        outputs,
-        np.zeros(problem.size // 3),
-        sensitivity,
-        problem.rotation @ (problem.observed - sensitivity @ u),
-        rotated,
-        np.ones(problem.size),
-        0.0,
-        np.ones(columns),
+def linear_fit(rng, problem, at=0.0):
+    """A linear model of a soil and an effect's parameter, linearised where both are `at`."""
+    coordinates = (
+        Coordinate('soil', 'a', 0.0, 1.0),
+        Coordinate('e', 'b', 0.0, 1.0, 0.0, 3.0, role='strength'),
     )
+    sensitivity = rng.standard_normal((problem.size, 2)) * problem.std[:, None]
+    residual = problem.rotation @ (problem.observed - sensitivity.sum(axis=1) * at)
+    u, outputs = np.full(2, at), np.zeros((problem.size // 3, 4))
+    outputs[problem.row, problem.quantity] = sensitivity @ u
+    rotated, ones, none = problem.rotation @ sensitivity, np.ones(2), np.zeros(problem.size // 3)
+    variance = np.ones(problem.size)
+    return Fit(('e',), coordinates, u, outputs, none, sensitivity, residual, rotated, variance,
+               0.0, ones)  # fmt: skip
 
 
 def test_evidence_is_the_integral_over_parameters(setting):
@@ -156,11 +152,7 @@ def test_evidence_is_the_integral_over_parameters(setting):
     _, truth, std, inputs, scale = setting
     measured = std * rng.standard_normal(truth.shape)
     problem = build_problem(measured, std, inputs, scale)
-    coordinates = (
-        Coordinate('soil', 'a', 0.0, 1.0),
-        Coordinate('e', 'b', 0.0, 1.0, 0.0, 3.0, role='strength'),
-    )
-    model = linear_fit(rng, problem, 2, coordinates)
+    model = linear_fit(rng, problem)
     amplitude = 0.02
     floor = Floor((amplitude,) * 4, 0.0, False)
     got = evidence(problem, model, (floor,)).log_joint[0]
@@ -308,34 +300,25 @@ def test_outliers_are_found_and_a_hump_is_none(forward, setting):
     assert not cells_apart(hump) & {(3, 1), (11, 1)}
 
 
-def test_noise_is_estimated_beside_an_effect(forward, setting):
+def test_noise_is_estimated_beside_an_effect_and_never_none(forward, setting):
     soil, truth, std, inputs, scale = setting
-    rng = np.random.default_rng(7)
-    bent = truth.copy()
-    bent[:, 0] += 0.006 * forward.points.slip  # an effect of many deviations
-    ratios = []
-    for _ in range(6):
-        measured = bent + std * rng.standard_normal(truth.shape)
+
+    def estimated(measured):
         guess = np.broadcast_to(0.01 * scale, truth.shape)
-        origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
         problem = build_problem(measured, guess, inputs, scale)
         nothing = of_soil(forward, problem, soil, problem.variance(0.1))
-        before = Noise(guess, origin)
-        after = noise.estimate_noise(before, nothing, problem, problem.observed)
-        ratios.append((after.std[0] / std[0])[:3])
+        origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
+        after = noise.estimate_noise(Noise(guess, origin), nothing, problem, problem.observed)
+        return after.std[0, :3]
+
+    rng, bent = np.random.default_rng(7), truth.copy()
+    bent[:, 0] += 0.006 * forward.points.slip  # an effect of many deviations
+    ratios = [
+        estimated(bent + std * rng.standard_normal(truth.shape)) / std[0, :3] for _ in range(6)
+    ]
     assert np.all(np.exp(np.mean(np.log(ratios), axis=0)) == pytest.approx(1.0, rel=0.3))
-
-
-def test_smooth_rows_are_not_taken_for_free_of_noise(forward, setting):
-    """Sixteen rows without scatter, read off a curve: half a per cent of the range at least."""
-    soil, truth, _, inputs, scale = setting
-    guess = np.broadcast_to(0.01 * scale, truth.shape)
-    problem = build_problem(truth, guess, inputs, scale)
-    nothing = of_soil(forward, problem, soil, problem.variance(0.1))
-    origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
-    before = Noise(guess, origin)
-    after = noise.estimate_noise(before, nothing, problem, problem.observed)
-    assert (after.std[0, :3] > 0.005 * scale[:3]).all()
+    # Rows without scatter, read off a curve: half a per cent of the range at least.
+    assert (estimated(truth) > 0.005 * scale[:3]).all()
 
 
 def test_repeats_give_the_noise():
@@ -402,11 +385,7 @@ def test_chi_square_is_that_of_the_best_parameters(setting):
     rng = np.random.default_rng(8)
     _, truth, std, inputs, scale = setting
     problem = build_problem(std * rng.standard_normal(truth.shape), std, inputs, scale)
-    coordinates = (
-        Coordinate('soil', 'a', 0.0, 1.0),
-        Coordinate('e', 'b', 0.0, 1.0, 0.0, 3.0, role='strength'),
-    )
-    model = linear_fit(rng, problem, 2, coordinates, at=0.4)
+    model = linear_fit(rng, problem, at=0.4)
     variance = np.full(problem.size, 1.3)
     rows = np.vstack([model.jacobian / np.sqrt(1.3), [1.0, 0.0]])
     right = np.append(problem.rotation @ problem.observed / np.sqrt(1.3), 0.0)
@@ -504,3 +483,48 @@ def test_an_error_that_a_good_model_may_have_is_smaller_than_one_that_asks_for_a
 def test_sizes_that_an_effect_may_have_share_one_probability():
     assert sum(EFFECT_SHARES) == pytest.approx(1.0)
     assert len(EFFECT_SHARES) == len(EFFECT_SCALES)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(5)
+
+
+def test_precision_is_the_inverse_of_the_conditioned_covariance(rng):
+    """Bayes for a linear model, by conditioning the joint Gaussian of parameters and readings."""
+    jacobian, variance = rng.standard_normal((7, 3)), rng.uniform(0.2, 4.0, 7)
+    prior = rng.uniform(0.5, 2.0, 3)
+    nothing = np.zeros(0)
+    found = Fit(
+        (), (), nothing, nothing, nothing, nothing, nothing, jacobian, variance, 0.0, prior
+    ).precision()
+    before = np.diag(1.0 / prior)
+    seen = jacobian @ before @ jacobian.T + np.diag(variance)
+    after = before - before @ jacobian.T @ np.linalg.solve(seen, jacobian @ before)
+    np.testing.assert_allclose(np.linalg.inv(found), after, rtol=1e-10)
+
+
+def test_inverse_covariance_is_the_inverse(rng):
+    variance, jacobian = rng.uniform(0.2, 4.0, 8), rng.standard_normal((8, 2))
+    whole = np.diag(variance) + jacobian @ jacobian.T
+    found = outliers.inverse_covariance(variance, jacobian)
+    np.testing.assert_allclose(found @ whole, np.eye(8), atol=1e-12)
+
+
+def test_a_cell_set_apart_is_the_evidence_of_its_wider_noise(rng):
+    """Against the densities of both hypotheses, up to the factor that they share."""
+    size, std = 30, 3.0
+    covariance = np.diag(np.full(size, std**2)) + 0.3 * np.ones((size, size))
+    target = std * rng.standard_normal(size)
+    target[4] += 9.0 * std
+    problem = SimpleNamespace(
+        size=size, std=np.full(size, std), row=np.arange(size), quantity=np.zeros(size, int)
+    )
+    score, cells = outliers._rejected_cells(problem, np.linalg.inv(covariance), target)
+    assert [cell[0] for cell in cells] == [4]
+    wider = covariance.copy()
+    wider[4, 4] = 0.3 + (outliers.OUTLIER_FACTOR * std) ** 2
+    constant = -0.5 * size * np.log(2.0 * np.pi)
+    price = np.log((1.0 - outliers.SHARE) / outliers.SHARE)
+    expected = multivariate_normal(np.zeros(size), wider).logpdf(target) - constant - price
+    assert score == pytest.approx(float(expected))

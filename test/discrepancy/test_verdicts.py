@@ -26,9 +26,8 @@ from wheel_terra_lab.trials.campaign import Plan, make_campaign
 def with_effect(design, seed, name, **parameters):
     """Return a table to which the catalogue's own effect was added, and the settings."""
     table, values, soil, _ = make(design, seed=seed)
-    points = operating_points(
-        check_table('t.csv', table).columns, reader.from_parameters(values, complete=False), 't'
-    )
+    configuration = reader.from_parameters(values, complete=False)
+    points = operating_points(check_table('t.csv', table).columns, configuration, 't')
     true_soil = reader.from_parameters(
         {
             f'soil.{key}': getattr(soil, key)
@@ -94,11 +93,9 @@ def test_pulls_of_the_other_sign_are_refused_with_the_cure():
 def test_an_uncertain_leaving_angle_counts_as_noise(unproposed):
     """Angles 2 degrees off: a finding where they are called exact, none where they are not."""
     table, values, *_ = make('lugs48')
-    points = operating_points(
-        check_table('t.csv', table).columns, reader.from_parameters(values, complete=False), 't'
-    )
-    model = WheelSoilModel(reader.from_parameters(values, complete=False).soil, {})
-    state = model.steady_state(points)
+    configuration = reader.from_parameters(values, complete=False)
+    points = operating_points(check_table('t.csv', table).columns, configuration, 't')
+    state = WheelSoilModel(configuration.soil, {}).steady_state(points)
     angle, rng = state.leaving_angle, np.random.default_rng(3)
     for key in ('sinkage', 'drawbar_pull', 'torque'):
         table[key] = getattr(state, key) + table[f'{key}_std'] * rng.standard_normal(len(angle))

@@ -1,17 +1,22 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The pages: all within two clicks, links that lead somewhere, words that readers can follow."""
+"""The pages: within two clicks, with links that lead, commands that parse, figures that hold."""
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import re
+import shlex
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+
+from wheel_terra_estimator.cli.main import sub_parsers
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / 'docs'
@@ -133,3 +138,98 @@ def test_python_of_a_page_runs(page, tmp_path, monkeypatch):
     for block in python_blocks(page):
         exec(compile(block, page.name, 'exec'), {})
     pyplot.close('all')
+
+
+WITH_COMMANDS = [
+    *sorted((ROOT / 'docs').rglob('*.md')),
+    ROOT / 'README.md',
+    ROOT / 'CONTRIBUTING.md',
+]
+PARSERS = sub_parsers()
+PROGRAMS = r'(?:wheel-terra|python3? -m wheel_terra\S+|python3? tools/\S+)'
+BLOCKS = re.compile(r'^ *```(?:sh|bash|console)\n(.*?)^ *```|((?:^    \S.*\n)+)', re.M | re.S)
+SHORTENED = re.compile(r'\.\.\.|…|COMMAND')
+
+
+def commands(page: Path) -> list[str]:
+    """Return the commands of ours in the blocks of a page, one line each."""
+    text = page.read_text(encoding='utf-8')
+    blocks = ''.join(a or b for a, b in BLOCKS.findall(text)).replace('\\\n', ' ')
+    found = re.findall(rf'^ *({PROGRAMS} [^\n|>;&#`]*)', blocks, re.M)
+    return [line for line in found if not SHORTENED.search(line)]
+
+
+CASES = [
+    pytest.param(line, id=f'{page.relative_to(ROOT)}: {line[:60]}')
+    for page in WITH_COMMANDS
+    for line in dict.fromkeys(commands(page))
+]
+
+
+def test_there_are_commands_to_judge():
+    assert len(CASES) > 60
+
+
+@pytest.mark.parametrize('line', CASES)
+def test_a_command_of_a_page_is_understood(line):
+    words = shlex.split(re.sub(r'\$\w+', '1', line))
+    if words[0] == 'wheel-terra':
+        if words[1].startswith('-'):
+            return  # of the program itself: --version, --help
+        try:
+            PARSERS[words[1]].parse_args(words[2:])
+        except SystemExit as end:
+            assert end.code == 0, line
+    elif words[1] == '-m':
+        assert importlib.util.find_spec(words[2]) is not None, line
+    else:
+        assert (ROOT / words[1]).is_file(), line
+
+
+RESULTS: list[dict[str, Any]] = yaml.safe_load(
+    (ROOT / 'docs' / 'figures.yaml').read_text(encoding='utf-8')
+)
+README = (ROOT / 'README.md').read_text(encoding='utf-8')
+SECTION = README.partition('## How good, how fast')[2].partition('\n## ')[0]
+ROWS = {name: cells for result in RESULTS for name, cells in result.get('rows', {}).items()}
+NUMBER = re.compile(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.]*\.\w)')
+
+
+def tables() -> list[list[str]]:
+    """Return the rows of the section's tables without heads, cells stripped."""
+    lines = [line for line in SECTION.splitlines() if line.startswith('|')]
+    rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in lines]
+    rules = [i for i, row in enumerate(rows) if set(row[0]) <= {'-'} and row[0]]
+    heads = {i - 1 for i in rules} | set(rules)
+    return [row for i, row in enumerate(rows) if i not in heads]
+
+
+def test_every_row_of_the_readme_is_a_result():
+    rows = tables()
+    assert {row[0]: row[1:-1] for row in rows} == ROWS
+    assert len(rows) == len(ROWS)
+
+
+def test_every_number_of_the_text_is_a_result():
+    text = '\n'.join(line for line in SECTION.splitlines() if not line.startswith('|'))
+    quoted = [words for result in RESULTS for words in result.get('text', [])]
+    for words in quoted:
+        assert words in SECTION, words
+        text = text.replace(words, '')
+    # What the intervals are meant to hold is no result.
+    assert NUMBER.findall(text.replace('95 % intervals', '')) == []
+
+
+@pytest.mark.parametrize('result', RESULTS, ids=lambda result: result['what'])
+def test_a_result_says_where_it_comes_from(result):
+    assert result['command'] and result['seeds']
+    commits = result['commit'] if isinstance(result['commit'], list) else [result['commit']]
+    assert commits and all(re.fullmatch(r'[0-9a-f]{7,40}', commit) for commit in commits)
+    git = ['git', '-C', str(ROOT)]
+    whole = subprocess.run(
+        [*git, 'rev-parse', '--is-shallow-repository'], capture_output=True, text=True
+    )
+    if whole.stdout.strip() == 'false':  # with its history, not an unpacked archive
+        for commit in commits:
+            known = subprocess.run([*git, 'cat-file', '-e', f'{commit}^{{commit}}'])
+            assert known.returncode == 0, f'{commit} is no commit of this repository'

@@ -150,7 +150,7 @@ def test_blocks_of_a_tutorial_run(page, command, tmp_path, monkeypatch, capsys, 
 
 
 @pytest.mark.slow
-def test_the_picture_of_the_report_shows_what_the_replay_says(tmp_path, capsys):
+def test_the_picture_of_the_report_shows_what_the_replay_says(capsys):
     image = pytest.importorskip('PIL.Image')
     drive = [str(ROOT / 'data' / 'demo' / 'entrapment')]
     drive += ['--config', 'generic_six_wheel', '--config', 'test_sand']

@@ -31,11 +31,10 @@ def estimates(folder: Path) -> bytes:
     return file.read_bytes()
 
 
-def test_several_are_what_each_is_alone(bags, config, tmp_path, capsys):
+def test_several_are_what_each_is_alone(bags, config, tmp_path, printed):
     out = tmp_path / 'out'
     arguments = ['replay', *bags, *config, '-o', str(out), '--jobs', '2', '--table', 't.csv']
-    assert main(arguments) == 1
-    said = capsys.readouterr().out.splitlines()
+    said = printed(arguments, 1).splitlines()
     assert said[-2] == '1 of 4 recordings failed:'
     assert said[-1].startswith(f'  {bags[1]}: not one message can be read')
     for name in ('drive3', 'drive2', 'drive1'):
@@ -94,27 +93,12 @@ def test_an_output_that_has_lost_a_file_is_made_anew(bags, config, tmp_path, und
     assert not (out / 'drive1').exists()
 
 
-@pytest.mark.parametrize('taken', ['one replay', 'a file'])
-def test_only_a_folder_of_several_replays_is_continued(bags, config, tmp_path, capsys, taken):
-    out = tmp_path / 'out'
-    if taken == 'a file':
-        out.write_text('mine')
-    else:
-        assert main(['replay', bags[3], *config, '-o', str(out)]) == 0
-    before = sorted(tmp_path.rglob('*'))
-    capsys.readouterr()
-    assert main(['replay', bags[0], bags[2], *config, '-o', str(out)]) == 2
-    assert 'holds nothing that this command can go on with' in capsys.readouterr().err
-    assert sorted(tmp_path.rglob('*')) == before
-
-
-def test_bags_of_one_name_get_folders_of_their_own(bags, config, tmp_path, capsys):
+def test_bags_of_one_name_get_folders_of_their_own(bags, config, tmp_path, printed):
     (tmp_path / 'other').mkdir()
     Path(bags[2]).rename(tmp_path / 'other' / 'drive3')
     out = tmp_path / 'out'
     given = [bags[0], str(tmp_path / 'other' / 'drive3')]
-    assert main(['replay', *given, *config, '-o', str(out), '--json']) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(printed(['replay', *given, *config, '-o', str(out), '--json']))
     assert [drive['folder'] for drive in told['drives']] == ['drive3', 'drive3_2']
     assert [drive['bag'] for drive in told['drives']] == given
 

@@ -3,7 +3,6 @@
 """Messages to measurements."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,64 +12,94 @@ from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.messages.convert import input_layout, stamp_of
 
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+NONE = 'none of the configured wheels in it'
+LENGTHS = 'velocity and name differ in length'
+
 
 @pytest.fixture
-def converter(rover):
-    return Converter(input_layout(rover))
-
-
-def test_stamp_is_exact(factory):
-    assert stamp_of(factory.joint_state(factory.header(STAMP), [])) == STAMP
-
-
-def test_joint_state_is_sorted_into_the_order_of_the_wheels(converter, factory):
-    message = factory.joint_state(
-        factory.header(STAMP),
-        ('right', 'mast', 'left'),
-        velocity=(-3.0, 99.0, 2.0),
-        effort=(-5.0, 99.0, 4.0),
+def make_converter(rover):
+    """Make a converter for the cart, with other parameters."""
+    return lambda **changes: Converter(
+        input_layout(rover.replace({key.replace('__', '.'): v for key, v in changes.items()}))
     )
-    measured = converter.convert('joint_states', message)
+
+
+@pytest.fixture
+def converter(make_converter):
+    return make_converter()
+
+
+@pytest.fixture
+def joints(converter, factory):
+    """Convert a JointState of these names and columns."""
+
+    def convert(names, by=converter, topic='joint_states', **columns):
+        return by.convert(topic, factory.joint_state(factory.header(STAMP), names, **columns))
+
+    return convert
+
+
+@pytest.fixture
+def imu(converter, factory):
+    """Convert an Imu; diagonals of its covariances by the names of their fields."""
+
+    def convert(attitude=UPRIGHT, force=(0.0, 0.0, 9.8), rate=(0.0,) * 3, by=converter, **fields):
+        message = factory.imu(factory.header(STAMP), force, rate, attitude)
+        for field, diagonal in fields.items():
+            setattr(message, f'{field}_covariance', np.diag(diagonal).reshape(9))
+        return by.convert('imu/data', message)
+
+    return convert
+
+
+@pytest.fixture
+def odometry(factory):
+    """Convert an Odometry of these speeds; variances along x and y."""
+
+    def convert(by, topic, forward, yaw_rate=0.0, lateral=0.0, variances=(0.0, 0.0)):
+        covariance = np.zeros(36)
+        covariance[[0, 7]] = variances
+        twist = factory.twist_with_covariance(forward, yaw_rate, covariance)
+        twist.twist.linear.y = lateral
+        return by.convert(topic, factory.odometry(factory.header(STAMP), twist))
+
+    return convert
+
+
+def test_joint_state_is_sorted_into_the_order_of_the_wheels(joints, factory):
+    assert stamp_of(factory.joint_state(factory.header(STAMP), [])) == STAMP
+    measured = joints(('right', 'mast', 'left'), velocity=(-3, 99, 2), effort=(-5, 99, 4))
     assert measured.stamp == STAMP
     # The right joint counts negative forward: rate and torque are flipped.
     assert measured.rate.tolist() == [2.0, 3.0]
     assert measured.torque.tolist() == [4.0, 5.0]
-
-
-def test_wheels_that_a_message_does_not_hold_are_unknown(converter, factory):
-    message = factory.joint_state(factory.header(STAMP), ('right',), velocity=(-3.0,))
-    measured = converter.convert('joint_states', message)
-    assert math.isnan(measured.rate[0])
-    assert measured.rate[1] == 3.0
+    # Wheels that a message does not hold are unknown.
+    measured = joints(('right',), velocity=(-3.0,))
+    assert math.isnan(measured.rate[0]) and measured.rate[1] == 3.0
     assert np.isnan(measured.torque).all()
 
 
 @pytest.mark.parametrize(
-    ('names', 'velocity', 'effort', 'reason'),
+    ('names', 'velocity', 'reason'),
     [
-        (('mast',), (1.0,), (), 'none of the configured wheels in it'),
-        ((), (), (), 'none of the configured wheels in it'),
-        (('left', 'right'), (), (), 'velocity and name differ in length'),
-        (('left', 'right'), (1.0,), (), 'velocity and name differ in length'),
+        (('mast',), (1.0,), NONE),
+        ((), (), NONE),
+        (('left', 'right'), (), LENGTHS),
+        (('left', 'right'), (1.0,), LENGTHS),
     ],
 )
-def test_joint_state_that_does_not_fit_is_counted(
-    converter, factory, names, velocity, effort, reason
-):
-    message = factory.joint_state(factory.header(STAMP), names, velocity=velocity, effort=effort)
-    assert converter.convert('joint_states', message) is None
+def test_joint_state_that_does_not_fit_is_counted(joints, converter, names, velocity, reason):
+    assert joints(names, velocity=velocity) is None
     assert converter.rejected == {('joint_states', reason): 1}
 
 
-def test_other_joints_on_the_topic_of_the_wheels_are_no_fault(converter, factory):
+def test_other_joints_on_the_topic_of_the_wheels_are_no_fault(joints, converter):
     """A mast publishes there too, without a rate: unknown names are ignored."""
-    header = factory.header(STAMP)
-    mast = factory.joint_state(header, ('mast',), position=(0.1,))
-    wheel = factory.joint_state(header, ('left',), velocity=(1.0,))
-    assert converter.convert('joint_states', mast) is None
+    assert joints(('mast',), position=(0.1,)) is None
     assert converter.rejected  # for so long as nothing else comes
-    assert converter.convert('joint_states', wheel) is not None
-    assert converter.convert('joint_states', mast) is None
+    assert joints(('left',), velocity=(1.0,)) is not None
+    assert joints(('mast',), position=(0.1,)) is None
     assert not converter.rejected
 
 
@@ -83,137 +112,108 @@ def test_other_joints_on_the_topic_of_the_wheels_are_no_fault(converter, factory
         (('x' * 5000,), f'{"x" * 300} ...'),
     ],
 )
-def test_odd_names_stay_in_one_short_line(converter, factory, names, words):
-    message = factory.joint_state(factory.header(STAMP), names, velocity=(0.0,) * len(names))
-    converter.convert('joint_states', message)
+def test_odd_names_stay_in_one_short_line(joints, converter, names, words):
+    joints(names, velocity=(0.0,) * len(names))
     ((topic, reason),) = converter.rejected
     assert f'in it but {words}; wheels.names' in converter.in_words(topic, reason)
 
 
-def test_effort_of_another_length_costs_the_torque_only(converter, factory):
-    message = factory.joint_state(
-        factory.header(STAMP), ('left', 'right'), velocity=(1.0, -1.0), effort=(1.0,)
-    )
-    measured = converter.convert('joint_states', message)
+def test_effort_of_another_length_costs_the_torque_only(joints, converter):
+    measured = joints(('left', 'right'), velocity=(1.0, -1.0), effort=(1.0,))
     assert measured.rate.tolist() == [1.0, 1.0]
     assert np.isnan(measured.torque).all()
     assert converter.rejected == {('joint_states', 'effort and name differ in length'): 1}
 
 
-def test_unknown_rate_of_a_named_wheel_is_counted(converter, factory):
-    header = factory.header(STAMP)
-    message = factory.joint_state(header, ('left', 'mast'), velocity=(1.0, math.nan))
-    converter.convert('joint_states', message)
+def test_unknown_rate_of_a_named_wheel_is_counted(joints, converter):
+    joints(('left', 'mast'), velocity=(1.0, math.nan))
     assert not converter.rejected
-    message = factory.joint_state(header, ('left', 'right'), velocity=(1.0, math.nan))
-    measured = converter.convert('joint_states', message)
-    assert measured.rate[0] == 1.0
-    assert math.isnan(measured.rate[1])
+    measured = joints(('left', 'right'), velocity=(1.0, math.nan))
+    assert measured.rate[0] == 1.0 and math.isnan(measured.rate[1])
     assert sum(converter.rejected.values()) == 1
 
 
-def test_odometry_gives_each_wheel_its_own_rim_speed(rover, factory):
-    converter = Converter(input_layout(rover.replace({'wheel_odometry': 'odom'})))
-    twist = factory.twist_with_covariance(1.0, 0.5, np.zeros(36))
-    measured = converter.convert('odom', factory.odometry(factory.header(STAMP), twist))
+def test_odometry_gives_each_wheel_its_own_rim_speed(make_converter, odometry):
+    measured = odometry(make_converter(wheel_odometry='odom'), 'odom', 1.0, 0.5)
     # Left (y = 0.4): 1.0 - 0.5 * 0.4 = 0.8 m/s, right 1.2 m/s, at the lug tips (0.21 m).
     np.testing.assert_allclose(measured.rate * 0.21, [0.8, 1.2], rtol=1e-14)
     assert np.isnan(measured.torque).all()
 
 
-def test_imu_without_orientation(converter, factory):
-    message = factory.imu(factory.header(STAMP), (0.1, 0.2, 9.8), (0.01, 0.02, 0.03), None)
-    measured = converter.convert('imu/data', message)
+def test_imu_without_orientation(imu, converter):
+    measured = imu(None, (0.1, 0.2, 9.8), (0.01, 0.02, 0.03))
     assert measured.orientation is None
     assert measured.specific_force.tolist() == [0.1, 0.2, 9.8]
     assert measured.angular_rate.tolist() == [0.01, 0.02, 0.03]
-    zero = factory.imu(factory.header(STAMP), (0, 0, 9.8), (0, 0, 0), (0.0, 0.0, 0.0, 0.0))
-    assert converter.convert('imu/data', zero).orientation is None
+    assert imu((0.0, 0.0, 0.0, 0.0)).orientation is None
     assert sum(converter.rejected.values()) == 1
 
 
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('absurd', [math.nan, math.inf, -math.inf, 1.7e308])
-def test_absurd_values_pass_without_a_warning_on_the_terminal(rover, factory, absurd):
-    turned = rover.replace({'wheel_odometry': 'odom', 'sensors.imu_mounting_yaw_deg': 30.0})
-    converter = Converter(input_layout(turned))
-    header = factory.header(STAMP)
-    imu = factory.imu(header, (absurd,) * 3, (absurd,) * 3, (absurd,) * 4)
-    assert converter.convert('imu/data', imu).orientation is None
-    twist = factory.twist_with_covariance(absurd, absurd, np.zeros(36))
-    assert converter.convert('odom', factory.odometry(header, twist)) is not None
-    counted = {topic for topic, _ in converter.rejected}
+def test_absurd_values_pass_without_a_warning_on_the_terminal(
+    make_converter, imu, odometry, absurd
+):
+    turned = make_converter(wheel_odometry='odom', sensors__imu_mounting_yaw_deg=30.0)
+    assert imu((absurd,) * 4, (absurd,) * 3, (absurd,) * 3, turned).orientation is None
+    assert odometry(turned, 'odom', absurd, absurd) is not None
+    counted = {topic for topic, _ in turned.rejected}
     assert ('odom' in counted) != math.isfinite(absurd)
 
 
-@pytest.mark.parametrize('field', ['linear_acceleration', 'angular_velocity'])
-def test_imu_that_says_it_lacks_a_field_keeps_the_others(converter, factory, field):
-    message = factory.imu(factory.header(STAMP), (0.0, 0.0, 9.8), (0.0, 0.0, 0.0), None)
-    getattr(message, f'{field}_covariance')[0] = -1.0
-    measured = converter.convert('imu/data', message)
-    vectors = {
-        'linear_acceleration': measured.specific_force,
-        'angular_velocity': measured.angular_rate,
-    }
-    assert np.isnan(vectors.pop(field)).all()
-    assert all(np.isfinite(other).all() for other in vectors.values())
+LACKING = (-1.0, 0.0, 0.0)  # a first variance of -1: the sensor does not measure this
+
+
+@pytest.mark.parametrize(
+    ('field', 'lost', 'kept'),
+    [
+        ('linear_acceleration', 'specific_force', 'angular_rate'),
+        ('angular_velocity', 'angular_rate', 'specific_force'),
+    ],
+)
+def test_imu_that_says_it_lacks_a_field_keeps_the_others(imu, converter, field, lost, kept):
+    measured = imu(None, **{field: LACKING})
+    assert np.isnan(getattr(measured, lost)).all() and np.isfinite(getattr(measured, kept)).all()
     ((topic, reason),) = converter.rejected
-    assert topic == 'imu/data'
-    assert field.replace('_', ' ') in reason
+    assert topic == 'imu/data' and field.replace('_', ' ') in reason
 
 
-def test_imu_with_nothing_but_an_orientation_keeps_that(converter, factory):
-    level = (0.0, 0.0, 0.0, 1.0)
-    for orientation in (level, None):
-        message = factory.imu(factory.header(STAMP), (0.0,) * 3, (0.0,) * 3, orientation)
-        message.linear_acceleration_covariance[0] = -1.0
-        message.angular_velocity_covariance[0] = -1.0
-        measured = converter.convert('imu/data', message)
-        assert (measured is None) == (orientation is None)
-        if measured is not None:
-            assert measured.orientation.tolist() == list(level)
+def test_imu_with_nothing_but_an_orientation_keeps_that(imu):
+    nothing = {'linear_acceleration': LACKING, 'angular_velocity': LACKING}
+    assert imu(UPRIGHT, **nothing).orientation.tolist() == list(UPRIGHT)
+    assert imu(None, **nothing) is None
 
 
-def test_mounting_turns_the_imu_into_base_link(rover, factory):
+def test_mounting_turns_the_imu_into_base_link(make_converter, imu):
     """A sensor turned by 90 deg to the left and tilted sees the same rover."""
-    turned = rover.replace(
-        {'sensors.imu_mounting_yaw_deg': 90.0, 'sensors.imu_mounting_roll_deg': 180.0}
+    turned = make_converter(
+        sensors__imu_mounting_yaw_deg=90.0, sensors__imu_mounting_roll_deg=180.0
     )
-    converter = Converter(input_layout(turned))
     # Upside down, its x to the left of the rover: its y then points forward, its z down.
-    message = factory.imu(
-        factory.header(STAMP), (0.2, 0.1, -9.8), (0.02, 0.01, -0.03), (0.0, 0.0, 0.0, 1.0)
-    )
-    measured = converter.convert('imu/data', message)
+    measured = imu(UPRIGHT, (0.2, 0.1, -9.8), (0.02, 0.01, -0.03), turned)
     np.testing.assert_allclose(measured.specific_force, [0.1, 0.2, 9.8], atol=1e-12)
     np.testing.assert_allclose(measured.angular_rate, [0.01, 0.02, 0.03], atol=1e-12)
 
 
-def _with_variances(factory: Any, **fields: tuple[float, float, float]) -> Any:
-    upright = (0.0, 0.0, 0.0, 1.0)
-    message = factory.imu(factory.header(STAMP), (0.0, 0.0, 9.8), (0.0, 0.0, 0.0), upright)
-    for field, diagonal in fields.items():
-        setattr(message, f'{field}_covariance', np.diag(diagonal).reshape(9))
-    return message
-
-
-def test_imu_states_its_variances_along_the_axes_of_the_rover(rover, factory):
-    message = _with_variances(
-        factory,
+@pytest.mark.parametrize(
+    ('mounting', 'expected'),
+    [
+        ({}, (0.01, 9e-4, 2e-4)),
+        # Half a right angle about z mixes x and y; on its side its y turns about the vertical.
+        ({'sensors__imu_mounting_yaw_deg': 45.0}, (0.025, 9e-4, 2e-4)),
+        ({'sensors__imu_mounting_roll_deg': 90.0}, (0.01, 4e-4, 2e-4)),
+    ],
+)
+def test_imu_states_its_variances_along_the_axes_of_the_rover(
+    make_converter, imu, mounting, expected
+):
+    measured = imu(
+        by=make_converter(**mounting),
         linear_acceleration=(0.01, 0.04, 0.09),
         angular_velocity=(1e-4, 4e-4, 9e-4),
         orientation=(1e-4, 2e-4, 5e-2),  # heading, the last, is not used
     )
-    level = Converter(input_layout(rover)).convert('imu/data', message)
-    assert level.variance == (0.01, 9e-4, 2e-4)
-    # Half a right angle about z mixes x and y; a sensor on its side turns its y about the vertical.
-    for angles, expected in (
-        ({'yaw': 45.0}, (0.025, 9e-4, 2e-4)),
-        ({'roll': 90.0}, (0.01, 4e-4, 2e-4)),
-    ):
-        keys = {f'sensors.imu_mounting_{name}_deg': angle for name, angle in angles.items()}
-        turned = Converter(input_layout(rover.replace(keys))).convert('imu/data', message)
-        assert turned.variance == pytest.approx(expected)
+    assert measured.variance == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -221,37 +221,27 @@ def test_imu_states_its_variances_along_the_axes_of_the_rover(rover, factory):
     [
         (0.0,) * 3,
         (1.0,) * 3,
-        (-1.0, 0.0, 0.0),
+        LACKING,
         (math.nan,) * 3,
         (0.1, -0.1, 0.1),
         (0.1, 0.0, 0.1),
         (math.inf,) * 3,
     ],
 )
-def test_placeholders_in_an_imu_state_nothing(converter, factory, diagonal):
-    message = _with_variances(
-        factory, linear_acceleration=diagonal, angular_velocity=diagonal, orientation=diagonal
-    )
-    if diagonal[0] == -1.0:  # that field is not there at all; one of them has to be
-        message.linear_acceleration_covariance = np.zeros(9)
-    assert converter.convert('imu/data', message).variance == (0.0, 0.0, 0.0)
+def test_placeholders_in_an_imu_state_nothing(imu, diagonal):
+    force = (0.0,) * 3 if diagonal is LACKING else diagonal  # one of the fields has to be there
+    measured = imu(linear_acceleration=force, angular_velocity=diagonal, orientation=diagonal)
+    assert measured.variance == (0.0, 0.0, 0.0)
 
 
-def test_orientation_of_base_link_agrees_with_the_turned_vectors(rover, factory):
+def test_orientation_of_base_link_agrees_with_the_turned_vectors(make_converter, imu):
     """World vectors do not depend on how the sensor is mounted: R_base f_base = R_imu f_imu."""
-    turned = rover.replace(
-        {
-            'sensors.imu_mounting_roll_deg': 20.0,
-            'sensors.imu_mounting_pitch_deg': -35.0,
-            'sensors.imu_mounting_yaw_deg': 110.0,
-        }
-    )
-    converter = Converter(input_layout(turned))
+    roll, pitch, yaw = (f'sensors__imu_mounting_{name}_deg' for name in ('roll', 'pitch', 'yaw'))
     sensor = np.array([0.1, -0.3, 0.2, 0.9])
     sensor /= np.linalg.norm(sensor)
     force = np.array([0.5, -1.0, 9.0])
-    message = factory.imu(factory.header(STAMP), force, (0, 0, 0), tuple(sensor))
-    measured = converter.convert('imu/data', message)
+    turned = make_converter(**{roll: 20.0, pitch: -35.0, yaw: 110.0})
+    measured = imu(tuple(sensor), force, by=turned)
     np.testing.assert_allclose(
         Rotation.from_quat(measured.orientation).as_matrix() @ measured.specific_force,
         Rotation.from_quat(sensor).as_matrix() @ force,
@@ -272,52 +262,35 @@ def test_roll_pitch_yaw_are_about_fixed_axes(rover):
     np.testing.assert_allclose(found, z @ y @ x, atol=1e-15)
 
 
-def test_sinkage_leaving_angle_and_reference(converter, factory):
-    header = factory.header(STAMP)
-    message = factory.joint_state(header, ('right', 'left'), position=(0.03, math.nan))
-    sinkage = converter.convert('sinkage', message)
-    assert math.isnan(sinkage.sinkage[0])
-    assert sinkage.sinkage[1] == 0.03
-    assert converter.convert('leaving_angle', message).leaving_angle[1] == 0.03
-    twist = factory.twist_with_covariance(0.7, 0.1, [4e-4] + [0.0] * 35)
-    reference = converter.convert('reference_odom', factory.odometry(header, twist))
+def test_sinkage_leaving_angle_and_reference(joints, converter, odometry):
+    told = {'names': ('right', 'left'), 'position': (0.03, math.nan)}
+    np.testing.assert_array_equal(joints(topic='sinkage', **told).sinkage, [math.nan, 0.03])
+    assert joints(topic='leaving_angle', **told).leaving_angle[1] == 0.03
+    reference = odometry(converter, 'reference_odom', 0.7, 0.1, variances=(4e-4, 0.0))
     assert (reference.forward, reference.variance) == (0.7, 4e-4)
 
 
 @pytest.fixture
-def steered(rover):
+def steered(make_converter):
     """The left wheel steers; the right one does not."""
-    return Converter(input_layout(rover.replace({'wheels.steering_joints': ['turn', '']})))
+    return make_converter(wheels__steering_joints=['turn', ''])
 
 
-def test_steering_angles_come_in_the_position_of_their_joints(steered, factory):
-    message = factory.joint_state(
-        factory.header(STAMP),
-        ('turn', 'right', 'left'),
-        position=(0.2, 7.0, 8.0),
-        velocity=(0.0, -3.0, 2.0),
-    )
-    measured = steered.convert('joint_states', message)
+def test_steering_angles_come_in_the_position_of_their_joints(joints, steered):
+    names = ('turn', 'right', 'left')
+    measured = joints(names, steered, position=(0.2, 7.0, 8.0), velocity=(0.0, -3.0, 2.0))
     assert measured.rate.tolist() == [2.0, 3.0]
     np.testing.assert_array_equal(measured.steering, [0.2, math.nan])
 
 
-def test_a_message_of_steering_joints_alone_is_no_fault(steered, factory):
-    message = factory.joint_state(factory.header(STAMP), ('turn',), position=(-0.1,))
-    measured = steered.convert('joint_states', message)
-    assert np.isnan(measured.rate).all()
-    assert measured.steering[0] == -0.1
+def test_a_message_of_steering_joints_alone_is_no_fault(joints, steered):
+    measured = joints(('turn',), steered, position=(-0.1,))
+    assert np.isnan(measured.rate).all() and measured.steering[0] == -0.1
     assert not steered.rejected
-    message = factory.joint_state(factory.header(STAMP), ('turn', 'left'), velocity=(0.0, 2.0))
-    assert steered.convert('joint_states', message).steering is None
+    assert joints(('turn', 'left'), steered, velocity=(0.0, 2.0)).steering is None
     assert steered.rejected == {('joint_states', 'position of steering joints missing'): 1}
-
-
-def test_without_steering_joints_positions_are_not_looked_at(converter, factory):
-    message = factory.joint_state(
-        factory.header(STAMP), ('left',), position=(math.nan,), velocity=(2.0,)
-    )
-    assert converter.convert('joint_states', message).steering is None
+    # Without steering joints positions are not looked at.
+    assert joints(('left',), position=(math.nan,), velocity=(2.0,)).steering is None
 
 
 @pytest.mark.parametrize(
@@ -331,12 +304,7 @@ def test_without_steering_joints_positions_are_not_looked_at(converter, factory)
     ],
 )
 def test_a_reference_tells_a_lateral_speed_where_it_knows_one(
-    converter, factory, lateral, stated, told, variance
+    converter, odometry, lateral, stated, told, variance
 ):
-    covariance = np.zeros(36)
-    covariance[[0, 7]] = 4e-4, stated
-    twist = factory.twist_with_covariance(0.7, 0.0, covariance)
-    twist.twist.linear.y = lateral
-    message = factory.odometry(factory.header(STAMP), twist)
-    reference = converter.convert('reference_odom', message)
-    np.testing.assert_equal((reference.lateral, reference.lateral_variance), (told, variance))
+    found = odometry(converter, 'reference_odom', 0.7, 0.0, lateral, (4e-4, stated))
+    np.testing.assert_equal((found.lateral, found.lateral_variance), (told, variance))

@@ -31,9 +31,7 @@ def test_a_thinned_line_keeps_ends_and_extremes():
     assert (np.diff(few_x) > 0.0).all()
     assert (few_y.max(), few_y.min()) == (9.0, -9.0)
     np.testing.assert_array_equal(few_y, y[np.searchsorted(x, few_x)])
-
-
-def test_short_lines_and_gaps_are_left_alone():
+    # Short lines and gaps are left alone.
     x, y = np.arange(10.0), np.full(10, np.nan)
     assert thin(x, y)[1] is y
     x, y = np.arange(10_000.0), np.full(10_000, np.nan)

@@ -93,7 +93,6 @@ def test_a_failure_while_it_is_configured_is_logged():
 
 
 def test_a_silence_is_put_down_to_what_is_refused_in_it():
-    from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.messages.pipeline import Pipeline
     from wheel_terra_estimator.ros.input_watch import InputWatch
     from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
@@ -221,35 +220,18 @@ def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, paramete
     until(lambda: 'listening to /drive/joints, /imu/data' in process.said())
 
 
-def test_wrong_parameters_end_the_node_with_one_line(start, parameters):
-    """Which are wrong is tested where they are read, in configuration."""
-    status, said = start('estimator_node', *ROVER, parameters, '-p', 'rover.mas:=20.0').stop()
-    assert status == 2
-    assert 'rover.mass' in said
-    assert 'Traceback' not in said
-
-
-@pytest.fixture
-def proposal(tmp_path):
-    """The file of a law that no listed effect states, as a diagnosis writes it."""
-    law = {
-        'enabled': True,
-        'targets': ['torque', 'exponent'],
-        'features': ['rim_speed', 'slip'],
-        'coefficients': [0.05, 0.4],
-        'coefficients_std': [0.01, 0.1],
-    }
-    values = {f'effects.learned_closure.{key}': value for key, value in law.items()}
-    path = tmp_path / 'proposal.yaml'
-    reader.from_parameters(values, complete=False).write(path)
-    return str(path)
-
-
 def test_a_proposed_law_is_a_further_file_and_an_integer_may_stand_for_a_number(
-    start, parameters, proposal, listener
+    start, parameters, proposed_law, listener
 ):
     node, until = listener
-    further = ['--params-file', proposal, '-p', 'rover.mass:=20', '-p', 'use_sim_time:=true']
+    further = [
+        '--params-file',
+        str(proposed_law),
+        '-p',
+        'rover.mass:=20',
+        '-p',
+        'use_sim_time:=true',
+    ]
     further += ['-p', 'rover.contact_law:=wong_reece']
     start('estimator_node', *ROVER, parameters, *further)
     stuck = hear(node, ros.Bool, f'{NODE}/stuck', latched())

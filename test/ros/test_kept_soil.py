@@ -37,6 +37,11 @@ def configuration():
     return reader.load(['pathfinder'])
 
 
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / 's.yaml'
+
+
 def write(path, content):
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return path
@@ -66,8 +71,7 @@ def test_a_path_without_a_name_is_refused():
         KeptSoil(Path('/'))
 
 
-def test_a_file_that_the_node_reads_is_refused_even_if_it_is_a_soil_file(tmp_path):
-    path = tmp_path / 's.yaml'
+def test_a_file_that_the_node_reads_is_refused_even_if_it_is_a_soil_file(path, tmp_path):
     write_values(path, LEARNED)
     with pytest.raises(UserError, match='which the command reads'):
         KeptSoil(path, [path])
@@ -78,8 +82,7 @@ def test_a_file_that_the_node_reads_is_refused_even_if_it_is_a_soil_file(tmp_pat
 
 
 @pytest.mark.parametrize('before', [None, '', f'{OWN}    soil.cohesion: 170.0\n'])
-def test_a_new_an_empty_and_an_own_file_are_written(tmp_path, configuration, before):
-    path = tmp_path / 's.yaml'
+def test_a_new_an_empty_and_an_own_file_are_written(path, tmp_path, configuration, before):
     if before is not None:
         write(path, before)
     kept = KeptSoil(path)
@@ -92,8 +95,7 @@ def test_a_new_an_empty_and_an_own_file_are_written(tmp_path, configuration, bef
     assert not left_over(tmp_path)
 
 
-def test_what_is_put_in_its_place_later_is_not_overwritten(tmp_path):
-    path = tmp_path / 's.yaml'
+def test_what_is_put_in_its_place_later_is_not_overwritten(path, tmp_path):
     kept = KeptSoil(path)
     kept.save(LEARNED, STUCK)
     mine = write(path, FOREIGN['rover file']).read_bytes()
@@ -108,9 +110,9 @@ def test_what_is_put_in_its_place_later_is_not_overwritten(tmp_path):
     assert state.read_text() == '{"my": "notes"}'
 
 
-def test_an_own_file_that_does_not_suit_the_rover_is_told_and_left_alone(tmp_path, configuration):
+def test_an_own_file_that_does_not_suit_the_rover_is_told_and_left_alone(path, configuration):
     other_rover = f'{OWN}    sensors.torque_zero: [0.0, 0.0, 0.0]\n'
-    path = write(tmp_path / 's.yaml', other_rover)
+    write(path, other_rover)
     kept = KeptSoil(path)
     assert kept.values(configuration) == {}
     assert 'torque_zero' in kept.fault
@@ -125,9 +127,8 @@ def test_an_own_file_that_does_not_suit_the_rover_is_told_and_left_alone(tmp_pat
 @pytest.mark.parametrize('number', [errno.ENOSPC, errno.EROFS, errno.EIO, errno.EDQUOT])
 @pytest.mark.parametrize('call', ['fsync', 'write'])
 def test_a_disk_that_takes_nothing_is_told_and_nothing_is_left(
-    tmp_path, configuration, monkeypatch, number, call
+    path, tmp_path, configuration, monkeypatch, number, call
 ):
-    path = tmp_path / 's.yaml'
     kept = KeptSoil(path)
     kept.save(LEARNED, STUCK)
 
@@ -204,8 +205,7 @@ def test_a_full_disk_ends_the_arrival_log_alone(tmp_path):
     ArrivalLog('', (), said.append).write('imu/data 1')
 
 
-def test_a_damaged_state_is_told_and_the_soil_is_kept_all_the_same(tmp_path):
-    path = tmp_path / 's.yaml'
+def test_a_damaged_state_is_told_and_the_soil_is_kept_all_the_same(path, tmp_path):
     state = write(tmp_path / 's.yaml.state.json', json.dumps(['no state']))
     kept = KeptSoil(path)
     assert kept.warning() == StuckState()

@@ -240,12 +240,18 @@ def test_a_closing_that_hangs_is_cut_short(monkeypatch):
     assert status == [0]
 
 
-def test_a_broken_parameter_file_ends_it_with_one_line(start, tmp_path):
+def test_wrong_parameters_end_it_with_one_line(start, parameters, tmp_path):
+    """Which are wrong is tested where they are read, in configuration."""
     path = tmp_path / 'broken.yaml'
     path.write_text('/**:\n  ros__parameters:\n    rover.mass: [1, "a"\n')
-    files = (path, tmp_path / 'missing.yaml')
-    for process in [start('estimator_node', *ROVER, str(file)) for file in files]:
+    wrong = {
+        'rover.mass': (parameters, '-p', 'rover.mas:=20.0'),
+        'broken.yaml': (str(path),),
+        'missing.yaml': (str(tmp_path / 'missing.yaml'),),
+    }
+    started = {name: start('estimator_node', *ROVER, *given) for name, given in wrong.items()}
+    for name, process in started.items():
         status, words = process.stop()
-        assert status == 2
+        assert status == 2 and name in words
         assert 'Traceback' not in words
         assert len(words.strip().splitlines()) <= 2, words

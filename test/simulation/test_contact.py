@@ -16,17 +16,8 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 SOIL = Soil(15.6e3, 2407.4e3, 1.1, 250.0, np.radians(31.9), 0.0114, 0.4, -0.2)
-EFFECTS = {
-    name: {}
-    for name in (
-        'slip_sinkage_exponent',
-        'lug_shear_radius',
-        'lug_digging',
-        'soil_mound',
-        'multipass',
-        'bulldozing',
-    )
-}
+EFFECTS = ('slip_sinkage_exponent', 'lug_shear_radius', 'lug_digging', 'soil_mound', 'multipass',
+           'bulldozing')  # fmt: skip
 
 
 def wheels(random: np.random.Generator, count: int) -> Wheel:
@@ -39,15 +30,7 @@ def wheels(random: np.random.Generator, count: int) -> Wheel:
     )
 
 
-def answer(
-    model: ContactModel,
-    depth: np.ndarray,
-    slip: np.ndarray,
-    load: np.ndarray,
-    side_slip: np.ndarray | float = 0.0,
-    passes: np.ndarray | float = 1.0,
-    **factors: float,
-) -> SoilForces:
+def answer(model, depth, slip, load, side_slip=0.0, passes=1.0, **factors: float) -> SoilForces:
     one = np.ones_like(depth)
     given = {name: one * factors.get(name, 1.0) for name in SOIL_QUANTITIES}
     return model.forces(
@@ -55,7 +38,7 @@ def answer(
     )
 
 
-@pytest.mark.parametrize('effects', [{}, EFFECTS], ids=['plain', 'effects'])
+@pytest.mark.parametrize('effects', [{}, {name: {} for name in EFFECTS}], ids=['plain', 'effects'])
 def test_at_the_steady_depth_it_is_the_reference_model(effects):
     random = np.random.default_rng(3)
     count = 200
@@ -76,37 +59,38 @@ def test_at_the_steady_depth_it_is_the_reference_model(effects):
     np.testing.assert_allclose(depth + forces.lug_sinkage, steady.sinkage, atol=1e-9)
 
 
-def test_a_wheel_above_its_depth_of_balance_is_sinking():
+@pytest.fixture
+def twenty():
+    """Wheels and a function of their forces, by depth over radius and slip."""
     wheel = wheels(np.random.default_rng(4), 20)
-    load, slip = 5e3 * wheel.radius * wheel.width, np.full(20, 0.2)
+    load = 5e3 * wheel.radius * wheel.width
     model = ContactModel(wheel, SOIL, wheel.tip_radius, {}, 9.80665)
-    ratios = [
-        answer(model, share * wheel.radius, slip, load).support_ratio
-        for share in (0.01, 0.05, 0.2, 0.5)
-    ]
+
+    def forces(share: float, slip: float, **more: float) -> SoilForces:
+        return answer(model, share * wheel.radius, np.full(20, slip), load, **more)
+
+    return wheel, load, forces
+
+
+def test_a_wheel_above_its_depth_of_balance_is_sinking(twenty):
+    *_, forces = twenty
+    ratios = [forces(share, 0.2).support_ratio for share in (0.01, 0.05, 0.2, 0.5)]
     assert (np.diff(ratios, axis=0) < 0.0).all()
     assert (ratios[0] > 1.0).all()
     assert (ratios[-1] < 1.0).all()
 
 
-def test_stiffness_changes_the_support_and_nothing_else():
-    wheel = wheels(np.random.default_rng(5), 20)
-    load, slip = 5e3 * wheel.radius * wheel.width, np.full(20, 0.3)
-    model = ContactModel(wheel, SOIL, wheel.tip_radius, {}, 9.80665)
-    depth = 0.1 * wheel.radius
-    soft = answer(model, depth, slip, load, stiffness=0.3)
-    firm = answer(model, depth, slip, load)
+def test_stiffness_changes_the_support_and_nothing_else(twenty):
+    *_, forces = twenty
+    soft, firm = forces(0.1, 0.3, stiffness=0.3), forces(0.1, 0.3)
     np.testing.assert_allclose(0.3 * soft.support_ratio, firm.support_ratio, rtol=1e-9)
     np.testing.assert_allclose(soft.pull, firm.pull, rtol=1e-9)
 
 
-def test_side_slip_acts_against_the_motion_and_costs_pull():
-    wheel = wheels(np.random.default_rng(6), 20)
-    load, slip = 5e3 * wheel.radius * wheel.width, np.full(20, 0.4)
-    model = ContactModel(wheel, SOIL, wheel.tip_radius, {}, 9.80665)
-    depth = 0.1 * wheel.radius
-    straight = answer(model, depth, slip, load)
-    left, right = (answer(model, depth, slip, load, side_slip=side) for side in (0.5, -0.5))
+def test_side_slip_acts_against_the_motion_and_costs_pull(twenty):
+    wheel, load, forces = twenty
+    straight = forces(0.1, 0.4)
+    left, right = (forces(0.1, 0.4, side_slip=side) for side in (0.5, -0.5))
     np.testing.assert_allclose(straight.side_force, 0.0, atol=1e-9)
     np.testing.assert_allclose(left.side_force, -right.side_force)
     np.testing.assert_allclose(left.pull, right.pull)
@@ -122,7 +106,6 @@ def test_without_friction_and_cohesion_pull_is_the_compaction_resistance():
     # F = -b k z^(n+1)/(n+1) when the stress starts at the bottom of the wheel (Bekker).
     slick = Soil(0.0, 1e6, 1.0, 0.0, 1e-9, 0.01, 1e-6, 0.0)
     wheel = Wheel(np.array([0.2]), np.array([0.1]))
-    depth = np.array([0.02])
     steady = WheelSoilModel(slick, {}).steady_state(OperatingPoints([0.3], [40.0], wheel))
     depth = steady.sinkage
     model = ContactModel(wheel, slick, wheel.radius, {}, 9.80665)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rover obeys mechanics: balances, limits, symmetry, and the steady state of the reference."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
 G = 9.80665
-MakePlant = Callable[..., RoverPlant]
 
 
 @pytest.fixture
@@ -82,30 +80,26 @@ def test_energy_balance_over_a_climb(plant):
     assert dissipated > 0.3 * pulled
 
 
-def test_a_parked_rover_stays_where_it_is(plant):
-    truth = drive(plant(slope_deg=12.0, side_deg=5.0), 10.0, forward=0.0)
+def test_a_parked_rover_stays_where_it_is_and_feels_the_attitude_of_its_chassis(plant):
+    truth = drive(plant(slope_deg=12.0, side_deg=5.0), 5.0, forward=0.0)
     assert np.abs(truth.position[:2]).max() < 1e-4
     assert np.isnan(truth.slip).all()
     expected = rover().rover.mass * G * np.sin(np.radians(12.0))
     assert truth.drawbar_pull.sum() == pytest.approx(expected, rel=2e-3)
-
-
-def test_a_rover_parked_on_a_kink_is_held_against_the_slope_under_each_wheel(plant):
-    kink = {'slope_position': np.array([0.1, 0.3]), 'slope_angle': np.radians([0.0, 12.0])}
-    truth = drive(plant(**kink), 8.0, forward=0.0)
-    under_front = truth.normal_load[:2].sum()  # hubs at 0.61, 0 and -0.61 m
-    expected = under_front * np.sin(np.radians(12.0))
-    assert truth.drawbar_pull.sum() == pytest.approx(expected, rel=0.03)
-
-
-def test_accelerometer_at_rest_shows_the_attitude_of_the_chassis(plant):
-    truth = drive(plant(slope_deg=10.0, side_deg=6.0), 5.0, forward=0.0)
     assert np.linalg.norm(truth.specific_force) == pytest.approx(G, rel=1e-3)
     assert truth.specific_force[0] == pytest.approx(G * np.sin(truth.pitch), abs=5e-3)
     assert truth.specific_force[1] == pytest.approx(G * np.sin(truth.roll), abs=5e-3)
     # The lower wheels carry more and are deeper: the chassis leans further than the ground.
-    assert truth.pitch > np.radians(10.0)
-    assert truth.roll > np.radians(6.0)
+    assert truth.pitch > np.radians(12.0)
+    assert truth.roll > np.radians(5.0)
+
+
+def test_a_rover_parked_on_a_kink_is_held_against_the_slope_under_each_wheel(plant):
+    kink = {'slope_position': np.array([0.1, 0.3]), 'slope_angle': np.radians([0.0, 12.0])}
+    truth = drive(plant(**kink), 5.0, forward=0.0)
+    under_front = truth.normal_load[:2].sum()  # hubs at 0.61, 0 and -0.61 m
+    expected = under_front * np.sin(np.radians(12.0))
+    assert truth.drawbar_pull.sum() == pytest.approx(expected, rel=0.03)
 
 
 def test_specific_force_times_mass_is_the_sum_of_pulls_while_accelerating(plant):
@@ -135,7 +129,7 @@ def test_weak_drives_stall(plant):
 
 def test_descent_skids_and_a_locked_wheel_is_dragged(plant):
     rover_plant = plant(slope_deg=-16.0)
-    truth = drive(rover_plant, 20.0)
+    truth = drive(rover_plant, 12.0)
     assert (truth.slip < -0.03).all()
     assert (truth.drawbar_pull < 0.0).all()
     rover_plant.faults.rate_factor[0] = 0.0
@@ -173,7 +167,7 @@ def test_left_mirrors_right_and_scrub_slows_the_turn(plant):
 
 
 def test_the_path_closes_on_a_turn_in_place(plant):
-    truth = drive(plant(), 10.0, forward=0.0, turn=0.1)
+    truth = drive(plant(), 5.0, forward=0.0, turn=0.1)
     assert truth.yaw_rate > 0.01
     assert np.abs(truth.position[:2]).max() < 0.1
     outward = np.sign(truth.slip_velocity)
@@ -184,12 +178,12 @@ def test_the_path_closes_on_a_turn_in_place(plant):
 def test_a_shorter_step_gives_the_same_drive(monkeypatch):
     configuration = rover()
     ends = []
-    for step in (0.05, 0.0125):
+    for step in (0.05, 0.02):
         monkeypatch.setattr(plant_module, 'LONGEST_STEP', step)
         hill = ground(
             slope_position=np.array([0.0, 0.2, 0.4]), slope_angle=np.radians([0.0, 0.0, 12.0])
         )
-        ends.append(drive(RoverPlant(configuration, hill, drives(configuration)), 4.5, 0.1))
+        ends.append(drive(RoverPlant(configuration, hill, drives(configuration)), 3.5, 0.1))
     np.testing.assert_allclose(ends[0].slip, ends[1].slip, atol=3e-3)
     np.testing.assert_allclose(ends[0].sinkage, ends[1].sinkage, atol=3e-4)
     np.testing.assert_allclose(ends[0].position, ends[1].position, atol=5e-3)
@@ -219,7 +213,7 @@ def test_a_steered_rover_turns_about_its_middle_axle_without_scrub(plant):
     steered = plant(rover(f'wheels.steering_joints:={CORNERS}'))
     skidding = plant()
     drive(steered, 1.5, 0.1)
-    truth, other = drive(steered, 7.5, 0.1, 0.1), drive(skidding, 9.0, 0.1, 0.1)
+    truth, other = drive(steered, 5.0, 0.1, 0.1), drive(skidding, 6.5, 0.1, 0.1)
     wheels = rover().wheels
     expected = np.arctan2(0.1 * wheels.x, 0.1 - 0.1 * wheels.y)
     inner = np.abs(expected) < 1.2  # the others are at their limit
@@ -238,7 +232,7 @@ def test_a_steered_rover_turns_about_its_middle_axle_without_scrub(plant):
 
 
 def test_the_forces_of_steered_wheels_add_up_in_the_body(plant):
-    truth = drive(plant(rover(f'wheels.steering_joints:={CORNERS}')), 12.0, 0.05, 0.03)
+    truth = drive(plant(rover(f'wheels.steering_joints:={CORNERS}')), 8.0, 0.05, 0.03)
     cosine, sine = np.cos(truth.steering), np.sin(truth.steering)
     along = (truth.drawbar_pull * cosine - truth.lateral_force * sine).sum()
     across = (truth.drawbar_pull * sine + truth.lateral_force * cosine).sum()
@@ -293,15 +287,6 @@ def test_noise_has_the_stated_spread_and_length():
 
 
 # Loads against statics done by hand.
-
-
-def test_rocker_bogie_statics_on_the_level():
-    configuration = rover()
-    loads = suspension_of(configuration).normal_loads(
-        180.0, np.array([0.0, 0.0, G]), np.zeros(6), np.zeros(6)
-    )
-    # Front wheel at 0.61 m and bogie at -0.305 m about the centre of gravity: 1 to 2.
-    np.testing.assert_allclose(loads, 180.0 * G / 6.0, rtol=1e-9)
 
 
 def test_moments_balance_for_any_force():

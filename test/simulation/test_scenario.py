@@ -54,16 +54,13 @@ def test_a_file_that_is_not_a_scenario_is_named(tmp_path):
         scenarios.load(tmp_path / 'missing.yaml')
 
 
-def test_changes_and_parameters_win_over_the_file():
+def test_changes_and_parameters_win_over_the_file_and_degrees_become_radians():
     scenario = scenarios.load(
         'firm_drive', parameters=['rover.mass:=99.0'], sensors__reference=False, duration=5.0
     )
     assert scenario.configuration.rover.mass == scenario.truth.rover.mass == 99.0
     assert scenario.duration == 5.0
     assert not scenario.sensors.reference
-
-
-def test_degrees_become_radians():
     scenario = scenarios.load({'slope.angle_deg': [10.0]})
     np.testing.assert_allclose(scenario.slope.angle, np.radians([10.0]))
 

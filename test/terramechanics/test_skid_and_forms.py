@@ -33,17 +33,6 @@ def test_a_wheel_without_shear_sinks_by_slip_and_skid_alike(method):
     assert z[0] > 1.5 * z[2]
 
 
-@pytest.mark.parametrize('rover', ['hit_wh3_lug10'])
-def test_shipped_wheel_digs_in_while_it_skids(rover):
-    configuration = reader.load([f'rovers/{rover}', 'soils/hit_fit'], [])
-    wheels = configuration.wheels.wheel
-    wheel = Wheel(wheels.radius[0], wheels.width[0], wheels.lug_height[0], wheels.lug_count[0])
-    for method in ('quadrature', 'closed_form'):
-        model = WheelSoilModel(configuration.soil, configuration.effects, method)
-        z = model.steady_state(points([-0.6, -0.3, 0.0], wheel=wheel)).sinkage
-        assert z[0] > z[1] > z[2], method
-
-
 def test_skid_has_a_coefficient_of_its_own():
     settings = {SKID: {'n1': 0.4, 'n2': -0.1}}
     skid = state(-0.4, effects=settings)

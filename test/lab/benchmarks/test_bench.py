@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
-from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_lab.benchmarks.pairs import Figure
 from wheel_terra_lab.benchmarks.peers import PlainFilter, smooth_wheel
@@ -48,28 +47,25 @@ def test_the_ratio_is_the_median_of_the_pairs():
 
 @pytest.mark.slow
 @pytest.mark.parametrize('processes', [False, True])
-def test_it_runs(capsys, monkeypatch, processes):
+def test_it_runs(printed, monkeypatch, processes):
     started = []
     if not processes:
         monkeypatch.setattr(subprocess, 'run', lambda command, **_: started.append(command))
-    assert main(['bench', '--quick', '--json']) == 0
-    told = capsys.readouterr().out
+    told = printed(['bench', '--quick', '--json'])
     figures = json.loads(told)['figures']
     assert len(figures) == 12
     assert all(entry['seconds'] > 0 and entry['times_as_fast'] > 0 for entry in figures)
     assert processes or {'diagnose', '--help', 'predict'} <= {c[3] for c in started if len(c) > 3}
 
 
-def test_an_earlier_run_is_compared_by_its_ratios(tmp_path, monkeypatch, capsys):
+def test_an_earlier_run_is_compared_by_its_ratios(tmp_path, monkeypatch, printed):
     def of_ratio(ratio):
         figure = Figure('a', 'b', (1.0,), (ratio,))
         monkeypatch.setattr('wheel_terra_lab.benchmarks.run.figures', lambda _: [figure])
 
     of_ratio(2.0)
-    assert main(['bench', '--json']) == 0
-    (tmp_path / 'before.json').write_text(capsys.readouterr().out)
+    (tmp_path / 'before.json').write_text(printed(['bench', '--json']))
     of_ratio(3.0)
     against = ['bench', '--against', str(tmp_path / 'before.json')]
-    assert main(against) == 0
-    assert '3 times as fast (3 to 3) as b' in (said := capsys.readouterr().out)
+    assert '3 times as fast (3 to 3) as b' in (said := printed(against))
     assert '1.50 times the earlier ratio' in said

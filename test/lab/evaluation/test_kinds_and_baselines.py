@@ -58,12 +58,13 @@ def test_another_rover_drives_any_kind_and_any_scenario_of_the_own_world(kind):
         (['-p', 'filter.class_std:=0.1', '--limiter'], '--limiter'),
     ],
 )
-def test_what_is_no_rover_and_no_scenario_is_refused_before_the_first_drive(options, words, capsys):
-    assert main(['evaluate', '--seeds', '1', *options]) == 2
-    assert words in capsys.readouterr().err
+def test_what_is_no_rover_and_no_scenario_is_refused_before_the_first_drive(
+    options, words, refused
+):
+    refused(['evaluate', '--seeds', '1', *options], words)
 
 
-def test_the_estimator_is_told_of_config_and_parameters_and_the_drive_is_not(monkeypatch, capsys):
+def test_the_estimator_is_told_of_config_and_parameters_and_the_drive_is_not(monkeypatch, printed):
     estimators, drives = [], []
 
     def score(simulator, kind, seed, mode, drive):
@@ -79,11 +80,11 @@ def test_the_estimator_is_told_of_config_and_parameters_and_the_drive_is_not(mon
     monkeypatch.setattr(bench, 'score_mode', score)
     monkeypatch.setattr(tables, 'report', lambda *_: 'tables')
     command = ['evaluate', '--kinds', 'climb', '--seeds', '1', '--modes', 'reference']
-    assert main(command) == 0
-    said = capsys.readouterr().out
+    said = printed(command)
     assert 'told' not in said
-    assert main([*command, '--config', 'dlr_mss', '-p', 'filter.class_std:=0.1']) == 0
-    assert 'filter.class_std' in capsys.readouterr().out
+    assert 'filter.class_std' in printed(
+        [*command, '--config', 'dlr_mss', '-p', 'filter.class_std:=0.1']
+    )
     plain, told = estimators
     assert told.filter.class_std == 0.1 and plain.filter.class_std != 0.1
     assert told.soil.cohesion == reader.load(['dlr_mss'], complete=False).soil.cohesion
@@ -202,12 +203,13 @@ def test_pitch_filter_sees_the_slope_by_orientation_or_by_specific_force():
     assert slips[0] == pytest.approx(0.05 + 1.0 * np.sin(up), abs=0.01)
 
 
-def test_a_filter_that_failed_on_a_drive_ends_evaluate_with_status_1(monkeypatch, capsys):
+def test_a_filter_that_failed_on_a_drive_ends_evaluate_with_status_1(monkeypatch, printed):
     health = {'filter_restarts': 2}
     drive = bench.DriveScore('climb', 1, 'reference', None, None, health)
     monkeypatch.setattr(bench, 'run', lambda *_: bench.Results([drive]))
     monkeypatch.setattr(tables, 'report', lambda *_: 'tables')
-    assert main(['evaluate', '--kinds', 'climb', '--seeds', '1']) == 1
-    assert 'The filter was started anew 2 times in 1 runs.' in capsys.readouterr().out
+    assert 'The filter was started anew 2 times in 1 runs.' in printed(
+        ['evaluate', '--kinds', 'climb', '--seeds', '1'], 1
+    )
     health['filter_restarts'] = 0
     assert main(['evaluate', '--kinds', 'climb', '--seeds', '1']) == 0

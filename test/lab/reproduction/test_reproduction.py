@@ -55,9 +55,8 @@ def test_all_papers_stand_on_one_page_with_a_verdict_each(tmp_path, capsys, undr
     ]
 
 
-def test_one_figure_alone_and_one_that_is_not_there(tmp_path, capsys, undrawn):
-    assert main(['reproduce', 'nakashima', '--figure', '12', '-o', str(tmp_path / 'a')]) == 0
-    page = capsys.readouterr().out
+def test_one_figure_alone_and_one_that_is_not_there(tmp_path, printed, undrawn):
+    page = printed(['reproduce', 'nakashima', '--figure', '12', '-o', str(tmp_path / 'a')])
     assert 'figure 12(a)' in page and 'figure 12(b)' in page and '| table 7' not in page
     assert main(['reproduce', 'ding', '--figure', '99', '-o', str(tmp_path / 'b')]) == 2
     assert not (tmp_path / 'b').exists()

@@ -64,10 +64,7 @@ def test_summary_of_a_steady_run():
     assert row['normal_load'] == pytest.approx(19.6 * math.cos(case.operation.slope))
     assert row['drawbar_pull'] == pytest.approx(7.0)
     assert row['torque'] == pytest.approx(0.8)
-
-
-def test_wheel_that_slides_back_has_no_power_number():
-    case = Case()
+    # A wheel that slides back has no power number.
     series, facts = steady_series(case, slip=1.1)
     assert math.isnan(summary(case, series, facts, '')['power_number'])
 
@@ -90,8 +87,6 @@ def test_metrics_of_linear_curves():
     assert found['slope_at_20_percent_deg'] == pytest.approx(8)
     assert found['power_number_20_percent'] == pytest.approx(0.44)
     assert found['power_number_15_deg'] == pytest.approx(0.65)
-
-
-def test_metrics_are_not_made_up_between_slopes_far_apart():
+    # Nothing is made up between slopes far apart.
     rows = [{'slope_deg': str(s), 'slip': str(0.02 * s), 'power_number': '1'} for s in (7.1, 25)]
     assert all(math.isnan(value) for value in metrics.table6_metrics(rows).values())

@@ -198,7 +198,7 @@ def test_output_folder_is_complete(coarse_run):
 
 
 @pytest.mark.slow
-def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path, capsys):
+def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path):
     _, cache = coarse_run
     output = tmp_path / 'out'
     # Eight times slower, so that the interrupt comes before the end on a fast machine too.

@@ -176,7 +176,9 @@ class lammps:
         (FAKE_BROKEN, 'the engine stopped: ERROR: Lost atoms'),
     ],
 )
-def test_engine_absent_or_failing_gives_one_line(tmp_path, monkeypatch, capsys, engine, words):
+def test_engine_absent_or_failing_gives_one_line(
+    tmp_path, monkeypatch, capsys, refused, engine, words
+):
     (tmp_path / 'lammps.py').write_text(engine)
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
     output = tmp_path / 'out'
@@ -188,8 +190,8 @@ def test_engine_absent_or_failing_gives_one_line(tmp_path, monkeypatch, capsys, 
     assert not output.exists()  # the next try does not end with "exists already"
     study_of = ['reproduce', 'nakashima', '--figure', '8', '--run', '--no-cache', '--jobs', '1']
     if engine is FAKE_ABSENT:
-        assert main([*study_of, '-o', str(output)]) == 2
-        assert words in capsys.readouterr().err and not output.exists()
+        refused([*study_of, '-o', str(output)], words)
+        assert not output.exists()
 
 
 @pytest.mark.parametrize(
@@ -209,11 +211,8 @@ def test_engine_absent_or_failing_gives_one_line(tmp_path, monkeypatch, capsys, 
     ],
 )
 def test_case_that_cannot_run_is_refused_before_anything_is_written(
-    tmp_path, capsys, override, words
+    tmp_path, refused, override, words
 ):
     output = tmp_path / 'out'
-    assert main(['soilbin', 'run', 'quick', '-o', str(output), '-p', override]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert len(said.strip().splitlines()) == 1
-    assert not output.exists()
+    said = refused(['soilbin', 'run', 'quick', '-o', str(output), '-p', override], words)
+    assert len(said.strip().splitlines()) == 1 and not output.exists()
