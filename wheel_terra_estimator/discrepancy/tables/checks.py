@@ -131,6 +131,7 @@ _RANGES: tuple[tuple[str, float, float, str], ...] = (
     ('gravity', 1e-3, 100.0, 'is outside 0.001..100'),
     ('pass_number', 1.0, 1000.0, 'is outside 1..1000'),
     ('angular_velocity', -60.0, 60.0, 'looks like degrees per second; give rad/s'),
+    ('sinkage', -900.0, _MOST, 'looks like a mark of no reading; leave the cell empty'),
     ('sinkage', -1.0, 1.0, 'looks like millimetres (or centimetres); give it in m'),
     *((f'{name}_std', _LEAST_DEVIATION, _MOST, _NO_DEVIATION) for name in QUANTITIES),
     ('slip_std', 0.0, _MOST, _NO_DEVIATION),
