@@ -133,6 +133,13 @@ def test_all_measures_that_are_missing_are_named_at_once(tmp_path, capsys):
     assert '--mass' not in complaint and not (tmp_path / 'rover.yaml').exists()
 
 
+def test_a_single_wheel_needs_neither_track_nor_wheelbase(tmp_path):
+    file = tmp_path / 'rig.yaml'
+    measures = ['--wheels', 'wheel', '--radius', '0.1', '--mass', '15']
+    assert main(['init', *measures, '-o', str(file)]) == 0
+    assert reader.load([file]).wheels.y.tolist() == [0.0]
+
+
 def test_config(capsys):
     assert main(['config', 'list', 'rovers']) == 0
     listed = capsys.readouterr().out
