@@ -121,7 +121,7 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     repeated = float(np.mean(again)) if step.size else 0.0
     words = []
     if zero > 0.01:
-        words.append(f'{100 * zero:.0f} % of the stamps are 0')
+        words.append(f'{100 * zero:.0f} % of the stamps are 0 or negative')
     if back > most_back:
         words.append(
             f'{100 * back:.1f} % of the stamps go back, by up to {-min(step.min(), 0.0):.2g} s'
