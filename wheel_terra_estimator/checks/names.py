@@ -17,9 +17,8 @@ from wheel_terra_estimator.checks.faults import found, untold
 from wheel_terra_estimator.checks.finding import Finding, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import JointSeries, Recording
-from wheel_terra_estimator.messages.convert import names_in_words
-from wheel_terra_estimator.messages.unpack import IMU
 
+IMU = 'sensor_msgs/msg/Imu'
 LONGEST_SILENCE = 2.0  # of all wheels at the end, while other joints are told [s]
 
 DEFAULT_TOPICS = {
@@ -121,7 +120,7 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     if silence > LONGEST_SILENCE:
         others: Any = np.isfinite(joints.rate[last + 1 :]).any(axis=0)
         later = itertools.compress(joints.names, others)
-        how = f'in no message of the last {silence:.0f} s, but {names_in_words(later)}'
+        how = f'in no message of the last {silence:.0f} s, but {", ".join(later)}'
         outcomes.append(_missing(joints.topic, facts.names, how))
     mute = [name for name in facts.names if name in silent]
     if mute:
