@@ -341,6 +341,17 @@ def test_wheels_that_are_named_otherwise_half_way_are_told():
     assert 'but a, b, c, d' in outcome.words and outcome.wheel == ', '.join(rolling.NAMES)
 
 
+def test_drives_that_send_a_message_each_drop_nothing():
+    joints = WHOLE.joints
+    stamp = np.add.outer(joints.stamp, [0, 200_000, 400_000, 600_000]).ravel()
+    rate, torque = (np.full((stamp.size, 4), np.nan) for _ in range(2))
+    for i in range(4):
+        rate[i::4, i], torque[i::4, i] = joints.rate[:, i], joints.torque[:, i]
+    one = replace(joints, stamp=stamp, log_time=stamp + 2_000_000, rate=rate, torque=torque)
+    report = checked(joints=one)
+    assert not report.findings and report.figures['joints.rate_hz'] == pytest.approx(rolling.RATE)
+
+
 def test_both_imus_are_named_where_neither_is_listened_to():
     two = ('/imu_front', '/imu_rear')
     topics = tuple((name, 'sensor_msgs/msg/Imu', 9) for name in two)
