@@ -140,6 +140,13 @@ def test_a_single_wheel_needs_neither_track_nor_wheelbase(tmp_path):
     assert reader.load([file]).wheels.y.tolist() == [0.0]
 
 
+def test_an_axis_that_is_not_across_leaves_the_sign_a_guess(tmp_path, capsys):
+    urdf = tmp_path / 'cart.urdf'
+    urdf.write_text(URDF.replace('rpy="1.5707963 0 0"', 'rpy="0 0 0"'))
+    main(['init', '--urdf', str(urdf), '-o', str(tmp_path / 'rover.yaml')])
+    assert 'wheels.direction is a guess' in capsys.readouterr().out
+
+
 def test_config(capsys):
     assert main(['config', 'list', 'rovers']) == 0
     listed = capsys.readouterr().out
