@@ -143,4 +143,8 @@ def _cure(cell: str) -> str:
         return 'give the ratio, without a percent sign'
     if is_number(cell.replace('\u2212', '-').replace('\u2013', '-')):
         return 'use the plain minus sign'
+    if ':' in cell:
+        return 'give a time as a number, in s, ms, us or ns'
+    if is_number(cell.partition(' ')[0]):
+        return 'a unit belongs into the title, in brackets'
     return 'leave the cell empty where nothing was measured'

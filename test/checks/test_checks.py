@@ -329,6 +329,37 @@ def test_visual_odometry_is_the_reference_beside_joint_states(tmp_path):
     assert chosen['odom'] == '/wheel_odom'
 
 
+def test_wheels_that_are_named_otherwise_half_way_are_told():
+    joints, half = WHOLE.joints, WHOLE.joints.stamp.size // 2
+    rate = np.full((joints.stamp.size, 8), np.nan)
+    rate[:half, :4], rate[half:, 4:] = joints.rate[:half], joints.rate[half:]
+    names = (*joints.names, 'a', 'b', 'c', 'd')
+    renamed = replace(joints, names=names, rate=rate, torque=np.full_like(rate, np.nan))
+    (outcome,), _ = check_wheel_names(
+        replace(WHOLE, joints=renamed), from_configuration(rolling.rover())
+    )
+    assert 'but a, b, c, d' in outcome.words and outcome.wheel == ', '.join(rolling.NAMES)
+
+
+def test_drives_that_send_a_message_each_drop_nothing():
+    joints = WHOLE.joints
+    stamp = np.add.outer(joints.stamp, [0, 200_000, 400_000, 600_000]).ravel()
+    rate, torque = (np.full((stamp.size, 4), np.nan) for _ in range(2))
+    for i in range(4):
+        rate[i::4, i], torque[i::4, i] = joints.rate[:, i], joints.torque[:, i]
+    one = replace(joints, stamp=stamp, log_time=stamp + 2_000_000, rate=rate, torque=torque)
+    report = checked(joints=one)
+    assert not report.findings and report.figures['joints.rate_hz'] == pytest.approx(rolling.RATE)
+
+
+def test_both_imus_are_named_where_neither_is_listened_to():
+    two = ('/imu_front', '/imu_rear')
+    topics = tuple((name, 'sensor_msgs/msg/Imu', 9) for name in two)
+    whole = replace(WHOLE, topics=topics, imu=replace(WHOLE.imu, topic=two[0]))
+    finding = only(checked(whole=whole), 'unknown_name')
+    assert finding.words.endswith('has /imu_front and /imu_rear') and '/imu_front' in finding.cure
+
+
 def test_gravity_taken_off_on_a_slope_is_not_a_unit():
     """A slope of 6 degrees leaves 1 m/s^2: the size of gravity in g, across the wrong axis."""
     imu = rolling.recording().imu

@@ -14,7 +14,7 @@ from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.calibration import calibrate
 from wheel_terra_estimator.checks.evidence import gather
 from wheel_terra_estimator.checks.rover_facts import from_configuration
-from wheel_terra_estimator.checks.series import rows_of
+from wheel_terra_estimator.checks.series import VelocitySeries, rows_of
 from wheel_terra_estimator.checks.statistics import block_fit
 
 WHOLE = rolling.recording()
@@ -27,6 +27,27 @@ def faults(report):
 def test_torques_are_judged_by_the_gravity_that_is_there():
     report = checked(rolling.rover(**{'rover.gravity': 3.71}))
     assert faults(report) == ['planet'] and report.findings[0].value == 9.81
+
+
+def test_the_moon_is_not_gravity_that_was_taken_off():
+    moon = WHOLE.imu.force * 1.62 / rolling.GRAVITY
+    (finding,) = checked(imu=replace(WHOLE.imu, force=moon)).findings
+    assert finding.fault == 'planet' and finding.cure == 'rover.gravity: 1.62'
+
+
+def test_wheel_odometry_from_odom_is_checked_without_joint_states():
+    """Its publisher knows radius and track; a gyro that turns the other way is seen."""
+    rover = rolling.rover(**{'wheel_odometry': 'odom'})
+    wheels, joints = rover.wheels, WHOLE.joints
+    speed = joints.rate * wheels.slip_radius
+    turn = np.polyfit(wheels.y, speed.T, 1)[0] * -1.0
+    ahead = np.column_stack([speed.mean(axis=1), 0.0 * turn, 0.0 * turn])
+    odom = VelocitySeries('/odom', joints.stamp, joints.log_time, ahead, turn, 0.0 * turn)
+    assert faults(checked(rover, wheel_odometry=odom, joints=None)) == []
+    back = replace(WHOLE.imu, rate=-WHOLE.imu.rate)
+    report = checked(rover, wheel_odometry=odom, joints=None, imu=back)
+    assert report.findings and {f.topic for f in report.findings} <= {'/odom', WHOLE.imu.topic}
+    assert {'radius', 'track'} <= {entry.kind for entry in report.not_checked}
 
 
 def test_without_slopes_a_ratio_of_speeds_below_one_is_no_radius():

@@ -196,6 +196,20 @@ def test_all_measures_that_are_missing_are_named_at_once(init, tmp_path, capsys)
     assert '--mass' not in complaint and not (tmp_path / 'rover.yaml').exists()
 
 
+def test_a_single_wheel_needs_neither_track_nor_wheelbase(tmp_path):
+    file = tmp_path / 'rig.yaml'
+    measures = ['--wheels', 'wheel', '--radius', '0.1', '--mass', '15']
+    assert main(['init', *measures, '-o', str(file)]) == 0
+    assert reader.load([file]).wheels.y.tolist() == [0.0]
+
+
+def test_an_axis_that_is_not_across_leaves_the_sign_a_guess(tmp_path, printed):
+    urdf = tmp_path / 'cart.urdf'
+    urdf.write_text(CART.replace('rpy="1.5707963 0 0"', 'rpy="0 0 0"'))
+    made = printed(['init', '--urdf', str(urdf), '-o', str(tmp_path / 'rover.yaml')])
+    assert 'wheels.direction is a guess' in made
+
+
 def test_config(printed, refused):
     listed = printed(['config', 'list', 'rovers'])
     assert 'rovers/frostyboy' in listed and 'soils/' not in listed

@@ -162,6 +162,17 @@ def test_random_stamps(short_drive, tmp_path, capsys, seed):
     run('replay', bag, capsys)
 
 
+def test_a_recording_without_stamps_is_no_success(short_drive, tmp_path, capsys):
+    def change(topic, message):
+        if hasattr(message, 'header'):
+            message.header.stamp.sec = message.header.stamp.nanosec = 0
+        return message
+
+    assert main(['replay', str(changed(short_drive, tmp_path / 'bag', change)), *CONFIG]) == 2
+    said = capsys.readouterr()
+    assert 'x stamp is zero or negative' in said.out and 'bag: no estimate; ' in said.err
+
+
 def test_wild_numbers_in_the_truth(short_drive, tmp_path, capsys):
     numbers = itertools.cycle(WILD)
 

@@ -132,6 +132,8 @@ def test_column_names_alone_are_no_table(tmp_path):
         ('"1,25"', ('line 5', 'torque', 'point as decimal')),
         ('"1,234.5"', ('line 5', 'between thousands')),
         ('12 %', ('line 5', 'without a percent sign')),
+        ('-1.8 N', ('line 5', 'into the title')),
+        ('00:12.5', ('line 5', 'in s, ms')),
         ('\u22124.1', ('line 5', 'plain minus')),
         ('1,2', ('line 5', '6 cells', 'point as decimal')),
     ],
@@ -151,6 +153,7 @@ def test_cells_that_are_no_numbers(tmp_path, cell, parts):
         ({'slip': np.linspace(0.1, 1.2, 8)}, ('slip', 'outside -1..1')),
         ({'slope': np.full(8, 15.0)}, ('slope', 'degrees')),
         ({'sinkage': np.linspace(5, 20, 8)}, ('sinkage', 'millimetres')),
+        ({'sinkage': np.r_[np.full(7, 0.01), -999.0]}, ('line 9', 'mark of no reading')),
         ({'wheel_radius': np.full(8, 157.0)}, ('wheel_radius', 'millimetres')),
         ({'normal_load': np.full(8, -80.0)}, ('normal_load', 'not positive')),
         ({'normal_load': np.full(8, 0.08)}, ('normal_load', 'kN')),
@@ -207,6 +210,8 @@ def test_copies_count_once_but_repeats_stay():
 def test_readings_that_look_odd_are_said_and_used():
     still = check_table('x.csv', rows(sinkage=np.full(8, 0.004), sinkage_std=np.full(8, 1e-3)))
     assert any('0.004 m in all 8 rows' in note for note in still.notes)
+    off = check_table('x.csv', rows(drawbar_pull=np.where(rows()['slip'] > 0.4, 0.0, 3.0)))
+    assert any('drawbar_pull is exactly 0 in 4 rows' in note for note in off.notes)
     narrow = rows(slip=np.linspace(0.2, 0.25, 8), normal_load=np.linspace(40, 90, 8))
     assert any('slip only from 0.2' in note for note in check_table('x.csv', narrow).notes)
     # A skidding wheel may take torque (friction before it) as long as it does not pull.

@@ -126,6 +126,15 @@ def test_a_rate_that_changes_on_the_way_counts_from_then_on():
     assert after[0].forward_velocity == pytest.approx(before[-1].forward_velocity, rel=0.2)
 
 
+def test_inputs_before_what_a_shorter_history_kept_are_too_old():
+    core = EstimatorCore(configuration(**{**DEFAULT, 'history': 0.0}))
+    play(core, [odometry(0.01 * i) for i in range(300)], flush=False)
+    core.retune(configuration(**{**DEFAULT, 'history': 2.0}))
+    stream = [reference(1.5, 0.1), odometry(3.0), reference(2.995, 0.1), odometry(3.1)]
+    assert len(play(core, stream, flush=False)) >= 2
+    assert core.rejected == {('reference_odom', 'stamp older than `history` (raise it)'): 1}
+
+
 def test_numbers_do_not_depend_on_how_often_they_are_asked_for():
     stream = [odometry(0.01 * i, 1.0 + 0.01 * i) for i in range(300)]
     stream += [imu(0.02 * i, 0.1 * i) for i in range(150)]

@@ -103,6 +103,14 @@ def test_other_joints_on_the_topic_of_the_wheels_are_no_fault(joints, converter)
     assert not converter.rejected
 
 
+def test_wheels_that_come_no_more_under_their_names_are_told(converter, factory):
+    for name, stamp in (('left', STAMP), ('wheel_1', STAMP), ('wheel_1', STAMP + 2 * 10**9)):
+        message = factory.joint_state(factory.header(stamp), (name,), velocity=(1.0,))
+        converter.convert('joint_states', message)
+    ((topic, reason),) = converter.rejected
+    assert 'in it but wheel_1; wheels.names: left, right' in converter.in_words(topic, reason)
+
+
 @pytest.mark.parametrize(
     ('names', 'words'),
     [

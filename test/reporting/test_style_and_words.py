@@ -13,6 +13,7 @@ from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, Border, known
 from wheel_terra_estimator.reporting.drive_summary import (
     DriveSummary,
+    MessageRow,
     WheelSummary,
     as_text,
     short_names,
@@ -54,12 +55,14 @@ def test_figures_of_any_size_stand_apart():
     wheel = WheelSummary(
         'a', seconds, seconds, 0.95, 0.19, 0.13, 0, 0, 0, (0.4, 0.6), (0.1, 0.16), 0.09
     )
-    lines = as_text(DriveSummary('', 86400.0, 1, (wheel,), (), (), ())).splitlines()
+    heard = MessageRow('odom', '/odom', 5, '')
+    lines = as_text(DriveSummary('', 86400.0, 1, (wheel,), (), (heard,), ())).splitlines()
     titles, row = (line for line in lines if line.startswith(('  time in', '  a ')))
     cells = re.split(' {3,}', row.strip())
     assert cells[1:] == ['86400.0'] * 5 + ['0.40 to 0.60', '0.95', '100 to 160 +- 90', '190 +- 130']
     assert len(re.split(' {3,}', titles.strip())) == len(cells)
     assert len(titles) == len(row)
+    assert any(line.split() == ['messages', 'received', 'rejected'] for line in lines)
 
 
 def test_the_same_picture_is_the_same_text_and_no_setting_stays():

@@ -227,16 +227,19 @@ def _gravity(state: ImuState) -> Judged:
     upright = abs(float((state.rotation @ middle)[2])) > UPRIGHT_SHARE * size
     # What a slope leaves may have the size of gravity in g.
     in_g = abs(size * STANDARD_GRAVITY / gravity - 1.0) <= UNIT_TOLERANCE and upright
-    if size < 0.3 * min(gravity, STANDARD_GRAVITY) and not in_g:
+    places = GRAVITIES.items()
+    place = next((p for p, there in places if abs(size / there - 1.0) <= GRAVITY_TOLERANCE), '')
+    elsewhere = bool(place) and upright  # a slope leaves as much, but along the ground
+    if size < 0.3 * min(gravity, STANDARD_GRAVITY) and not in_g and not elsewhere:
         return told('gravity_off', gravity), state.without('force')
     for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
         if abs(size * factor / gravity - 1.0) <= UNIT_TOLERANCE:
             return told('force_unit', factor, unit=unit), state.with_values(
                 force=imu.force * factor
             )
-    for place, there in GRAVITIES.items():
-        if abs(size / there - 1.0) <= GRAVITY_TOLERANCE:
-            return told('planet', there, place=place), replace(state, gravity=there)
+    if place:
+        there = GRAVITIES[place]
+        return told('planet', there, place=place), replace(state, gravity=there)
     return [untold('gravity', 'unlike', size=size, gravity=gravity)], state
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,8 +18,12 @@ from wheel_terra_estimator.checks.finding import Finding, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 
+IMU = 'sensor_msgs/msg/Imu'
+LONGEST_SILENCE = 2.0  # of all wheels at the end, while other joints are told [s]
+
 DEFAULT_TOPICS = {
-    'joint_states': '/joint_states',
+    'joints': '/joint_states',
+    'wheel_odometry': '/odom',
     'imu': '/imu/data',
     'sinkage': '/sinkage',
     'reference': '/reference_odom',
@@ -48,18 +53,42 @@ def _required(own: str, what: str, effect: str, cure: str) -> Finding:
     return found('missing_input', f'/{own}', 0.999, what=what, effect=effect, how=cure)
 
 
-def check_topics(recording: Recording, remapped: Sequence[str]) -> list[Outcome]:
-    """Return topics that are there under another name than the estimator listens to."""
+def check_topics(
+    recording: Recording, remapped: Sequence[str], odometry: str = 'joint_states'
+) -> list[Outcome]:
+    """Return topics that are there under another name than the estimator listens to.
+
+    ``odometry``: topic of the wheel odometry.
+    """
     outcomes: list[Outcome] = []
+    unheard = 'wheel_odometry' if odometry == 'joint_states' else 'joints'
     for name, default in DEFAULT_TOPICS.items():
-        series = getattr(recording, 'joints' if name == 'joint_states' else name)
+        series = getattr(recording, name) if name != unheard else None
         own = default.lstrip('/')
         if series is None or series.topic == default or own in remapped:
             continue
         if 'truth' not in series.topic:  # kept apart on purpose, to compare with
+            there = [series.topic]
+            if name == 'imu':
+                there += [
+                    t for t, kind, n in recording.topics if kind == IMU and n and t not in there
+                ]
+            told: dict[str, Any] = {'own': default, 'there': ' and '.join(there)}
             remap = f'--remap {own}:={series.topic}'
-            outcomes.append(found('topic_name', series.topic, 0.9, own=default, remap=remap))
+            outcomes.append(found('topic_name', series.topic, 0.9, remap=remap, **told))
     return outcomes
+
+
+def of_rims(recording: Recording, facts: RoverFacts) -> Recording:
+    """Return a recording with rates of the rims from its odometry in place of joint states."""
+    odometry, wheels = recording.wheel_odometry, facts.configuration.wheels
+    if odometry is None or not facts.known:
+        return recording
+    speed = odometry.velocity[:, :1] - odometry.yaw_rate[:, np.newaxis] * wheels.y
+    rate = wheels.direction * speed / wheels.slip_radius
+    times = odometry.stamp, odometry.log_time
+    torque = np.full_like(rate, np.nan)
+    return replace(recording, joints=JointSeries(odometry.topic, *times, facts.names, rate, torque))
 
 
 def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome], RoverFacts]:
@@ -85,6 +114,14 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     gone = [name for name in absent if name not in renamed]
     if gone:
         outcomes.append(_missing(joints.topic, gone, 'in no message'))
+    heard = np.isfinite(joints.rate[:, [name in names for name in joints.names]]).any(axis=1)
+    last = int(np.flatnonzero(heard)[-1]) if heard.any() else -1
+    silence = (joints.log_time[-1] - joints.log_time[last]) * 1e-9
+    if silence > LONGEST_SILENCE:
+        others: Any = np.isfinite(joints.rate[last + 1 :]).any(axis=0)
+        later = itertools.compress(joints.names, others)
+        how = f'in no message of the last {silence:.0f} s, but {", ".join(later)}'
+        outcomes.append(_missing(joints.topic, facts.names, how))
     mute = [name for name in facts.names if name in silent]
     if mute:
         outcomes.append(

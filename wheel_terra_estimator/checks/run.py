@@ -131,7 +131,12 @@ def _examined(
     own = facts.configuration.wheel_odometry
     mended = Mended(report)
     mended('drop_outs', None, lambda: names.check_required(recording, own))
-    mended('unknown_name', None, lambda: names.check_topics(recording, remapped))
+    mended('unknown_name', None, lambda: names.check_topics(recording, remapped, own))
+    checks = AGAINST_EACH_OTHER
+    if own == 'odom':  # in which radius and track are its publisher's
+        recording = names.of_rims(recording, facts)
+        checks = tuple(check for check in checks if check[1] is not geometry)
+        report.not_checked += [untold('radius', 'odom'), untold('track', 'odom')]
     stated = facts
     facts = mended('missing_wheel', facts, lambda: names.check_wheel_names(recording, stated))
     arrived = recording
@@ -139,7 +144,7 @@ def _examined(
         'order', arrived, lambda: transport.check_transport(arrived, stated, report.figures)
     )
     recording = mended('placeholder', stamped, lambda: _whole_rows(stamped))
-    evidence = against_each_other(recording, facts, AGAINST_EACH_OTHER, mended)
+    evidence = against_each_other(recording, facts, checks, mended)
     if evidence is None:
         report.not_checked.append(untold('sign', 'no_rates'))
     if not report.findings and not _drives(evidence):

@@ -20,6 +20,7 @@ from wheel_terra_estimator.checks.series import (
     JointSeries,
     Recording,
     SinkageSeries,
+    rows_of,
     shifted,
 )
 from wheel_terra_estimator.checks.statistics import robust_std
@@ -27,6 +28,7 @@ from wheel_terra_estimator.checks.statistics import robust_std
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
 GAP_SHARE = 0.05  # share of missing messages of a stuttering channel
+IN_MOST = 0.6  # share of messages with a wheel below which others hold other wheels [-]
 SEVERAL = 10  # messages over which a period is taken where stamps jitter
 OFF_PERIOD, REGULAR = 0.2, 0.6
 """Distance of a step from a multiple of the period, as a share of it, and the share of steps nearer
@@ -60,7 +62,7 @@ def check_transport(
             if np.count_nonzero(jumps) <= MOST_STEPS:
                 mended[name] = shifted(channel, np.round(1e9 * np.cumsum(jumps)).astype(np.int64))
         elif not order:
-            outcomes += _drop_outs(name, channel, figures)
+            outcomes += _drop_outs(name, _of_one_wheel(channel, facts), figures)
         if channel.late.size and not step:
             ends = np.array_split(channel.late, 4)[:: 3 if channel.late.size > 3 else 1]
             late[name] = float(np.median(channel.late))
@@ -121,7 +123,7 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     repeated = float(np.mean(again)) if step.size else 0.0
     words = []
     if zero > 0.01:
-        words.append(f'{100 * zero:.0f} % of the stamps are 0')
+        words.append(f'{100 * zero:.0f} % of the stamps are 0 or negative')
     if back > most_back:
         words.append(
             f'{100 * back:.1f} % of the stamps go back, by up to {-min(step.min(), 0.0):.2g} s'
@@ -140,8 +142,23 @@ def _of_one_joint(channel: Channel) -> NDArray[np.bool_]:
     """
     if not isinstance(channel, JointSeries | SinkageSeries):
         return np.ones(channel.stamp.size, dtype=bool)
-    there = np.isfinite(channel.rate if isinstance(channel, JointSeries) else channel.sinkage)
+    there = _there(channel)
     return np.r_[True, np.any(there[1:] & there[:-1], axis=1)]
+
+
+def _there(channel: JointSeries | SinkageSeries) -> NDArray[np.bool_]:
+    return np.isfinite(channel.rate if isinstance(channel, JointSeries) else channel.sinkage)
+
+
+def _of_one_wheel(channel: Channel, facts: RoverFacts) -> Channel:
+    """Return the messages of the wheel that is told most often, where they hold one or few each."""
+    if not isinstance(channel, JointSeries | SinkageSeries):
+        return channel
+    there = _there(channel)[:, [name in facts.names for name in channel.names]]
+    if not there.any():
+        return channel
+    one = there[:, np.argmax(there.sum(axis=0))]
+    return rows_of(channel, one) if one.mean() < IN_MOST else channel
 
 
 def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Outcome]:

@@ -21,6 +21,8 @@ EXAMPLES = (
     'wheel-terra check my_drive --config my_rover.yaml --json',
 )
 
+NOTES = 'recording.notes'  # figure: what is damaged
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
@@ -55,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         check_remaps(bag, remaps)
     report = check_recording(recording, configuration, tuple(remaps))
     if recording.notes:
-        report.figures['recording.notes'] = list(recording.notes)
+        report.figures[NOTES] = list(recording.notes)
     if arguments.json:
         print(json.dumps(report.as_dict(), indent=2))
     else:
@@ -82,9 +84,11 @@ def as_text(recording: Recording, report: CheckReport, without_rover: bool) -> s
     if report.not_checked:
         lines += ['', '  not checked']
         lines += [f'    {entry.kind}: {entry.reason}' for entry in report.not_checked]
-    lines += ['', '  figures'] if report.figures else []
-    width = max((len(key) for key in report.figures), default=0)
-    lines += [f'    {key:{width}}  {value}' for key, value in report.figures.items()]
+    figures = {key: value for key, value in report.figures.items() if key != NOTES}
+    lines += ['', '  figures'] if figures else []
+    width = max((len(key) for key in figures), default=0)
+    lines += [f'    {key:{width}}  {value}' for key, value in figures.items()]
+    lines += [f'  note: {note}' for note in recording.notes]
     if recording.shortened:
         lines += ['', '  a long recording: judged by its beginning']
     return '\n'.join(lines)

@@ -157,8 +157,9 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
     )
 
     measures = {name: getattr(arguments, name) for name, _, _ in _MEASURES}
-    if measures['wheelbase'] is None and len(wheels) == 2:
-        measures['wheelbase'] = 0.0  # one axle
+    for name, most in (('wheelbase', 2), ('track', 1)):
+        if measures[name] is None and len(wheels) <= most:
+            measures[name] = 0.0  # one axle, one wheel
     missing = [name for name in _NEEDED if measures[name] is None]
     if missing:
         words = {name: f'--{name} {unit} ({meaning})' for name, unit, meaning in _MEASURES}
@@ -166,6 +167,8 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
     sides = [side_of(name) for name in wheels]
     if 0 in sides:  # left before right, as the file has it
         sides = [1 if i % 2 == 0 else -1 for i in range(len(wheels))]
+    if len(wheels) == 1:
+        sides = [0]
     rows = [sum(side == sides[i] for side in sides[:i]) for i in range(len(wheels))]
     last = max(rows, default=0)
     base, half = measures['wheelbase'], 0.5 * measures['track']

@@ -122,7 +122,11 @@ def _run_one(arguments: argparse.Namespace) -> int:
     if not arguments.json:
         for what, path in written.items():
             print(f'{what}: {path}')
-    return INTERRUPTED if drive.result.interrupted else 0
+    if drive.result.interrupted:
+        return INTERRUPTED
+    if not drive.summary.sets:
+        raise UserError(f'{bag}: no estimate; what was heard, and why it was refused, stands above')
+    return 0
 
 
 def _options(arguments: argparse.Namespace) -> Options:

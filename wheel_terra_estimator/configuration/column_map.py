@@ -18,18 +18,20 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import read_text
 
 _DEGREE = math.pi / 180.0
-_FOOT, _POUND = 0.3048, 4.4482216152605  # [m], [N]
+_FOOT, _POUND, _KILOPOND = 0.3048, 4.4482216152605, 9.80665  # [m], [N], [N]
 UNITS: dict[str, dict[str, float]] = {
     's': {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9},
     'm': {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'in': _FOOT / 12, 'ft': _FOOT},
     'm/s': {'m/s': 1.0, 'km/h': 1 / 3.6, 'mm/s': 1e-3},
     'm/s^2': {'m/s^2': 1.0, 'g': 9.80665, 'mg': 9.80665e-3, 'm/s2': 1.0, 'm/s\u00b2': 1.0},
-    'N': {'N': 1.0, 'kN': 1e3, 'lbf': _POUND},
+    'N': {'N': 1.0, 'kN': 1e3, 'lbf': _POUND, 'kgf': _KILOPOND, 'gf': 1e-3 * _KILOPOND},
     'N m': {
         'N m': 1.0,
         'N mm': 1e-3,
         'N cm': 1e-2,
         'kN m': 1e3,
+        'kgf m': _KILOPOND,
+        'kgf cm': 1e-2 * _KILOPOND,
         'lbf ft': _POUND * _FOOT,
         'ft lbf': _POUND * _FOOT,
     },

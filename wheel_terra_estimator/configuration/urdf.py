@@ -28,6 +28,7 @@ LARGEST_FILE = 20_000_000  # [byte]
 DEEPEST_CHAIN = 1000
 BASE_LINKS = ('base_link', 'base_footprint')
 
+_ACROSS = 0.1  # y of an axis below which nothing tells its sign
 _UPRIGHT = 0.8  # cosine between the axis of a joint that steers and the vertical, at least
 
 Pose = FloatArray  # (4, 4)
@@ -57,6 +58,9 @@ def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None)
     shapes = [robot.cylinder(joints[name]) for name in names]
     guessed = {'wheels.width'} if any(width is None for _, width in shapes) else set()
     radius = [r for r, _ in shapes]
+    leftward = [_leftward(joints[n], p, path) for n, p in zip(names, poses, strict=True)]
+    if any(abs(left) < _ACROSS for left in leftward):
+        guessed.add('wheels.direction')
     steering = [robot.steering_joint(joints[name]) for name in names]
     if any(axis < 0.0 for _, axis in steering):
         guessed.add('wheels.steering_joints')
@@ -75,7 +79,7 @@ def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None)
         z=[round(float(p[2, 3]), 5) for p in poses],
         mass=round(mass, 3) or 50.0,
         centre_of_gravity=centre,
-        direction=[_direction(joints[n], p, path) for n, p in zip(names, poses, strict=True)],
+        direction=[-1 if left < -_ACROSS else 1 for left in leftward],
         steering_joints=[joint for joint, _ in steering],
         guessed=frozenset(guessed),
         source=f'{path.name}, relative to {robot.base}',
@@ -150,9 +154,9 @@ def _axis(joint: ElementTree.Element, path: Path) -> FloatArray:
     return np.array(_numbers(axis.get('xyz') if axis is not None else None, (1.0, 0, 0), path))
 
 
-def _direction(joint: ElementTree.Element, pose: Pose, path: Path) -> int:
-    """Return 1 where a positive rate drives forward: the axis points left."""
-    return -1 if float((pose[:3, :3] @ _axis(joint, path))[1]) < -0.1 else 1
+def _leftward(joint: ElementTree.Element, pose: Pose, path: Path) -> float:
+    """Return y of a joint's axis: a positive rate drives forward where it points left."""
+    return float((pose[:3, :3] @ _axis(joint, path))[1])
 
 
 class _Robot:

@@ -45,6 +45,7 @@ INPUT_TYPES = {
 _FASTEST = 30.0  # lateral speed that no rover has [m/s]
 DAMAGED = 'damaged message'  # why bytes are refused that are no message of their type
 _NO_WHEEL = 'none of the configured wheels in it'
+_GONE = 1_000_000_000  # other joints alone for so long [ns] are told
 _MOST_LETTERS = 300  # of the names of joints in one line of words
 
 
@@ -95,7 +96,8 @@ class InputConverter:
         # Messages that did not fit, by (topic, reason in words)
         self.rejected: Counter[tuple[str, str]] = Counter()
         self._unknown_names: dict[str, Sequence[str]] = {}  # topic -> names in a message
-        self._with_wheels: set[str] = set()  # topics that had a wheel: other joints are no fault
+        # topic -> stamp of its last message with a wheel: other joints beside it are no fault
+        self._with_wheels: dict[str, int] = {}
         self._columns: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}
         self._index = {name: i for i, name in enumerate(layout.names)}
         self._all = list(range(len(layout.names)))
@@ -132,12 +134,12 @@ class InputConverter:
         if steering is not None and not self._columns_of(message.names)[0]:
             blank = np.full(len(self.layout.names), math.nan)
             return WheelOdometry(message.stamp, blank, blank, steering)
-        values = self._wheel_values('joint_states', message.names, velocity, 'velocity')
+        values = self._wheel_values('joint_states', message, velocity, 'velocity')
         if values is None:
             return None
         torque = None
         if len(effort):
-            torque = self._wheel_values('joint_states', message.names, effort, 'effort')
+            torque = self._wheel_values('joint_states', message, effort, 'effort')
         if torque is None:
             torque = np.full(len(self.layout.names), math.nan)
         unknown = np.count_nonzero(np.isnan(values))
@@ -213,7 +215,7 @@ class InputConverter:
 
     def _per_wheel(self, kind: Any, topic: str, message: Message) -> Any:
         """Return what a sensor at each wheel measured, a reading of a kind."""
-        values = self._wheel_values(topic, message.names, message.numbers[0], 'position')
+        values = self._wheel_values(topic, message, message.numbers[0], 'position')
         return None if values is None else kind(message.stamp, values)
 
     def _reference_odom(self, message: Message) -> ReferenceVelocity:
@@ -232,18 +234,20 @@ class InputConverter:
         )
 
     def _wheel_values(
-        self, topic: str, names: Sequence[str], values: Any, label: str
+        self, topic: str, message: Message, values: Any, label: str
     ) -> FloatArray | None:
         """Sort the values of a JointState into the order of the wheels, nan where there is none."""
+        names = message.names
         source, target = self._columns_of(names)
         if not source:
-            if topic not in self._with_wheels:
+            last = self._with_wheels.get(topic)
+            if last is None or message.stamp - last > _GONE:
                 self.rejected[topic, _NO_WHEEL] += 1
                 self._unknown_names[topic] = names
             return None
         if topic not in self._with_wheels:
-            self._with_wheels.add(topic)
             del self.rejected[topic, _NO_WHEEL]
+        self._with_wheels[topic] = message.stamp
         if len(values) != len(names):
             self.rejected[topic, f'{label} and name differ in length'] += 1
             return None

@@ -279,7 +279,7 @@ def as_text(summary: DriveSummary) -> str:
         row.name if row.topic == f'/{row.name}' else f'{row.name} ({row.topic})'
         for row in summary.messages
     ]
-    width = max((len(name) for name in heard), default=0)
+    width = max(map(len, ('messages ', *heard)))
     lines += ['', f'  {"messages":{width}}{"received":>8}   rejected']
     for name, row in zip(heard, summary.messages, strict=True):
         lines.append(f'  {name:{width}}{row.count:8}   {row.rejected or "none"}')

@@ -78,9 +78,9 @@ class Losses:
                 joined[-1][1] = max(joined[-1][1], end)
             else:
                 joined.append([begin, end])
-        texts = [
-            f'from {(begin - first) * 1e-9:.1f} s to {(end - first) * 1e-9:.1f} s'
-            for begin, end in joined[:SHOWN_SPANS]
-        ]
+        texts = []
+        for begin, end in joined[:SHOWN_SPANS]:
+            ends = f'to {(end - first) * 1e-9:.1f} s' if end < last else 'on'
+            texts.append(f'from {(begin - first) * 1e-9:.1f} s {ends}')
         more = len(joined) - SHOWN_SPANS
         return ', '.join(texts) + (f' and {more} more times' if more > 0 else '')

@@ -108,6 +108,7 @@ _DEGREES = 'looks like degrees; multiply the column by pi/180'
 _MILLIMETRES = 'looks like millimetres; divide the column by 1000'
 _NO_LENGTH = 'is not a positive length in m'
 _NO_DEVIATION = 'is not positive, or next to nothing; leave it empty where the deviation is unknown'
+_FEW = 2  # readings of exactly nought that are no sign of a channel that was off
 _LEAST_DEVIATION = 1e-12  # [m], [N], [N m] or [rad]: below all that is measured
 
 _MOST = math.inf
@@ -131,6 +132,7 @@ _RANGES: tuple[tuple[str, float, float, str], ...] = (
     ('gravity', 1e-3, 100.0, 'is outside 0.001..100'),
     ('pass_number', 1.0, 1000.0, 'is outside 1..1000'),
     ('angular_velocity', -60.0, 60.0, 'looks like degrees per second; give rad/s'),
+    ('sinkage', -900.0, _MOST, 'looks like a mark of no reading; leave the cell empty'),
     ('sinkage', -1.0, 1.0, 'looks like millimetres (or centimetres); give it in m'),
     *((f'{name}_std', _LEAST_DEVIATION, _MOST, _NO_DEVIATION) for name in QUANTITIES),
     ('slip_std', 0.0, _MOST, _NO_DEVIATION),
@@ -253,6 +255,12 @@ def _check_dead_columns(table: SteadyTable, remarks: list[str]) -> None:
     for q, quantity in enumerate(QUANTITIES):
         here = np.isfinite(table.measured[:, q])
         values = table.measured[here, q]
+        noughts = np.count_nonzero(values == 0.0)
+        if _FEW < noughts < len(values):
+            remarks.append(
+                f'{quantity} is exactly 0 in {noughts} rows: taken as measured; where nothing '
+                'was, leave the cell empty'
+            )
         if len(values) < MINIMUM_ROWS or np.ptp(values) > 0.0:
             continue
         said = f'{values[0]:g} {UNITS[quantity]} in all {len(values)} rows'

@@ -83,7 +83,7 @@ def read_columns(
     notes = []
     if file.decimal_comma:
         mark = 'tabs' if file.delimiter == '\t' else repr(file.delimiter)
-        notes.append(f'cells are separated by {mark}, a comma was read as the decimal mark')
+        notes.append(f'cells are separated by {mark}, a comma would be read as the decimal mark')
     return lines, values, [*notes, *header.notes]
 
 

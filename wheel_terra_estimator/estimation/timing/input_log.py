@@ -202,6 +202,10 @@ class InputLog:
         before = self.grid.step_index(stamp - self.first)
         return self.grid.step_index(end - self.first) - before + 1
 
+    def reaches(self, stamp: int) -> bool:
+        """Whether a state before `stamp` [ns] is kept: not where a shorter history forgot it."""
+        return self._origin is not None or stamp > self.stamps[0]
+
     def run_to(self, last: int) -> None:
         """Run up to and with the entry `last`."""
         pending = self._run_steps(last)

@@ -100,8 +100,8 @@ class Timeline:
         Such is wheel odometry that comes after younger inputs of other channels but is younger than
         the last set.
         """
-        stamp, state = measurement.stamp, self._state
-        if state is not None and stamp < state - self.settings.history:
+        stamp = measurement.stamp
+        if self._is_too_old(stamp):
             return Fate.TOO_OLD, None
         if len(self._log.entries) >= GREATEST_LENGTH:
             return Fate.FULL, None
@@ -141,6 +141,12 @@ class Timeline:
         self._log.begin_after(due.entry)
         self.released -= due.entry + 1
 
+    def _is_too_old(self, stamp: int) -> bool:
+        state = self._state
+        if state is None:
+            return False
+        return stamp < state - self.settings.history or not self._log.reaches(stamp)
+
     # -- The log --------------------------------------------------------------------------------
 
     def _insert(self, channel: int, measurement: Measurement) -> tuple[Fate, Due | None]:
@@ -169,8 +175,7 @@ class Timeline:
         self._allowance -= max(cost, 0)
         deferred, self._deferred = self._deferred, []
         for channel, measurement in deferred:
-            state = self._state
-            if state is not None and measurement.stamp < state - self.settings.history:
+            if self._is_too_old(measurement.stamp):
                 self.counts['late_inputs_dropped'] += 1
             else:
                 _, due = self._insert(channel, measurement)
