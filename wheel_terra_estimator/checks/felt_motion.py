@@ -23,7 +23,7 @@ Complex: TypeAlias = NDArray[np.complex128]
 
 LEAST_YAW = math.radians(12.0)  # yaw that starts and stops tell, at least [rad]
 YAW_SIGMAS = 4.0
-LEAST_FELT = 0.4  # what is felt along an axis over what wheels and gyro say, at least [-]
+FELT = (0.4, 2.5)  # what is felt along an axis over what wheels and gyro say; else it is another [-]
 FELT_BLOCKS = 10  # parts of a drive that a deviation comes from
 
 
@@ -56,7 +56,7 @@ def felt_senses(evidence: Evidence) -> list[int]:
     motion, seen = both
     pairs = (motion.real, seen.real), (motion.imag, seen.imag)
     fits = [block_fit(wheels[:, None], felt)[0] for wheels, felt in pairs]
-    clear = [abs(f.value) > LEAST_FELT and f.sigmas_from(0.0) > YAW_SIGMAS for f in fits]
+    clear = [FELT[0] < abs(f.value) < FELT[1] and f.sigmas_from(0.0) > YAW_SIGMAS for f in fits]
     return [int(np.sign(f.value)) * there for f, there in zip(fits, clear, strict=True)]
 
 

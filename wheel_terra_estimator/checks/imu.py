@@ -41,7 +41,7 @@ from wheel_terra_estimator.checks.turning import (
     ordinary_track,
     track_ratio,
 )
-from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
+from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE, WILD_RATE
 
 GRAVITY_TOLERANCE = 0.1  # of the mean specific force (slopes, bias, vibration) [-]
 SLOPES = 0.035  # the same by slopes and bias alone [-]
@@ -70,6 +70,7 @@ LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by 
 UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_WILD = 3
+WILD_SIGMAS = 10.0  # of the usual change of a reading, which another unit makes large
 MOST_WILD = 0.2  # share of wild samples that are single ones, at most [-]
 LEAST_MESSAGES = 20
 UNIT_TOLERANCE = 0.12  # share by which the mean specific force may lie off gravity in another unit
@@ -204,12 +205,16 @@ def _frozen(state: ImuState) -> Judged:
 
 def _wild(state: ImuState) -> Judged:
     """Leave out single samples that no body can make; the node does so by the same limits."""
-    off = lonely(state.imu.force).max(axis=1)
-    wild = off > WILD_FORCE  # a gyro may yet turn out to be in degrees
-    if wild.sum() < LEAST_WILD or np.mean(wild) > MOST_WILD:
-        return [], state
-    told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'most': float(off.max())}
-    return [state.found('imu_wild', 0.97, **told)], state.with_imu(rows_of(state.imu, ~wild))
+    imu, outcomes, kept = state.imu, list[Outcome](), np.ones(state.imu.stamp.size, dtype=bool)
+    for values, limit, unit in ((imu.force, WILD_FORCE, 'm/s^2'), (imu.rate, WILD_RATE, 'rad/s')):
+        noise = np.array([robust_std(column) for column in np.diff(values, axis=0).T])
+        off = lonely(values)
+        wild = (off > np.maximum(limit, WILD_SIGMAS * noise)).any(axis=1)  # or in another unit
+        if LEAST_WILD <= wild.sum() <= MOST_WILD * wild.size:
+            told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'unit': unit}
+            outcomes.append(state.found('imu_wild', 0.97, most=float(off.max()), **told))
+            kept &= ~wild
+    return outcomes, state.with_imu(rows_of(imu, kept)) if outcomes else state
 
 
 def _gravity(state: ImuState) -> Judged:

@@ -75,7 +75,8 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         if not np.isfinite(column).any()
     }
     absent = [name for name in facts.names if name not in joints.names]
-    spare = [name for name in wheel_names(joints.names) if name not in facts.names]
+    known = {*facts.names, *facts.configuration.wheels.steering_joints}
+    spare = [name for name in wheel_names(joints.names) if name not in known]
     renamed = _pairs(absent, spare)
     names = tuple(renamed.get(name, name) for name in facts.names)
     outcomes: list[Outcome] = []

@@ -425,13 +425,19 @@ def _turns(evidence: Evidence, heading: FloatArray) -> FloatArray:
     return heading[rows:] - heading[:-rows]
 
 
-def _turns_as_oriented(evidence: Evidence, imu: ImuSeries) -> bool:
-    """Return whether the gyro turns as its orientation does; not where there is none."""
+def _most(turns: FloatArray) -> float:
+    """Return the size of the larger of some turns [rad]; 0 without any."""
+    return float(np.quantile(np.abs(turns), 0.95)) if turns.size else 0.0
+
+
+def _turns_as_oriented(evidence: Evidence, imu: ImuSeries, least: float = 0.0) -> bool:
+    """Return whether the gyro turns as its orientation does, by ``least`` [rad] in a while."""
     heading = _heading(evidence, imu)
     if heading is None:
         return False
+    seen = _turns(evidence, heading)
     gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
-    return correlation(_turns(evidence, heading), gyro) > LEAST_CORRELATION
+    return _most(seen) >= least and correlation(seen, gyro) > LEAST_CORRELATION
 
 
 def _heading(evidence: Evidence, imu: ImuSeries) -> FloatArray | None:
@@ -458,7 +464,7 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
     for name, other in pairs:
         seen = _turns(evidence, other)
-        if correlation(gyro, seen) < SAME_TURNS:
+        if _most(seen) < LEAST_TURNED or correlation(gyro, seen) < SAME_TURNS:
             continue
         # Noise of either flattens the fit to it: the scale lies between both.
         one = np.ones(seen.size)
@@ -468,8 +474,7 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         times = 1.0 / cure.value
         if IN_DEGREES[0] < times < IN_DEGREES[1]:
             return _in_degrees(evidence, times, f'turning by {name}')
-        turned = float(np.quantile(np.abs(seen), 0.95)) > LEAST_TURNED
-        if turned and abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
+        if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
             told = {'value': cure.value, 'times': times, 'against': name}
             finding = evidence.found('gyro_scale', 0.9, std=cure.std, **told)
             return [finding], replace(evidence, gyro=evidence.gyro * cure.value)
@@ -543,7 +548,7 @@ def gyro_unit_known(evidence: Evidence) -> bool:
     if track_ratio(evidence) is not None:
         return True
     imu = evidence.recording.imu
-    return imu is not None and _turns_as_oriented(evidence, imu)
+    return imu is not None and _turns_as_oriented(evidence, imu, LEAST_TURNED)
 
 
 def skids(evidence: Evidence) -> bool:

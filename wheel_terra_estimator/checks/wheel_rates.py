@@ -37,6 +37,7 @@ LEAST_COUNTS = 0.2  # speed of a wheel with fewer counts over the others', at le
 WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0  # wild change over the greatest and usual value [-]
 LEAST_WILD, MOST_WILD = 3, 0.1  # number and share of single wild values that are told
 LONG_FROZEN_TIME = 10.0  # time that a coarse encoder does not repeat itself [s]
+FAR_LONGER, MOST_FROZEN = 10.0, 0.75  # so many times longer, for so much of the driving [-]
 HELD_TORQUE = 1.5  # torque of a held wheel over that of the others, at least [-]
 DRAGGED_TORQUE = 0.5  # the same against theirs, of one that the others drag [-]
 NOISE_FACTOR = 5.0
@@ -99,9 +100,22 @@ def _about_a_side(evidence: Evidence, index: int) -> Mask:
 def _stays(evidence: Evidence, index: int) -> float:
     """Return how long a rate stays the same, but for 0, where the torque decides."""
     dead = stays(evidence, evidence.time, evidence.rate[:, index : index + 1])
-    if dead is None or dead.value == 0.0 or dead.longest <= LONG_FROZEN_TIME:
-        return 0.0
-    return dead.longest
+    longest = dead.longest if dead is not None and dead.value != 0.0 else 0.0
+    longest = max(longest, _stays_once(evidence, index))
+    return longest if longest > LONG_FROZEN_TIME else 0.0
+
+
+def _stays_once(evidence: Evidence, index: int) -> float:
+    """Return how long a coarse rate stays, if far longer than it or the others' do else [s]."""
+    rate = evidence.rate[evidence.moving]
+    lengths = [
+        sorted([0, 0, *(b - a for a, b in runs((np.diff(one) == 0.0) & (one[1:] != 0.0)))])
+        for one in rate.T
+    ]
+    own = lengths.pop(index)
+    usual = max(own[-2], float(np.median([others[-1] for others in lengths])), 1.0)
+    far = FAR_LONGER * usual < own[-1] < MOST_FROZEN * rate.shape[0]
+    return own[-1] * evidence.period * far
 
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:
