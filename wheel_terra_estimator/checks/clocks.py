@@ -22,22 +22,24 @@ from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Channel, Recording, shifted
 from wheel_terra_estimator.checks.statistics import (
+    Trial,
     averaged,
     correlation,
     even_times,
+    halves,
     moving_mean,
     without_drift,
+    worst,
 )
 from wheel_terra_estimator.checks.transport import FUTURE
-from wheel_terra_estimator.checks.trial import Trial, halves, worst
 
 STEP = 0.05  # time between the values that are compared [s]
 LONGEST = {'imu': 2.0, 'reference': 3.0}  # greatest lag that is looked for [s]
 IN_A_DRIVE = 15.0  # length of a drive over the greatest lag that it tells [-]
-LEAST_OFFSET = 0.1  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
+LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
-FALLS = {'turns': 0.7, 'starts': 0.9, 'speeds': 0.75}  # unlike part with it, at most
-LEAST_STD = {'turns': 0.06, 'starts': 0.06, 'speeds': 0.1}  # of chassis and filters [s]
+FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part with it, at most
+LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1}  # of chassis and filters [s]
 APART = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS, SHARP_SIGMAS = 4.0, 10.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]

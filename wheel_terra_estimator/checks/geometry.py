@@ -19,14 +19,15 @@ from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
     UNIFORM_STD,
     Estimate,
+    Trial,
     bend_noise,
     block_fit,
     confidence,
     correlation,
     probability,
+    tried,
 )
 from wheel_terra_estimator.checks.torque import SOFT_TRACTION, both_ways, thrust
-from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.checks.wheel_rates import OF_RADII, rounding
 
 LEAST_RADIUS_ERROR = 0.025  # share by which a radius is wrong before it is a finding [-]

@@ -36,7 +36,6 @@ from wheel_terra_estimator.checks.statistics import (
     step_of,
 )
 from wheel_terra_estimator.checks.turning import (
-    IN_DEGREES,
     gyro_unit_known,
     ordinary_track,
     track_ratio,
@@ -54,7 +53,7 @@ LEAST_SHOWN = 0.01  # change of an angle [deg] below which a cure leaves it out
 LEAST_MOUNTING = math.radians(1.5)  # mounting errors below this [rad] are left to calibration
 LEAST_TURN = 4.5  # heading that a drive has to cover for the mounting to be told from a slope [rad]
 FLAT_TURN_STD = math.radians(0.1)  # unevenness of the ground leaves open [rad]
-TURNED_ROUND = 0.75  # probability that an IMU is turned round, not its x axis reversed [-]
+TURNED = 0.75  # probability that an IMU is turned, not its accelerometer reversed [-]
 YAW_MODEL_STD = math.radians(1.0)  # pitch and roll in starts and turns leave open [rad]
 LEAST_QUARTER = math.radians(45.0)  # least yaw of a quarter turn [rad]
 ALONG_AXIS = math.cos(math.radians(25.0))  # cosine within which an axis is meant [-]
@@ -67,7 +66,6 @@ BIAS_SIGMAS = 5.0
 TILT_IS_MOUNTING = 0.7  # probability that a tilt in circles is the mounting, not a zero [-]
 CROSS_AXIS = 0.01  # gyro against accelerometer in one housing [rad]; data sheets of MEMS
 LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
-UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_WILD = 3
 WILD_SIGMAS = 10.0  # of the usual change of a reading, which another unit makes large
@@ -264,24 +262,14 @@ def _against_orientation(state: ImuState) -> Judged:
     total = np.vstack([np.zeros(3), np.cumsum(imu.rate, axis=0)])
     told = ((total[step:] - total[:-step]) / step)[: good.size][good]
     seen, told = seen - np.median(seen, axis=0), told - np.median(told, axis=0)
-    factor, degrees = np.ones(3), []
-    outcomes: list[Outcome] = []
+    factor, outcomes = np.ones(3), list[Outcome]()
     for axis, name in enumerate('xyz'):
         x, y = seen[:, axis], told[:, axis]
         fit = correlation(x, y)
-        if abs(fit) < 0.6 or float(np.std(x)) < 0.01:
-            continue
-        if fit < 0.0:
+        if fit < -0.6 and float(np.std(x)) >= 0.01:
             factor[axis] = -1.0
             words = {'value': -1.0, 'axis': name, 'against': 'the orientation'}
             outcomes.append(state.found('gyro_reversed', confidence(6.0 * abs(fit)), **words))
-        times = abs(float(x @ y) / float(x @ x))
-        if IN_DEGREES[0] < times < IN_DEGREES[1]:
-            degrees.append(times)
-    if degrees:
-        factor *= math.radians(1.0)
-        words = {'times': degrees[0], 'how': 'turning of the orientation'}
-        outcomes.append(state.found('gyro_degrees', 0.99, value=math.radians(1.0), **words))
     return outcomes, state.with_values(rate=imu.rate * factor) if outcomes else state
 
 
@@ -444,7 +432,7 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sure = 0.97
     if not clear and math.cos(seen.value) < -ALONG_AXIS:
         words['rival'] = ', or linear_acceleration.x has the wrong sign: drive circles'
-        sure = TURNED_ROUND
+        sure = TURNED
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)
     return [mounting_finding('imu_yaw', evidence, mended, words['off'], sure, **words)], mended
 
@@ -474,7 +462,7 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             told = evidence.found('force_reversed', 0.97, **words)
             return [told], replace(evidence, force=-evidence.force)
         if upright > -CLEAR_AGREEMENT:
-            sure = UNTURNED
+            sure = TURNED
             words['rival'] = ', or linear_acceleration has the wrong sign: drive circles'
     std = math.degrees(STEEPEST_MEAN) / 3.0
     return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended

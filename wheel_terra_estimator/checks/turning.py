@@ -28,14 +28,16 @@ from wheel_terra_estimator.checks.finding import Finding, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
+    Trial,
     block_fit,
     confidence,
     correlation,
+    halves,
     integrated,
     robust_std,
+    worst,
 )
 from wheel_terra_estimator.checks.torque import Slopes, slope_fit
-from wheel_terra_estimator.checks.trial import Trial, halves, worst
 from wheel_terra_estimator.estimation.measurements import heading_of
 
 Mask = BoolArray
