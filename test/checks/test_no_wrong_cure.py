@@ -14,6 +14,7 @@ from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.calibration import calibrate
 from wheel_terra_estimator.checks.evidence import gather
 from wheel_terra_estimator.checks.rover_facts import from_configuration
+from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import block_fit
 
@@ -344,3 +345,74 @@ def test_a_crawl_below_the_noise_of_the_rates_is_no_standstill_that_tells_a_zero
     rubs = crawls.joints.torque + np.outer(speed > 0.0, [0.0, 5.0, 0.0, 0.0])
     joints = replace(crawls.joints, rate=crawls.joints.rate + noise, torque=rubs)
     assert 'torque_zero' not in faults(checked(whole=crawls, joints=joints))
+
+
+def test_a_turn_on_the_spot_reverses_no_axis_of_the_accelerometer():
+    """No curve is felt in it: what the ground does to y is far more than what little there is."""
+    time = np.arange(0.0, 40.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [2, 3, 8, 9, 30, 31, 36, 37], [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0])
+    yaw = np.interp(time, [10, 11, 28, 29], [0, 0.3, 0.3, 0])
+    whole = rolling.recording(rolling.Motion(time, speed + 0.004 * yaw, yaw, 0.0 * time))
+    sway = np.outer(np.interp(whole.imu.seconds, time, -0.01 * np.gradient(yaw, time)), [0, 9, 0])
+    assert 'force_mirrored' not in faults(
+        checked(whole=whole, imu=replace(whole.imu, force=whole.imu.force + sway))
+    )
+
+
+def test_a_heading_that_hardly_turns_tells_no_scale_of_a_gyro():
+    """Both drift evenly: the gyro by its zero, the orientation by a hundredth of that."""
+    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
+    half = 2e-5 * straight.imu.seconds
+    turned = np.column_stack([0.0 * half, 0.0 * half, np.sin(half), np.cos(half)])
+    drift = straight.imu.rate + np.array([0.0, 0.0, 0.003])
+    report = checked(whole=straight, imu=replace(straight.imu, rate=drift, orientation=turned))
+    assert not {'gyro_degrees', 'gyro_scale'} & set(faults(report))
+
+
+@pytest.mark.parametrize('factor', [1.0, math.degrees(1.0)])
+def test_wild_samples_of_a_gyro_are_told_in_any_unit(factor):
+    rate = factor * WHOLE.imu.rate
+    rate[500::2500] += 20.0 * factor
+    told = [f for f in checked(imu=replace(WHOLE.imu, rate=rate)).findings if f.fault == 'imu_wild']
+    assert [f.words.split()[0] for f in told] == ['6'] and 'rad/s' in told[0].words
+
+
+def test_a_coarse_rate_that_stays_is_frozen():
+    """Three counts in a period, and a little noise: all rates repeat themselves now and then."""
+    rate = np.round(
+        WHOLE.joints.rate / 0.4 + 0.3 * np.random.default_rng(3).standard_normal((3000, 4))
+    )
+    rate[2000:, 3] = rate[2000, 3]
+    told = checked(joints=replace(WHOLE.joints, rate=0.4 * rate)).findings
+    assert [f.wheel for f in told if f.fault == 'rate_frozen'] == ['rear_right']
+
+
+def test_a_steering_joint_stands_in_for_no_wheel():
+    names = ['fl', 'fr', 'rl', 'rr']
+    steered = [f'{name}_steer' for name in names]
+    joints = replace(
+        WHOLE.joints, names=('fl', 'rl', 'rr', *steered),
+        rate=np.hstack([WHOLE.joints.rate[:, [0, 2, 3]], np.zeros((3000, 4))]),
+        torque=np.hstack([WHOLE.joints.torque[:, [0, 2, 3]], np.zeros((3000, 4))]),
+        position=np.zeros((3000, 7)),
+    )  # fmt: skip
+    file = rolling.rover(**{'wheels.names': names, 'wheels.steering_joints': steered})
+    report = check_recording(replace(WHOLE, joints=joints), file)
+    assert 'missing_wheel' in faults(report) and 'joint_name' not in faults(report)
+
+
+def test_rates_without_a_sign_tell_neither_track_nor_stamps():
+    joints = replace(WHOLE.joints, rate=np.abs(WHOLE.joints.rate))
+    assert not {'track', 'imu_offset', 'wheel_odometry_offset'} & set(
+        faults(checked(joints=joints))
+    )
+
+
+def test_an_imu_on_its_back_is_written_only_where_turns_tell_it():
+    """Without turns the accelerometer may as well count the other way round."""
+    for turns in (True, False):
+        whole = rolling.recording(rolling.ten_minute_drive(turns))
+        over = [1.0, -1.0, -1.0]
+        imu = replace(whole.imu, force=whole.imu.force * over, rate=whole.imu.rate * over)
+        written = calibrate(replace(whole, imu=imu), rolling.rover()).changes
+        assert any('mounting_roll' in change.key for change in written) == turns

@@ -13,8 +13,7 @@ import numpy as np
 
 from wheel_terra_estimator.checks import geometry, imu, torque, turning
 from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, Evidence
-from wheel_terra_estimator.checks.faults import untold
-from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
+from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked, untold
 from wheel_terra_estimator.checks.run import examine
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration

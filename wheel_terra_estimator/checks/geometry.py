@@ -13,8 +13,13 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask
-from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, listed, untold
-from wheel_terra_estimator.checks.finding import NotChecked, Outcome
+from wheel_terra_estimator.checks.finding import (
+    LEAST_TURN_RATE,
+    NotChecked,
+    Outcome,
+    listed,
+    untold,
+)
 from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
     UNIFORM_STD,

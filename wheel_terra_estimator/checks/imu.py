@@ -16,10 +16,23 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, LONGEST_GAP, Evidence
-from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed, untold
-from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS, felt_senses, felt_yaw
-from wheel_terra_estimator.checks.finding import Finding, Outcome
+from wheel_terra_estimator.checks.evidence import (
+    EVEN_GROUND_STD,
+    LEAST_YAW,
+    LONGEST_GAP,
+    YAW_SIGMAS,
+    Evidence,
+    felt_senses,
+    felt_yaw,
+)
+from wheel_terra_estimator.checks.finding import (
+    STANDARD_GRAVITY,
+    Finding,
+    Outcome,
+    found,
+    listed,
+    untold,
+)
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
     DRIFT,
@@ -36,6 +49,7 @@ from wheel_terra_estimator.checks.statistics import (
     step_of,
 )
 from wheel_terra_estimator.checks.turning import (
+    IN_DEGREES,
     gyro_unit_known,
     ordinary_track,
     track_ratio,
@@ -262,14 +276,24 @@ def _against_orientation(state: ImuState) -> Judged:
     total = np.vstack([np.zeros(3), np.cumsum(imu.rate, axis=0)])
     told = ((total[step:] - total[:-step]) / step)[: good.size][good]
     seen, told = seen - np.median(seen, axis=0), told - np.median(told, axis=0)
-    factor, outcomes = np.ones(3), list[Outcome]()
+    factor, degrees = np.ones(3), []
+    outcomes: list[Outcome] = []
     for axis, name in enumerate('xyz'):
         x, y = seen[:, axis], told[:, axis]
         fit = correlation(x, y)
-        if fit < -0.6 and float(np.std(x)) >= 0.01:
+        if abs(fit) < 0.6 or float(np.std(x)) < 0.01:
+            continue
+        if fit < 0.0:
             factor[axis] = -1.0
             words = {'value': -1.0, 'axis': name, 'against': 'the orientation'}
             outcomes.append(state.found('gyro_reversed', confidence(6.0 * abs(fit)), **words))
+        times = abs(float(x @ y) / float(x @ x))
+        if IN_DEGREES[0] < times < IN_DEGREES[1]:
+            degrees.append(times)
+    if degrees:
+        factor *= math.radians(1.0)
+        words = {'times': degrees[0], 'how': 'turning of the orientation'}
+        outcomes.append(state.found('gyro_degrees', 0.99, value=math.radians(1.0), **words))
     return outcomes, state.with_values(rate=imu.rate * factor) if outcomes else state
 
 

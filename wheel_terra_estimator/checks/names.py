@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.checks.faults import found, untold
-from wheel_terra_estimator.checks.finding import Finding, Outcome
+from wheel_terra_estimator.checks.finding import Finding, Outcome, found, untold
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 

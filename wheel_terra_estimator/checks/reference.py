@@ -10,8 +10,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
-from wheel_terra_estimator.checks.faults import untold
-from wheel_terra_estimator.checks.finding import Outcome
+from wheel_terra_estimator.checks.finding import Outcome, untold
 from wheel_terra_estimator.checks.series import VelocitySeries
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,

@@ -16,10 +16,9 @@ from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
     SETTLING,
     Evidence,
+    felt_yaw,
 )
-from wheel_terra_estimator.checks.faults import listed, untold
-from wheel_terra_estimator.checks.felt_motion import felt_yaw
-from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome, listed, untold
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
     Trial,

@@ -21,10 +21,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
-from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS, listed, untold
-from wheel_terra_estimator.checks.felt_motion import felt_senses, felt_yaw
-from wheel_terra_estimator.checks.finding import Finding, Outcome
+from wheel_terra_estimator.checks.evidence import (
+    LEAST_MOVING_ROWS,
+    Evidence,
+    felt_senses,
+    felt_yaw,
+    row_medians,
+)
+from wheel_terra_estimator.checks.finding import (
+    LEAST_TURN_RATE,
+    SKID_TRACKS,
+    Finding,
+    Outcome,
+    listed,
+    untold,
+)
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (

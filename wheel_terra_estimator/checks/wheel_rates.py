@@ -13,8 +13,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask, row_medians
-from wheel_terra_estimator.checks.faults import RATE_UNITS, listed, untold
-from wheel_terra_estimator.checks.finding import Outcome
+from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, untold
 from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, hardly_moves
 from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import correlation, lonely, robust_std, runs, step_of
