@@ -375,6 +375,13 @@ def test_a_coarse_rate_that_stays_is_frozen():
     assert [f.wheel for f in told if f.fault == 'rate_frozen'] == ['rear_right']
 
 
+def test_torques_of_an_instant_at_starts_and_stops_are_not_wild():
+    starts = np.searchsorted(WHOLE.joints.seconds, [15.0, 65.0, 105.0])
+    torque = WHOLE.joints.torque.copy()
+    torque[starts] += 100.0
+    assert 'wild' not in faults(checked(joints=replace(WHOLE.joints, torque=torque)))
+
+
 def test_a_steering_joint_stands_in_for_no_wheel():
     names = list(rolling.NAMES)
     steered = [f'{name}_steer' for name in names]

@@ -484,11 +484,8 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         cure = block_fit(np.column_stack([gyro, one]), seen)[0]
         other_way = 1.0 / block_fit(np.column_stack([seen, one]), gyro)[0].value
         off = min((cure.value - 1.0, other_way - 1.0), key=abs)
-        times = 1.0 / cure.value
-        if IN_DEGREES[0] < times < IN_DEGREES[1]:
-            return _in_degrees(evidence, times, f'turning by {name}')
         if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
-            told = {'value': cure.value, 'times': times, 'against': name}
+            told = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
             finding = evidence.found('gyro_scale', 0.9, std=cure.std, **told)
             return [finding], replace(evidence, gyro=evidence.gyro * cure.value)
     return [], evidence

@@ -137,7 +137,9 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         off, usual = lonely(table), np.nanquantile(np.abs(table), 0.98, axis=0)
         noise = np.array([robust_std(column) for column in np.diff(table, axis=0).T])
         wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
-        if LEAST_WILD <= wild.sum() < MOST_WILD * wild.size:
+        # To break away or turn back takes a large torque for an instant.
+        told_by = wild if name == 'velocity' else wild & evidence.steady[:, None]
+        if told_by.sum() >= LEAST_WILD and wild.sum() < MOST_WILD * wild.size:
             wheels = evidence.facts.named(wild.any(axis=0))
             told = {'field': name, 'count': int(wild.sum()), 'most': float(off[wild].max())}
             outcomes.append(evidence.found('wild', 0.97, wheel=wheels, **told))
