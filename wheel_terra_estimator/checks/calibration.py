@@ -111,7 +111,7 @@ def _directions(changes: _Changes, report: CheckReport, configuration: Configura
 
 def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
     all_told = [f for f in report.findings if f.parameter in imu.MOUNTING]
-    if any(f.confidence <= LEAST_SURE for f in all_told):  # a rival may be it
+    if any(f.confidence <= imu.UNTURNED for f in all_told):  # a rival may be it
         evidence, all_told = evidence.turned(evidence.facts.mounting), []
     told = all_told[0] if all_told else None
     rotation, std = evidence.rotation, told.std if told is not None else None

@@ -67,7 +67,7 @@ LEAST_SHOWN = 0.01  # change of an angle [deg] below which a cure leaves it out
 LEAST_MOUNTING = math.radians(1.5)  # mounting errors below this [rad] are left to calibration
 LEAST_TURN = 4.5  # heading that a drive has to cover for the mounting to be told from a slope [rad]
 FLAT_TURN_STD = math.radians(0.1)  # unevenness of the ground leaves open [rad]
-TURNED = 0.75  # probability that an IMU is turned, not its accelerometer reversed [-]
+TURNED_ROUND = 0.75  # probability that an IMU is turned round, not its x axis reversed [-]
 YAW_MODEL_STD = math.radians(1.0)  # pitch and roll in starts and turns leave open [rad]
 LEAST_QUARTER = math.radians(45.0)  # least yaw of a quarter turn [rad]
 ALONG_AXIS = math.cos(math.radians(25.0))  # cosine within which an axis is meant [-]
@@ -79,6 +79,7 @@ LEAST_STANDSTILL = 3.0  # [s]
 BIAS_SIGMAS = 5.0
 TILT_IS_MOUNTING = 0.7  # probability that a tilt in circles is the mounting, not a zero [-]
 CROSS_AXIS = 0.01  # gyro against accelerometer in one housing [rad]; data sheets of MEMS
+UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
 LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_WILD = 3
@@ -456,7 +457,7 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sure = 0.97
     if not clear and math.cos(seen.value) < -ALONG_AXIS:
         words['rival'] = ', or linear_acceleration.x has the wrong sign: drive circles'
-        sure = TURNED
+        sure = TURNED_ROUND
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)
     return [mounting_finding('imu_yaw', evidence, mended, words['off'], sure, **words)], mended
 
@@ -486,7 +487,7 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             told = evidence.found('force_reversed', 0.97, **words)
             return [told], replace(evidence, force=-evidence.force)
         if upright > -CLEAR_AGREEMENT:
-            sure = TURNED
+            sure = UNTURNED
             words['rival'] = ', or linear_acceleration has the wrong sign: drive circles'
     std = math.degrees(STEEPEST_MEAN) / 3.0
     return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended
