@@ -220,8 +220,10 @@ def _wild(state: ImuState) -> Judged:
     """Leave out single samples that no body can make; the node does so by the same limits."""
     imu, outcomes, kept = state.imu, list[Outcome](), np.ones(state.imu.stamp.size, dtype=bool)
     for values, limit, unit in ((imu.force, WILD_FORCE, 'm/s^2'), (imu.rate, WILD_RATE, 'rad/s')):
-        noise = np.array([robust_std(column) for column in np.diff(values, axis=0).T])
         off = lonely(values)
+        if (off > limit).sum() < LEAST_WILD:
+            continue
+        noise = np.array([robust_std(column) for column in np.diff(values, axis=0).T])
         wild = (off > np.maximum(limit, WILD_SIGMAS * noise)).any(axis=1)  # or in another unit
         if LEAST_WILD <= wild.sum() <= MOST_WILD * wild.size:
             told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'unit': unit}

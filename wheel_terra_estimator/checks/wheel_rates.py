@@ -107,14 +107,17 @@ def _stays(evidence: Evidence, index: int) -> float:
 def _stays_once(evidence: Evidence, index: int) -> float:
     """Return how long a coarse rate stays, if far longer than it or the others' do else [s]."""
     rate = evidence.rate[evidence.moving]
-    lengths = [
-        sorted([0, 0, *(b - a for a, b in runs((np.diff(one) == 0.0) & (one[1:] != 0.0)))])
-        for one in rate.T
-    ]
-    own = lengths.pop(index)
-    usual = max(own[-2], float(np.median([others[-1] for others in lengths])), 1.0)
-    far = FAR_LONGER * usual < own[-1] < MOST_FROZEN * rate.shape[0]
-    return own[-1] * evidence.period * far
+
+    def stretches(one: FloatArray) -> list[int]:
+        same = (np.diff(one) == 0.0) & (one[1:] != 0.0)
+        return sorted([0, 0, *(last - first for first, last in runs(same))])
+
+    *_, second, longest = stretches(rate[:, index])
+    if not LONG_FROZEN_TIME / evidence.period < longest < MOST_FROZEN * rate.shape[0]:
+        return 0.0
+    others = [stretches(one)[-1] for one in np.delete(rate, index, axis=1).T]
+    usual = max(second, float(np.median(others)), 1.0)
+    return longest * evidence.period if longest > FAR_LONGER * usual else 0.0
 
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:
