@@ -365,3 +365,63 @@ def test_a_crawl_below_the_noise_of_the_rates_is_no_standstill_that_tells_a_zero
     rubs = crawls.joints.torque + np.outer(speed > 0.0, [0.0, 5.0, 0.0, 0.0])
     joints = replace(crawls.joints, rate=crawls.joints.rate + noise, torque=rubs)
     assert 'torque_zero' not in faults(checked(whole=crawls, joints=joints))
+
+
+def test_a_turn_on_the_spot_reverses_no_axis_of_the_accelerometer():
+    """What the ground does to y in it is far more than a curve of next to no speed."""
+    time = np.arange(0.0, 40.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [2, 3, 8, 9, 30, 31, 36, 37], [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0])
+    yaw = np.interp(time, [10, 11, 19, 20, 28, 29], [0, 0.3, 0.3, 0.1, 0.3, 0])
+    whole = rolling.recording(rolling.Motion(time, speed + 0.03 * (yaw > 0), yaw, 0.0 * time))
+    force = whole.imu.force.copy()
+    force[:, 1] -= 8.0 * 0.03 * np.interp(whole.imu.seconds, time, yaw)
+    assert 'force_mirrored' not in faults(checked(whole=whole, imu=replace(whole.imu, force=force)))
+
+
+@pytest.mark.parametrize('factor', [1.0, math.degrees(1.0)])
+def test_wild_samples_of_a_gyro_are_told_in_any_unit(factor):
+    rate = factor * WHOLE.imu.rate
+    rate[500::2500] += 20.0 * factor
+    told = [f for f in checked(imu=replace(WHOLE.imu, rate=rate)).findings if f.fault == 'imu_wild']
+    assert [f.words.split()[0] for f in told] == ['6'] and 'rad/s' in told[0].words
+
+
+def test_a_coarse_rate_that_stays_is_frozen():
+    """Three counts in a period, and a little noise: all rates repeat themselves now and then."""
+    rate = np.round(
+        WHOLE.joints.rate / 0.4 + 0.3 * np.random.default_rng(3).standard_normal((3000, 4))
+    )
+    rate[2000:, 3] = rate[2000, 3]
+    told = checked(joints=replace(WHOLE.joints, rate=0.4 * rate)).findings
+    assert [f.wheel for f in told if f.fault == 'rate_frozen'] == ['rear_right']
+
+
+def test_torques_of_an_instant_at_starts_and_stops_are_not_wild():
+    starts = np.searchsorted(WHOLE.joints.seconds, [15.0, 65.0, 105.0])
+    torque = WHOLE.joints.torque.copy()
+    torque[starts] += 100.0
+    assert 'wild' not in faults(checked(joints=replace(WHOLE.joints, torque=torque)))
+
+
+def test_a_steering_joint_stands_in_for_no_wheel():
+    names = list(rolling.NAMES)
+    steered = [f'{name}_steer' for name in names]
+    there = [0, 2, 3]
+    joints = replace(
+        WHOLE.joints, names=(*(names[i] for i in there), *steered),
+        rate=np.hstack([WHOLE.joints.rate[:, there], np.zeros((3000, 4))]),
+        torque=np.hstack([WHOLE.joints.torque[:, there], np.zeros((3000, 4))]),
+        position=np.zeros((3000, 7)),
+    )  # fmt: skip
+    report = checked(rolling.rover(**{'wheels.steering_joints': steered}), joints=joints)
+    assert 'missing_wheel' in faults(report) and 'joint_name' not in faults(report)
+
+
+def test_an_imu_on_its_back_is_written_only_where_turns_tell_it():
+    """Without turns the accelerometer may as well count the other way round."""
+    for turns in (True, False):
+        whole = rolling.recording(rolling.ten_minute_drive(turns))
+        over = [1.0, -1.0, -1.0]
+        imu = replace(whole.imu, force=whole.imu.force * over, rate=whole.imu.rate * over)
+        written = calibrate(replace(whole, imu=imu), rolling.rover()).changes
+        assert any('mounting_roll' in change.key for change in written) == turns

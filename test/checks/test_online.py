@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from estimate_sets import some_estimates
 
-from wheel_terra_estimator.checks.faults import FAULTS as FAULT_TABLE
-from wheel_terra_estimator.checks.faults import found
+from wheel_terra_estimator.checks.finding import FAULTS as FAULT_TABLE
+from wheel_terra_estimator.checks.finding import found
 from wheel_terra_estimator.checks.input_judge import LONGEST_WAIT, InputJudge
 from wheel_terra_estimator.checks.online import CAP, OnlineChecks, Tally
 from wheel_terra_estimator.checks.series import Recording

@@ -9,7 +9,7 @@ import pytest
 import rolling_rover as rolling
 
 from wheel_terra_estimator.checks.calibration import calibrate
-from wheel_terra_estimator.checks.trial import Trial, halves, tried
+from wheel_terra_estimator.checks.statistics import Trial, halves, tried
 
 SKID = {'wheels.x': [0.3, 0.3, -0.3, -0.3]}  # wheels in two rows: its turns need skid
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from wheel_terra_estimator.checks import geometry, imu, torque, turning
 from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, Evidence
-from wheel_terra_estimator.checks.faults import untold
-from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
+from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked, untold
 from wheel_terra_estimator.checks.run import examine
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -112,7 +111,7 @@ def _directions(changes: _Changes, report: CheckReport, configuration: Configura
 
 def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
     all_told = [f for f in report.findings if f.parameter in imu.MOUNTING]
-    if any(f.confidence <= LEAST_SURE for f in all_told):  # a rival may be it
+    if any(f.confidence <= imu.UNTURNED for f in all_told):  # a rival may be it
         evidence, all_told = evidence.turned(evidence.facts.mounting), []
     told = all_told[0] if all_told else None
     rotation, std = evidence.rotation, told.std if told is not None else None

@@ -13,20 +13,26 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask
-from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, listed, untold
-from wheel_terra_estimator.checks.finding import NotChecked, Outcome
+from wheel_terra_estimator.checks.finding import (
+    LEAST_TURN_RATE,
+    NotChecked,
+    Outcome,
+    listed,
+    untold,
+)
 from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
     UNIFORM_STD,
     Estimate,
+    Trial,
     bend_noise,
     block_fit,
     confidence,
     correlation,
     probability,
+    tried,
 )
 from wheel_terra_estimator.checks.torque import SOFT_TRACTION, both_ways, thrust
-from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.checks.wheel_rates import OF_RADII, rounding
 
 LEAST_RADIUS_ERROR = 0.025  # share by which a radius is wrong before it is a finding [-]

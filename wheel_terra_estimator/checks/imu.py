@@ -16,10 +16,23 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, LONGEST_GAP, Evidence
-from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed, untold
-from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS, felt_senses, felt_yaw
-from wheel_terra_estimator.checks.finding import Finding, Outcome
+from wheel_terra_estimator.checks.evidence import (
+    EVEN_GROUND_STD,
+    LEAST_YAW,
+    LONGEST_GAP,
+    YAW_SIGMAS,
+    Evidence,
+    felt_senses,
+    felt_yaw,
+)
+from wheel_terra_estimator.checks.finding import (
+    STANDARD_GRAVITY,
+    Finding,
+    Outcome,
+    found,
+    listed,
+    untold,
+)
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
     DRIFT,
@@ -41,7 +54,7 @@ from wheel_terra_estimator.checks.turning import (
     ordinary_track,
     track_ratio,
 )
-from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
+from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE, WILD_RATE
 
 GRAVITY_TOLERANCE = 0.1  # of the mean specific force (slopes, bias, vibration) [-]
 SLOPES = 0.035  # the same by slopes and bias alone [-]
@@ -66,10 +79,11 @@ LEAST_STANDSTILL = 3.0  # [s]
 BIAS_SIGMAS = 5.0
 TILT_IS_MOUNTING = 0.7  # probability that a tilt in circles is the mounting, not a zero [-]
 CROSS_AXIS = 0.01  # gyro against accelerometer in one housing [rad]; data sheets of MEMS
-LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
 UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
+LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_WILD = 3
+WILD_SIGMAS = 10.0  # of the usual change of a reading, which another unit makes large
 MOST_WILD = 0.2  # share of wild samples that are single ones, at most [-]
 LEAST_MESSAGES = 20
 UNIT_TOLERANCE = 0.12  # share by which the mean specific force may lie off gravity in another unit
@@ -204,12 +218,18 @@ def _frozen(state: ImuState) -> Judged:
 
 def _wild(state: ImuState) -> Judged:
     """Leave out single samples that no body can make; the node does so by the same limits."""
-    off = lonely(state.imu.force).max(axis=1)
-    wild = off > WILD_FORCE  # a gyro may yet turn out to be in degrees
-    if wild.sum() < LEAST_WILD or np.mean(wild) > MOST_WILD:
-        return [], state
-    told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'most': float(off.max())}
-    return [state.found('imu_wild', 0.97, **told)], state.with_imu(rows_of(state.imu, ~wild))
+    imu, outcomes, kept = state.imu, list[Outcome](), np.ones(state.imu.stamp.size, dtype=bool)
+    for values, limit, unit in ((imu.force, WILD_FORCE, 'm/s^2'), (imu.rate, WILD_RATE, 'rad/s')):
+        off = lonely(values)
+        if (off > limit).sum() < LEAST_WILD:
+            continue
+        noise = np.array([robust_std(column) for column in np.diff(values, axis=0).T])
+        wild = (off > np.maximum(limit, WILD_SIGMAS * noise)).any(axis=1)  # or in another unit
+        if LEAST_WILD <= wild.sum() <= MOST_WILD * wild.size:
+            told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'unit': unit}
+            outcomes.append(state.found('imu_wild', 0.97, most=float(off.max()), **told))
+            kept &= ~wild
+    return outcomes, state.with_imu(rows_of(imu, kept)) if outcomes else state
 
 
 def _gravity(state: ImuState) -> Judged:

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.checks.faults import found, untold
-from wheel_terra_estimator.checks.finding import Finding, Outcome
+from wheel_terra_estimator.checks.finding import Finding, Outcome, found, untold
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 
@@ -104,7 +103,8 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         if not np.isfinite(column).any()
     }
     absent = [name for name in facts.names if name not in joints.names]
-    spare = [name for name in wheel_names(joints.names) if name not in facts.names]
+    known = {*facts.names, *facts.configuration.wheels.steering_joints}
+    spare = [name for name in wheel_names(joints.names) if name not in known]
     renamed = _pairs(absent, spare)
     names = tuple(renamed.get(name, name) for name in facts.names)
     outcomes: list[Outcome] = []

@@ -17,8 +17,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.checks import rover_facts
-from wheel_terra_estimator.checks.faults import FAULTS, RANK
-from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
+from wheel_terra_estimator.checks.finding import FAULTS, RANK, CheckReport, Finding, NotChecked
 from wheel_terra_estimator.checks.run import (
     LEAST_RIM_SPEED,
     WHILE_DRIVING,

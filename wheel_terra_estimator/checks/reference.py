@@ -10,8 +10,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
-from wheel_terra_estimator.checks.faults import untold
-from wheel_terra_estimator.checks.finding import Outcome
+from wheel_terra_estimator.checks.finding import Outcome, untold
 from wheel_terra_estimator.checks.series import VelocitySeries
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,
@@ -67,7 +66,8 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if both and not _sideways(reference) and _without_sign(rim, forward):
         calm = moving_mean(forward, LEAST_ROWS)
         sense = np.sign(np.interp(evidence.time, evidence.seconds(reference), calm))
-        mended = evidence.with_rate(evidence.rate * sense[:, None])
+        turns = (evidence.moving & ~evidence.unturned)[:, None]  # in which the sides may be unlike
+        mended = evidence.with_rate(np.where(turns, np.nan, evidence.rate * sense[:, None]))
         return [evidence.found('rates_unsigned', 0.95)], mended
     return [], evidence
 

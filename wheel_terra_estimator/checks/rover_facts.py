@@ -109,8 +109,9 @@ def from_names(joints: Sequence[str]) -> RoverFacts:
 
 def wheel_names(joints: Sequence[str]) -> tuple[str, ...]:
     """Return the joints that are wheels by their names, front to rear, left before right."""
-    wheels = [n for n in joints if _WHEEL.search(n.lower()) and 'steer' not in n.lower()]
-    wheels = wheels or [n for n in joints if side_of(n)] or list(joints)
+    driven = [n for n in joints if 'steer' not in n.lower()]
+    wheels = [n for n in driven if _WHEEL.search(n.lower())]
+    wheels = wheels or [n for n in driven if side_of(n)] or list(joints)
     return tuple(sorted(wheels, key=_place))
 
 

@@ -29,18 +29,19 @@ from wheel_terra_estimator.checks import (
     rover_facts,
     sinkage,
     torque,
-    transport,
     turning,
     wheel_rates,
 )
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, gather
-from wheel_terra_estimator.checks.faults import RANK, found, untold
 from wheel_terra_estimator.checks.finding import (
     INTERNAL_ERROR,
+    RANK,
     CheckReport,
     Finding,
     NotChecked,
     Outcome,
+    found,
+    untold,
 )
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Recording, Series, rows_of
@@ -141,7 +142,7 @@ def _examined(
     facts = mended('missing_wheel', facts, lambda: names.check_wheel_names(recording, stated))
     arrived = recording
     stamped = mended(
-        'order', arrived, lambda: transport.check_transport(arrived, stated, report.figures)
+        'order', arrived, lambda: clocks.check_transport(arrived, stated, report.figures)
     )
     recording = mended('placeholder', stamped, lambda: _whole_rows(stamped))
     evidence = against_each_other(recording, facts, checks, mended)

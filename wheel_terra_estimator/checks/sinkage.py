@@ -12,13 +12,11 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, row_medians
-from wheel_terra_estimator.checks.faults import listed, untold
-from wheel_terra_estimator.checks.finding import Finding, Outcome
+from wheel_terra_estimator.checks.finding import Finding, Outcome, listed, untold
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import SinkageSeries
-from wheel_terra_estimator.checks.statistics import bend_noise, correlation
+from wheel_terra_estimator.checks.statistics import bend_noise, correlation, halves
 from wheel_terra_estimator.checks.torque import thrust
-from wheel_terra_estimator.checks.trial import halves
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors
 
 DEEPEST = 1.2  # sinkage over radius that no wheel gets out of [-]

@@ -1,10 +1,15 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Robust statistics that the checks share."""
+"""Robust statistics that the checks share, and how a cure is tried before it is named.
+
+What is found on one half of a recording is applied to the other: the residual of the evidence has
+to fall there, and no rival's cure may do as well.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +30,9 @@ UNIFORM_STD = 1.0 / math.sqrt(12.0)  # of what lies anywhere in an interval, ove
 MOST_STEPS = 200  # different values of a reading beyond which steps do not matter
 SAME_VALUE = 1e-6  # share of the greatest value below which two values are one
 OFF_A_STEP = 0.05  # distance from a multiple of a step, as a share of it
+LEAST_HALF = 12  # rows of a half that something is found on, at least
+LEAST_FALL = 0.7  # residual with a cure over that without, on the other half, at most [-]
+LEAST_MARGIN = 0.8  # the same over that with a rival's cure [-]
 
 
 class Estimate(NamedTuple):
@@ -199,3 +207,54 @@ def step_of(values: FloatArray) -> float:
             return 0.0
     fits = np.abs(values / step - np.round(values / step)) < OFF_A_STEP
     return step if float(np.mean(fits)) > 0.95 else 0.0
+
+
+# Trials -------------------------------------------------------------------------------------------
+
+
+class Trial(NamedTuple):
+    """Residuals without a cure, with it, and with the best rival's, each on the other half."""
+
+    before: float
+    after: float
+    rival: float = math.inf
+
+    @property
+    def falls(self) -> bool:
+        """Whether the cure mends something."""
+        return self.after < LEAST_FALL * self.before
+
+    @property
+    def passes(self) -> bool:
+        """Whether the cure mends something and no rival does as well."""
+        return self.falls and self.after < LEAST_MARGIN * self.rival
+
+    def words(self, what: str, unit: str) -> str:
+        """Return what the trial showed, to be put behind a finding."""
+        unit = f' {unit}' if unit else ''
+        return f' ({what} {self.before:.3g} -> {self.after:.3g}{unit} on the other half)'
+
+
+def halves(energy: FloatArray) -> tuple[slice, slice]:
+    """Return two stretches of rows that hold as much of an energy (k,) each."""
+    total = np.cumsum(energy)
+    middle = int(np.searchsorted(total, 0.5 * total[-1])) + 1 if total.size else 0
+    return slice(0, middle), slice(middle, total.size)
+
+
+def tried(fit: Callable[[slice], float], nothing: float, energy: FloatArray) -> Trial:
+    """Fit a number on each half of some rows and return what it leaves on the other, the worse one.
+
+    ``nothing`` is the number that changes nothing, ``energy`` (k,) what each row tells of it.
+    """
+    parts = halves(energy)
+    if min(part.stop - part.start for part in parts) < LEAST_HALF:
+        return Trial(0.0, math.inf)
+    first, second = (fit(part) for part in parts)
+    apart = abs(second - first)
+    return worst([Trial(abs(second - nothing), apart), Trial(abs(first - nothing), apart)])
+
+
+def worst(trials: Sequence[Trial]) -> Trial:
+    """Return the trial, of those on the halves, in which the cure did least."""
+    return max(trials, key=lambda t: t.after / max(min(t.before, t.rival), 1e-12))

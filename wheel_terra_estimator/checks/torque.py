@@ -16,18 +16,18 @@ from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
     SETTLING,
     Evidence,
+    felt_yaw,
 )
-from wheel_terra_estimator.checks.faults import listed, untold
-from wheel_terra_estimator.checks.felt_motion import felt_yaw
-from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome, listed, untold
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
+    Trial,
     block_fit,
     confidence,
     moving_mean,
     runs,
+    tried,
 )
-from wheel_terra_estimator.checks.trial import Trial, tried
 
 UPHILL_ENOUGH = -0.02  # specific force along the drive at which a wheel takes power [g]
 SIGN_SIGMAS = 4.0

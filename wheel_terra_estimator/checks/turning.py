@@ -21,21 +21,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
-from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS, listed, untold
-from wheel_terra_estimator.checks.felt_motion import felt_senses, felt_yaw
-from wheel_terra_estimator.checks.finding import Finding, Outcome
+from wheel_terra_estimator.checks.evidence import (
+    LEAST_MOVING_ROWS,
+    Evidence,
+    felt_senses,
+    felt_yaw,
+    row_medians,
+)
+from wheel_terra_estimator.checks.finding import (
+    LEAST_TURN_RATE,
+    SKID_TRACKS,
+    Finding,
+    Outcome,
+    listed,
+    untold,
+)
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
+    Trial,
     block_fit,
     confidence,
     correlation,
+    halves,
     integrated,
     robust_std,
+    worst,
 )
 from wheel_terra_estimator.checks.torque import Slopes, slope_fit
-from wheel_terra_estimator.checks.trial import Trial, halves, worst
 from wheel_terra_estimator.estimation.measurements import heading_of
 
 Mask = BoolArray
@@ -425,13 +438,19 @@ def _turns(evidence: Evidence, heading: FloatArray) -> FloatArray:
     return heading[rows:] - heading[:-rows]
 
 
-def _turns_as_oriented(evidence: Evidence, imu: ImuSeries) -> bool:
-    """Return whether the gyro turns as its orientation does; not where there is none."""
+def _most(turns: FloatArray) -> float:
+    """Return the size of the larger of some turns [rad]; 0 without any."""
+    return float(np.quantile(np.abs(turns), 0.95)) if turns.size else 0.0
+
+
+def _turns_as_oriented(evidence: Evidence, imu: ImuSeries, least: float = 0.0) -> bool:
+    """Return whether the gyro turns as its orientation does, by ``least`` [rad] in a while."""
     heading = _heading(evidence, imu)
     if heading is None:
         return False
+    seen = _turns(evidence, heading)
     gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
-    return correlation(_turns(evidence, heading), gyro) > LEAST_CORRELATION
+    return _most(seen) >= least and correlation(seen, gyro) > LEAST_CORRELATION
 
 
 def _heading(evidence: Evidence, imu: ImuSeries) -> FloatArray | None:
@@ -458,19 +477,15 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
     for name, other in pairs:
         seen = _turns(evidence, other)
-        if correlation(gyro, seen) < SAME_TURNS:
+        if _most(seen) < LEAST_TURNED or correlation(gyro, seen) < SAME_TURNS:
             continue
         # Noise of either flattens the fit to it: the scale lies between both.
         one = np.ones(seen.size)
         cure = block_fit(np.column_stack([gyro, one]), seen)[0]
         other_way = 1.0 / block_fit(np.column_stack([seen, one]), gyro)[0].value
         off = min((cure.value - 1.0, other_way - 1.0), key=abs)
-        times = 1.0 / cure.value
-        if IN_DEGREES[0] < times < IN_DEGREES[1]:
-            return _in_degrees(evidence, times, f'turning by {name}')
-        turned = float(np.quantile(np.abs(seen), 0.95)) > LEAST_TURNED
-        if turned and abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
-            told = {'value': cure.value, 'times': times, 'against': name}
+        if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
+            told = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
             finding = evidence.found('gyro_scale', 0.9, std=cure.std, **told)
             return [finding], replace(evidence, gyro=evidence.gyro * cure.value)
     return [], evidence
@@ -543,7 +558,7 @@ def gyro_unit_known(evidence: Evidence) -> bool:
     if track_ratio(evidence) is not None:
         return True
     imu = evidence.recording.imu
-    return imu is not None and _turns_as_oriented(evidence, imu)
+    return imu is not None and _turns_as_oriented(evidence, imu, LEAST_TURNED)
 
 
 def skids(evidence: Evidence) -> bool:

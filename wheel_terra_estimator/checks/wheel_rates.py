@@ -13,8 +13,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask, row_medians
-from wheel_terra_estimator.checks.faults import RATE_UNITS, listed, untold
-from wheel_terra_estimator.checks.finding import Outcome
+from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, untold
 from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, hardly_moves
 from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import correlation, lonely, robust_std, runs, step_of
@@ -37,6 +36,7 @@ LEAST_COUNTS = 0.2  # speed of a wheel with fewer counts over the others', at le
 WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0  # wild change over the greatest and usual value [-]
 LEAST_WILD, MOST_WILD = 3, 0.1  # number and share of single wild values that are told
 LONG_FROZEN_TIME = 10.0  # time that a coarse encoder does not repeat itself [s]
+FAR_LONGER, MOST_FROZEN = 10.0, 0.75  # so many times longer, for so much of the driving [-]
 HELD_TORQUE = 1.5  # torque of a held wheel over that of the others, at least [-]
 DRAGGED_TORQUE = 0.5  # the same against theirs, of one that the others drag [-]
 NOISE_FACTOR = 5.0
@@ -99,9 +99,25 @@ def _about_a_side(evidence: Evidence, index: int) -> Mask:
 def _stays(evidence: Evidence, index: int) -> float:
     """Return how long a rate stays the same, but for 0, where the torque decides."""
     dead = stays(evidence, evidence.time, evidence.rate[:, index : index + 1])
-    if dead is None or dead.value == 0.0 or dead.longest <= LONG_FROZEN_TIME:
+    longest = dead.longest if dead is not None and dead.value != 0.0 else 0.0
+    longest = max(longest, _stays_once(evidence, index))
+    return longest if longest > LONG_FROZEN_TIME else 0.0
+
+
+def _stays_once(evidence: Evidence, index: int) -> float:
+    """Return how long a coarse rate stays, if far longer than it or the others' do else [s]."""
+    rate = evidence.rate[evidence.moving]
+
+    def stretches(one: FloatArray) -> list[int]:
+        same = (np.diff(one) == 0.0) & (one[1:] != 0.0)
+        return sorted([0, 0, *(last - first for first, last in runs(same))])
+
+    *_, second, longest = stretches(rate[:, index])
+    if not LONG_FROZEN_TIME / evidence.period < longest < MOST_FROZEN * rate.shape[0]:
         return 0.0
-    return dead.longest
+    others = [stretches(one)[-1] for one in np.delete(rate, index, axis=1).T]
+    usual = max(second, float(np.median(others)), 1.0)
+    return longest * evidence.period if longest > FAR_LONGER * usual else 0.0
 
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:
@@ -124,7 +140,9 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         off, usual = lonely(table), np.nanquantile(np.abs(table), 0.98, axis=0)
         noise = np.array([robust_std(column) for column in np.diff(table, axis=0).T])
         wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
-        if LEAST_WILD <= wild.sum() < MOST_WILD * wild.size:
+        # To break away or turn back takes a large torque for an instant.
+        told_by = wild if name == 'velocity' else wild & evidence.steady[:, None]
+        if told_by.sum() >= LEAST_WILD and wild.sum() < MOST_WILD * wild.size:
             wheels = evidence.facts.named(wild.any(axis=0))
             told = {'field': name, 'count': int(wild.sum()), 'most': float(off[wild].max())}
             outcomes.append(evidence.found('wild', 0.97, wheel=wheels, **told))
