@@ -41,14 +41,14 @@ def test_nose_up_is_a_negative_pitch():
 
 
 def test_without_orientation_gyro_and_gravity_give_the_slope():
-    imu, slope = InertialInput(GRAVITY), 0.15
+    imu, slope, zero = InertialInput(GRAVITY), 0.15, GyroZero(pitch=0.02)
     force = (GRAVITY * math.sin(slope), 0.0, GRAVITY * math.cos(slope))
     for i in range(2000):
-        imu.update(0.02 * i, reading(force=force), GyroZero())
+        imu.update(0.02 * i, reading(force=force, rate=(0.0, 0.02, 0.0)), zero)
     assert imu.state.attitude.sine_up == pytest.approx(math.sin(slope), abs=1e-3)
     # Nose going up at 0.1 rad/s for half a second.
     for i in range(2000, 2025):
-        imu.update(0.02 * i, reading(force=force, rate=(0.0, -0.1, 0.0)), GyroZero())
+        imu.update(0.02 * i, reading(force=force, rate=(0.0, -0.08, 0.0)), zero)
     assert imu.state.attitude.sine_up == pytest.approx(math.sin(slope) + 0.05, abs=0.01)
     assert not imu.state.attitude.reported
 

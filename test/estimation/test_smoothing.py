@@ -159,7 +159,7 @@ def test_a_late_reference_is_smoothed_at_its_own_stamp(drive):
     settled = [i for i, (s, _) in enumerate(one) if s.stamp < one[-1][0].stamp - 2e9]
     for i in settled:
         # The pull takes half of what the filter said live.
-        assert (abs(one[i][0].slip - other[i][0].slip) < 0.25 * one[i][0].slip_std).all()
+        assert (abs(one[i][0].slip - other[i][0].slip) < 0.35 * one[i][0].slip_std).all()
         np.testing.assert_allclose(one[i][0].sinkage, other[i][0].sinkage, atol=1e-4)
 
 

@@ -13,7 +13,12 @@ from wheel_terra_estimator.estimation.filter.speed_process import (
     SpeedProcess,
     SpeedStep,
 )
-from wheel_terra_estimator.estimation.filter.state import SLIP_PER_DEMAND, SPEED, Prediction
+from wheel_terra_estimator.estimation.filter.state import (
+    GRAVITY_BIAS,
+    SLIP_PER_DEMAND,
+    SPEED,
+    Prediction,
+)
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.inputs.noise import StatedNoise
 
@@ -270,6 +275,33 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
 @pytest.mark.parametrize('before', [0.0, 0.05])
 def test_wheels_alone_say_nothing_of_the_accelerometers_zero(before):
     assert process([before] * 6).by_wheels(0.1, speeds([0.06] * 6), 0.0).bias_gain == 0.0
+
+
+def test_at_rest_the_accelerometer_tells_its_zero():
+    """Twenty readings of one constant beside a prior: weighted least squares."""
+    zero, cycles, dt = 0.03, 20, 0.1
+    parts = Parts(reader.load(SAND))
+    made, ekf = process([0.0] * 6), parts.filter()
+    ekf.set(SPEED, 0.0, 1e-8)
+    prior = float(ekf.covariance[GRAVITY_BIAS, GRAVITY_BIAS])
+    window = InertialWindow(readings=1, speed_change=zero * dt, duration=dt)
+    at_rest = parts.cycle((0.0,) * 6, still=True, window=window)
+    for _ in range(cycles):
+        made.learn_bias(ekf, at_rest, 1.0)
+    precision = cycles * dt**2 / (noise() ** 2 * dt)
+    assert ekf.mean[GRAVITY_BIAS] == pytest.approx(zero * precision / (precision + 1 / prior), 1e-3)
+    assert ekf.covariance[GRAVITY_BIAS, GRAVITY_BIAS] == pytest.approx(
+        1 / (precision + 1 / prior), 1e-3
+    )
+    assert abs(ekf.mean[SPEED]) < 1e-6
+
+
+@pytest.mark.parametrize(('turning', 'ratio'), [(False, 0.2), (True, 0.8)])
+def test_the_slip_of_a_sharp_turn_is_none_to_start_with(turning, ratio):
+    made, ekf = process([0.0] * 6), Parts(reader.load(SAND)).filter()
+    ekf.set(SPEED, 0.2, 1e-4)
+    made.end_cycle(0.1, ekf, speeds([1.0] * 6), settled=True, turning=turning)
+    assert made.state.ratio == pytest.approx(ratio)
 
 
 @pytest.mark.parametrize(

@@ -119,7 +119,7 @@ def test_each_quadrant_has_the_right_signs(slope, speed, climb, climbed):
     assert np.sign(last([s.drawbar_pull for s in sets]).sum()) == np.sign(slope)
     assert last([s.forward_velocity for s in sets]) * speed > 0.0
     assert last([s.slip_velocity for s in sets]) == pytest.approx(
-        last(truth.slip_velocity), abs=0.003
+        last(truth.slip_velocity), abs=0.004
     )
     assert not any(s.stuck for s in sets)
 

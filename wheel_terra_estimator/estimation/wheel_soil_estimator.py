@@ -308,7 +308,13 @@ class WheelSoilEstimator:
 
         if not cycle.reference_known:
             self._speed.keep_with_rims(ekf, cycle.yaw_compensated)
-        self._speed.end_cycle(time, ekf, cycle.yaw_compensated, settled=self._contact_age.settled)
+        self._speed.end_cycle(
+            time,
+            ekf,
+            cycle.yaw_compensated,
+            settled=self._contact_age.settled,
+            turning=cycle.lateral_motion > _SHARP_TURN,
+        )
         self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
         self._speed.keep_least_variance(ekf, cycle.rims)
         evidence = PullEvidence(
@@ -414,6 +420,8 @@ class WheelSoilEstimator:
 
     def _predict(self, cycle: Cycle) -> None:
         """Predict speed, sinkage, soil and errors of the shear model to the time of a cycle."""
+        direction = self._contact_age.state.direction
+        self._speed.learn_bias(self._ekf, cycle, direction)
         x = self._ekf.mean
         prediction = Prediction.unchanged(x)
         step = self._speed.step(
@@ -423,7 +431,6 @@ class WheelSoilEstimator:
             inflated=cycle.reference_known,
         )
         if not cycle.still and not cycle.reference_known:
-            direction = self._contact_age.state.direction
             step = self._speed.towards_equilibrium_slip(step, cycle, direction)
         self._speed.predict(prediction, step, cycle)
         self._reference.predict(prediction, cycle.dt)

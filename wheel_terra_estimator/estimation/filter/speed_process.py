@@ -21,12 +21,14 @@ from collections.abc import Sequence
 from math import isnan
 from typing import NamedTuple
 
+import numpy as np
+
 from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
 from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
-from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import (
     GRAVITY_BIAS,
     SLIP_PER_DEMAND,
@@ -161,6 +163,7 @@ class SpeedProcess(Component[SpeedState]):
 
     def __init__(self, configuration: Configuration, rover: Rover, sensors: SensorFigures) -> None:
         self._walk = float(configuration.filter.ratio_walk)
+        self._gate = float(configuration.filter.gate)
         unknown = RimSpeeds((NAN,) * rover.wheel_count, NAN)
         super().__init__(
             SpeedState(
@@ -320,17 +323,48 @@ class SpeedProcess(Component[SpeedState]):
         variance += state.ratio_std**2 * max(now * now - before * before, 0.0)
         return SpeedStep(1.0, 0.0, state.ratio * change, variance)
 
-    def combined(self, step: SpeedStep, dt: float, window: InertialWindow) -> SpeedStep:
-        """Return the prediction with the wheels combined with the accelerometer's over `dt` [s]."""
+    def felt(self, dt: float, window: InertialWindow) -> tuple[float, float] | None:
+        """Return the change of speed by the accelerometer over `dt` [s], and its variance.
+
+        [m/s], [(m/s)^2], with the bias in it; None where the IMU left out too much.
+        """
         covered = window.duration
         if covered < _LEAST_COVERED * dt or dt <= 0.0:
-            return step
-        # A stretch that the IMU left out is filled with its mean.
-        accelerated = window.speed_change * dt / covered
+            return None
         # A vibrating rover is as noisy as it is seen to be, whatever its file states.
         stated = self.acceleration_noise(window.stated)
         noise = max(stated.force, window.noise_density) + stated.attitude
-        noise *= dt
+        # A stretch that the IMU left out is filled with its mean.
+        return window.speed_change * dt / covered, noise * dt
+
+    def learn_bias(self, ekf: GatedFilter, cycle: Cycle, direction: float) -> None:
+        """Fuse that wheels and accelerometer tell of the same change of speed.
+
+        `combined` weighs the two for a given speed and bias; how well they agree tells of these:
+        most of all at rest, where the wheels know. `direction` of the drive is 1 or -1.
+        """
+        felt = self.felt(cycle.dt, cycle.window)
+        rims = cycle.yaw_compensated
+        if felt is None or isnan(self.state.rims.typical) or isnan(rims.typical):
+            return
+        told = cycle.reference_known
+        step = self.by_wheels(cycle.dt, rims, self.state.inflation if told else 0.0)
+        if not (told or cycle.still):
+            step = self.towards_equilibrium_slip(step, cycle, direction)
+        row = np.zeros(len(ekf.mean))
+        row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - 1.0, cycle.dt
+        residual = felt[0] - step.constant - float(row @ ekf.mean)
+        variance = step.variance + felt[1]
+        prior = float(row @ ekf.covariance @ row)
+        gate = chi_square_gate(residual, prior + variance, self._gate)
+        ekf.fuse([Row(residual, row, variance + gate)])
+
+    def combined(self, step: SpeedStep, dt: float, window: InertialWindow) -> SpeedStep:
+        """Return the prediction with the wheels combined with the accelerometer's over `dt` [s]."""
+        felt = self.felt(dt, window)
+        if felt is None:
+            return step
+        accelerated, noise = felt
         weight = noise / (noise + step.variance)  # of the wheels
         return SpeedStep(
             weight * step.speed_gain + (1.0 - weight),
@@ -433,12 +467,20 @@ class SpeedProcess(Component[SpeedState]):
         if lacking > 0.0:
             ekf.inflate(SPEED, lacking)
 
-    def end_cycle(self, time: float, ekf: GatedFilter, rims: RimSpeeds, *, settled: bool) -> None:
-        """Remember what the next cycle needs."""
+    def end_cycle(
+        self,
+        time: float,
+        ekf: GatedFilter,
+        rims: RimSpeeds,
+        *,
+        settled: bool,
+        turning: bool = False,
+    ) -> None:
+        """Remember what the next cycle needs; the slip of sharp turns is none to start with."""
         state, rim = self.state, rims.typical
         inflation = state.inflation * math.exp(-self.since_cycle(time) / _INFLATION_TIME)
         ratio, ratio_std = state.ratio, state.ratio_std
-        if settled and rims.along(_RATIO_RIM * self._rover.low_rim):
+        if settled and not turning and rims.along(_RATIO_RIM * self._rover.low_rim):
             speed, variance = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
             ratio = clipped(speed / rim, _LEAST_RATIO, _MOST_RATIO)
             std = math.sqrt(variance) / abs(rim)

@@ -114,7 +114,7 @@ class InertialInput(Component[InertialState]):
             stated = window.stated.completed(reading.variance, self._given)
             if stated != window.stated:
                 window = window._replace(stated=stated)
-        attitude = self.attitude_after(attitude, reading, dt)
+        attitude = self.attitude_after(attitude, reading, dt, zero.pitch)
         force_x, force_y, force_z = reading.specific_force.tolist()
         _, pitch_rate, yaw_rate = reading.angular_rate.tolist()
         if not isnan(yaw_rate):
@@ -162,11 +162,13 @@ class InertialInput(Component[InertialState]):
         self.state = self.state._replace(window=empty)
         return window
 
-    def attitude_after(self, attitude: Attitude, reading: InertialReading, dt: float) -> Attitude:
+    def attitude_after(
+        self, attitude: Attitude, reading: InertialReading, dt: float, zero: float
+    ) -> Attitude:
         """Return the attitude after a reading that came `dt` [s] after the last one.
 
-        Without an orientation it follows the gyro and is pulled to the specific force: right on
-        average.
+        Without an orientation it follows the gyro, its `zero` [rad/s] taken off, and is pulled to
+        the specific force: right on average.
         """
         if reading.orientation is not None:
             x, y, z, w = reading.orientation.tolist()
@@ -176,7 +178,7 @@ class InertialInput(Component[InertialState]):
         if not attitude.known:
             return attitude if isnan(force) else Attitude(clipped(force, -1.0, 1.0), known=True)
         # Nose up is a negative rotation about y.
-        rate = float(reading.angular_rate[1])
+        rate = float(reading.angular_rate[1]) - zero
         turned = attitude.sine_up - (0.0 if isnan(rate) else rate * dt)
         if isnan(force):
             return Attitude(clipped(turned, -1.0, 1.0), known=True)

@@ -72,8 +72,9 @@ _ONE_SECOND_IN = 4  # is learned from; the noise of sensors changes slowly
 _FIRST_SECONDS = 12.0  # of a run; of what nobody stated they are all learned from
 _READINGS = 200.0  # over which the mean goes
 _REFERENCES = 30.0
-_MOST_JUMP = 4.0
-"""Deviations of what is seen beyond which one reading does not count: steps are no noise."""
+_MOST_JUMP = 2.0
+"""Deviations of what is seen for which one reading counts at most: steps are no noise, and with
+four, one wild reading in 16 would raise it without end."""
 _WILD = 10.0
 """Deviations of what is seen beyond which a reference is wild: no noise, and the gate's."""
 _IN_STEP = 0.2  # share by which two spacings of readings may differ
