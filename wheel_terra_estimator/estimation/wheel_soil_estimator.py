@@ -495,10 +495,9 @@ class WheelSoilEstimator:
             model_variance=start,
             repeats=repeats,
         )
-        read = 2 * len(self._sinkage.unread(cycle.time)) < self._rover.wheel_count
         self._speed.follow_contacts(
             self._contact_age.state.travel,
-            self._clock.assessment.digging if read else NAN,
+            self._clock.assessment.digging if self._depth_read(cycle.time) else NAN,
             reference_known=cycle.reference_known,
         )
         if not cycle.window.readings:
@@ -509,6 +508,10 @@ class WheelSoilEstimator:
             ekf, forces, total, cycle, stationary=stationary, model_variance=start, repeats=repeats
         )
         return forces, total, pulls, [*rows, balance]
+
+    def _depth_read(self, time: float) -> bool:
+        """Say whether sensors tell the sinkage of most wheels."""
+        return 2 * len(self._sinkage.unread(time)) < self._rover.wheel_count
 
     # -- What it means ---------------------------------------------------------------------------
 
@@ -554,6 +557,7 @@ class WheelSoilEstimator:
                 tuple(seen),
                 turning=motion.lateral_motion > _SHARP_TURN
                 or sides_oppose(rims, body.headings.by_yaw_rate),
+                depth_read=self._depth_read(time),
             ),
         )
         self._clock = self._clock._replace(assessment=assessment, speed=present)

@@ -142,12 +142,16 @@ def test_the_direction_is_that_of_the_rims_that_led_in_and_stays_until_it_clears
     assert drive(0.97, -0.05, 20.0, 140.0).direction == -ahead, 'a new one is its own'
 
 
-@pytest.mark.parametrize(('depth', 'told', 'clears'), [(0.3, 0, 1), (0.5, 0, 0), (0.5, 1, 1)])
-def test_it_does_not_clear_by_a_guessed_slip_of_wheels_too_deep_to_climb_out(depth, told, clears):
+@pytest.mark.parametrize(
+    ('depth', 'told', 'read', 'clears'),
+    [(0.3, 0, 1, 1), (0.5, 0, 1, 0), (0.5, 1, 1, 1), (0.5, 0, 0, 1)],
+)
+def test_it_does_not_clear_by_a_guessed_slip_of_wheels_too_deep(depth, told, read, clears):
     monitor = StuckMonitor(SETTINGS)
     assert course([[wheel(0.97)] * 6] * 100, monitor)[-1].stuck
     deep = wheel(0.2)._replace(sinkage=depth * wheel(0.2).radius)
-    settled = held(monitor, [deep] * 6, 10.0, start=10.0, speed=0.04, speed_known=bool(told))
+    given = {'speed_known': bool(told), 'depth_read': bool(read)}
+    settled = held(monitor, [deep] * 6, 10.0, start=10.0, speed=0.04, **given)
     assert settled[-1].stuck is not bool(clears)
 
 

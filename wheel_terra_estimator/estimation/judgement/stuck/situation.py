@@ -61,6 +61,7 @@ class RoverMotion(NamedTuple):
     wheels: tuple[WheelMotion, ...]
     turning: bool = False
     """Sharply: slip that comes from turning says nothing of what is ahead."""
+    depth_read: bool = True  # sensors tell the sinkage of most wheels
 
 
 class Memory(NamedTuple):
@@ -132,9 +133,10 @@ class Situation:
 
     @property
     def sunk(self) -> bool:
-        """Whether the wheels are too deep to climb out, and no speed says that they do."""
+        """Whether the wheels are read too deep to climb out, and no speed says that they do."""
         depths = [w.sinkage / w.radius for w in self.motion.wheels]
-        return not self.motion.speed_known and median(depths) > _DEEP
+        told = self.motion.depth_read and not self.motion.speed_known
+        return told and median(depths) > _DEEP
 
     @cached_property
     def travel_until_too_deep(self) -> tuple[float, ...]:
