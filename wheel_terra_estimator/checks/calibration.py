@@ -153,7 +153,9 @@ SEEN = {
 def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
     for key, figure in SEEN.items():
         seen, stated = report.figures.get(figure), changes.number(key)
-        if not seen or (stated and abs(math.log(seen / stated)) < WORTH_CHANGING):
+        if not seen or not math.isfinite(seen):
+            continue
+        if stated and abs(math.log(seen / stated)) < WORTH_CHANGING:
             continue
         if key.endswith('_std'):
             if seen < stated:  # biases and vibration do not jump from message to message

@@ -160,11 +160,11 @@ def _up_by_orientation(state: ImuState) -> Judged:
     imu = state.imu
     norm = np.linalg.norm(imu.orientation, axis=1)
     known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
-    if known.size < LEAST_MESSAGES:
+    usual = np.median(imu.force, axis=0)  # without noise and vibration
+    if known.size < LEAST_MESSAGES or not np.isfinite(usual).all():
         return [], state
     some = known[:: max(known.size // MOST_COMPARED, 1)]
     up = Rotation.from_quat(imu.orientation[some]).apply(imu.force[some])[:, 2]
-    usual = np.median(imu.force, axis=0)  # without noise and vibration
     cosine = float(np.clip(np.median(up) / np.linalg.norm(usual), -1.0, 1.0))
     apart, upright = math.acos(cosine), float((state.rotation @ usual)[2]) > 0.0
     if apart < UP_APART or (apart > math.pi - UP_APART and not upright):  # see `check_upside`

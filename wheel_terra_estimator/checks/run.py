@@ -240,9 +240,10 @@ def _whole_rows(recording: Recording) -> tuple[list[Outcome], Recording]:
     imu, velocity, outcomes = recording.imu, recording.reference, list[Outcome]()
     if imu is not None:
         both = np.hstack([imu.force, imu.rate])
-        there = np.isfinite(both).any(axis=0)  # a field may say that it is not there
         known = np.isfinite(both)
-        lost = np.where(there, 1.0 - known.mean(axis=0), 0.0)
+        there = np.asarray(known.any(axis=0))
+        measured = np.repeat([there[:3].any(), there[3:].any()], 3)  # or said not to be there
+        lost = np.where(measured, 1.0 - known.mean(axis=0), 0.0)
         if lost.max() > LEAST_LOST:
             field = 'linear_acceleration' if lost[:3].max() > lost[3:].max() else 'angular_velocity'
             share = 100.0 * float(lost.max())
