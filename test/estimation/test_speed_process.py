@@ -287,7 +287,7 @@ def test_at_rest_the_accelerometer_tells_its_zero():
     window = InertialWindow(readings=1, speed_change=zero * dt, duration=dt)
     at_rest = parts.cycle((0.0,) * 6, still=True, window=window)
     for _ in range(cycles):
-        made.learn_bias(ekf, at_rest, 1.0)
+        made.learn_bias(ekf, at_rest, made.by_wheels(dt, at_rest.yaw_compensated, 0.0))
     precision = cycles * dt**2 / (noise() ** 2 * dt)
     assert ekf.mean[GRAVITY_BIAS] == pytest.approx(zero * precision / (precision + 1 / prior), 1e-3)
     assert ekf.covariance[GRAVITY_BIAS, GRAVITY_BIAS] == pytest.approx(

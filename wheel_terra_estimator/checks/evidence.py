@@ -380,10 +380,7 @@ Complex: TypeAlias = NDArray[np.complex128]
 
 LEAST_YAW = math.radians(12.0)  # yaw that starts and stops tell, at least [rad]
 YAW_SIGMAS = 4.0
-FELT = (
-    0.4,
-    2.5,
-)  # what is felt along an axis over what wheels and gyro say; else it is another [-]
+FELT = (0.4, 2.5)  # felt along an axis over what wheels and gyro say; else it is another [-]
 FELT_BLOCKS = 10  # parts of a drive that a deviation comes from
 
 

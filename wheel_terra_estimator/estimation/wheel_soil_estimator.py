@@ -420,19 +420,19 @@ class WheelSoilEstimator:
 
     def _predict(self, cycle: Cycle) -> None:
         """Predict speed, sinkage, soil and errors of the shear model to the time of a cycle."""
-        direction = self._contact_age.state.direction
-        self._speed.learn_bias(self._ekf, cycle, direction)
+        speed, direction = self._speed, self._contact_age.state.direction
+        inflation = speed.state.inflation if cycle.reference_known else 0.0
+        by_wheels = expected = speed.by_wheels(cycle.dt, cycle.yaw_compensated, inflation)
+        unseen = not cycle.still and not cycle.reference_known
+        if unseen:
+            expected = speed.towards_equilibrium_slip(by_wheels, cycle, direction)
+        speed.learn_bias(self._ekf, cycle, expected)
         x = self._ekf.mean
         prediction = Prediction.unchanged(x)
-        step = self._speed.step(
-            cycle.time,
-            cycle.yaw_compensated,
-            self._trusted(cycle.window, cycle.time),
-            inflated=cycle.reference_known,
-        )
-        if not cycle.still and not cycle.reference_known:
-            step = self._speed.towards_equilibrium_slip(step, cycle, direction)
-        self._speed.predict(prediction, step, cycle)
+        step = speed.combined(by_wheels, cycle.dt, self._trusted(cycle.window, cycle.time))
+        if unseen:
+            step = speed.towards_equilibrium_slip(step, cycle, direction)
+        speed.predict(prediction, step, cycle)
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:
             travel = self._sinkage_process.predict(prediction, x, cycle)

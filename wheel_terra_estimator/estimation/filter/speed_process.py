@@ -337,20 +337,15 @@ class SpeedProcess(Component[SpeedState]):
         # A stretch that the IMU left out is filled with its mean.
         return window.speed_change * dt / covered, noise * dt
 
-    def learn_bias(self, ekf: GatedFilter, cycle: Cycle, direction: float) -> None:
+    def learn_bias(self, ekf: GatedFilter, cycle: Cycle, step: SpeedStep) -> None:
         """Fuse that wheels and accelerometer tell of the same change of speed.
 
         `combined` weighs the two for a given speed and bias; how well they agree tells of these:
-        most of all at rest, where the wheels know. `direction` of the drive is 1 or -1.
+        most of all at rest, where the wheels know. `step` is the prediction without accelerometer.
         """
         felt = self.felt(cycle.dt, cycle.window)
-        rims = cycle.yaw_compensated
-        if felt is None or isnan(self.state.rims.typical) or isnan(rims.typical):
+        if felt is None or isnan(self.state.rims.typical) or isnan(cycle.yaw_compensated.typical):
             return
-        told = cycle.reference_known
-        step = self.by_wheels(cycle.dt, rims, self.state.inflation if told else 0.0)
-        if not (told or cycle.still):
-            step = self.towards_equilibrium_slip(step, cycle, direction)
         row = np.zeros(len(ekf.mean))
         row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - 1.0, cycle.dt
         residual = felt[0] - step.constant - float(row @ ekf.mean)
