@@ -78,6 +78,15 @@ def test_the_noise_of_a_vibrating_accelerometer_is_seen_raw_and_in_means():
     assert seen[20.0] == pytest.approx(0.01, rel=0.5)
 
 
+def test_a_slope_that_the_attitude_follows_is_no_noise():
+    imu = InertialInput(GRAVITY)
+    for i, pitch in enumerate(np.linspace(0.0, 0.3, 200)):  # nose up: about -y
+        orientation = (0.0, -np.sin(0.5 * pitch), 0.0, np.cos(0.5 * pitch))
+        force = (GRAVITY * np.sin(pitch), 0.0, GRAVITY * np.cos(pitch))
+        imu.update(0.01 * i, reading(force=force, orientation=orientation), GyroZero())
+    assert imu.take().noise_density == pytest.approx(0.0, abs=1e-20)
+
+
 def test_a_gyro_without_accelerometer_and_the_reverse_are_kept_apart():
     """A rover tilted nose up by 0.1 rad, each part of the IMU sent by itself."""
     inertial, unknown = InertialInput(9.8), np.full(3, NAN)

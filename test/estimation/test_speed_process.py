@@ -52,7 +52,8 @@ def step(speed, before=0.05, now=0.05, inflation=0.0, window=None):
 
 
 def noise(parts_keys=()):
-    return process([0.0] * 6, keys=parts_keys).acceleration_noise(StatedNoise()).density
+    made = process([0.0] * 6, keys=parts_keys)
+    return made.acceleration_noise(StatedNoise()).noise_density**0.5
 
 
 def test_slow_rover_follows_its_wheels_through_a_ramp():
@@ -96,13 +97,14 @@ def test_the_inflation_is_forgotten_within_a_second():
 
 def test_wheels_that_disagree_leave_the_speed_to_the_accelerometer():
     """Two wheels spin up, two stand: the mean rim speed says nothing of the body."""
-    window = InertialWindow(speed_change=0.0, duration=0.1)
+    shaken = 1e-3
+    window = InertialWindow(speed_change=0.0, duration=0.1, noise_density=shaken)
     made = process([0.25] * 4)
     together = made.step(0.1, speeds([0.30] * 4), window, inflated=True)
     apart = made.step(0.1, speeds([0.25, 0.25, 0.35, 0.35]), window, inflated=True)
     assert together.speed_gain * 0.1 + together.constant > 0.103
     assert apart.speed_gain * 0.1 + apart.constant == pytest.approx(0.1, abs=0.001)
-    assert apart.variance <= made.acceleration_noise(StatedNoise()).density ** 2 * 0.1
+    assert apart.variance <= shaken * 0.1
 
 
 @pytest.mark.parametrize(
@@ -124,7 +126,7 @@ def test_disagreement_of_the_wheels(changes, expected):
 
 def test_slow_rover_does_not_integrate_a_bias():
     window = InertialWindow(speed_change=0.02 * 0.1, duration=0.1)
-    assert step(0.04, window=window)[0] == pytest.approx(0.04, abs=1e-4)
+    assert step(0.04, window=window)[0] == pytest.approx(0.04, abs=2e-4)
 
 
 def test_combination_is_better_than_either():

@@ -426,7 +426,8 @@ class WheelSoilEstimator:
         unseen = not cycle.still and not cycle.reference_known
         if unseen:
             expected = speed.towards_equilibrium_slip(by_wheels, cycle, direction)
-        speed.learn_bias(self._ekf, cycle, expected)
+        lacking = speed.learn_bias(self._ekf, cycle, expected)
+        by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
         x = self._ekf.mean
         prediction = Prediction.unchanged(x)
         step = speed.combined(by_wheels, cycle.dt, self._trusted(cycle.window, cycle.time))

@@ -94,12 +94,9 @@ _RATE_NOISE = 3.0
 _SIDE_TIME = 1.0  # over which a change of one side against the other is seen [s]
 _SIDE_CHANGE = 1.0  # speed that it may bring, over that change [-]
 _LEAST_COVERED = 0.5  # of a step by the IMU, to use it
-_ATTITUDE_TIME = 0.5
-"""Time within which errors of the attitude change over rough ground [s]."""
 _BIAS_WALK = 1e-3  # of the accelerometer's bias [m/s^2/sqrt(s)]
-_LEAKING_SHARE = 0.3
-"""Of gravity times the error of the attitude: what of it changes along the way."""
-_LEAK_RATE = 0.1  # of that change [1/s]
+_ATTITUDE_TIME = 20.0
+"""Time constant of the errors of the attitude [s]: what changes faster is seen as noise."""
 _EQUILIBRIUM_SLIP_STD = 0.2  # about that of the configured soil on such a slope
 USUAL_LENGTH = 1.5  # rim travel over which slip returns to it [m]
 _LEAST_EQUILIBRIUM_SLIP = -0.2
@@ -107,8 +104,8 @@ _MOST_EQUILIBRIUM_SLIP = 0.8
 _START_SHARE = 0.5
 """Of the usual speed: what is farther from it at a start without reference is a transient of
 the accelerometer."""
-_START_NOISE = 3.0
-"""Times the accelerometer's noise over a second: what is more is no transient but a slide."""
+_START_TRANSIENT = 0.1
+"""Speed [m/s] that a transient may make (0.3 m/s^2 for 0.3 s): what is more is a slide."""
 
 
 class SpeedStep(NamedTuple):
@@ -148,14 +145,9 @@ class SpeedState(NamedTuple):
 class AccelerationNoise(NamedTuple):
     """Noise of the specific force less gravity, as stated."""
 
-    force: float  # of the accelerometer, density of white noise squared [(m/s^2)^2 s]
-    attitude: float  # of gravity by errors of the attitude, the same
-    bias_walk: float  # of what the bias changes, per second [(m/s^2)^2/s]
-
-    @property
-    def density(self) -> float:
-        """White noise density of accelerometer and attitude [m/s^2 sqrt(s)]."""
-        return math.sqrt(self.force + self.attitude)
+    noise_density: float  # of white noise, squared [(m/s^2)^2 s]
+    bias_walk: float
+    """What the bias changes per second, with gravity by errors of the attitude [(m/s^2)^2/s]."""
 
 
 class SpeedProcess(Component[SpeedState]):
@@ -179,12 +171,9 @@ class SpeedProcess(Component[SpeedState]):
         sensors = self._sensors
         force = stated.specific_force_std or sensors.specific_force_std
         attitude = self._rover.gravity * (stated.orientation_std or sensors.orientation_std)
-        # The residual of gravity changes as the rover drives over rough ground.
-        leak = _LEAKING_SHARE * attitude
         return AccelerationNoise(
             force**2 / max(sensors.imu_rate, 1.0),
-            attitude**2 * _ATTITUDE_TIME,
-            _BIAS_WALK**2 + leak**2 * _LEAK_RATE,
+            _BIAS_WALK**2 + 2.0 * attitude**2 / _ATTITUDE_TIME,
         )
 
     # -- What other parts tell -------------------------------------------------------------------
@@ -332,27 +321,30 @@ class SpeedProcess(Component[SpeedState]):
         if covered < _LEAST_COVERED * dt or dt <= 0.0:
             return None
         # A vibrating rover is as noisy as it is seen to be, whatever its file states.
-        stated = self.acceleration_noise(window.stated)
-        noise = max(stated.force, window.noise_density) + stated.attitude
+        stated = self.acceleration_noise(window.stated).noise_density
+        noise = max(stated, window.noise_density)
         # A stretch that the IMU left out is filled with its mean.
         return window.speed_change * dt / covered, noise * dt
 
-    def learn_bias(self, ekf: GatedFilter, cycle: Cycle, step: SpeedStep) -> None:
+    def learn_bias(self, ekf: GatedFilter, cycle: Cycle, step: SpeedStep) -> float:
         """Fuse that wheels and accelerometer tell of the same change of speed.
 
         `combined` weighs the two for a given speed and bias; how well they agree tells of these:
         most of all at rest, where the wheels know. `step` is the prediction without accelerometer.
+        Return the variance [(m/s)^2] that it lacks where the two differ by more than the gate: soil
+        that lets go or gives way is no random walk, and wheels do not see it.
         """
         felt = self.felt(cycle.dt, cycle.window)
         if felt is None or isnan(self.state.rims.typical) or isnan(cycle.yaw_compensated.typical):
-            return
+            return 0.0
         row = np.zeros(len(ekf.mean))
         row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - 1.0, cycle.dt
         residual = felt[0] - step.constant - float(row @ ekf.mean)
         variance = step.variance + felt[1]
         prior = float(row @ ekf.covariance @ row)
-        gate = chi_square_gate(residual, prior + variance, self._gate)
-        ekf.fuse([Row(residual, row, variance + gate)])
+        lacking = chi_square_gate(residual, prior + variance, self._gate)
+        ekf.fuse([Row(residual, row, variance + lacking)])
+        return lacking
 
     def combined(self, step: SpeedStep, dt: float, window: InertialWindow) -> SpeedStep:
         """Return the prediction with the wheels combined with the accelerometer's over `dt` [s]."""
@@ -436,14 +428,14 @@ class SpeedProcess(Component[SpeedState]):
 
         A start-up transient of the accelerometer weighs much while the wheels turn slowly, and from
         a speed of zero the wheels' prediction, v' = v rim'/rim, stays zero. A rover that slides, or
-        wheels that spin up at once, differ by more than the accelerometer's noise.
+        wheels that spin up at once, differ by more than such a transient makes.
         """
         state = self.state
         rim = cycle.yaw_compensated.typical
         usual = state.ratio * rim
         off = abs(float(ekf.mean[SPEED]) - usual)
-        noise = _START_NOISE * self.acceleration_noise(cycle.window.stated).density
-        if abs(rim) > self._rover.low_rim and _START_SHARE * abs(usual) < off < noise:
+        transient = _START_SHARE * abs(usual) < off < _START_TRANSIENT
+        if transient and abs(rim) > self._rover.low_rim:
             ekf.set(SPEED, usual, (state.ratio_std * rim) ** 2)
 
     def keep_with_rims(self, ekf: GatedFilter, rims: RimSpeeds) -> None:

@@ -45,8 +45,8 @@ class InertialWindow(NamedTuple):
     speed_change: float = 0.0  # integral of f_x - g_x [m/s]
     duration: float = 0.0  # [s] covered by that integral
     noise_density: float = 0.0
-    """Square of the white noise density that the specific force along the body is seen to have,
-    vibration included [(m/s^2)^2 s]."""
+    """Square of the white noise density that f_x - g_x is seen to have, with vibration and what
+    the attitude adds [(m/s^2)^2 s]."""
     stated: StatedNoise = NOTHING_STATED
     """What the messages state of their noise, where no file does."""
 
@@ -83,7 +83,7 @@ class InertialState(NamedTuple):
     rate_time: float = -math.inf  # of the last angular rate
     window: InertialWindow = InertialWindow()
     attitude: Attitude = Attitude()
-    force_x: float = NAN  # of the last reading [m/s^2]
+    acceleration: float = NAN  # f_x - g_x of the last reading [m/s^2]
 
 
 class InertialInput(Component[InertialState]):
@@ -108,7 +108,7 @@ class InertialInput(Component[InertialState]):
 
     def update(self, time: float, reading: InertialReading, zero: GyroZero) -> None:
         """Take a reading at a time [s]."""
-        before, force_time, rate_time, window, attitude, last_force = self.state
+        before, force_time, rate_time, window, attitude, last = self.state
         dt = time - before if before > -math.inf else 0.0
         if any(reading.variance) and not all(window.stated):
             stated = window.stated.completed(reading.variance, self._given)
@@ -126,7 +126,9 @@ class InertialInput(Component[InertialState]):
             )
         if not isnan(force_x):
             since = time - force_time if force_time > -math.inf else 0.0
-            force_time, change, last_force = time, force_x - last_force, force_x
+            force_time = time
+            acceleration = force_x - self._gravity * attitude.sine_up
+            change, last = acceleration - last, acceleration
             speed_change, duration = window.speed_change, window.duration
             noise = window.noise_density
             if 0.0 < since <= _LONGEST_GAP:
@@ -134,7 +136,7 @@ class InertialInput(Component[InertialState]):
                 # the same for raw readings and for means of several.
                 seen = 0.5 * change**2 * since
                 noise += gain_of(since, _NOISE_TIME) * (seen - noise)
-                speed_change += (force_x - self._gravity * attitude.sine_up) * since
+                speed_change += acceleration * since
                 duration += since
             window = window._replace(
                 readings=window.readings + 1,
@@ -147,7 +149,7 @@ class InertialInput(Component[InertialState]):
             )
         elif reading.orientation is not None:
             window = window._replace(gravity=self._at_rest(reading.orientation))
-        self.state = InertialState(time, force_time, rate_time, window, attitude, last_force)
+        self.state = InertialState(time, force_time, rate_time, window, attitude, last)
 
     def _at_rest(self, orientation: FloatArray) -> tuple[float, float, float]:
         """Return the specific force of a rover that stands with this orientation [m/s^2]."""

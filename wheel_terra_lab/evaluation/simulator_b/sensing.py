@@ -172,8 +172,8 @@ def _inertial(
     felt = felt + sensors.force_bias_walk * np.sqrt(dt) * np.cumsum(
         generator.standard_normal((n, 3)), axis=0
     )
-    turn = np.zeros((n, 3))
-    turn[:, 2] = course.at('speed', time)[:, 2]
+    up = np.gradient(course.at('slopes', time) + tilt, time, axis=0)  # nose, left side [rad/s]
+    turn = np.stack([up[:, 1], -up[:, 0], course.at('speed', time)[:, 2]], axis=1)
     turn = turn + sensors.gyro_bias + sensors.gyro_noise * generator.standard_normal((n, 3))
     turn = turn + sensors.gyro_bias_walk * np.sqrt(dt) * np.cumsum(
         generator.standard_normal((n, 3)), axis=0
