@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from rosbags.interfaces import Nodetype
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.bags.storage import jazzy_types
@@ -29,12 +30,31 @@ class MessageFactory:
         self.store = jazzy_types()
 
     def make(self, kind: str, **values: Any) -> Any:
-        """Return a message of a type such as ``std_msgs/msg/Bool``."""
-        return self.store.types[kind](**values)
+        """Return a message of a type such as ``std_msgs/msg/Bool``.
+
+        A dictionary states a message within it; what is not stated is zero, false or empty.
+        """
+        _, fields = self.store.fielddefs[kind]
+        assert values.keys() <= dict(fields).keys()
+        parts = {name: self._part(values.get(name), *field) for name, field in fields}
+        return self.store.types[kind](**parts)
+
+    def _part(self, given: Any, node: Nodetype, of: Any) -> Any:
+        """Return the value of a field, or of an entry of one."""
+        if node is Nodetype.NAME:
+            stated = {} if given is None else given
+            return self.make(of, **stated) if isinstance(stated, dict) else stated
+        if node is Nodetype.BASE:
+            usual = {'string': '', 'bool': False, 'float64': 0.0}.get(of[0], 0)
+            return usual if given is None else type(usual)(given)
+        entry, size = of
+        if entry[0] is Nodetype.NAME or entry[1][0] == 'string':
+            return [self._part(each, *entry) for each in (given or ())]
+        return np.asarray([0] * size if given is None else given, dtype=entry[1][0]).ravel()
 
     def header(self, stamp: int, frame: str = BASE_FRAME) -> Any:
         seconds, nanoseconds = divmod(stamp, 1_000_000_000)
-        time = self.make('builtin_interfaces/msg/Time', sec=seconds, nanosec=nanoseconds)
+        time = {'sec': seconds, 'nanosec': nanoseconds}
         return self.make('std_msgs/msg/Header', stamp=time, frame_id=frame)
 
     def joint_state(
@@ -45,71 +65,33 @@ class MessageFactory:
         velocity: ArrayLike = (),
         effort: ArrayLike = (),
     ) -> Any:
-        return self.make(
-            JOINT_STATE,
-            header=header,
-            name=list(names),
-            position=np.asarray(position, dtype=np.float64),
-            velocity=np.asarray(velocity, dtype=np.float64),
-            effort=np.asarray(effort, dtype=np.float64),
-        )
+        columns = {'position': position, 'velocity': velocity, 'effort': effort}
+        return self.make(JOINT_STATE, header=header, name=names, **columns)
 
-    def slip_class(self, classes: ArrayLike) -> Any:
+    def slip_class(self, classes: Sequence[int]) -> Any:
         """Return the classes of the wheels as a UInt8MultiArray."""
-        data = np.asarray(classes, dtype=np.uint8)
-        dimension = self.make(
-            'std_msgs/msg/MultiArrayDimension', label='wheel', size=data.size, stride=data.size
-        )
-        layout = self.make('std_msgs/msg/MultiArrayLayout', dim=[dimension], data_offset=0)
-        return self.make('std_msgs/msg/UInt8MultiArray', layout=layout, data=data)
-
-    def vector(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
-        return self.make('geometry_msgs/msg/Vector3', x=float(x), y=float(y), z=float(z))
-
-    def quaternion(self, x: float, y: float, z: float, w: float) -> Any:
-        return self.make(
-            'geometry_msgs/msg/Quaternion', x=float(x), y=float(y), z=float(z), w=float(w)
-        )
+        dimension = {'label': 'wheel', 'size': len(classes), 'stride': len(classes)}
+        return self.make('std_msgs/msg/UInt8MultiArray', layout={'dim': [dimension]}, data=classes)
 
     def twist_with_covariance(self, forward: float, yaw_rate: float, covariance: ArrayLike) -> Any:
         """Return a TwistWithCovariance of a body that moves along x and turns about z."""
-        twist = self.make(
-            'geometry_msgs/msg/Twist', linear=self.vector(forward), angular=self.vector(z=yaw_rate)
-        )
-        return self.make(
-            'geometry_msgs/msg/TwistWithCovariance',
-            twist=twist,
-            covariance=np.asarray(covariance, dtype=np.float64).reshape(36),
-        )
+        twist = {'linear': {'x': forward}, 'angular': {'z': yaw_rate}}
+        kind = 'geometry_msgs/msg/TwistWithCovariance'
+        return self.make(kind, twist=twist, covariance=covariance)
 
     def twist_stamped(
         self, header: Any, forward: float, yaw_rate: float, covariance: ArrayLike
     ) -> Any:
+        twist = self.twist_with_covariance(forward, yaw_rate, covariance)
         return self.make(
-            'geometry_msgs/msg/TwistWithCovarianceStamped',
-            header=header,
-            twist=self.twist_with_covariance(forward, yaw_rate, covariance),
+            'geometry_msgs/msg/TwistWithCovarianceStamped', header=header, twist=twist
         )
 
     def odometry(self, header: Any, twist: Any) -> Any:
         """Return an Odometry that states a twist only (pose at the origin, placeholder 0.1)."""
-        position = self.make('geometry_msgs/msg/Point', x=0.0, y=0.0, z=0.0)
-        pose = self.make(
-            'geometry_msgs/msg/Pose',
-            position=position,
-            orientation=self.quaternion(0.0, 0.0, 0.0, 1.0),
-        )
-        return self.make(
-            'nav_msgs/msg/Odometry',
-            header=header,
-            child_frame_id=BASE_FRAME,
-            pose=self.make(
-                'geometry_msgs/msg/PoseWithCovariance',
-                pose=pose,
-                covariance=(0.1 * np.eye(6)).reshape(36),
-            ),
-            twist=twist,
-        )
+        pose = {'pose': {'orientation': {'w': 1.0}}, 'covariance': 0.1 * np.eye(6)}
+        kind = 'nav_msgs/msg/Odometry'
+        return self.make(kind, header=header, child_frame_id=BASE_FRAME, pose=pose, twist=twist)
 
     def imu(
         self,
@@ -120,38 +102,24 @@ class MessageFactory:
         variances: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> Any:
         """Return an Imu; ``variances`` of orientation, angular rate and specific force."""
-        of_orientation, of_rate, of_force = ((np.eye(3) * v).reshape(9) for v in variances)
+        of_orientation, of_rate, of_force = (np.eye(3) * v for v in variances)
         if orientation is None:
-            of_orientation = np.array([-1.0, *[0.0] * 8])
+            orientation, of_orientation = (0.0, 0.0, 0.0, 1.0), np.array([-1.0, *[0.0] * 8])
         return self.make(
             'sensor_msgs/msg/Imu',
             header=header,
-            orientation=self.quaternion(
-                *((0.0, 0.0, 0.0, 1.0) if orientation is None else orientation)
-            ),
+            orientation=dict(zip('xyzw', orientation, strict=True)),
             orientation_covariance=of_orientation,
-            angular_velocity=self.vector(*angular_rate),
+            angular_velocity=dict(zip('xyz', angular_rate, strict=True)),
             angular_velocity_covariance=of_rate,
-            linear_acceleration=self.vector(*specific_force),
+            linear_acceleration=dict(zip('xyz', specific_force, strict=True)),
             linear_acceleration_covariance=of_force,
         )
 
     def diagnostic_array(self, header: Any, found: Sequence[Status]) -> Any:
-        return self.make(
-            'diagnostic_msgs/msg/DiagnosticArray',
-            header=header,
-            status=[
-                self.make(
-                    'diagnostic_msgs/msg/DiagnosticStatus',
-                    level=status.level,
-                    name=status.name,
-                    message=status.message,
-                    hardware_id=status.hardware_id,
-                    values=[
-                        self.make('diagnostic_msgs/msg/KeyValue', key=key, value=value)
-                        for key, value in status.values
-                    ],
-                )
-                for status in found
-            ],
-        )
+        """Return a DiagnosticArray of statuses."""
+        statuses = [
+            {**s._asdict(), 'values': [{'key': key, 'value': value} for key, value in s.values]}
+            for s in found
+        ]
+        return self.make('diagnostic_msgs/msg/DiagnosticArray', header=header, status=statuses)

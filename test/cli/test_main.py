@@ -86,31 +86,16 @@ def test_debug_shows_the_traceback(broken, arguments):
         main.main(arguments)
 
 
-def examples():
+def test_every_command_has_a_debug_option_and_examples_that_parse():
+    parser, parsers = main._parsers(main.COMMANDS)[0], main.sub_parsers()
     for name in main.COMMANDS:
-        module = main.command_module(name)
-        for line in getattr(module, 'EXAMPLES', ()):
-            yield pytest.param(line, id=line[:40])
-
-
-@pytest.fixture(scope='module')
-def parser():
-    return main._parsers(main.COMMANDS)[0]
-
-
-@pytest.mark.parametrize('line', list(examples()))
-def test_examples_of_the_help_parse(line, parser):
-    own, _, _ = line.partition(' > ')  # what follows is the shell's
-    program, *arguments = shlex.split(own)
-    assert program == 'wheel-terra'
-    if '--help' not in arguments:
-        parser.parse_args(arguments)
-
-
-def test_every_command_has_examples_and_a_debug_option():
-    for name, parser in main.sub_parsers().items():
-        assert 'examples:' in (parser.epilog or ''), name
-        assert any('--debug' in action.option_strings for action in parser._actions), name
+        assert 'examples:' in (parsers[name].epilog or ''), name
+        assert any('--debug' in action.option_strings for action in parsers[name]._actions), name
+        for line in main.command_module(name).EXAMPLES:
+            program, *arguments = shlex.split(line.partition(' > ')[0])  # the rest is the shell's
+            assert program == 'wheel-terra'
+            if '--help' not in arguments:
+                parser.parse_args(arguments)
 
 
 @pytest.mark.parametrize(('shell', 'text'), list(scripts().items()))

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
-from node_server import InterpretedProcess, NodeServer
+from node_server import ForkedProcess, InterpretedProcess
 
 ATTEMPTS = 3
 """A test over DDS fails when it fails this often: where processes share few cores, the machine
@@ -41,8 +41,12 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope='session', autouse=True)
 def own_domain():
-    """Keep apart from other robots and from other test runs on this machine."""
+    """Keep apart from other robots and from other test runs on this machine.
+
+    The libraries of nodes get one thread: of several a fork would keep none.
+    """
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ |= {'OMP_NUM_THREADS': '1', 'OPENBLAS_NUM_THREADS': '1'}
     domains = random.SystemRandom().sample(range(1, 101), 100)
     for domain in domains:  # a lock keeps parallel workers and runs out of each other's domain
         path = Path(tempfile.gettempdir()) / f'wheel_terra_test_domain_{domain}.lock'
@@ -64,18 +68,11 @@ def no_node_stays():
     gc.collect()
 
 
-@pytest.fixture(scope='session')
-def node_server(own_domain):
-    server = NodeServer()
-    yield server
-    server.close()
-
-
 def _starter(make):
     running = []
 
     def start(module, *arguments, **more):
-        running.append(make(module, arguments, **more))
+        running.append(make(module, *arguments, **more))
         return running[-1]
 
     yield start
@@ -91,9 +88,9 @@ def soon():
 
 
 @pytest.fixture
-def start(node_server):
+def start():
     """Start nodes that do not outlive the test, imports done (a second less for each)."""
-    yield from _starter(node_server.start)
+    yield from _starter(ForkedProcess)
 
 
 @pytest.fixture
@@ -113,14 +110,13 @@ def parameters(tmp_path):
 
 
 @pytest.fixture(scope='class')
-def running_estimator(node_server, tmp_path_factory):
+def running_estimator(tmp_path_factory):
     """One estimator node for the tests of a class, in their order."""
     from wheel_terra_estimator.configuration import reader
 
     path = tmp_path_factory.mktemp('estimator') / 'rover.yaml'
     reader.load(['pathfinder']).write(path)
-    arguments = ['--ros-args', '--params-file', str(path)]
-    process = node_server.start('estimator_node', arguments)
+    process = ForkedProcess('estimator_node', '--ros-args', '--params-file', str(path))
     yield process
     process.stop(signal.SIGKILL)
 

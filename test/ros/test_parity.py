@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from node_server import ForkedProcess
 from recordings import beginning
 
 from wheel_terra_estimator.bags.storage import open_bag
@@ -15,6 +16,7 @@ from wheel_terra_estimator.cli.main import main
 
 SECONDS = 6.0
 """Of a recording that is played."""
+NODE = 'estimator_node'
 DEMO = Path(__file__).resolve().parents[2] / 'data' / 'demo'
 
 
@@ -70,14 +72,11 @@ def assert_same_bits(live, again, least):
 
 
 @pytest.fixture
-def forked_node(node_server, monkeypatch):
+def forked_node(monkeypatch):
     """The player of a recording gets its node from the server."""
     from wheel_terra_lab import live_drive
 
-    def start_node(arguments):
-        return node_server.start('estimator_node', arguments)
-
-    monkeypatch.setattr(live_drive, 'start_node', start_node)
+    monkeypatch.setattr(live_drive, 'start_node', lambda given: ForkedProcess(NODE, *given))
 
 
 @pytest.mark.usefixtures('forked_node')
@@ -105,10 +104,10 @@ def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
     assert_same_bits(live, again, least=50)
 
 
-def test_ctrl_c_ends_a_live_drive_without_a_traceback(node_server, tmp_path):
+def test_ctrl_c_ends_a_live_drive_without_a_traceback(start, tmp_path):
     arguments = [str(DEMO / 'pathfinder'), '--config', 'pathfinder', '--rate', '0.1']
     arguments += ['-o', str(tmp_path / 'out'), '--arrival', str(tmp_path / 'arrival.txt')]
-    process = node_server.start('live_drive', arguments, 'wheel_terra_lab')
+    process = start('live_drive', *arguments, package='wheel_terra_lab')
     until = time.monotonic() + 60.0
     while not (tmp_path / 'arrival.txt').is_file() and time.monotonic() < until:
         time.sleep(0.1)
