@@ -83,9 +83,7 @@ class MessageFactory:
         self, header: Any, forward: float, yaw_rate: float, covariance: ArrayLike
     ) -> Any:
         twist = self.twist_with_covariance(forward, yaw_rate, covariance)
-        return self.make(
-            'geometry_msgs/msg/TwistWithCovarianceStamped', header=header, twist=twist
-        )
+        return self.make('geometry_msgs/msg/TwistWithCovarianceStamped', header=header, twist=twist)
 
     def odometry(self, header: Any, twist: Any) -> Any:
         """Return an Odometry that states a twist only (pose at the origin, placeholder 0.1)."""

@@ -5,17 +5,19 @@
 import json
 import os
 import re
+import struct
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
-import fuzzing_bags
 import pytest
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab.studies.fuzzing import mcap_maker as maker
 
 HEAD = '/**:\n  ros__parameters:\n'
 LAUGHS = 'a0: &a0 [x, x]\n' + ''.join(
@@ -70,11 +72,33 @@ def limited(commands: list[list[str]]) -> list[tuple[int, str, float, int]]:
     return [tuple(json.loads(line)) for line in done.stdout.splitlines()]
 
 
+def bombs(size: int) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of what unpacks to so many bytes, one chunk to a quarter of them."""
+    try:
+        from compression import zstd
+    except ImportError:
+        from backports import zstd
+    zeros, frame = bytes(2**24), zstd.ZstdCompressor()
+    count = size // len(zeros)
+    one_frame = b''.join([*(frame.compress(zeros) for _ in range(count)), frame.flush()])
+    for name, packed, stated in (
+        ('frames.mcap', count * zstd.compress(zeros), size),
+        ('frame.mcap', one_frame, size),
+        ('liar.mcap', one_frame, 1000),
+        ('zeros.mcap', one_frame, size // 4),
+    ):
+        head = struct.pack('<QQQI', 1, 2, stated, 0) + maker._text('zstd')
+        content = head + struct.pack('<Q', len(packed)) + packed
+        yield name, maker.MAGIC + maker._record(6, content)
+    yield 'file.mcap.zstd', one_frame
+    yield 'file.db3.zstd', one_frame
+
+
 @pytest.mark.parametrize('size', [5 * 2**26, pytest.param(2**30, marks=pytest.mark.slow)])
 def test_bombs_in_recordings(tmp_path, size):
     """A chunk that unpacks to a gigabyte, one that says less than it holds, a file of zeros."""
     paths = []
-    for name, content in fuzzing_bags.bombs(size):
+    for name, content in bombs(size):
         paths.append(tmp_path / name)
         paths[-1].write_bytes(content)
     commands = [['replay', str(path), '--config', 'frostyboy'] for path in paths]

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Python interface against the commands, and its own examples."""
 
-import contextlib
 import csv
 import doctest
 import importlib
@@ -14,7 +13,6 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator import api
-from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
@@ -35,20 +33,10 @@ def test_examples_in_docstrings(name):
     assert result.attempted > 0
 
 
-def command(*arguments):
-    """Return what a command prints."""
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out):
-        assert main([str(a) for a in arguments]) == 0
-    return out.getvalue()
-
-
-def test_curve_is_that_of_predict():
+def test_curve_is_that_of_predict(printed):
     files = ('hit_wh3', 'hit_fit')
-    printed = command(
-        'predict', '--config', files[0], '--config', files[1], '--slip', '0.1,0.4', '--load', '80'
-    )
-    rows = list(csv.DictReader(io.StringIO(printed)))
+    command = ['predict', '--config', files[0], '--config', files[1], '--slip', '0.1,0.4']
+    rows = list(csv.DictReader(io.StringIO(printed([*command, '--load', '80']))))
     curve = api.Model.load(*files).curve([0.1, 0.4], 80.0)
     for name in ('sinkage', 'drawbar_pull', 'torque'):
         np.testing.assert_allclose(

@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from fake_estimator import SECOND
+from fake_estimator import SECOND, play
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -72,8 +72,7 @@ def test_late_inputs_end_in_the_same_bits(rover, seed):
     ends = []
     for order in (stream, late):
         core = EstimatorCore(rover)
-        sets = [s for m in (*order, *tail()) for s in core.add(m)] + core.flush()
-        ends.append(bits(sets[-1]))
+        ends.append(bits(play(core, (*order, *tail()))[-1]))
         assert core.health()['filter_restarts'] == 0
     assert ends[0] == ends[1]
 
@@ -83,10 +82,8 @@ def test_after_a_reset_nothing_is_left(rover):
     for m in drive(1):
         core.add(m)
     core.reset()
-    again = [bits(s) for m in drive(2) for s in core.add(m)]
-    fresh = EstimatorCore(rover)
-    expected = [bits(s) for m in drive(2) for s in fresh.add(m)]
-    assert again == expected
+    again, fresh = (play(each, drive(2)) for each in (core, EstimatorCore(rover)))
+    assert list(map(bits, again)) == list(map(bits, fresh))
 
 
 @pytest.mark.parametrize('seed', [0, pytest.param(1, marks=pytest.mark.slow)])

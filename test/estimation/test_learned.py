@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from fake_estimator import SECOND
+from fake_estimator import SECOND, play
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import read_values, write_values
@@ -33,8 +33,7 @@ OVERRIDES = {'sensors.specific_force_bias_std': 0.1, 'sensors.orientation_std_de
 
 def run(configuration, measurements):
     core = EstimatorCore(configuration)
-    sets = [s for m in measurements for s in core.add(m)] + core.flush()
-    return core, sets
+    return core, play(core, measurements)
 
 
 def deviation(key):

@@ -19,7 +19,6 @@ from fake_estimator import (
     reference,
     sinkage,
     stamp_at,
-    with_runs_in_order,
 )
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -152,28 +151,6 @@ def drive(duration):
     stream += [sinkage(0.1 * i + 0.013, depth=0.001 * i) for i in range(round(10 * duration))]
     stream += [reference(0.5 * i + 0.007, forward=0.01 * i) for i in range(round(2 * duration))]
     return sorted(stream, key=lambda m: m.stamp)
-
-
-@pytest.mark.parametrize(('seed', 'silent'), [(0, None), (1, None), (2, 0.2)])
-def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(seed, silent):
-    """The definition itself, with merged steps: also where late odometry moves their ends.
-
-    Where the odometry is silent, sets come in the midst of steps.
-    """
-    unbounded = {**DEFAULT, 'max_lag': 0.0, 'filter__rerun_rate': 0.0}
-    stream = drive(0.6 if silent is None else 1.4)
-    if silent is not None:
-        end = stamp_at(silent + 0.9)
-        stream = [
-            m
-            for m in stream
-            if not isinstance(m, WheelOdometry) or not stamp_at(silent) < m.stamp < end
-        ]
-    delays = np.random.default_rng(seed).choice([0.0, 0.0, 0.004, 0.03, 0.25], len(stream))
-    for estimates, expected in with_runs_in_order(stream, delays, **unbounded):
-        # A late odometry may have taken the place of this one: then it ends no step there.
-        if expected.stamp == estimates.stamp:
-            assert essence([estimates]) == essence([expected])
 
 
 # -- Lag ----------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from math import nan, radians
 
 import numpy as np
 import pytest
+from fake_estimator import play
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -69,7 +70,7 @@ def without_statement():
 def run(configuration, stream):
     """Return speed, slip and their deviations of all sets, and what diagnostics tell."""
     core = EstimatorCore(configuration)
-    sets = [s for m in stream for s in core.add(m)] + core.flush()
+    sets = play(core, stream)
     rows = [[s.forward_velocity, s.forward_velocity_variance, *s.slip, *s.slip_std] for s in sets]
     return np.array(rows), core.health()
 

@@ -134,14 +134,26 @@ def test_with_a_large_max_lag_the_order_of_arrival_is_nothing(data):
     assert essence(play(core, shuffled)) == expected
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.data())
 def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(data):
-    """The definition itself: laziness, kept states and forgetting must not show."""
-    stream = drive(1.5)
+    """The definition itself: laziness, kept states, forgetting and merged steps must not show.
+
+    Late odometry moves the ends of merged steps; where it is silent, sets come in their midst.
+    """
+    rate, silent = data.draw(st.sampled_from([0.0, 4.0])), data.draw(st.booleans())
+    end = stamp_at(0.9) if silent else 0
+    stream = [
+        m
+        for m in drive(1.5)
+        if not isinstance(m, WheelOdometry) or not stamp_at(0.2) < m.stamp < end
+    ]
     delays = [data.draw(st.sampled_from([0.0, 0.0, 0.004, 0.03, 0.25, 0.7])) for _ in stream]
-    for estimates, expected in with_runs_in_order(stream, delays):
-        assert estimates.forward_velocity == expected.forward_velocity
+    unbounded = {'output_rate': rate, 'filter__rerun_rate': 0.0}
+    for estimates, expected in with_runs_in_order(stream, delays, **unbounded):
+        # A late odometry may have taken the place of this one: then it ends no step there.
+        if expected.stamp == estimates.stamp or not (rate or silent):
+            assert essence([estimates]) == essence([expected])
 
 
 @settings(max_examples=20, deadline=None)

@@ -113,7 +113,7 @@ def test_each_quadrant_has_the_right_signs(slope, speed, climb, climbed):
     if slope == 8.0:
         sets, truth = climbed[0], climb.truth
     else:
-        run = drive(12.0, **{'slope.angle_deg': [slope], 'drive.forward': [speed]})
+        run = drive(**{'slope.angle_deg': [slope], 'drive.forward': [speed]})
         sets, truth = estimate(run), run.truth
     assert_followed(sets, truth)
     assert np.sign(last([s.drawbar_pull for s in sets]).sum()) == np.sign(slope)
@@ -187,9 +187,7 @@ def test_new_run_keeps_the_soil_only_when_asked(climb, climbed):
 
 
 def test_rest_holds_slip_and_says_unknown():
-    run = drive(
-        duration=14.0, **{'drive.time': [0.0, 8.0, 8.1], 'drive.forward': [0.05, 0.05, 0.0]}
-    )
+    run = drive(**{'drive.time': [0.0, 5.0, 5.1], 'drive.forward': [0.05, 0.05, 0.0]})
     sets = estimate(run)
     at_rest = sets[-30:]
     assert all((s.slip_class == SlipClass.UNKNOWN).all() for s in at_rest)
@@ -221,7 +219,7 @@ def test_wheel_without_load_is_found_by_its_torque_and_taken_back():
 
 
 def test_locked_wheel_is_dragged_along():
-    run = drive(12.0, **fault('locked', 'rear_right', 8.0, 12.0))
+    run = drive(10.0, **fault('locked', 'rear_right', 6.0, 10.0))
     sets, truth = estimate(run), run.truth
     # Once the body stands as well the wheel is dragged no more, and its pull is hardly seen.
     pull, true_pull = sets[-15].drawbar_pull, truth.drawbar_pull[-15]
@@ -272,15 +270,15 @@ def test_torques_alone_carry_no_rover_backwards():
 
 
 @pytest.mark.parametrize(
-    ('kind', 'mode', 'most'),
+    ('kind', 'mode', 'duration', 'most'),
     [
-        pytest.param('firm', 'reference', 0.04, marks=pytest.mark.slow),
-        ('cruise', 'no_reference', 0.05),
+        pytest.param('firm', 'reference', 40.0, 0.04, marks=pytest.mark.slow),
+        ('cruise', 'no_reference', 20.0, 0.035),
     ],
 )
-def test_nothing_drifts_along_the_ridge_of_slip_and_strength(kind, mode, most):
+def test_nothing_drifts_along_the_ridge_of_slip_and_strength(kind, mode, duration, most):
     """One contact, looked at ten times a second, must not tell slip, strength and K apart."""
-    sets, rows, d = after_ten_seconds(kind, 40.0, mode)
+    sets, rows, d = after_ten_seconds(kind, duration, mode)
     error = [np.nanmedian(s.slip - d.truth.slip[row]) for s, row in zip(sets, rows, strict=True)]
     assert np.sqrt(np.mean(np.square(error))) < most
     found = dict(zip(sets[-1].soil_names, sets[-1].soil, strict=True))
@@ -308,7 +306,7 @@ def test_a_wheel_sunk_to_its_hub_is_followed():
 
 
 def test_sinkage_tells_weak_ground_where_no_torque_does():
-    sets, rows, d = after_ten_seconds('mixed_soil', 30.0, 'no_torque')
+    sets, rows, d = after_ten_seconds('mixed_soil', 22.0, 'no_torque')
     error = np.array([s.drawbar_pull for s in sets]) - d.truth.drawbar_pull[rows]
     std = np.array([s.drawbar_pull_std for s in sets])
     assert np.sqrt(np.nanmean(error**2)) < 0.03 * d.truth.normal_load.mean()

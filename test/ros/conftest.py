@@ -122,16 +122,26 @@ def running_estimator(tmp_path_factory):
 
 
 @pytest.fixture
-def listener():
-    """Return a node in this process and a function that spins until a condition holds."""
+def executor():
+    """What turns nodes of this process, in a context of its own."""
     import rclpy
     from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
 
     context = Context()
     rclpy.init(args=[], context=context)
-    node = rclpy.create_node('listener', context=context)
-    executor = SingleThreadedExecutor(context=context)
+    made = SingleThreadedExecutor(context=context)
+    yield made
+    made.shutdown()
+    rclpy.shutdown(context=context)
+
+
+@pytest.fixture
+def listener(executor):
+    """Return a node in this process and a function that spins until a condition holds."""
+    from rclpy.node import Node
+
+    node = Node('listener', context=executor.context)
     executor.add_node(node)
 
     def until(condition, seconds=60.0):
@@ -143,6 +153,5 @@ def listener():
                 executor.spin_once(timeout_sec=left)
 
     yield node, until
-    executor.shutdown()
+    executor.remove_node(node)
     node.destroy_node()
-    rclpy.shutdown(context=context)

@@ -10,6 +10,8 @@ import pytest
 import ros_types as ros
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.messages.convert import INPUT_TYPES
+from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS
 
 ROVER = ['--ros-args', '--params-file']
 NODE = '/wheel_terra_estimator'
@@ -131,13 +133,7 @@ class TestOneNode:
     def test_topics_types_and_stuck_for_those_who_come_late(self, listener):
         node, until = listener
         expected = {
-            'slip': 'sensor_msgs/msg/JointState',
-            'sinkage': 'sensor_msgs/msg/JointState',
-            'slip_stddev': 'sensor_msgs/msg/JointState',
-            'sinkage_stddev': 'sensor_msgs/msg/JointState',
-            'mobility': 'sensor_msgs/msg/JointState',
-            'soil': 'sensor_msgs/msg/JointState',
-            'slip_on_slope': 'sensor_msgs/msg/JointState',
+            **dict.fromkeys(JOINT_OUTPUTS, 'sensor_msgs/msg/JointState'),  # listed in test_pack
             'slip_class': 'std_msgs/msg/UInt8MultiArray',
             'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
             'stuck': 'std_msgs/msg/Bool',
@@ -152,14 +148,7 @@ class TestOneNode:
             assert offered()[f'{NODE}/{topic}'] == kind
             (info,) = node.get_publishers_info_by_topic(f'{NODE}/{topic}')
             assert info.qos_profile.reliability.name == 'RELIABLE'
-        for topic in (
-            'joint_states',
-            'odom',
-            'imu/data',
-            'sinkage',
-            'leaving_angle',
-            'reference_odom',
-        ):
+        for topic in INPUT_TYPES:
             if subscribers := node.get_subscriptions_info_by_topic(f'/{topic}'):
                 assert subscribers[0].qos_profile.reliability.name == 'BEST_EFFORT', topic
         stuck = hear(node, ros.Bool, f'{NODE}/stuck', latched())

@@ -16,25 +16,18 @@ MISSED = 400  # messages: more than the queues hold
 
 
 @pytest.fixture
-def drive(start, tmp_path):
+def drive(executor, start, tmp_path):
     """A rover that publishes all inputs, and what turns it and starts a node."""
-    import rclpy
-    from rclpy.context import Context
-    from rclpy.executors import SingleThreadedExecutor
-
     from wheel_terra_lab.studies.live_rover import Rover
 
     configuration = reader.load([ROVER])
     path = tmp_path / 'rover.yaml'
     configuration.write(path)
-    context = Context()
-    rclpy.init(args=[], context=context)
-    rover = Rover(configuration.wheels.names, RATES, context=context)
-    executor = SingleThreadedExecutor(context=context)
+    rover = Rover(configuration.wheels.names, RATES, context=executor.context)
     executor.add_node(rover)
 
-    def until(condition, seconds=60.0):
-        end = time.monotonic() + seconds
+    def until(condition):
+        end = time.monotonic() + 60.0
         while not condition():
             assert time.monotonic() < end, f'not in time; the node says: {rover.said}'
             due = rover.publish_due()
@@ -44,9 +37,8 @@ def drive(start, tmp_path):
         return start('estimator_node', '--ros-args', '--params-file', str(path), **more)
 
     yield rover, until, start_node
-    executor.shutdown()
+    executor.remove_node(rover)
     rover.destroy_node()
-    rclpy.shutdown(context=context)
 
 
 def lasts(seconds):
