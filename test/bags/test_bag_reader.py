@@ -78,9 +78,11 @@ def test_what_is_missing_is_told_with_what_it_costs(make_bag, rover, drive):
     assert 'without a reference velocity slip can be wrong' in cost
 
 
-def test_remap_to_a_topic_that_is_not_there_or_of_another_type(make_bag, rover):
-    bag = make_bag()
-    with pytest.raises(UserError, match=r'/vo is not in the bag.*--remap reference_odom:='):
+def test_remap_to_a_topic_that_is_not_there_or_of_another_type(make_bag, rover, drive):
+    arm = [('/arm', *row[1:]) for row in drive if row[0] == '/joint_states']
+    bag = make_bag([*arm, *drive])
+    right = '--remap reference_odom:=/reference_odom'
+    with pytest.raises(UserError, match=f'/vo is not in the bag.*{right}'):
         list(read(bag, {'reference_odom': '/vo'}, rover))
     with pytest.raises(UserError, match=r'/imu/data has type sensor_msgs/msg/Imu, sinkage needs'):
         list(read(bag, {'sinkage': '/imu/data'}, rover))

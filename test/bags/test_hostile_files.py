@@ -119,7 +119,7 @@ MCAPS = (zeros, lying_zeros, packed_messages, packed_gaps, headless, headless_bo
 
 
 def walk() -> float:
-    """Return the processor time of a plain walk over a chunk of short messages, here and now [s]."""
+    """Return the processor time of a plain walk over a chunk of messages, here and now [s]."""
     began = time.process_time()
     sum(1 for _ in struct.iter_unpack('<BQHIQQ', bytes(CHUNK // 31 * 31)))
     return time.process_time() - began

@@ -148,6 +148,14 @@ def test_soil_without_shear_strength_takes_no_torque_and_resists():
     assert backwards == spinning
 
 
+def test_cohesion_alone_is_mobilised_as_in_the_quadrature():
+    clay = replace(SAND, cohesion=8e3, friction_angle=0.0, leaving_angle_ratio=-0.6)
+    slip = [-0.6, -0.2, 0.1, 0.3, 0.6, 0.9]
+    truth, ours = (state(slip, soil=clay, method=m) for m in ('quadrature', 'closed_form'))
+    assert ours.torque == pytest.approx(truth.torque, rel=0.05)
+    assert ours.drawbar_pull == pytest.approx(truth.drawbar_pull, abs=0.02 * 80.0)
+
+
 def test_balance_without_iteration_agrees_with_the_bracketed_solver():
     random, count = np.random.default_rng(12), 500
     wheel = Wheel(random.uniform(0.05, 0.3, count), random.uniform(0.05, 0.3, count), 0.01, 20)

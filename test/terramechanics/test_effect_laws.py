@@ -98,6 +98,20 @@ def test_bulldozing_after_terzaghi():
     assert pull - pushed == pytest.approx(expected, rel=0.03)
 
 
+@pytest.mark.parametrize(('inside', 'felt'), [(-0.001, 0.0), (5e-4, 1.25e-4), (0.003, 0.0025)])
+def test_a_hard_layer_begins_within_a_millimetre(inside, felt):
+    """As printed: <x> = x^2 / (2 mm) up to x = 1 mm, x - 0.5 mm beyond."""
+    stiffness, depth, radius, entrance = 2e6, 0.02, 0.2, 0.8
+    angle = math.acos(math.cos(entrance) + (depth + inside) / radius)
+    contact = SimpleNamespace(
+        radius=radius, entrance_angle=entrance, angle=np.array([angle]), normal_stress=100.0
+    )
+    catalogue()['hard_layer'].on_normal_stress(
+        contact, SimpleNamespace(stiffness=stiffness, depth=depth)
+    )
+    assert contact.normal_stress == pytest.approx([100.0 + stiffness * felt])
+
+
 def test_soil_carried_round_balances_volume_and_energy():
     slip, fill = 0.5, 0.8
     z, pull, torque = state(slip, LOAD).outputs()[0]
