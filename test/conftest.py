@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import functools
 import gc
 import io
 import logging
@@ -41,11 +40,12 @@ hypothesis.settings.load_profile('same')
 LONGEST = (
     'ros/test_parity.py',
     'ros/test_transport_faults.py',
-    'ros',
     'discrepancy',
     'estimation/test_wheel_soil_estimator.py',
 )
 """Files and folders that begin first, so that no worker ends long after the others."""
+WAITING, BETWEEN = 'ros', 3
+"""A folder whose tests wait most of their time: so many files that compute go between two of it."""
 
 
 def pytest_xdist_auto_num_workers() -> int:
@@ -54,16 +54,23 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Sort the files, each as it stands: the longest first."""
+    """Sort the files, each as it stands: the longest first, those that wait among the others."""
     here = Path(__file__).parent
 
-    @functools.cache
     def rank(file: Path) -> int:
         path = file.relative_to(here) if file.is_relative_to(here) else file
         names = {path.as_posix(), path.parts[0]}
         return next((i for i, name in enumerate(LONGEST) if name in names), len(LONGEST))
 
-    items.sort(key=lambda item: rank(item.path))
+    files = sorted(dict.fromkeys(item.path for item in items), key=rank)
+    waiting = [file for file in files if file.parent.name == WAITING]
+    order = []
+    for number, file in enumerate(file for file in files if file.parent.name != WAITING):
+        if waiting and number % BETWEEN == 0:
+            order.append(waiting.pop(0))
+        order.append(file)
+    place = {file: number for number, file in enumerate([*order, *waiting])}
+    items.sort(key=lambda item: place[item.path])
 
 
 def pytest_collection_finish() -> None:

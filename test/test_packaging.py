@@ -13,6 +13,7 @@ import yaml
 
 import wheel_terra_estimator
 from wheel_terra_estimator.configuration import reader, shipped
+from wheel_terra_estimator.simulation import scenario
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'wheel_terra_estimator'
@@ -101,16 +102,13 @@ def test_entry_points_exist(name):
     assert callable(getattr(importlib.import_module(module), function))
 
 
-@pytest.mark.parametrize('name', sorted(shipped.files()))
-def test_shipped_files_load(name):
-    folder = name.split('/')[0]
-    if folder in ('rovers', 'soils', 'demo'):
-        configuration = reader.load([name], complete=folder == 'rovers')
-        assert configuration.stated
-    elif folder == 'scenarios':
-        from wheel_terra_estimator.simulation.scenario import load
-
-        assert load(name.split('/')[1]).description
+def test_shipped_files_load():
+    for name in shipped.files():
+        folder, _, file = name.partition('/')
+        if folder in ('rovers', 'soils', 'demo'):
+            assert reader.load([name], complete=folder == 'rovers').stated, name
+        elif folder == 'scenarios':
+            assert scenario.load(file).description, name
 
 
 def test_every_shipped_folder_is_installed():

@@ -98,12 +98,12 @@ def test_every_command_has_a_debug_option_and_examples_that_parse():
                 parser.parse_args(arguments)
 
 
-@pytest.mark.parametrize(('shell', 'text'), list(scripts().items()))
-def test_the_shipped_completion_is_that_of_the_parsers(shell, text, capsys):
-    with pytest.raises(SystemExit) as end:
-        main.main(['--print-completion', shell])
-    assert end.value.code == 0
-    assert capsys.readouterr().out == text, 'run python tools/complete_shells.py'
+def test_the_shipped_completion_is_that_of_the_parsers(capsys):
+    for shell, text in scripts().items():
+        with pytest.raises(SystemExit) as end:
+            main.main(['--print-completion', shell])
+        assert end.value.code == 0
+        assert capsys.readouterr().out == text, 'run python tools/complete_shells.py'
 
 
 @pytest.mark.parametrize(
