@@ -17,7 +17,6 @@ import sys
 from pathlib import Path
 
 import pytest
-import yaml
 
 from wheel_terra_estimator.cli.main import main
 
@@ -159,16 +158,6 @@ def test_the_picture_of_the_report_shows_what_the_replay_says(capsys):
         shown = picture.info['Description']
     verdict = json.loads(capsys.readouterr().out)['verdict']
     assert shown == verdict, 'python tools/readme_pictures.py makes it anew'
-
-
-def test_configuration_of_robot_localization_takes_speeds_and_turn_only():
-    text = (FOLDER / 'nav2.md').read_text(encoding='utf-8')
-    block = re.search(r'^```yaml\n(.*?)^```', text, re.M | re.S)[1]
-    values = yaml.safe_load(block)['ekf_filter_node']['ros__parameters']
-    assert values['twist0'] == '/wheel_terra_estimator/twist'
-    flags = values['twist0_config']
-    assert len(flags) == len(values['imu0_config']) == 15
-    assert [i for i, flag in enumerate(flags) if flag] == [6, 7, 11]  # vx, vy, vyaw
 
 
 SKELETON = """<robot name="cart"><link name="base_link"><inertial><origin xyz="0 0 0.1"/>

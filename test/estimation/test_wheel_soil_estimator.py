@@ -69,8 +69,7 @@ def fault(kind, wheel, start, end):
 
 def after_ten_seconds(kind, duration, mode):
     """Return sets of a drive of the bench, their rows in the truth, and the drive."""
-    scenario = kinds.FIRM if kind == 'firm' else kinds.KINDS[kind]
-    d = simulate(load({**scenario, 'duration': duration, 'sensors.jitter': 0.0}), 1000)
+    d = simulate(load({**kinds.KINDS[kind], 'duration': duration, 'sensors.jitter': 0.0}), 1000)
     row = {int(stamp): i for i, stamp in enumerate(d.truth.stamp)}
     sets = [s for s in estimate(d, mode) if s.stamp in row][100:]
     return sets, [row[s.stamp] for s in sets], d
@@ -269,24 +268,19 @@ def test_torques_alone_carry_no_rover_backwards():
     assert np.all(sets[-1].slip_std > 0.15)  # of the slip nothing is known
 
 
-@pytest.mark.parametrize(
-    ('kind', 'mode', 'duration', 'most'),
-    [
-        pytest.param('firm', 'reference', 40.0, 0.04, marks=pytest.mark.slow),
-        ('cruise', 'no_reference', 20.0, 0.035),
-    ],
-)
-def test_nothing_drifts_along_the_ridge_of_slip_and_strength(kind, mode, duration, most):
-    """One contact, looked at ten times a second, must not tell slip, strength and K apart."""
-    sets, rows, d = after_ten_seconds(kind, duration, mode)
+def test_nothing_drifts_along_the_ridge_of_slip_and_strength():
+    """One contact, looked at ten times a second, must not tell slip, strength and K apart.
+
+    If each look counted anew, slip would be off by 0.05 and the tangent by 0.1.
+    """
+    sets, rows, d = after_ten_seconds('cruise', 20.0, 'no_reference')
     error = [np.nanmedian(s.slip - d.truth.slip[row]) for s, row in zip(sets, rows, strict=True)]
-    assert np.sqrt(np.mean(np.square(error))) < most
+    assert np.sqrt(np.mean(np.square(error))) < 0.035
     found = dict(zip(sets[-1].soil_names, sets[-1].soil, strict=True))
     nominal = d.configuration.soil
-    # The ground is off by 20 % (one deviation) in each; the drift ended at a factor of 0.37.
     tangent = np.tan(np.radians(found['soil.friction_angle_deg']))
-    assert abs(np.log(tangent / np.tan(nominal.friction_angle))) < 0.6
-    assert abs(np.log(found['soil.shear_modulus'] / nominal.shear_modulus)) < 0.6
+    assert abs(np.log(tangent / np.tan(nominal.friction_angle))) < 0.06
+    assert abs(np.log(found['soil.shear_modulus'] / nominal.shear_modulus)) < 0.06
 
 
 def test_a_wheel_sunk_to_its_hub_is_followed():

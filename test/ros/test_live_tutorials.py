@@ -98,8 +98,9 @@ def test_the_live_tutorials_in_one_drive(start, listener, tmp_path):
     assert list(heard['slip'][-1].name) == list(names)
     assert max(abs(slip) for slip in heard['slip'][-1].position) < 0.2
     last = heard['twist'][-1].twist
-    taken = block['ekf_filter_node']['ros__parameters']['twist0_config'][6:12]
-    for axis, fused in enumerate(taken):
+    flags = block['ekf_filter_node']['ros__parameters']['twist0_config']
+    assert len(flags) == 15 and not any(flags[:6] + flags[12:])
+    for axis, fused in enumerate(flags[6:12]):
         assert (last.covariance[7 * axis] < 1e6) == fused, 'what is not estimated is not fused'
     assert last.twist.linear.x == pytest.approx(speed, rel=0.2)
 
