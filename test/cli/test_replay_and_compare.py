@@ -27,7 +27,7 @@ CONFIG = ['--config', 'generic_six_wheel', '--config', 'test_sand']
 @pytest.fixture(scope='module')
 def drive(tmp_path_factory):
     path = tmp_path_factory.mktemp('drive') / 'drive'
-    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=10.0), path)
+    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=13.0), path)
     return path
 
 
