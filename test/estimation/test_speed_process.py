@@ -53,7 +53,7 @@ def step(speed, before=0.05, now=0.05, inflation=0.0, window=None):
 
 def noise(parts_keys=()):
     made = process([0.0] * 6, keys=parts_keys)
-    return made.acceleration_noise(StatedNoise()).noise_density**0.5
+    return made.acceleration_noise(StatedNoise()).noise_density ** 0.5
 
 
 def test_slow_rover_follows_its_wheels_through_a_ramp():
@@ -296,6 +296,25 @@ def test_at_rest_the_accelerometer_tells_its_zero():
         1 / (precision + 1 / prior), 1e-3
     )
     assert abs(ekf.mean[SPEED]) < 1e-6
+
+
+def test_a_jolt_is_felt_at_once_and_an_accelerometer_that_jolts_for_long_is_doubted():
+    parts = Parts(reader.load(SAND))
+    made, ekf, dt = process([0.05] * 6), parts.filter(), 0.1
+    ekf.set(SPEED, 0.04, 1e-6)
+
+    def weight_of_wheels(change):
+        window = InertialWindow(readings=1, speed_change=change, duration=dt)
+        cycle = parts.cycle((0.05,) * 6, window=window)
+        wheels = made.by_wheels(dt, cycle.yaw_compensated, 0.0)
+        lacking = made.learn_bias(ekf, cycle, wheels)
+        wheels = wheels._replace(variance=wheels.variance + lacking)
+        return made.combined(wheels, dt, window).wheel_weight
+
+    assert weight_of_wheels(0.0) > 0.9
+    assert weight_of_wheels(0.05) < 0.1
+    weights = [weight_of_wheels(0.05 * (-1) ** i) for i in range(40)]
+    assert min(weights[-10:]) > 0.5
 
 
 @pytest.mark.parametrize(('turning', 'ratio'), [(False, 0.2), (True, 0.8)])

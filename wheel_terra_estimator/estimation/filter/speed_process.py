@@ -28,6 +28,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
 from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
+from wheel_terra_estimator.estimation.filter.consistency import excess, smoothed_nis
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import (
     GRAVITY_BIAS,
@@ -140,6 +141,8 @@ class SpeedState(NamedTuple):
     slow_rims: Floats = ()  # mean of `rims.each` over the last second [m/s]
     settled: bool = True  # the contacts were, at the last cycle
     other_direction: PastDrive | None = None
+    felt_nis: float | None = None
+    """Running mean of the NIS of wheels against accelerometer; None = never compared."""
 
 
 class AccelerationNoise(NamedTuple):
@@ -322,7 +325,7 @@ class SpeedProcess(Component[SpeedState]):
             return None
         # A vibrating rover is as noisy as it is seen to be, whatever its file states.
         stated = self.acceleration_noise(window.stated).noise_density
-        noise = max(stated, window.noise_density)
+        noise = max(stated, window.noise_density) * excess(self.state.felt_nis) ** 2
         # A stretch that the IMU left out is filled with its mean.
         return window.speed_change * dt / covered, noise * dt
 
@@ -332,7 +335,8 @@ class SpeedProcess(Component[SpeedState]):
         `combined` weighs the two for a given speed and bias; how well they agree tells of these:
         most of all at rest, where the wheels know. `step` is the prediction without accelerometer.
         Return the variance [(m/s)^2] that it lacks where the two differ by more than the gate: soil
-        that lets go or gives way is no random walk, and wheels do not see it.
+        that lets go or gives way is no random walk, and wheels do not see it. Where they differ for
+        longer, the accelerometer is doubted: its attitude is wrong.
         """
         felt = self.felt(cycle.dt, cycle.window)
         if felt is None or isnan(self.state.rims.typical) or isnan(cycle.yaw_compensated.typical):
@@ -341,8 +345,10 @@ class SpeedProcess(Component[SpeedState]):
         row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - 1.0, cycle.dt
         residual = felt[0] - step.constant - float(row @ ekf.mean)
         variance = step.variance + felt[1]
-        prior = float(row @ ekf.covariance @ row)
-        lacking = chi_square_gate(residual, prior + variance, self._gate)
+        expected = float(row @ ekf.covariance @ row) + variance
+        lacking = chi_square_gate(residual, expected, self._gate)
+        nis = smoothed_nis(self.state.felt_nis, min(residual**2 / expected, self._gate))
+        self.state = self.state._replace(felt_nis=nis)
         ekf.fuse([Row(residual, row, variance + lacking)])
         return lacking
 
