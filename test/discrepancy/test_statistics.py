@@ -80,7 +80,7 @@ def setting(forward):
 def of_soil(forward, problem, soil, variance, *more):
     """Return the fit of the soil alone."""
     start = [np.zeros(len(soil))]
-    return fit(forward, problem, problem.observed, [((), soil)], start, variance, *more)[0]
+    return fit(forward, problem, [((), soil)], start, variance, *more)[0]
 
 
 def smooth_error(problem, inputs, scale, amplitude):
@@ -245,9 +245,9 @@ def test_held_out_rows_are_predicted_by_a_fit_without_them():
     problem = build_problem(measured, std, inputs, np.ptp(measured, axis=0))
     variance = problem.variance(0.0)
     start = [np.zeros(len(coordinates))]
-    whole = fit(forward, problem, problem.observed, [((), coordinates)], start, variance)[0]
+    whole = fit(forward, problem, [((), coordinates)], start, variance)[0]
     groups = np.tile(np.arange(8), 3)
-    work = SimpleNamespace(problem=problem, observed=problem.observed, forward=forward)
+    work = SimpleNamespace(problem=problem, forward=forward)
     found = held_out.hold_out(work, [whole], variance, groups)[0]
 
     def predicted(u):
@@ -284,9 +284,8 @@ def test_outliers_are_found_and_a_hump_is_none(forward, setting):
 
     def cells_apart(measured):
         problem = build_problem(measured, std, inputs, scale)
-        one = [problem.variance(0.02), problem.variance(0.25)]
-        nothing = of_soil(forward, problem, soil, one[0])
-        found = noise.find_outliers(problem, nothing, one, problem.observed, narrow)
+        nothing = of_soil(forward, problem, soil, problem.variance(0.02))
+        found = noise.find_outliers(problem, nothing, 0.25, narrow)
         return {cell[:2] for cell in found}
 
     clean = truth + std * rng.standard_normal(truth.shape)
@@ -308,7 +307,7 @@ def test_noise_is_estimated_beside_an_effect_and_never_none(forward, setting):
         problem = build_problem(measured, guess, inputs, scale)
         nothing = of_soil(forward, problem, soil, problem.variance(0.1))
         origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
-        after = noise.estimate_noise(Noise(guess, origin), nothing, problem, problem.observed)
+        after = noise.estimate_noise(Noise(guess, origin), nothing, problem)
         return after.std[0, :3]
 
     rng, bent = np.random.default_rng(7), truth.copy()
@@ -409,7 +408,7 @@ def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
         nothing = of_soil(forward, problem, soil, one)
         named = dict(zip(QUANTITIES, measured.T, strict=True))
         table = check_table('t', {**columns, **named})
-        found.append(locate(table, problem, nothing, problem.observed, len(table)))
+        found.append(locate(table, problem, nothing, len(table)))
         if number == 0:
             cells = (problem.observed - problem.flat(nothing.outputs)) / problem.std
             pull = cells[problem.quantity == 1] ** 2
@@ -441,7 +440,7 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
         one = np.ones(problem.size)
         nothing = of_soil(forward, problem, soil, one)
         table = SimpleNamespace(columns={'time': order.astype(float)})
-        work = SimpleNamespace(problem=problem, observed=problem.observed)
+        work = SimpleNamespace(problem=problem)
         return changed_stretch(table, work, nothing, one)
 
     assert 0.3 < told(0.5).stiffness < 0.8

@@ -163,3 +163,23 @@ def test_a_patchwork_of_doubtful_names_is_not_given(monkeypatch):
     patched = diagnose_campaign(campaign, campaign.hidden)
     assert len(patched.effects) > 1
     assert min(effect.confidence_of_set for effect in patched.effects) < 0.5
+
+
+@pytest.mark.parametrize(
+    ('column', 'factor', 'units'),
+    [
+        ('sinkage', 10.0, 'mm in place of cm'),
+        ('sinkage', 0.1, 'cm in place of mm'),
+        ('torque', 0.1, 'kgf m in place of N m'),
+    ],
+)
+def test_a_wrong_unit_is_said_before_any_effect(column, factor, units):
+    campaign = make_campaign(92_510_001, 'sweep40', Plan(hide='none'))
+    for name in (column, f'{column}_std'):
+        campaign.table[name] = factor * campaign.table[name]
+    found = diagnose_campaign(campaign)
+    assert found.verdict == 'unexplained'
+    assert not found.effects
+    assert not found.proposal
+    assert list(found.misread) == [column]
+    assert f'The unit of {column} looks wrong ({units})' in found.sentence

@@ -77,6 +77,8 @@ class Decision:
     gap: Mapping[str, QuantityGap]  # quantity -> QuantityGap
     names: tuple[Naming, ...] = ()  # strongest first; empty unless ``named``
     doubtful: tuple[Naming, ...] = ()  # names that would have been given, were they likely enough
+    # Quantity -> factor by which its unit looks wrong; nothing is named then
+    misread: Mapping[str, float] = field(default_factory=dict)
     proposal: Proposal | None = None  # A law, where something is missing and no name is given
 
     @property
@@ -93,6 +95,7 @@ class Decider:
     both: SteadyTable  # with the rows of a reference behind those of the table
     findings: Findings
     allowed_error: float  # model error that is no reason for doubt [share of the range]
+    misread: Mapping[str, float] = field(default_factory=dict)  # as in the decision
     # The best law beside each floor, soil held or not: it competes with doubtful names, or is
     # proposed
     laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
@@ -103,7 +106,8 @@ class Decider:
         selection, problem = self.findings.selection, self.findings.setting.problem
         everything = frozenset(range(len(selection.explanations)))
         while True:
-            barred = everything if len(tried) >= _MOST_TRIED else frozenset(tried)
+            enough = self.misread or len(tried) >= _MOST_TRIED
+            barred = everything if enough else frozenset(tried)
             verdict = choose(selection, problem, off=off, excluded=barred)
             decision = self._judged(verdict)
             if verdict.status == 'agrees' and not off and channels_off(decision.gap):
@@ -119,8 +123,8 @@ class Decider:
 
     def _law(self, decision: Decision, hold_soil: bool = False) -> Proposal | None:
         """Return the law for what a decision's refit of the soil leaves."""
-        if LAW in self.findings.setting.forward.base_effects:
-            return None  # not on top of another law
+        if self.misread or LAW in self.findings.setting.forward.base_effects:
+            return None  # not for a wrong unit, nor on top of another law
         key = decision.floor, hold_soil
         if key not in self.laws:
             self.laws[key] = propose(self._gap(decision), hold_soil=hold_soil)
@@ -172,7 +176,7 @@ class Decider:
         own = self.findings.setting.problem.variance(floor.amplitude)
         fits = [nothing, chosen.fitted] if chosen.names else [nothing]
         found = self._predicted(fits, own, floor.largest)
-        return Decision(verdict=verdict, floor_index=place, **found)
+        return Decision(verdict=verdict, floor_index=place, misread=self.misread, **found)
 
     def _predicted(self, fits: list[Fit], variance: FloatArray, floor: float) -> dict[str, Any]:
         """Refit nothing and what was chosen (the last), and predict rows that no fit saw."""
@@ -287,8 +291,7 @@ def _curves(
     # Where slips are latent the model stands at the most probable slip; a curve is compared with
     # what was read, so that it goes back along the tangent (cells that were not measured stay).
     problem = setting.problem
-    moved = np.zeros_like(after.outputs)
-    moved[problem.row, problem.quantity] = setting.observed - problem.observed
+    moved = problem.moved
     refit_error, after_error = refit_error - moved, after_error - moved
     band = np.sqrt(findings.noise.std**2 + (floor * problem.scale) ** 2)
     return Curves(
@@ -315,7 +318,7 @@ def _shared_error(findings: Findings, fitted: Fit, floor: float) -> FloatArray:
     smooth = (unrotate * (problem.variance(floor) - noise)) @ unrotate.T
     total = smooth + (unrotate * noise) @ unrotate.T
     ours = active[problem.row]
-    residual = setting.observed - problem.flat(fitted.outputs)
+    residual = problem.wanted - problem.flat(fitted.outputs)
     weights = np.linalg.solve(total[np.ix_(~ours, ~ours)], residual[~ours])
     error[problem.row[ours], problem.quantity[ours]] = smooth[np.ix_(ours, ~ours)] @ weights
     return error

@@ -50,7 +50,7 @@ def render(
     findings, after, variance = decision.findings, decision.after, decision.variance
     setting, known, left = findings.setting, catalogue(), decision.verdict.left
     effects = _effects(decision, known)
-    nearest = () if after.names else _nearest(decision)
+    nearest = () if after.names or decision.misread else _nearest(decision)
     stretch = changed_stretch(both, setting, after, variance)
     proposal = _proposal(decision)
     gap_p_value = chi_square_p_value(decision.findings.nothing, decision.variance)
@@ -67,9 +67,7 @@ def render(
         gap=decision.gap,
         not_visible=dict(findings.not_visible),
         smallest_visible=_smallest_visible(findings, known),
-        where=locate(
-            both, setting.problem, decision.findings.nothing, setting.observed, len(table)
-        ),
+        where=locate(both, setting.problem, decision.findings.nothing, len(table)),
         next_measurement=_next(decision),
         curves=decision.curves,
         noise=replace(findings.noise, std=findings.noise.std[: len(table)]),
@@ -92,6 +90,7 @@ def render(
         along_rows=tuple(along),
         nearest=nearest,
         proposal=proposal,
+        misread=decision.misread,
     )
 
 
@@ -209,6 +208,8 @@ def _smallest_visible(
 
 def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
     findings, verdict, after = decision.findings, decision.verdict, decision.after
+    if decision.misread:
+        return ()
     selection = findings.selection
     competitors: list[Fit] = []
     for member, names in enumerate(verdict.ambiguity_groups):

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -29,11 +30,18 @@ from wheel_terra_estimator.discrepancy.tables.checks import (
     check_against_wheel,
     check_pull_against_model,
     check_wheel_of_model,
+    decades_off,
 )
-from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable, operating_points
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    QUANTITIES,
+    SteadyTable,
+    operating_points,
+)
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
+
+_CLEARLY_MISREAD = 10.0  # nats by which another unit must explain the rows better
 
 
 @dataclass(frozen=True)
@@ -87,22 +95,27 @@ def diagnose(
     nuisance = nuisance_coordinates(configuration, known, chosen.soil_known_to)
     floors = default_floors(chosen.floor) if reference is None else shared_floors()
 
-    def decided(
-        model: Forward, free: tuple[Coordinate, ...], more: Mapping[str, Effect]
-    ) -> Decision:
-        findings = search(both, model, free, {**effects, **more}, floors)
-        return Decider(table, both, findings, chosen.allowed_error).decision()
-
-    decision = decided(forward, nuisance, {})
+    findings = search(both, forward, nuisance, effects, floors)
+    misread = {}
+    for quantity, times in decades_off(both, configured).items():
+        # The odds of two explanations of the same rows, in whatever unit.
+        cells = int(np.isfinite(both.measured[:, QUANTITIES.index(quantity)]).sum())
+        read = search(both.scaled(quantity, times), forward, nuisance, effects, floors)
+        gain = read.selection.best + cells * math.log(times) - findings.selection.best
+        if gain > _CLEARLY_MISREAD:
+            misread[quantity] = times
+    decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     notes: tuple[str, ...] = ()
-    if decision.verdict.status in OPEN and reference is None:
+    if decision.verdict.status in OPEN and reference is None and not misread:
         for name, forms in _other_forms(forward, chosen).items():
             not_tried[name] += '; its other forms, in its place, were tried'
             rest = tuple(c for c in nuisance if effect_of(c.owner) != name)
-            alone = search(both, forward.without(name), rest, forms, floors)
+            without = forward.without(name)
+            alone = search(both, without, rest, forms, floors)
             if set(alone.selection.explanations[0].names) <= forward.base_effects.keys():
                 continue  # no other form fits better than its own, or than none
-            again = decided(forward.without(name), rest, forms)
+            findings = search(both, without, rest, {**effects, **forms}, floors)
+            again = Decider(table, both, findings, chosen.allowed_error).decision()
             new = [naming.key for naming in again.names if naming.key not in forward.base_effects]
             # Its own form, free as well, is a competitor: what both explain is no other form.
             if len(again.names) == 1 and new and effect_of(new[0]) == name:

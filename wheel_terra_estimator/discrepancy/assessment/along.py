@@ -69,7 +69,7 @@ def changed_stretch(
     columns = fitted.sensitivity[:, [place[name] for name in _FIELDS]]
     inverse = inverse_covariance(variance, fitted.jacobian / np.sqrt(fitted.prior))
     inverse = problem.rotation.T @ inverse @ problem.rotation
-    target = setting.observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
+    target = problem.wanted - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
     # Sums over the cells of each time; those of a stretch are differences of running sums.
     times = np.unique(time)
     at = np.searchsorted(times, time)[problem.row]

@@ -10,6 +10,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Descent, Fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.result import Curves, QuantityGap
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.weights import Setting
@@ -40,7 +41,7 @@ def hold_out(
     inverse = (problem.rotation.T / variance) @ problem.rotation  # (m, m), without free parameters
     labels = np.unique(groups[groups >= 0])
     weights = [_without(inverse, np.flatnonzero(groups[problem.row] == k)) for k in labels]
-    tasks = [_Refit(setting, fitted, kept) for fitted in fits for kept in weights]
+    tasks = [_Refit(problem, fitted, kept) for fitted in fits for kept in weights]
     for _ in range(_REFITS):
         going = [task for task in tasks if task.way.going]
         if not going:
@@ -65,16 +66,16 @@ def hold_out(
 class _Refit:
     """One hypothesis fitted to the cells that are kept."""
 
-    def __init__(self, setting: Setting, fitted: Fit, kept: FloatArray) -> None:
+    def __init__(self, problem: Problem, fitted: Fit, kept: FloatArray) -> None:
         self.fitted = fitted
         self.way = Descent(fitted.coordinates, fitted.u)
-        self._setting = setting
+        self._problem = problem
         self._kept = kept  # (m, m) inverse covariance of the kept cells, 0 at the others
         self.look(fitted.outputs, fitted.sensitivity)
 
     def look(self, outputs: FloatArray, sensitivity: FloatArray) -> None:
         """Take the model at the trial point, if it is better, and choose the next one."""
-        residual = self._setting.observed - self._setting.problem.flat(outputs)
+        residual = self._problem.wanted - self._problem.flat(outputs)
         weighted = self._kept @ residual
         if self.way.is_better(float(residual @ weighted)):
             self.outputs = outputs

@@ -27,16 +27,14 @@ _SURE = 0.05
 _ONE_SIGN = 0.3  # below this share of the size a mean misfit says nothing
 
 
-def locate(
-    table: SteadyTable, problem: Problem, nothing: Fit, observed: FloatArray, rows: int
-) -> Where:
+def locate(table: SteadyTable, problem: Problem, nothing: Fit, rows: int) -> Where:
     """Return the region of the inputs in which the soil-refitted model is worst.
 
     The residuals after a refit are neither independent nor equal in size; the p-value therefore
     comes from noise drawn and refitted on the same rows (linear), under the same scan. Only the
     first `rows` are looked at; the others are a reference.
     """
-    cells = (observed - problem.flat(nothing.outputs)) / problem.std
+    cells = (problem.wanted - problem.flat(nothing.outputs)) / problem.std
     cells = np.where(problem.outlier | (problem.row >= rows), 0.0, cells)
     residual = np.full((len(table), len(QUANTITIES)), np.nan)
     residual[problem.row, problem.quantity] = cells

@@ -49,11 +49,11 @@ class Fit:
         """Posterior covariance of u."""
         return np.asarray(np.linalg.inv(self.precision()), dtype=float)
 
-    def within(self, problem: Problem, observed: FloatArray) -> Fit:
+    def within(self, problem: Problem) -> Fit:
         """Return the same fit seen through other noise: same cells, another rotation."""
         return replace(
             self,
-            residual=problem.rotation @ (observed - problem.flat(self.outputs)),
+            residual=problem.residual(self.outputs),
             jacobian=problem.rotation @ self.sensitivity,
         )
 
@@ -105,14 +105,13 @@ class Descent:
 def fit(
     forward: Forward,
     problem: Problem,
-    observed: FloatArray,
     hypotheses: Sequence[tuple[tuple[str, ...], tuple[Coordinate, ...]]],
     starts: Sequence[FloatArray],
     variance: FloatArray,
     angles: FloatArray | None = None,
     iterations: int = 10,
 ) -> list[Fit]:
-    """Fit all hypotheses to the (m,) cells ``observed``; the variance is (m,), of the rotated axes.
+    """Fit all hypotheses to the cells; the variance is (m,), of the rotated axes.
 
     Each of the B hypotheses, (names, coordinates), has a start (P,), and entrance angles (N,) near
     its end.
@@ -133,7 +132,7 @@ def fit(
             angle = np.empty((len(ways), state.angle.shape[1]))
         for index, b in enumerate(active):
             way, angle[b] = ways[b], state.angle[index]
-            residual = problem.rotation @ (observed - problem.flat(state.outputs[index]))
+            residual = problem.residual(state.outputs[index])
             better = way.is_better(float(residual @ (residual / variance)))
             if better:
                 sensitivity = problem.flat(state.jacobian[index])

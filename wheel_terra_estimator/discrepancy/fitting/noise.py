@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -84,17 +83,17 @@ def repeats(table: SteadyTable, quantity: int) -> tuple[float, int]:
     return (float(np.sqrt(square / freedom)), freedom) if freedom else (np.nan, 0)
 
 
-def estimate_noise(noise: Noise, fitted: Fit, problem: Problem, observed: FloatArray) -> Noise:
+def estimate_noise(noise: Noise, fitted: Fit, problem: Problem) -> Noise:
     """Estimate what was neither stated nor repeated, beside soil and a smooth misfit.
 
     The marginal likelihood of a Gaussian process (any amplitude) plus the soil's tangent space plus
     white noise is maximised over the noise of each quantity, so that effects do not pass for noise.
-    ``problem`` was built with ``noise``; ``observed`` are its (m,) cells.
+    ``problem`` was built with ``noise``.
     """
     unknown = [q for q in range(len(QUANTITIES)) if noise.origin.get(QUANTITIES[q]) == 'estimated']
     if not unknown:
         return noise
-    here = fitted.within(problem, observed)
+    here = fitted.within(problem)
     target = here.residual + here.jacobian @ here.u
     std = noise.std.copy()
     for q in unknown:
@@ -132,6 +131,7 @@ def _white_part(
     return chosen[0], max(chosen[1], 2.0)
 
 
+_ROBUST_FLOOR = 0.02  # structural error beside which outliers are sought [share of the range]
 SHARE = 0.02  # prior share of outliers among the cells
 # Sizes of features narrow in slip that rows may share [share of the range].
 NARROW = (0.05, 0.15)
@@ -142,11 +142,7 @@ _CHANCE = 1e-5
 
 
 def find_outliers(
-    problem: Problem,
-    fitted: Fit,
-    variances: Sequence[FloatArray],
-    observed: FloatArray,
-    narrow: FloatArray,
+    problem: Problem, fitted: Fit, amplitude: FloatArray | float, narrow: FloatArray
 ) -> list[tuple[int, int, float]]:
     """Return (row, quantity, deviation) of the cells to be rejected, worst first.
 
@@ -154,14 +150,14 @@ def find_outliers(
     the cell that gains most from a twelve times larger noise is rejected. A hump or a ripple in
     slip that all loads share competes with outliers: the evidence says which of the two it is.
 
-    ``problem`` has no cell rejected, and (m,) ``observed`` cells; ``variances``, (m,) each, of the
-    rotated axes are for a structural error that is small and one that is large; ``narrow`` (N, N)
-    comes from `slip_features`.
+    ``problem`` has no cell rejected. Beside a small structural error one of ``amplitude`` is tried,
+    (4,) per quantity [share of the range]; ``narrow`` (N, N) comes from `slip_features`.
     """
     jacobian = problem.rotation @ fitted.sensitivity / np.sqrt(fitted.prior)
-    target = observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
+    target = problem.wanted - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
+    sizes = [_ROBUST_FLOOR, np.maximum(amplitude, _ROBUST_FLOOR)]
     best, found, chosen = -np.inf, [], None
-    for variance in variances:
+    for variance in map(problem.variance, sizes[: 1 + bool(np.max(amplitude) > _ROBUST_FLOOR)]):
         inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
         score, cells = _rejected_cells(problem, inverse, target)
         if score > best:

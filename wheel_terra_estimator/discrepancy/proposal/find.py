@@ -109,11 +109,8 @@ class Gap:
     def measured(self) -> FloatArray:
         """(N, 4) cells that the model has to match; nan where they were rejected."""
         measured, rows = self.table.measured.copy(), len(self.table)
-        setting, problem = self.findings.setting, self.findings.setting.problem
         # Where slips are latent the model stands at the most probable one.
-        shift = np.zeros((int(problem.row.max()) + 1, len(QUANTITIES)))
-        shift[problem.row, problem.quantity] = setting.observed - problem.observed
-        measured += shift[:rows]
+        measured += self.findings.setting.problem.moved[:rows]
         for row, column, _ in self.findings.outliers:
             if row < rows:
                 measured[row, column] = np.nan

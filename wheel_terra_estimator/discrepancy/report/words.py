@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 from scipy.special import chdtrc
 
 from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.configuration.column_map import UNITS
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
@@ -35,6 +38,7 @@ from wheel_terra_estimator.discrepancy.result import (
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import LARGEST_Z_SCORE, Verdict
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS as QUANTITY_UNITS
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
@@ -46,6 +50,7 @@ FACTORS = {
 # Inputs that tell effects apart, in the order of how easily a rig varies them.
 _WORTH_VARYING = ('normal_load', 'lug_height')
 _CHANCE = 1e-3  # of a scatter of repeated rows, beside the stated noise
+_SAME_FACTOR = 0.03  # between two units: a factor of ten, or that of a kilopond
 _COARSE = 0.05  # model-error floor above which agreement says little
 
 
@@ -240,6 +245,27 @@ def untried(alike: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
     )
 
 
+def wrong_units(misread: Mapping[str, float]) -> str:
+    """Return which columns look as if they had another unit than was said, and the remedy."""
+    parts = []
+    for name, times in misread.items():
+        units = UNITS[QUANTITY_UNITS[name]]
+        alike = (
+            f' ({found} in place of {said})'
+            for said, found in itertools.product(units, units)
+            if abs(math.log(units[found] / units[said] / times)) < _SAME_FACTOR
+        )
+        parts.append(
+            f'the unit of {plain(name)} looks wrong{next(alike, "")}: times {times:g} the rows '
+            'are explained far better than by any effect'
+        )
+    text = '; '.join(parts)
+    return (
+        f'{text[0].upper()}{text[1:]}. Correct the column, or the soil of --config if the unit is '
+        'right; no effect is named before.'
+    )
+
+
 def sentence(
     decision: Decision,
     effects: tuple[NamedEffect, ...],
@@ -249,6 +275,8 @@ def sentence(
 ) -> str:
     """Return the verdict in words."""
     verdict, left, floor = decision.verdict, decision.verdict.left, decision.floor
+    if decision.misread:
+        return wrong_units(decision.misread)
     if verdict.status == 'undecided':
         return _undecided(decision.gap, nearest)
     within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray, IndexArray
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting import noise as noises
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
@@ -49,7 +49,6 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 Outliers: TypeAlias = Sequence[tuple[int, int, float]]  # row, quantity, deviation of a cell
 
 _FLEXIBLE = 0.25  # floor of the first robust pass: wide enough for any effect [share of range]
-_ROBUST_FLOOR = 0.02  # floor of the later ones
 _PASSES = 5
 _LATENT_FLOOR = 0.03  # structural error allowed while slips are moved [share of range]
 _CELLS = 8  # measured cells for each effect of a set, at least
@@ -84,55 +83,56 @@ def search(
     floors: tuple[Floor, ...],
 ) -> Findings:
     """Find noise, outliers and the weights of all explanations by effects that may be named."""
-    scale = _ranges(table)
-    noise = noises.stated_noise(table, scale)
-    builder = _Builder(table, forward, scale)
-    problem, observed, nothing = builder.fit_nothing(noise.std, (), nuisance, None)
-    if builder.latent:
+    builder = _Builder(table, forward, nuisance)
+    noise = noises.stated_noise(table, builder.scale)
+    problem, nothing = builder.fit_nothing(noise.std, (), None)
+    if (table.slip_std > 0.0).any():
         builder.linearise(nothing, noise.std)
-        problem, observed, nothing = builder.fit_nothing(noise.std, (), nuisance, nothing)
-    builder.read_leaving_angles(nothing)
+        problem, nothing = builder.fit_nothing(noise.std, (), nothing)
+    if table.leaving_angle_std.any():
+        builder.by_angle = builder.forward.by_input(
+            'leaving_angle', nothing.coordinates, nothing.u, nothing.angle
+        )
     noise = builder.estimate(noise, nothing, ())
     # A smooth misfit of any size is allowed here, so that an effect does not look like outliers.
-    problem, observed, nothing = builder.fit_nothing(noise.std, (), nuisance, nothing)
-    outliers = find_outliers(
-        problem, nothing, _variances(problem, _FLEXIBLE), observed, builder.narrow
-    )
+    problem, nothing = builder.fit_nothing(noise.std, (), nothing)
+    outliers = find_outliers(problem, nothing, _FLEXIBLE, builder.narrow)
     if outliers:
         noise = builder.estimate(noise, nothing, outliers)
     lug_height = np.broadcast_to(forward.points.wheel.lug_height, (len(table),))
     reasons = {name: unavailable(effect, table, lug_height) for name, effect in effects.items()}
     possible = {name: effect for name, effect in effects.items() if not reasons[name]}
-    findings = None
     apart = [{cell[:2] for cell in outliers}]
     for turn in range(_PASSES):
-        problem, observed, nothing = builder.fit_nothing(noise.std, outliers, nuisance, nothing)
+        problem, nothing = builder.fit_nothing(noise.std, outliers, nothing)
         rim = forward.points.wheel.radius * (1.0 - np.cos(nothing.angle))
         deepest = float(np.max(rim))
         found = signatures(builder.forward, problem, nothing, possible, deepest)
         visible = {name: possible[name] for name, s in found.items() if s.greatest >= SEEN}
-        setting = Setting(builder.forward, problem, observed, nuisance, visible, floors, deepest)
+        setting = Setting(builder.forward, problem, nuisance, visible, floors, deepest)
         selection = _select(setting, nothing)
-        findings = Findings(
-            setting,
-            nothing,
-            selection,
-            found,
-            _not_visible(reasons, found, selection),
-            noise,
-            tuple(outliers),
-            frozenset(map(effect_of, (*effects, *forward.base_effects))),
-        )
         if turn == _PASSES - 1:
             break
-        again = _outliers_of_best(builder, noise, selection)
+        # Outliers are sought anew, from scratch, under the best explanation.
+        best = selection.explanations[0].fitted
+        floor = floors[int(np.argmax(selection.probability[0]))]
+        whole = builder.build(noise.std, ())
+        again = find_outliers(whole, best, np.array(floor.amplitude), builder.narrow)
         if {cell[:2] for cell in again} in apart:
             break  # the same cells as before, or as once before: they would go round
         outliers = again
         apart.append({cell[:2] for cell in outliers})
-        noise = builder.estimate(noise, selection.explanations[0].fitted, outliers)
-    assert findings is not None
-    return findings
+        noise = builder.estimate(noise, best, outliers)
+    return Findings(
+        setting,
+        nothing,
+        selection,
+        found,
+        _not_visible(reasons, found, selection),
+        noise,
+        tuple(outliers),
+        frozenset(map(effect_of, (*effects, *forward.base_effects))),
+    )
 
 
 def _not_visible(
@@ -224,61 +224,29 @@ def _joined_by(setting: Setting, selection: Selection, more: list[Explanation]) 
     return weigh(tuple(known.values()), setting.floors, setting.effects)
 
 
-def _variances(problem: Problem, amplitude: FloatArray | float) -> list[FloatArray]:
-    """Return the variances with a small structural error, and with one of at least `amplitude`."""
-    small = problem.variance(_ROBUST_FLOOR)
-    if np.max(amplitude) <= _ROBUST_FLOOR:
-        return [small]
-    return [small, problem.variance(np.maximum(amplitude, _ROBUST_FLOOR))]
-
-
-def _outliers_of_best(
-    builder: _Builder, noise: Noise, selection: Selection
-) -> list[tuple[int, int, float]]:
-    """Look for outliers anew, from scratch, under the best explanation."""
-    problem, observed = builder.build(noise.std, ())
-    best = selection.explanations[0]
-    floor = selection.floors[int(np.argmax(selection.probability[0]))]
-    return find_outliers(
-        problem,
-        best.fitted,
-        _variances(problem, np.array(floor.amplitude)),
-        observed,
-        builder.narrow,
-    )
-
-
-def _slip_groups(table: SteadyTable) -> IndexArray:
-    """(N,) rows that share a reading of the slip: equal to the last digit, not a set value."""
-    slip = table.columns['slip']
-    _, group = np.unique(slip, return_inverse=True)
-    group = np.ravel(group)
-    nominal = np.abs(slip - np.round(slip, 2)) < 1e-9
-    return np.where(nominal, group.max() + 1 + np.arange(len(slip)), group).astype(np.intp)
-
-
 class _Builder:
     """Makes problems of one table, with the recorded slip as a latent variable where needed."""
 
-    def __init__(self, table: SteadyTable, forward: Forward, scale: FloatArray) -> None:
+    def __init__(
+        self, table: SteadyTable, forward: Forward, nuisance: tuple[Coordinate, ...]
+    ) -> None:
         self.table = table
         self.forward = forward
-        self.scale = scale
+        self.nuisance = nuisance
+        self.scale = _ranges(table)
         self.inputs = table.scaled_inputs()
         names = table.varying()
         self.narrow = slip_features(self.inputs, names.index('slip') if 'slip' in names else None)
-        self.latent = bool((table.slip_std > 0.0).any())
-        self._by_slip: FloatArray | None = None
-        self._moved = np.zeros(len(table))
-        self._group = _slip_groups(table)
-        self._by_angle: FloatArray | None = None
-
-    def read_leaving_angles(self, nothing: Fit) -> None:
-        """Find how the stated errors of measured leaving angles act on the cells."""
-        if self.table.leaving_angle_std.any():
-            self._by_angle = self.forward.by_input(
-                'leaving_angle', nothing.coordinates, nothing.u, nothing.angle
-            )
+        # (N, 4) derivatives of the outputs by slip and leaving angle, where these are uncertain
+        self.by_slip: FloatArray | None = None
+        self.by_angle: FloatArray | None = None
+        self._moved: FloatArray | None = None
+        # Rows share a reading of the slip that is equal to the last digit and no set value.
+        slip = table.columns['slip']
+        group = np.ravel(np.unique(slip, return_inverse=True)[1])
+        nominal = np.abs(slip - np.round(slip, 2)) < 1e-9
+        own = group.max() + 1 + np.arange(len(slip))
+        self._group = np.where(nominal, own, group).astype(np.intp)
 
     def linearise(self, nothing: Fit, noise_std: FloatArray) -> None:
         """Linearise the slip errors around the most probable slips, given all quantities.
@@ -286,59 +254,51 @@ class _Builder:
         Where the curves bend within an error of the slip, a tangent at the reading is not enough.
         """
         slip, std = self.table.columns['slip'], self.table.slip_std
-        self._by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, nothing.angle)
-        problem, observed = self.build(noise_std, ())
-        here = nothing.within(problem, observed)
+        self.by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, nothing.angle)
+        problem = self.build(noise_std, ())
+        here = nothing.within(problem)
         inverse = problem.rotation.T @ inverse_covariance(
             problem.variance(_LATENT_FLOOR), here.jacobian
         )
         cells = inverse @ (here.residual + here.jacobian @ here.u)
         pull = np.bincount(
             self._group[problem.row],
-            problem.flat(self._by_slip) * std[problem.row] * cells,
+            problem.flat(self.by_slip) * std[problem.row] * cells,
             minlength=self._group.max() + 1,
         )
         moved = np.clip(pull[self._group], -_FARTHEST, _FARTHEST) * std
         moved = np.clip(slip + moved, -0.97, 0.97) - slip
         self.forward = self.forward.at(replace(self.forward.points, slip=slip + moved))
-        self._moved = moved
         angle = self.forward.solve([nothing.coordinates], [nothing.u], jacobian=False).angle[0]
-        self._by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, angle)
+        self.by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, angle)
+        # The reading lies off the point of linearisation: the tangent takes the cells along.
+        self._moved = self.by_slip * moved[:, None]
 
-    def build(self, std: FloatArray, outliers: Outliers) -> tuple[Problem, FloatArray]:
-        """Return the problem and the cells that the model has to match."""
+    def build(self, std: FloatArray, outliers: Outliers) -> Problem:
+        """Return the problem without some cells."""
         common = []
-        if self._by_slip is not None:
-            common.append(CommonError(self._by_slip, self.table.slip_std, self._group))
-        if self._by_angle is not None:
+        if self.by_slip is not None:
+            common.append(CommonError(self.by_slip, self.table.slip_std, self._group))
+        if self.by_angle is not None:
             rows = np.arange(len(self.table), dtype=np.intp)
-            common.append(CommonError(self._by_angle, self.table.leaving_angle_std, rows))
+            common.append(CommonError(self.by_angle, self.table.leaving_angle_std, rows))
         rejected = [(row, quantity) for row, quantity, _ in outliers]
-        problem = build_problem(self.table.measured, std, self.inputs, self.scale, rejected, common)
-        observed = problem.observed
-        if self._by_slip is not None:
-            # The reading lies off the point of linearisation: the tangent takes the cells along.
-            observed = observed + problem.flat(self._by_slip * self._moved[:, None])
-        return problem, observed
+        return build_problem(
+            self.table.measured, std, self.inputs, self.scale, rejected, common, self._moved
+        )
 
     def fit_nothing(
-        self,
-        std: FloatArray,
-        outliers: Outliers,
-        nuisance: tuple[Coordinate, ...],
-        previous: Fit | None,
-    ) -> tuple[Problem, FloatArray, Fit]:
-        """Return problem, cells, and the fit of the soil alone from a previous one."""
-        problem, observed = self.build(std, outliers)
-        start = np.zeros(len(nuisance)) if previous is None else previous.u
+        self, std: FloatArray, outliers: Outliers, previous: Fit | None
+    ) -> tuple[Problem, Fit]:
+        """Return the problem, and the fit of the soil alone from a previous one."""
+        problem = self.build(std, outliers)
+        start = np.zeros(len(self.nuisance)) if previous is None else previous.u
         angles = None if previous is None else previous.angle[None]
-        variance, one = problem.variance(FIT_FLOOR), [((), nuisance)]
-        found = fit(self.forward, problem, observed, one, [start], variance, angles, 12)[0]
-        return problem, observed, found
+        variance, one = problem.variance(FIT_FLOOR), [((), self.nuisance)]
+        return problem, fit(self.forward, problem, one, [start], variance, angles, 12)[0]
 
     def estimate(self, noise: Noise, fitted: Fit, outliers: Outliers) -> Noise:
         """Estimate the noise that was not stated."""
         if 'estimated' not in noise.origin.values():
             return noise
-        problem, observed = self.build(noise.std, outliers)
-        return noises.estimate_noise(noise, fitted, problem, observed)
+        return noises.estimate_noise(noise, fitted, self.build(noise.std, outliers))

@@ -13,7 +13,6 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -63,7 +62,6 @@ class Setting:
 
     forward: Forward
     problem: Problem
-    observed: FloatArray  # (m,) measured cells (moved along the slip where slip is latent)
     nuisance: tuple[Coordinate, ...]  # soil and stated base effects
     effects: Mapping[str, Effect]  # the visible effects
     floors: tuple[Floor, ...]
@@ -92,7 +90,6 @@ class Setting:
         return fit(
             self.forward,
             self.problem,
-            self.observed,
             [(names, self.coordinates(names)) for names in sets],
             starts,
             weights,
@@ -132,8 +129,7 @@ def linear_starts(setting: Setting, base: Fit, names: Sequence[str]) -> list[tup
         )
         prior = loose_precision([*base.coordinates, own[0]])
         precision = jacobian.T @ (jacobian / base.variance[:, None]) + np.diag(prior)
-        residual = problem.rotation @ (setting.observed - problem.flat(outputs))
-        target = residual + jacobian @ np.append(base.u, shape[0])
+        target = problem.residual(outputs) + jacobian @ np.append(base.u, shape[0])
         mean = np.linalg.solve(precision, jacobian.T @ (target / base.variance))
         strength = np.clip(mean[-1], own[0].lower, own[0].upper)
         # Fall of the objective that the linear signature promises inside the bounds.
@@ -203,10 +199,6 @@ _COMPETITORS = 2  # other effects that are put in the place of each effect of a 
 _PROMISE = 1.5
 
 
-def _everywhere(amplitude: float) -> tuple[float, ...]:
-    return (amplitude,) * len(QUANTITIES)
-
-
 def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
     """Return the assumptions on the structural error with their priors.
 
@@ -216,8 +208,8 @@ def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
     most = math.inf if greatest is None else greatest
     kept = [(a, p) for a, p in _FLOORS if a <= most] or [_FLOORS[0]]
     share = (1.0 - _UNEXPLAINED_PRIOR) / sum(p for _, p in kept)
-    floors = [Floor(_everywhere(a), math.log(p * share), False) for a, p in kept]
-    patterns = [_everywhere(a) for a in _UNEXPLAINED]
+    floors = [Floor((a,) * len(QUANTITIES), math.log(p * share), False) for a, p in kept]
+    patterns = [(a,) * len(QUANTITIES) for a in _UNEXPLAINED]
     patterns += [
         tuple(a * there for there in some)
         for some, a in itertools.product(_SOME, _UNEXPLAINED_SOME)
@@ -234,7 +226,7 @@ def shared_floors() -> tuple[Floor, ...]:
     """
     amplitudes = (0.0, 0.015, 0.03, 0.06, 0.12, 0.25)
     each = -math.log(len(amplitudes))
-    return tuple(Floor(_everywhere(a), each, False) for a in amplitudes)
+    return tuple(Floor((a,) * len(QUANTITIES), each, False) for a in amplitudes)
 
 
 @dataclass(frozen=True)
@@ -250,6 +242,11 @@ class Selection:
     def unexplained(self) -> BoolArray:
         """(F,) True for floors that ask for a name."""
         return np.array([floor.unexplained for floor in self.floors])
+
+    @property
+    def best(self) -> float:
+        """Log of prior times evidence of the best explanation."""
+        return float(log_sum(self.log_joint[0]))
 
     @property
     def nothing(self) -> int:
@@ -280,17 +277,12 @@ def log_prior(names: Sequence[str], visible: Iterable[str]) -> float:
 
     The forms of an effect share its weight.
     """
-    forms, count = _forms(tuple(visible)), len(names)
+    forms, count = Counter(map(effect_of, visible)), len(names)
     if count == 0:
         return math.log(PRIOR_NOTHING)
     prior = PRIOR_ONE if count == 1 else PRIOR_TWO * PRIOR_MORE ** (count - 2)
     prior /= max(math.comb(len(forms), count), 1)
     return math.log(prior) - sum(math.log(max(forms[effect_of(key)], 1)) for key in names)
-
-
-@lru_cache(maxsize=8)
-def _forms(visible: tuple[str, ...]) -> Counter[str]:
-    return Counter(map(effect_of, visible))
 
 
 def weigh(

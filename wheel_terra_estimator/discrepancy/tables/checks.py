@@ -330,6 +330,22 @@ def check_pull_against_model(table: SteadyTable, predicted: FloatArray) -> None:
         )
 
 
+def decades_off(table: SteadyTable, predicted: FloatArray) -> dict[str, float]:
+    """Return quantity -> power of ten that brings it to the size that the model gives.
+
+    ``predicted`` are (N, 4) values of the configured model. Only those that are off by more than
+    half a decade: units differ by tens, or by 9.8 (kilopond). Where all are, it is no unit.
+    """
+    found: dict[str, float] = {}
+    for q, quantity in enumerate(QUANTITIES):
+        here = np.isfinite(table.measured[:, q])
+        size, due = (np.sum(np.abs(values[here, q])) for values in (table.measured, predicted))
+        decades = round(math.log10(due / size)) if size > 0.0 and due > 0.0 else 0
+        if decades:
+            found[quantity] = 10.0**decades
+    return found if len(found) < len(table.quantities) else {}
+
+
 def _without_copies(table: SteadyTable) -> tuple[SteadyTable, int]:
     """Drop rows in which every number equals that of an earlier row."""
     everything = np.column_stack(
