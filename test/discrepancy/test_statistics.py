@@ -25,7 +25,6 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     WORSE_SHARE,
     Coordinate,
     bounds,
-    deviations,
     effect_coordinates,
     soil_coordinates,
 )
@@ -68,7 +67,7 @@ def forward():
 @pytest.fixture(scope='module')
 def setting(forward):
     """Truth, inputs and noise of a table on these points."""
-    soil = soil_coordinates(SOIL, deviations(SOIL, {}))
+    soil = soil_coordinates(SOIL, {})
     truth = forward.solve([soil], [np.zeros(len(soil))], jacobian=False).outputs[0]
     truth[:, 3] = np.nan  # no lateral force measured
     std = np.broadcast_to([4e-4, 1.0, 0.1, np.nan], truth.shape)
@@ -95,12 +94,13 @@ def smooth_error(problem, inputs, scale, amplitude):
 )
 def test_cohesion_is_known_to_a_share_and_some_pascal(source, pascal):
     """As docs/diagnose.md has it; a share that is taken for pascals holds it fast."""
-    assert deviations(SOIL, {}, source)['cohesion'].value == pytest.approx(pascal)
+    cohesion = next(c for c in soil_coordinates(SOIL, {}, source) if c.name == 'cohesion')
+    assert cohesion.scale / WIDENING == pytest.approx(pascal)
 
 
 def test_batched_model_is_the_package_model(forward):
     """Outputs and Jacobians against terramechanics, one hypothesis at a time, other steps."""
-    soil = soil_coordinates(SOIL, deviations(SOIL, {}))
+    soil = soil_coordinates(SOIL, {})
     names = [name for name, effect in catalogue().items() if effect.candidate]
     hypotheses = [(*soil, *effect_coordinates(catalogue()[name])) for name in names]
     u = [
@@ -234,7 +234,7 @@ def test_held_out_rows_are_predicted_by_a_fit_without_them():
     smooth = Wheel(0.14, 0.15, 0.0, 0.0, 0.0)
     points = OperatingPoints(slip, np.repeat([60.0, 90.0, 120.0], 8), smooth)
     loose = Soil(5790.0, 180e3, 0.8, 300.0, np.radians(17.8), 0.01, 0.4, 0.0)
-    coordinates = soil_coordinates(loose, deviations(loose, {}, 'published'))
+    coordinates = soil_coordinates(loose, {}, 'published')
     forward = Forward(points, loose, {}, catalogue())
     rng = np.random.default_rng(6)
     true = np.clip(0.2 * rng.standard_normal(len(coordinates)), *bounds(coordinates))
@@ -356,7 +356,7 @@ def test_confidence_follows_what_speaks_for_a_name():
         values['margin_two'] = values['margin'] * values['two']
         return confidence.confidence(values).of_name
 
-    assert len(confidence._weights()['name']) == len(confidence.FEATURES)
+    assert len(confidence._WEIGHTS['name']) == len(confidence.FEATURES)
     assert of_name() > 0.95
     behind = of_name(margin=-1.0, margin_of_set=-0.5)
     assert behind < 0.6 < of_name(margin=1.0) < of_name()

@@ -15,9 +15,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration, Readings
 from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
-    Coordinate,
     base_coordinates,
-    deviations,
     soil_coordinates,
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
@@ -92,7 +90,12 @@ def diagnose(
     )
     configured = _check_soil_carries(both, forward)
     check_pull_against_model(both, configured[:, 1])
-    nuisance = nuisance_coordinates(configuration, known, chosen.soil_known_to)
+    # soil.relative_std is the estimator's doubt of a soil on its way, not that of a measured soil.
+    stated_std, source = configuration.soil_std_stated, configuration.soil_source
+    nuisance = (
+        *soil_coordinates(configuration.soil, stated_std, source, chosen.soil_known_to),
+        *base_coordinates(configuration.effects, configuration.effects_std, known),
+    )
     floors = default_floors(chosen.floor) if reference is None else shared_floors()
 
     findings = search(both, forward, nuisance, effects, floors)
@@ -126,19 +129,6 @@ def diagnose(
     seconds = time.perf_counter() - started
     notes = (*notes, *diagnosis.notes)
     return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
-
-
-def nuisance_coordinates(
-    configuration: Configuration, known: Mapping[str, Effect], known_to: float | None = None
-) -> tuple[Coordinate, ...]:
-    """Return the soil parameters and the stated uncertain parameters of effects that are on."""
-    # soil.relative_std is the estimator's doubt of a soil on its way, not that of a measured soil.
-    stated, source = configuration.soil_std_stated, configuration.soil_source
-    soil = deviations(configuration.soil, stated, source, known_to)
-    return (
-        *soil_coordinates(configuration.soil, soil),
-        *base_coordinates(configuration.effects, configuration.effects_std, known),
-    )
 
 
 def _effects_to_try(

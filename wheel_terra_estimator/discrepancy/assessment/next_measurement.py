@@ -56,7 +56,8 @@ def propose(
         blocks = []
         for (what, rows), (values, sensitivity) in zip(menu, predicted, strict=True):
             outputs = values[[0, place]]
-            then = _with_rows(setting, chosen, competitor, outputs, sensitivity[place], std)
+            new = (outputs[0] - outputs[1]) / std, sensitivity[place] / std[None, :, None]
+            then = _distance(setting, chosen, competitor, new)
             depth = outputs[..., 0].max()
             worth = np.isfinite(then) and then > max(_WORTH, _MORE * now)
             if worth and depth < _DEEPEST * rows['wheel_radius'][0]:
@@ -131,32 +132,21 @@ def _predicted(
     return [(state.outputs[:, part], [j[part] for j in state.jacobian]) for part in parts]
 
 
-def _with_rows(
-    setting: Setting,
-    chosen: Fit,
-    competitor: Fit,
-    outputs: FloatArray,
-    sensitivity: FloatArray,
-    std: FloatArray,
-) -> float:
-    """Distance d' of chosen and competitor with new rows: (2, n, 4) outputs, its Jacobian."""
-    difference = ((outputs[0] - outputs[1]) / std).reshape(-1)
-    jacobian = (sensitivity / std[None, :, None]).reshape(len(difference), -1)
-    keep = np.isfinite(difference)
-    return _distance(setting, chosen, competitor, (difference[keep], jacobian[keep]))
-
-
 def _distance(
     setting: Setting, chosen: Fit, competitor: Fit, new: tuple[FloatArray, FloatArray] | None = None
 ) -> float:
-    """Distance d' of the chosen prediction from the competitor's best refit to it (linear)."""
+    """Distance d' of the chosen prediction from the competitor's best refit to it (linear).
+
+    ``new``: differences (n, 4) on new rows and their derivatives (n, 4, P), in noise deviations.
+    """
     problem = setting.problem
     scale = 1.0 / np.sqrt(competitor.variance)
     difference = problem.rotation @ problem.flat(chosen.outputs - competitor.outputs) * scale
     jacobian = competitor.jacobian * scale[:, None]
     if new is not None:
-        difference = np.concatenate([difference, new[0]])
-        jacobian = np.concatenate([jacobian, new[1]])
+        keep = np.isfinite(new[0])
+        difference = np.concatenate([difference, new[0][keep]])
+        jacobian = np.concatenate([jacobian, new[1][keep]])
     precision = jacobian.T @ jacobian + np.diag(competitor.prior)
     step = np.linalg.solve(precision, jacobian.T @ difference)
     return float(np.linalg.norm(difference - jacobian @ step))

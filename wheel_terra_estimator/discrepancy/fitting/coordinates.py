@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,84 +28,44 @@ from wheel_terra_estimator.terramechanics.effects import by_variant
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 from wheel_terra_estimator.terramechanics.soil import Soil
 
-# Deviations in the space of the coordinates: of logarithms (stiffness, tan phi, K), else absolute;
-# of cohesion a share of its value, beside a part that does not vanish with it.
-_CLASSES = {  # soil tests, published
-    'stiffness': (0.10, 0.40),
-    'sinkage_exponent': (0.05, 0.20),
-    'tan_friction': (0.05, 0.25),
-    'shear_modulus': (0.10, 0.80),
-    'cohesion': (0.20, 0.50),
-    'peak_stress_ratio': (0.03, 0.10),
-    'leaving_angle_ratio': (0.03, 0.25),
-}
-_TESTS, _PUBLISHED = ({key: both[k] for key, both in _CLASSES.items()} for k in (0, 1))
-_PROXY = _PUBLISHED | {'stiffness': 0.60, 'sinkage_exponent': 0.40, 'shear_modulus': 1.0}
-_COHESION_FLOOR = {'': 10.0, 'published': 50.0, 'proxy': 50.0}  # [Pa], beside the share
-_BY_SOURCE = {'': _TESTS, 'published': _PUBLISHED, 'proxy': _PROXY}
-_PLATE = ('stiffness', 'sinkage_exponent')
-_ASSUMED = ('peak_stress_ratio', 'leaving_angle_ratio')
-_LEAST_RATIO = 0.03  # deviation of an angle ratio that is nought, where all are known to a share
-_STATED = {'stiffness': 'frictional_modulus', 'tan_friction': 'friction_angle'}
 
+class _Number(NamedTuple):
+    """A soil number that a diagnosis refits, and how well it is known where nobody states it.
 
-@dataclass(frozen=True)
-class Deviation:
-    """Standard deviation in the space of the coordinate, and where it comes from."""
-
-    value: float
-    source: str
-
-
-def deviations(
-    soil: Soil, stated: Mapping[str, float], source: str = '', known_to: float | None = None
-) -> dict[str, Deviation]:
-    """Return the deviation of each soil number that a diagnosis refits.
-
-    ``stated``: field of ``Soil`` -> deviation that the configuration states [SI]; ``source``: class
-    of the source of the rest (``soil.source``). ``known_to``, the share of its value to which every
-    number is known (``--soil-known-to``), goes before all.
+    Deviations are in the space of the coordinate: of logarithms, else absolute (of cohesion a share
+    of its value, beside a part that does not vanish with it).
     """
-    found = {}
-    for name, usual in _BY_SOURCE[source].items():
-        field = _STATED.get(name, name)
-        if known_to is not None:
-            found[name] = Deviation(_of_share(soil, name, known_to), 'as said: --soil-known-to')
-        elif field in stated:
-            found[name] = Deviation(_of_stated(soil, name, stated[field]), 'stated')
-        else:
-            part = usual * float(soil.cohesion) + _COHESION_FLOOR[source]
-            value = part if name == 'cohesion' else usual
-            found[name] = Deviation(value, f'class of source: {_class(name, source)}')
-    return found
+
+    field: str  # of ``Soil``
+    logarithmic: bool
+    lower: float
+    upper: float
+    unit: str
+    found_by: str  # of published numbers
+    by_tests: float  # beside the wheel
+    published: float
+    proxy: float  # another soil
 
 
-def _class(name: str, source: str) -> str:
-    if not source:
-        return 'soil tests'
-    if name in _ASSUMED:
-        return 'assumed'
-    if source == 'proxy' and name in (*_PLATE, 'shear_modulus'):
-        return 'proxy'
-    return 'plate' if name in _PLATE else 'shear box'
-
-
-def _of_stated(soil: Soil, name: str, std: float) -> float:
-    if name == 'tan_friction':
-        slope = 1.0 / math.cos(float(soil.friction_angle)) ** 2
-        return std * slope / math.tan(float(soil.friction_angle))
-    if name == 'stiffness':
-        return std / max(float(soil.frictional_modulus), 1e-9)
-    return std / float(soil.shear_modulus) if name == 'shear_modulus' else std
-
-
-def _of_share(soil: Soil, name: str, share: float) -> float:
-    if name in ('stiffness', 'tan_friction', 'shear_modulus'):
-        return share
-    value = share * abs(float(getattr(soil, name)))
-    if name == 'cohesion':
-        return value + _COHESION_FLOOR['']
-    return max(value, _LEAST_RATIO) if name in _ASSUMED else value
+_NUMBERS = {
+    'stiffness': _Number('frictional_modulus', True, 0.05, 20.0, '-', 'plate', 0.10, 0.40, 0.60),
+    'sinkage_exponent': _Number(
+        'sinkage_exponent', False, 0.15, 3.0, '-', 'plate', 0.05, 0.20, 0.40
+    ),
+    'tan_friction': _Number('friction_angle', True, 0.05, 1.7, '-', 'shear box', 0.05, 0.25, 0.25),
+    'shear_modulus': _Number('shear_modulus', True, 1e-4, 0.5, 'm', 'shear box', 0.10, 0.80, 1.0),
+    'cohesion': _Number('cohesion', False, 0.0, math.inf, 'Pa', 'shear box', 0.20, 0.50, 0.50),
+    'peak_stress_ratio': _Number(
+        'peak_stress_ratio', False, 0.02, 0.95, '-', 'assumed', 0.03, 0.10, 0.10
+    ),
+    'leaving_angle_ratio': _Number(
+        'leaving_angle_ratio', False, -1.2, 0.0, '-', 'assumed', 0.03, 0.25, 0.25
+    ),
+}
+"""Name of the coordinate -> the number; ``stiffness`` is a factor on both bearing moduli."""
+_COHESION_FLOOR = {'': 10.0, 'published': 50.0, 'proxy': 50.0}  # [Pa], beside the share
+_LEAST_RATIO = 0.03  # deviation of an angle ratio that is nought, where all are known to a share
+_OF_PROXIES = ('stiffness', 'sinkage_exponent', 'shear_modulus')  # known worse than published ones
 
 
 # Stated uncertainties are often optimistic: the coordinates are this many times wider, and the
@@ -118,9 +79,6 @@ AS_THEY_ARE = ((1.0, 1.0),)  # of coordinates that are held on purpose
 # know the size of the machine) are weighed against each other, with these shares.
 EFFECT_SCALES = (0.3, 2.0, 10.0)
 EFFECT_SHARES = (0.45, 0.45, 0.10)
-# Bounds of the fits: factor on the bearing moduli, and shear deformation modulus [m].
-_STIFFNESS = (0.05, 20.0)
-_SHEAR_MODULUS = (1e-4, 0.5)
 # During fits the strength is held loosely, so that a strong effect is not pulled back.
 LOOSE = 6.0
 
@@ -176,39 +134,53 @@ class Coordinate:
         return ((math.log(value) if self.logarithmic else value) - self.centre) / self.scale
 
 
-def soil_coordinates(soil: Soil, known: Mapping[str, Deviation]) -> tuple[Coordinate, ...]:
-    """Return the free soil parameters, centred on the configured soil.
+def soil_coordinates(
+    soil: Soil,
+    stated: Mapping[str, float],
+    source: str = '',
+    known_to: float | None = None,
+) -> tuple[Coordinate, ...]:
+    """Return the soil numbers that a diagnosis refits, centred on the configured soil.
 
-    ``known``: name of the coordinate -> its deviation (``deviations``).
+    ``stated``: field of ``Soil`` -> deviation that the configuration states [SI]; ``source``: class
+    of the source of the rest (``soil.source``). ``known_to``, the share of its value to which every
+    number is known (``--soil-known-to``), goes before all.
     """
-
-    def make(
-        name: str, centre: float, lower: float, upper: float, logarithmic: bool, unit: str = '-'
-    ) -> Coordinate:
-        scale = WIDENING * known[name].value
-        return Coordinate(
-            'soil', name, centre, scale, (lower - centre) / scale, (upper - centre) / scale,
-            logarithmic, unit=unit, source=known[name].source,
-        )  # fmt: skip
-
-    def logarithm(name: str, value: float, lower: float, upper: float, unit: str) -> Coordinate:
-        ends = math.log(min(lower, value)), math.log(max(upper, value))
-        return make(name, math.log(value), *ends, True, unit)
-
-    def shifted(name: str, lower: float, upper: float, unit: str = '-') -> Coordinate:
-        value = float(getattr(soil, name))
-        return make(name, value, min(lower, value), max(upper, value), False, unit)
-
-    stiffness = logarithm('stiffness', 1.0, *_STIFFNESS, '-')
-    return (
-        replace(stiffness, meaning='factor on both bearing moduli'),
-        shifted('sinkage_exponent', 0.15, 3.0),
-        logarithm('tan_friction', math.tan(float(soil.friction_angle)), 0.05, 1.7, '-'),
-        logarithm('shear_modulus', float(soil.shear_modulus), *_SHEAR_MODULUS, 'm'),
-        shifted('cohesion', 0.0, math.inf, 'Pa'),
-        shifted('peak_stress_ratio', 0.02, 0.95),
-        shifted('leaving_angle_ratio', -1.2, 0.0),
-    )
+    found = []
+    for name, n in _NUMBERS.items():
+        value = float(getattr(soil, n.field))
+        if known_to is not None:
+            deviation, said = known_to, 'as said: --soil-known-to'
+            if not n.logarithmic:
+                deviation = known_to * abs(value)
+            if name == 'cohesion':
+                deviation += _COHESION_FLOOR['']
+            elif n.found_by == 'assumed':
+                deviation = max(deviation, _LEAST_RATIO)
+        elif n.field in stated:
+            deviation, said = stated[n.field], 'stated'
+            if name == 'tan_friction':
+                deviation = deviation * (1.0 / math.cos(value) ** 2) / math.tan(value)
+            elif n.logarithmic:
+                deviation /= max(value, 1e-9)
+        else:
+            deviation = {'': n.by_tests, 'published': n.published, 'proxy': n.proxy}[source]
+            if name == 'cohesion':
+                deviation = deviation * value + _COHESION_FLOOR[source]
+            kind = 'proxy' if source == 'proxy' and name in _OF_PROXIES else n.found_by
+            said = f'class of source: {kind if source else "soil tests"}'
+        centre = {'stiffness': 1.0, 'tan_friction': math.tan(value)}.get(name, value)
+        least, most = min(n.lower, centre), max(n.upper, centre)
+        if n.logarithmic:
+            centre, least, most = map(math.log, (centre, least, most))
+        scale = WIDENING * deviation
+        lower, upper = (least - centre) / scale, (most - centre) / scale
+        found.append(
+            Coordinate(
+                'soil', name, centre, scale, lower, upper, n.logarithmic, unit=n.unit, source=said
+            )
+        )
+    return tuple(found)
 
 
 def narrowed(coordinates: Sequence[Coordinate], factor: float) -> tuple[Coordinate, ...]:

@@ -114,11 +114,17 @@ class Forward:
                 if c.owner == name:
                     setting.setdefault(c.name, c.neutral)
             settings[name] = {
-                p: self._where_active(name, p, stacked[f'{name}.{p}'])
-                if f'{name}.{p}' in stacked
-                else value * one
-                for p, value in setting.items()
+                p: stacked.get(f'{name}.{p}', value * one) for p, value in setting.items()
             }
+            if self.active is not None and name not in self.base_effects:
+                # A candidate is at neutral on rows of a reference.
+                neutral = self.catalogue[name].neutral()
+                settings[name] = {
+                    p: np.where(self.active, values, neutral.get(p, 0.0))
+                    if f'{name}.{p}' in stacked
+                    else values
+                    for p, values in settings[name].items()
+                }
         terms = Terms(settings)
         return build_contact(self.points, soil, self.soil.pressure_law, terms), terms
 
@@ -141,13 +147,6 @@ class Forward:
         if self.readings is not None:
             outputs[..., :3] = self.readings.read(outputs[..., :3])
         return load - contact.normal_load, outputs
-
-    def _where_active(self, name: str, parameter: str, values: FloatArray) -> FloatArray:
-        """Put a candidate's parameter at neutral on rows of a reference."""
-        if self.active is None or name in self.base_effects:
-            return values
-        neutral = self.catalogue[name].neutral().get(parameter, 0.0)
-        return np.where(self.active, values, neutral)
 
     def _resting_value(self, coordinate: Coordinate) -> float:
         """Value of a coordinate in hypotheses that do not have it."""

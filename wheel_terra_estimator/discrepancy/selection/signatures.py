@@ -53,12 +53,6 @@ def against_soil(fitted: Fit, variance: FloatArray, vectors: FloatArray) -> Floa
     return scaled - weighted @ np.linalg.solve(precision, weighted.T @ vectors)
 
 
-def distance(fitted: Fit, variance: FloatArray, change: FloatArray) -> float:
-    """Return d' of a rotated change of the cells beyond what the soil can imitate."""
-    square = float(change @ against_soil(fitted, variance, change))
-    return max(square, 0.0) ** 0.5
-
-
 def unavailable(effect: Effect, table: SteadyTable, lug_height: FloatArray) -> str:
     """Return why the columns of the table cannot show the effect; empty if they can."""
     if not effect.touches & set(table.quantities):
@@ -105,7 +99,8 @@ def signatures(
     found: dict[str, Signature] = {}
     for index, (name, own, shape) in enumerate(trials):
         change = problem.rotation @ problem.flat(state.outputs[index] - nothing.outputs)
-        far = distance(nothing, nothing.variance, change)
+        # How far it is beyond what the soil can imitate.
+        far = max(float(change @ against_soil(nothing, nothing.variance, change)), 0.0) ** 0.5
         size = float(own[0].value(shape[0])) - own[0].neutral
         if name not in found or far > found[name].distance:
             limit = max(abs(own[0].lower), abs(own[0].upper))
