@@ -101,7 +101,7 @@ def test_asked(title):
         table_of(data, 'data')
     assert '--columns' in str(caught.value) and '--ignore-columns' in str(caught.value)
     for ignored in (title, f'a,{title}, b', 'all'):
-        table = table_of(data, 'data', Choice(ignored=(ignored,)))
+        table = table_of(data, 'data', Choice.of((), ignored))
         assert table.quantities == ('sinkage',)
     chosen = Choice.of({'torque': {'column': title, 'unit': 'N m', 'sign': -1}})
     table = table_of(data | {title: -numbers}, 'data', chosen)

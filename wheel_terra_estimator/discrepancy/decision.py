@@ -170,8 +170,7 @@ class Decider:
     def _judged(self, verdict: Verdict) -> Decision:
         """Refit nothing and the chosen explanation under its own floor, and predict unseen rows."""
         selection, nothing = self.findings.selection, self.findings.nothing
-        quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
-        place = quiet[int(np.argmax(selection.log_joint[verdict.index][quiet]))]
+        place = selection.quiet_floor(verdict.index)
         floor, chosen = selection.floors[place], selection.explanations[verdict.index]
         own = self.findings.setting.problem.variance(floor.amplitude)
         fits = [nothing, chosen.fitted] if chosen.names else [nothing]

@@ -241,7 +241,6 @@ def _shifts(
     """Return the configured numbers of the soil, or of effects that were on, before and after."""
     weighted = after.jacobian / variance[:, None]
     covariance = np.linalg.inv(weighted.T @ after.jacobian + np.diag(after.prior))
-    refit = findings.nothing.values()
     found = []
     for index, c in enumerate(after.coordinates):
         if c.owner not in owners or c.role != 'believed':
@@ -252,7 +251,7 @@ def _shifts(
                 c.name if c.owner == 'soil' else f'effects.{c.key}',
                 float(c.value(0.0)),
                 c.deviation(0.0, 1.0 / c.stated),
-                refit[c.key],
+                float(c.value(findings.nothing.u[index])),  # it has the same ones, first
                 float(c.value(u)),
                 c.deviation(u, float(np.sqrt(covariance[index, index]))),
                 c.stated * u,

@@ -57,10 +57,6 @@ class Fit:
             jacobian=problem.rotation @ self.sensitivity,
         )
 
-    def values(self) -> dict[str, float]:
-        """Return key -> value of every coordinate."""
-        return {c.key: float(c.value(x)) for c, x in zip(self.coordinates, self.u, strict=True)}
-
 
 class Descent:
     """One hypothesis on its way down the objective, by damped Gauss-Newton steps inside bounds."""

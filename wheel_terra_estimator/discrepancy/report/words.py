@@ -69,6 +69,8 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
             left.append(f'These rows cannot tell {plain(effect.name)} from {competitors}.')
     if diagnosis.verdict in OPEN and not still_off:
         left.append('Why these rows need another soil, or more scatter, than was stated.')
+    if diagnosis.misread:
+        return {'open': left, 'next': ['Correct the unit, and diagnose again.']}
     settled = not left
     if settled:
         left.append('Nothing beyond noise and the allowed model error.')

@@ -67,10 +67,7 @@ def remainder(selection: Selection, index: int, problem: Problem) -> Remainder:
     top = int(np.argmax(joint))
     real = np.array([floor.largest >= 0.01 for floor in selection.floors])
     any_share = float(np.exp(log_sum(joint[real]) - log_sum(joint)))
-    quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
-    best = quiet[int(np.argmax(joint[quiet]))]
-    floor = selection.floors[best]
-    variance = problem.variance(floor.amplitude)
+    variance = problem.variance(selection.floors[selection.quiet_floor(index)].amplitude)
     # A reference has no misfit that asks for a name: its structural error moves the soil as well.
     z_score = largest_z_score(explanation.fitted) if selection.unexplained.any() else 0.0
     return Remainder(

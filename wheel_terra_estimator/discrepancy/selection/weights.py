@@ -253,6 +253,10 @@ class Selection:
         """Place of the explanation without an effect."""
         return self.index(())
 
+    def quiet_floor(self, index: int) -> int:
+        """Return the place of an explanation's best floor among those that ask for no name."""
+        return int(np.argmax(np.where(self.unexplained, -np.inf, self.log_joint[index])))
+
     @property
     def misfit(self) -> float:
         """Posterior probability that a misfit is left that asks for a name."""

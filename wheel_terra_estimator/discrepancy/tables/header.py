@@ -71,14 +71,9 @@ class Choice:
                     entries |= _entries({name.strip(): title.strip()}, '--columns')
                 else:
                     entries |= _entries(read_map(Path(text)), str(text))
-        return cls(entries, tuple([ignored] if isinstance(ignored, str) else ignored))
-
-    def leaves_out(self, title: str) -> bool:
-        """Return whether a column is ignored by its name."""
-        return any(
-            title == text or title in [part.strip() for part in text.split(',')]
-            for text in self.ignored
-        )
+        texts = [ignored] if isinstance(ignored, str) else ignored
+        parts = (part.strip() for text in texts for part in text.split(','))
+        return cls(entries, (*texts, *parts))
 
 
 def _entries(columns: Mapping[Any, Any], source: str) -> dict[str, Entry]:
@@ -195,7 +190,7 @@ class Header:
         self._leave_all = ALL in choice.ignored
         taken = set(self._chosen(choice))
         for place, title in enumerate(titles):
-            if place in taken or choice.leaves_out(title):
+            if place in taken or title in choice.ignored:
                 continue
             meaning = meaning_of(title)
             if meaning is None or meaning.asked:
