@@ -101,10 +101,10 @@ def diagnose(
     findings = search(both, forward, nuisance, effects, floors)
     misread = {}
     for quantity, times in decades_off(both, configured).items():
+        scaled = search(both.scaled(quantity, times), forward, nuisance, effects, floors)
+        cells = int((findings.setting.problem.quantity == QUANTITIES.index(quantity)).sum())
         # The odds of two explanations of the same rows, in whatever unit.
-        cells = int(np.isfinite(both.measured[:, QUANTITIES.index(quantity)]).sum())
-        read = search(both.scaled(quantity, times), forward, nuisance, effects, floors)
-        gain = read.selection.best + cells * math.log(times) - findings.selection.best
+        gain = scaled.selection.best + cells * math.log(times) - findings.selection.best
         if gain > _CLEARLY_MISREAD:
             misread[quantity] = times
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
