@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.checks.calibration import as_file, calibrate
 from wheel_terra_estimator.checks.imu import gross_tilt
-from wheel_terra_estimator.checks.run import check_recording, examine
-from wheel_terra_estimator.checks.series import rows_of
+from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.configuration import reader
 
 WRONG = {
@@ -92,20 +91,6 @@ def test_the_gravity_of_another_planet_is_mended():
     assert told['rover.gravity'].after == pytest.approx(9.81, rel=0.01)
 
 
-def test_a_reference_whose_noise_alone_is_too_much_is_said():
-    rough = rolling.recording().reference
-    noise = 0.03 * np.random.default_rng(3).standard_normal(rough.velocity.shape[0])
-    velocity = rough.velocity + np.column_stack([noise, 0.0 * noise, 0.0 * noise])
-    calibration, configuration = calibrated(reference=replace(rough, velocity=velocity))
-    radius = next(c for c in calibration.changes if c.key == 'wheels.radius')
-    assert 'its noise alone allows no better' in radius.source
-    assert radius.std > calibration.figures['rover.radius_bound_by_reference_m'] > 0.0
-    fine = next(c for c in calibrated()[0].changes if c.key == 'wheels.radius')
-    assert 'noise alone' not in fine.source and 'noise alone' in as_file(
-        calibration, configuration, 'drive'
-    )
-
-
 def test_zeros_of_the_torques_are_told_where_straights_are_driven_both_ways():
     joints = rolling.recording().joints
     zeros = np.linspace(-2.0, 2.0, joints.torque.shape[1])
@@ -140,63 +125,6 @@ def test_a_body_that_digs_in_is_on_no_slope():
     assert told.figures['torque.gain'] == pytest.approx(0.33, abs=0.05)
     assert not {'gain', 'mass'} & {finding.kind for finding in told.findings}
     assert 'sensors.torque_gain' not in {c.key for c in calibrate(sunk, rolling.rover()).changes}
-
-
-def in_the_air(friction=0.7, zero=0.2, begin=0.5, turn=7.5, end=14.0):
-    """The drive whose rover hangs in the air in its first seconds, wheels forward, then back."""
-    joints = rolling.recording().joints
-    seconds = joints.seconds
-    sense = np.select([(seconds > begin) & (seconds < turn), (seconds >= turn) & (seconds < end)],
-                      [1.0, -1.0])[:, None]  # fmt: skip
-    noise = 0.05 * np.random.default_rng(5).standard_normal(joints.rate.shape)
-    free = np.abs(sense) > 0.0
-    return replace(
-        joints,
-        rate=np.where(free, 1.5 * sense + 0.01 * noise, joints.rate),
-        torque=np.where(free, friction * sense + noise, joints.torque) + zero,
-    )
-
-
-def test_drive_friction_of_wheels_in_the_air(tmp_path):
-    recording = replace(rolling.recording(), joints=in_the_air())
-    rover = rolling.rover(**{'wheels.radius': [0.94 * rolling.RADIUS] * 4})
-    calibration = calibrate(recording, rover)
-    told = {change.key: change for change in calibration.changes}
-    friction = told['effects.drivetrain_friction.torque']
-    assert friction.after == pytest.approx(0.7, abs=0.02)
-    assert abs(friction.after - 0.7) < 3.0 * friction.std
-    assert told['wheels.radius'].after[0] == pytest.approx(rolling.RADIUS, rel=0.01)
-    path = tmp_path / 'rover.yaml'
-    path.write_text(as_file(calibration, rover, 'drive'))
-    mended = reader.load([path])
-    assert mended.effects['drivetrain_friction']['torque'] == pytest.approx(0.7, abs=0.02)
-
-
-def test_a_drive_that_never_leaves_the_ground_tells_no_friction():
-    calibration = calibrate(rolling.recording(), rolling.rover())
-    assert not any('friction' in change.key for change in calibration.changes)
-    assert any('in the air' in entry.reason for entry in calibration.not_seen)
-
-
-def test_a_dead_reference_lifts_no_rover():
-    whole = rolling.recording()
-    dead = replace(whole.reference, velocity=0.0 * whole.reference.velocity)
-    joints = replace(whole.joints, torque=0.0 * whole.joints.torque)
-    _, evidence = examine(replace(whole, reference=dead, joints=joints), rolling.rover())
-    assert not evidence.in_air.any() and evidence.moving.any()
-
-
-def test_a_reference_every_three_seconds_does_not_stand_where_the_rover_turns_back():
-    """Ahead, then to and fro in 15 s with light wheels: means of its velocity are nothing."""
-    time = np.arange(0.0, 200.0, 1.0 / rolling.RATE)
-    to_and_fro = np.interp(time % 15.0, [0, 1, 6.5, 7.5, 8.5, 14, 15], [0, 1, 1, 0, -1, -1, 0])
-    speed = 0.3 * np.where(time < 120.0, 1.0, to_and_fro)
-    motion = rolling.Motion(time, speed, 0.0 * time, 0.0 * time)
-    whole = rolling.recording(motion)
-    rare = rows_of(whole.reference, np.arange(whole.reference.stamp.size) % 6 == 0)
-    joints = replace(whole.joints, torque=0.5 * whole.joints.torque)
-    _, evidence = examine(replace(whole, reference=rare, joints=joints), rolling.rover())
-    assert evidence.moving.any() and not evidence.in_air.any()
 
 
 def test_what_the_recording_cannot_tell_stays():

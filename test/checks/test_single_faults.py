@@ -73,8 +73,6 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, {'torque': np.abs}, 'torque_unsigned', None, None, ''),
     (JOINTS, {'torque': by(0.0)}, 'torque_placeholder', None, None, 'effort'),
     (JOINTS, {'torque': by([1, -1, 1, 1])}, 'torque_sign', FR, None, ''),
-    (JOINTS, {'torque': by([2, 1, 1, 1])}, 'wheel_torque', FL, approx(2.0, rel=0.05), ''),
-    (JOINTS, {'torque': by([1, 1, 1, 2])}, 'wheel_torque', RR, approx(2.0, rel=0.05), ''),
     (*stays(JOINTS, 'torque', 2), 'torque_frozen', RL, None, FROZEN),
     (JOINTS, {'names': lambda n: ('fl_wheel', *n[1:])}, 'joint_name', FL, None, RENAMED),
     (JOINTS, THREE, 'missing_wheel', RR, None, ''),

@@ -24,7 +24,6 @@ WORTH_CHANGING = 0.2  # relative change of a noise or rate that is written, at l
 NOISE_STD = 0.1  # relative deviation of a noise that a drive tells [-]
 LEAST_SURE = 0.8  # confidence from which a cure is written [-]
 CLEAR = 2.0  # deviations by which a number is off, from which another is written [-]
-BLUNT_REFERENCE = 0.005  # error of the radius by noise of the reference that is told [-]
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,6 @@ def calibrate(
     evidence = _radius(changes, evidence, report)
     if np.isfinite(evidence.torque).any(axis=0).all():
         _torques(changes, evidence)
-        _friction(changes, evidence, report)
     _track(changes, evidence)
     report.not_checked.append(untold('mass', 'centre'))
     mended = {change.key for change in changes.made}
@@ -177,12 +175,9 @@ def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evide
     rolling, source = evidence.facts.radius, 'straight stretches against the other wheels'
     if told is not None and evidence.recording.reference is not None:
         source = f'straight, steady, firm stretches against {evidence.recording.reference.topic}'
-        bound = figures['rover.radius_bound_by_reference_m']
         if open_yet:  # nothing is mended by it yet
             rolling = rolling * figures['rover.radius_ratio']
             source += ' (or its scale is off: slip is the same)'
-        if bound > BLUNT_REFERENCE * float(np.mean(rolling)):
-            source += f' (its noise alone allows no better than +- {bound:.2g}: drive longer)'
     if np.allclose(rolling, configuration.wheels.slip_radius):
         return evidence
     lugs = configuration.wheels.slip_radius - configuration.wheels.radius
@@ -204,17 +199,6 @@ def _torques(changes: _Changes, evidence: Evidence) -> None:
         key = 'sensors.torque_zero'
         changes.add(key, after, std, source)
         changes.add(f'{key}_std', float(f'{std:.3g}'), None, f'deviation of {key}')
-
-
-def _friction(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
-    friction = torque.drive_friction(evidence)
-    if isinstance(friction, NotChecked):
-        report.not_checked.append(friction)
-    elif friction.value > 2.0 * friction.std:
-        source = 'torque of the wheels in the air (the reference says that the rover stands)'
-        changes.add('effects.drivetrain_friction.enabled', True, None, source)
-        value = round(friction.value, 4)
-        changes.add('effects.drivetrain_friction.torque', value, friction.std, source)
 
 
 def _track(changes: _Changes, evidence: Evidence) -> None:

@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
@@ -321,7 +320,8 @@ def check_transport(
         if channel is None or channel.stamp.size < 3:
             continue
         most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
-        order, jumps = _order(channel, most_back), _steps(channel)
+        one = _of_one_wheel(channel, facts)
+        order, jumps = _order(one, most_back), _steps(channel)
         step = float(jumps[np.argmax(np.abs(jumps))])
         outcomes += order
         if step and not order:
@@ -329,7 +329,7 @@ def check_transport(
             if np.count_nonzero(jumps) <= MOST_STEPS:
                 mended[name] = shifted(channel, np.round(1e9 * np.cumsum(jumps)).astype(np.int64))
         elif not order:
-            outcomes += _drop_outs(name, _of_one_wheel(channel, facts), figures)
+            outcomes += _drop_outs(name, one, figures)
         if channel.late.size and not step:
             ends = np.array_split(channel.late, 4)[:: 3 if channel.late.size > 3 else 1]
             late[name] = float(np.median(channel.late))
@@ -386,8 +386,7 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     forward = step[step > 0]
     period = float(np.median(forward)) if forward.size else 0.0
     back = float(np.mean(step < -period)) if step.size else 0.0
-    again = (step == 0.0) & _of_one_joint(channel)[stamped][1:]
-    repeated = float(np.mean(again)) if step.size else 0.0
+    repeated = float(np.mean(step == 0.0)) if step.size else 0.0
     words = []
     if zero > 0.01:
         words.append(f'{100 * zero:.0f} % of the stamps are 0 or negative')
@@ -402,30 +401,14 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     return [found('order', channel.topic, 0.99, how='; '.join(words))]
 
 
-def _of_one_joint(channel: Channel) -> NDArray[np.bool_]:
-    """Return which messages (k,) hold a joint that the one before holds too.
-
-    Drives that send a message each, all of one instant, repeat no stamp.
-    """
-    if not isinstance(channel, JointSeries | SinkageSeries):
-        return np.ones(channel.stamp.size, dtype=bool)
-    there = _there(channel)
-    return np.r_[True, np.any(there[1:] & there[:-1], axis=1)]
-
-
-def _there(channel: JointSeries | SinkageSeries) -> NDArray[np.bool_]:
-    return np.isfinite(channel.rate if isinstance(channel, JointSeries) else channel.sinkage)
-
-
 def _of_one_wheel(channel: Channel, facts: RoverFacts) -> Channel:
     """Return the messages of the wheel that is told most often, where they hold one or few each."""
     if not isinstance(channel, JointSeries | SinkageSeries):
         return channel
-    there = _there(channel)[:, [name in facts.names for name in channel.names]]
-    if not there.any():
-        return channel
+    there = np.isfinite(channel.rate if isinstance(channel, JointSeries) else channel.sinkage)
+    there[:, [name not in facts.names for name in channel.names]] = False
     one = there[:, np.argmax(there.sum(axis=0))]
-    return rows_of(channel, one) if one.mean() < IN_MOST else channel
+    return rows_of(channel, one) if 0.0 < one.mean() < IN_MOST else channel
 
 
 def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Outcome]:

@@ -34,11 +34,6 @@ SHORTEST_REST = 1.0  # A standstill counts as rest after this time [s]
 LEAST_REST = 0.4  # rest that tells the bias of a gyro [s]
 SETTLING = 0.5  # A speed counts as steady this long after it changed [s]
 STRAIGHT_SHARE = 0.25  # speed of the sides against the middle of a straight, at most [-]
-STANDING_SHARE = 0.1  # speed over rim speed of a rover that stands, at most [-]
-FREE_TRACTION = 0.12  # sum of T/r over the weight of wheels in the air, at most [-]
-SMOOTH_ROWS, SMOOTH_TIME = 5, 1.0
-"""Messages over which speed and torque are averaged for that, those of the reference in 1 s."""
-SHORTEST_FREE = 3.0  # wheels that turn so long while the rover stands may be in the air [s]
 LEAST_MOVING_ROWS = 30  # fewer rows of driving than these tell nothing
 EVEN_GROUND_STD = math.radians(0.8)  # deviation of a tilt by circles on a plane, at most [rad]
 LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
@@ -114,8 +109,8 @@ class Evidence:
         return float(np.median(moving)) if moving.size else 0.0
 
     @cached_property
-    def wheels_turn(self) -> Mask:
-        """Rows in which the wheels turn, on the ground or in the air."""
+    def moving(self) -> Mask:
+        """Rows in which the wheels turn."""
         return _shared(self.size > 0.2 * max(self.working_rate, 1e-9))
 
     @cached_property
@@ -177,25 +172,6 @@ class Evidence:
     def rested(self) -> bool:
         """Whether a standstill tells the bias of the gyro."""
         return float(self.at_rest.sum()) * self.period > LEAST_REST
-
-    @cached_property
-    def moving(self) -> Mask:
-        """Rows in which the wheels turn on the ground."""
-        return _shared(self.wheels_turn & ~self.in_air)
-
-    @cached_property
-    def in_air(self) -> Mask:
-        """Rows in which the wheels turn freely while the reference says that the rover stands."""
-        speed, facts = self.reference_speed, self.facts
-        if speed is None or not facts.known or not np.isfinite(self.torque).any():
-            return np.zeros(self.time.size, dtype=bool)
-        size = row_medians(np.abs(self.rate * facts.radius))
-        taken = np.nansum(np.abs(self.torque) / facts.radius, axis=1)
-        free = moving_mean(taken, SMOOTH_ROWS) < FREE_TRACTION * facts.mass * facts.gravity
-        turning = self.wheels_turn
-        rows = self._after(turning & (speed < STANDING_SHARE * size) & free, SHORTEST_FREE)
-        # A reference that always says 0 lifts no rover.
-        return rows if 2 * rows.sum() < turning.sum() else np.zeros_like(rows)
 
     @cached_property
     def steady(self) -> Mask:
@@ -269,18 +245,6 @@ class Evidence:
             return _shared(np.zeros(self.time.size, dtype=bool))
         rate = np.abs(self.gyro[:, 2])
         return _shared(self.moving & self.heard & (rate > 0.3 * np.quantile(rate, 0.98)))
-
-    @cached_property
-    def reference_speed(self) -> FloatArray | None:
-        """Size of the slip-free velocity, smoothed (k,) [m/s]; None without a reference."""
-        reference = self.recording.reference
-        if reference is None:
-            return None
-        # Over messages that are far apart a mean would stand where the rover turns back.
-        period = reference.period if reference.stamp.size > 1 else math.inf
-        rows = int(np.clip(SMOOTH_TIME / max(period, 1e-3), 1, SMOOTH_ROWS))
-        smooth = moving_mean(np.nan_to_num(reference.velocity[:, 0]), rows)
-        return _shared(np.interp(self.time, self.seconds(reference), np.abs(smooth)))
 
     def rim_at(self, stamp: IntArray, values: FloatArray) -> FloatArray:
         """Return means of (k,) values within `AROUND` of stamps [ns]; nan for none."""

@@ -25,7 +25,6 @@ from wheel_terra_estimator.checks.statistics import (
     UNIFORM_STD,
     Estimate,
     Trial,
-    bend_noise,
     block_fit,
     confidence,
     correlation,
@@ -121,9 +120,6 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
     if speeds is None:
         return untold('radius', 'no_straight')
     plain = speeds.ratio
-    # No estimator is better than the mean of independent readings of the reference.
-    bound = bend_noise(speeds.forward) / max(float(np.linalg.norm(speeds.rim)), 1e-6)
-    figures['rover.radius_bound_by_reference_m'] = round(bound * float(np.mean(facts.radius)), 5)
     figures['rover.speed_over_rim_speed'] = round(plain.value, 4)
     if not OF_RADII[0] < plain.value < OF_RADII[1]:
         return untold('radius', 'far_off', ratio=plain.value)

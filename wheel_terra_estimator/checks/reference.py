@@ -39,7 +39,6 @@ MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
 LEAST_UNIT_RATIO = 1.3  # speed over rim speed below which it may be the radius, not the unit [-]
 NO_SCALE = 30.0  # speed over rim speed that is a unit, however much the rover slips [-]
 MOSTLY = 0.4  # mean over median rim speed of wheels most of which turn one way [-]
-CLEAR_SPEED = 5.0  # speed over the noise of the reference that a ratio of speeds needs [-]
 LEAST_ROWS = 5  # velocities beside rims that a ratio needs
 KNOWN_UNITS = {
     'kilometres per hour': 3.6,
@@ -151,8 +150,6 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if rows.sum() < LEAST_ROWS:
         return [], evidence
     sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim))
-    if hardly_moves(reference.velocity[:, 0], rows):
-        return [], evidence
     ratio = float(np.median(sense * reference.velocity[rows, 0] / rim[rows]))
     fitting = reference_units(ratio)
     near = {unit: f for unit, f in fitting.items() if abs(ratio / f - 1.0) < WITHOUT_SLIP}
@@ -169,11 +166,6 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         )
         return [evidence.found('reference_unit', 0.9, **told)], mended
     return [], evidence
-
-
-def hardly_moves(speed: FloatArray, rows: Mask) -> bool:
-    """Return whether a speed (k,) is little more than its noise in some rows: no unit is told."""
-    return float(np.quantile(np.abs(speed[rows]), 0.8)) < CLEAR_SPEED * bend_noise(speed)
 
 
 def reference_units(ratio: float) -> dict[str, float]:

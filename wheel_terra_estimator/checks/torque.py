@@ -42,11 +42,7 @@ UP_AND_DOWN = 0.3
 the slope [m/s^2]."""
 GAIN_MODEL_STD = 0.05  # by resistance that is larger uphill (firm drives of the simulator)
 SLOPE_TIME = 2.0  # forces are averaged over this for a slope that a sign is told on [s]
-ODD_GAIN, SAME_GAIN = math.log(1.3), 0.25
-"""Torque over that of the wheel across that is another scale [ln], and by how much it may differ on
-slopes and on the level: a load, a zero or another radius changes one of them."""
 SMOOTH_ROWS = 20  # rows over which slopes are averaged
-LEAST_BACK_ROWS = 10  # rows of wheels turning back in the air that tell zero and friction apart
 RUTS = 0.3  # half of the difference of resistance one way and back over its mean, one deviation [-]
 RUT_TILT = 0.5
 """Tilt of a digging body, nose up, over the square of the level traction, one deviation [rad]: ruts
@@ -75,8 +71,6 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return outcomes, evidence
     if not known.all():
         return [*outcomes, *_not_told('not_all')], evidence
-    odd, evidence = _odd_scale(evidence)
-    outcomes += odd
     zeros = torque_zeros(evidence)
     without = evidence
     if zeros is not None:  # a zero looks like a resistance that no soil has, not the other way
@@ -195,14 +189,12 @@ def _middle_mean(values: FloatArray) -> float:
 class Slopes(NamedTuple):
     """Thrust over mass times specific force: torque gain times true over stated mass; its trial.
 
-    ``scatter`` is that of the specific force along the drive [m/s^2]; ``shares`` (n, 2) what slopes
-    and rolling take of each torque [kg m] and [N m].
+    ``scatter`` is that of the specific force along the drive [m/s^2].
     """
 
     gain: Estimate
     trial: Trial
     scatter: float
-    shares: FloatArray
 
 
 def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
@@ -230,56 +222,7 @@ def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
         1.0,
         (along - along.mean()) ** 2,
     )
-    table = np.nan_to_num(evidence.torque)
-    single = [moving_mean(column, SMOOTH_ROWS)[rows] for column in table.T]
-    shares = np.array([[one.value for one in block_fit(design, column)[:2]] for column in single])
-    return Slopes(block_fit(design, pushed)[0], trial, scatter, shares)
-
-
-def _odd_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return a torque of another scale than that of the wheel across, and it mended.
-
-    Only a scale changes what slopes and what rolling take of it alike.
-    """
-    facts, fit = evidence.facts, slope_fit(evidence)
-    if isinstance(fit, NotChecked) or not facts.has_sides():
-        return [], evidence
-    if fit.gain.sigmas_from(0.0) < GAIN_SIGMAS or (fit.shares <= 0.0).any():
-        return [], evidence  # the IMU does not feel these slopes along x
-    x = facts.configuration.wheels.x
-    across = [
-        int(np.argmin(np.where(facts.side == -side, np.abs(x - here), np.inf)))
-        for side, here in zip(facts.side, x, strict=True)
-    ]
-    size = np.log(fit.shares)
-    apart = size - size[across]
-    by = np.abs(apart).min(axis=1) * (np.abs(apart[:, 0] - apart[:, 1]) < SAME_GAIN)
-    pair = [int(np.argmax(by)), across[int(np.argmax(by))]]
-    others = np.delete(size[:, 1], pair)
-    unlike = np.abs(np.delete(apart[:, 1], pair)).max(initial=0.0)
-    if by[pair[0]] < max(ODD_GAIN, 2.0 * unlike) or not others.size:
-        return [], evidence
-    far = np.abs(size[pair, 1] - np.median(others))  # the one of both that is unlike all others
-    wheel, gain = pair[int(np.argmax(far))], np.ones(size.shape[0])
-    gain[wheel] = math.exp(float(apart[wheel].mean()))
-    if 2.0 * far.min() > far.max():
-        both = ' and '.join(facts.names[i] for i in pair)
-        return [untold('gain', 'one_of_two', wheels=both)], evidence
-    whole = whole_gain(evidence, 1.0) * gain
-    mended = evidence.with_rate(evidence.rate, evidence.torque / gain)
-    again = slope_fit(mended)
-    if isinstance(again, NotChecked) or again.gain.std > fit.gain.std:
-        return [], evidence  # all torques together fit the slopes no better
-    told = evidence.found(
-        'wheel_torque',
-        0.9,
-        wheel=facts.names[wheel],
-        value=round(float(whole[wheel]), 3),
-        std=round(float(whole[wheel] * max(0.5 * np.ptp(apart[wheel]), GAIN_MODEL_STD)), 3),
-        times=float(gain[wheel]),
-        gains=listed(whole, '.3f'),
-    )
-    return [told], mended
+    return Slopes(block_fit(design, pushed)[0], trial, scatter)
 
 
 def whole_gain(evidence: Evidence, left: float) -> FloatArray:
@@ -391,28 +334,6 @@ def _unsigned(evidence: Evidence) -> list[Outcome]:
     if (evidence.moving & uphill & (evidence.rim < 0.0)).sum() < LEAST_MOVING_ROWS:
         return []
     return [evidence.found('torque_unsigned', 0.9)]
-
-
-def drive_friction(evidence: Evidence) -> Estimate | NotChecked:
-    """Return the torque that a wheel takes in the air, mean of the wheels [N m].
-
-    On the ground rolling resistance looks the same.
-    """
-    rows = evidence.in_air
-    if rows.sum() < LEAST_MOVING_ROWS:
-        return untold('zero', 'in_air')
-    sense = np.sign(evidence.rate[rows])
-    ways = (sense > 0).any(axis=1).sum(), (sense < 0).any(axis=1).sum()
-    both = min(ways) > LEAST_BACK_ROWS
-    wheels = []
-    for i in range(len(evidence.facts.names)):
-        design = np.column_stack([sense[:, i], np.ones(sense.shape[0])][: 2 if both else 1])
-        wheels.append(block_fit(design, np.nan_to_num(evidence.torque[rows, i]))[0])
-    mean = float(np.mean([wheel.value for wheel in wheels]))
-    scatter = float(np.std([wheel.value for wheel in wheels])) / math.sqrt(len(wheels))
-    zero = 0.0 if both else float(evidence.facts.sensors.torque_zero_std)
-    noise = max(wheel.std for wheel in wheels)
-    return Estimate(mean, math.hypot(scatter, zero / math.sqrt(len(wheels)), noise))
 
 
 def _zeros(evidence: Evidence, zeros: list[Estimate] | None, unsure: bool) -> list[Outcome]:

@@ -12,24 +12,32 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask, row_medians
+from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, untold
-from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, hardly_moves
+from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead
 from wheel_terra_estimator.checks.repeats import stays
-from wheel_terra_estimator.checks.statistics import correlation, lonely, robust_std, runs, step_of
+from wheel_terra_estimator.checks.statistics import (
+    bend_noise,
+    correlation,
+    lonely,
+    robust_std,
+    runs,
+    step_of,
+)
 
 MOST_COUNT = 0.07  # speed over rim speed of counts (90 in a turn), at most [-]
 ONLY_BY_SPEED = ('thousandths of rad/s',)  # turns of a skidding rover do not tell it
 UNIT_BAND = (0.7, 1.25)  # ratio of speeds over its unit's factor; slip makes it smaller [-]
 LEAST_BAND, OUTRUN = 0.4, 1.05  # the same of units that may be counts [-]
 TELLING = 0.15  # difference of two units' distances from a ratio that tells them apart [ln]
+CLEAR_SPEED = 5.0  # speed over the noise of the reference that a ratio of speeds needs [-]
 SAME_SCALE = 0.1  # of rates by speeds and by turns of a rover that rolls [-]
 OF_RADII = (0.3, 1.4)  # speed over rim speed of a wrong radius [-]
 LEAST_ROLLING_TRACK = 0.9  # effective over stated track of rates in rad/s, at least [-]
 LARGE_WHEEL = 0.6  # radius of a wheel whose rim speed is too near to its rate [m]
 FROZEN_TIME = 5.0  # a dead rate does not change for so long while others do [s]
 LIVELY = 0.3  # rate of the others beside which none stands, over the working rate [-]
-GOES_ON = 0.75  # speed over that of the other side's rims of a rover that goes on [-]
+GOES_ON = 0.25  # turn times track over the speed of the other side of a rover that goes on [-]
 SAME_SPEED = 0.05  # speed of a side against the middle in which all roll alike, at most [-]
 LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0  # speed over the others' of a radius; over scatter [ln]
 LEAST_COUNTS = 0.2  # speed of a wheel with fewer counts over the others', at least [-]
@@ -73,27 +81,17 @@ def _stands(evidence: Evidence, index: int) -> float:
     """Return how long a rate is 0 while the others turn and no torque holds the wheel."""
     own, others = evidence.rate[:, index], np.delete(evidence.rate, index, axis=1)
     busy = row_medians(np.abs(others)) > LIVELY * evidence.working_rate
-    busy &= ~_about_a_side(evidence, index)
+    side = evidence.facts.side == evidence.facts.side[index]
+    if evidence.facts.has_sides() and side.sum() > 1:  # which the rover may turn about
+        turned = np.abs(evidence.yaw) * float(np.ptp(evidence.facts.lateral))
+        stands = (evidence.rate[:, side] == 0.0).all(axis=1)
+        busy &= ~stands | (turned < GOES_ON * row_medians(np.abs(evidence.speed[:, ~side])))
     longest = 0.0
     for start, end in runs(own == 0.0):
         rows = np.flatnonzero(busy[start:end]) + start
         if rows.size * evidence.period > FROZEN_TIME and not _held(evidence, index, rows):
             longest = max(longest, rows.size * evidence.period)
     return longest
-
-
-def _about_a_side(evidence: Evidence, index: int) -> Mask:
-    """Return where the whole side of a wheel stands, and no reference says that the rover goes on.
-
-    It may turn about that side, or try to.
-    """
-    side = evidence.facts.side == evidence.facts.side[index]
-    if not evidence.facts.has_sides() or side.sum() < 2:
-        return np.zeros(evidence.time.size, dtype=bool)
-    live = row_medians(np.abs(evidence.speed[:, ~side]))
-    speed = evidence.reference_speed
-    stands = (evidence.rate[:, side] == 0.0).all(axis=1)
-    return np.asarray(stands if speed is None else stands & (speed < GOES_ON * live))
 
 
 def _stays(evidence: Evidence, index: int) -> float:
@@ -264,7 +262,7 @@ def _speed_ratio(evidence: Evidence) -> float | None:
     speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
     if rows.sum() < LEAST_ROWS:
         return None
-    if hardly_moves(speed, rows):
+    if np.quantile(speed[rows], 0.8) < CLEAR_SPEED * bend_noise(speed):
         return None  # stuck, not another unit
     if correlation(np.nan_to_num(rim), np.nan_to_num(speed)) < 0.8:
         return None
