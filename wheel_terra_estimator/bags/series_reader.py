@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 import math
-from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import IndexArray
+from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.bags.reader import NO_INPUTS
 from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag
@@ -24,10 +23,11 @@ from wheel_terra_estimator.checks.series import (
     VelocitySeries,
 )
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
-from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
+from wheel_terra_estimator.messages.unpack import DamagedMessageError, Layout, layout_of
 
 MOST_MESSAGES = 400_000
 """Messages of a topic that are kept; a longer recording is judged by its beginning."""
+MOST_BYTES = 4_000_000  # of messages that are not read yet
 MOST_JOINTS = 64  # joints of a topic that are kept
 
 _REFERENCE_WORDS = ('reference', 'truth', 'visual', 'vio', 'gps', 'gnss', 'rtk', 'mocap', 'vo')
@@ -134,6 +134,37 @@ def credible(values: Any) -> Any:
         return np.where(np.abs(values) < LARGEST, values, math.nan)
 
 
+class _Alike:
+    """The messages of a topic that are laid out alike, as bytes until some have come together."""
+
+    def __init__(self, layout: Layout, columns: IndexArray | slice) -> None:
+        self.layout, self._columns = layout, columns
+        self.places: list[int] = []  # among those of the topic
+        self._raw = bytearray()
+        self._lists: tuple[list[FloatArray], ...] = tuple([] for _ in layout.lists)
+
+    def add(self, place: int, data: bytes) -> None:
+        """Take one more message."""
+        self.places.append(place)
+        self._raw += data
+        if len(self._raw) > MOST_BYTES:
+            self._read()
+
+    def _read(self) -> None:
+        """Read the numbers out of the bytes."""
+        table = np.frombuffer(self._raw, np.uint8).reshape(-1, self.layout.size)
+        for (at, count), kept in zip(self.layout.lists, self._lists, strict=True):
+            values = np.ascontiguousarray(table[:, at : at + 8 * count])
+            numbers = values.view(self.layout.order.number).astype(np.float64)
+            kept.append(numbers[:, self._columns])
+        self._raw = bytearray()
+
+    def numbers(self, field: int) -> FloatArray:
+        """Return one of the lists of numbers of all these messages."""
+        self._read()
+        return np.vstack(self._lists[field])
+
+
 class _Collector:
     """Numbers of one topic."""
 
@@ -145,22 +176,20 @@ class _Collector:
         self.stamps: list[int] = []  # of the messages that could be read, and their log times
         self._log_times: list[int] = []
         self._sound: Any = slice(None)  # which of them are kept
-        # Names and lengths of the lists of a message -> which messages have these; their numbers
-        self._alike: dict[Any, tuple[list[int], array[float]]] = {}
+        self._alike: dict[Layout, _Alike] = {}
+        self._latest: _Alike | None = None
 
     def add(self, log_time: int, data: bytes) -> None:
         self.arrivals.append(log_time)
-        try:
-            message = unpack(self._kind, data)
-        except DamagedMessageError:
-            return
-        numbers = [values[self.columns] for values in message.numbers]
-        key = message.names, tuple(map(len, numbers))
-        places, kept = self._alike.setdefault(key, ([], array('d')))
-        places.append(len(self.stamps))
-        for values in numbers:
-            kept.frombytes(values.tobytes())
-        self.stamps.append(message.stamp)
+        alike = self._latest
+        if alike is None or not alike.layout.fits(data):
+            try:
+                layout = layout_of(self._kind, data)
+            except DamagedMessageError:
+                return
+            alike = self._latest = self._alike.setdefault(layout, _Alike(layout, self.columns))
+        alike.add(len(self.stamps), data)
+        self.stamps.append(alike.layout.stamp(data))
         self._log_times.append(log_time)
 
     def leave_out_strays(self) -> int:
@@ -186,10 +215,8 @@ class _Collector:
     def table(self, field: int, columns: int) -> Any:
         """Return a list of numbers of all messages, (messages, columns)."""
         values = np.full((len(self.stamps), columns), math.nan)
-        for (names, lengths), (places, kept) in self._alike.items():
-            numbers = np.array(kept).reshape(len(places), sum(lengths))
-            begin = sum(lengths[:field])
-            self.fill(values, places, names, numbers[:, begin : begin + lengths[field]])
+        for layout, alike in self._alike.items():
+            self.fill(values, alike.places, layout.names, alike.numbers(field))
         return credible(values)[self._sound]
 
     def fill(self, values: Any, places: list[int], names: tuple[str, ...], numbers: Any) -> None:
@@ -202,7 +229,7 @@ class _Joints(_Collector):
     @property
     def names(self) -> tuple[str, ...]:
         """The first joints that were named."""
-        named = dict.fromkeys(name for names, _ in self._alike for name in names)
+        named = dict.fromkeys(name for layout in self._alike for name in layout.names)
         return tuple(named)[:MOST_JOINTS]
 
     def fill(self, values: Any, places: list[int], names: tuple[str, ...], numbers: Any) -> None:

@@ -62,33 +62,71 @@ class Message(NamedTuple):
     numbers: tuple[FloatArray, ...]
 
 
-def unpack(kind: str, data: bytes) -> Message:
-    """Return a message of one of the four types.
+class Layout(NamedTuple):
+    """What is alike in the messages of a topic: names, and where which numbers are.
+
+    ``lists``: first byte and length of each list of numbers, as in `Message`.
+    """
+
+    order: _Order
+    names: tuple[str, ...]
+    lists: tuple[tuple[int, int], ...]
+    fixed: tuple[tuple[int, bytes], ...]  # where what lies around stamp and numbers begins
+    size: int  # [byte]
+
+    def stamp(self, data: bytes) -> int:
+        """Return the stamp of a message [ns]."""
+        seconds, nanoseconds = self.order.stamp.unpack_from(data, _BODY)
+        return int(seconds * 1_000_000_000 + nanoseconds)
+
+    def fits(self, data: bytes) -> bool:
+        """Whether another message of the type is laid out so."""
+        for at, part in self.fixed:
+            if not data.startswith(part, at):
+                return False
+        return len(data) == self.size
+
+
+def layout_of(kind: str, data: bytes) -> Layout:
+    """Return how a message of one of the four types is laid out.
 
     Raises DamagedMessageError where the bytes are none.
     """
     try:
         order = _ORDERS[data[:2]]
-        seconds, nanoseconds = order.stamp.unpack_from(data, _BODY)
+        order.stamp.unpack_from(data, _BODY)
         _, at = _strings(data, _AFTER_STAMP, _STRINGS[kind], order)
-        names: list[str] = []
-        numbers: list[FloatArray] = []
+        names, lists, fixed = list[str](), list[tuple[int, int]](), [(0, data[:_BODY])]
+        since = _AFTER_STAMP
         if kind == JOINT_STATE:
             count, at = _count(data, at, order)
             names, at = _strings(data, at, count, order)
-            for _ in range(3):
+        for _ in range(3 if kind == JOINT_STATE else 1):
+            passed_over, count = _NUMBERS.get(kind, (0, 0))
+            if kind == JOINT_STATE:
                 count, at = _count(data, at, order)
-                values, at = _numbers(data, at, count, order)
-                numbers.append(values)
-        else:
-            passed_over, count = _NUMBERS[kind]
-            values, at = _numbers(data, at, passed_over + count, order)
-            numbers.append(values[passed_over:])
-        if len(data) - at > _LONGEST_PADDING:
-            raise ValueError('more bytes than fields')
+            fixed.append((since, data[since:at]))
+            if count:
+                at += -(at - _BODY) % 8
+            lists.append((at + 8 * passed_over, count))
+            since = at = at + 8 * (passed_over + count)
+        if not 0 <= len(data) - at <= _LONGEST_PADDING:
+            raise ValueError('other bytes than fields')
     except (struct.error, KeyError, ValueError) as error:
         raise DamagedMessageError(str(error)) from None
-    return Message(seconds * 1_000_000_000 + nanoseconds, tuple(names), tuple(numbers))
+    return Layout(order, tuple(names), tuple(lists), tuple(fixed), len(data))
+
+
+def unpack(kind: str, data: bytes) -> Message:
+    """Return a message of one of the four types.
+
+    Raises DamagedMessageError where the bytes are none.
+    """
+    layout = layout_of(kind, data)
+    number = layout.order.number
+    values = [np.frombuffer(data, number, count, at) for at, count in layout.lists]
+    numbers = values if number.isnative else [v.astype(np.float64) for v in values]
+    return Message(layout.stamp(data), layout.names, tuple(numbers))
 
 
 def _count(data: bytes, at: int, order: _Order) -> tuple[int, int]:
@@ -110,12 +148,3 @@ def _strings(data: bytes, at: int, count: int, order: _Order) -> tuple[list[str]
         found.append(text[:-1].decode())
         at += 4 + size
     return found, at
-
-
-def _numbers(data: bytes, at: int, count: int, order: _Order) -> tuple[FloatArray, int]:
-    """Return numbers, and where they end [byte]."""
-    if count:
-        at += -(at - _BODY) % 8
-    values = np.frombuffer(data, order.number, count, at)
-    native = values if order.number.isnative else values.astype(np.float64)
-    return native, at + 8 * count
