@@ -181,15 +181,15 @@ class _Collector:
 
     def add(self, log_time: int, data: bytes) -> None:
         self.arrivals.append(log_time)
+        try:
+            layout = layout_of(self._kind, data)
+        except DamagedMessageError:
+            return
         alike = self._latest
-        if alike is None or not alike.layout.fits(data):
-            try:
-                layout = layout_of(self._kind, data)
-            except DamagedMessageError:
-                return
+        if alike is None or alike.layout is not layout:
             alike = self._latest = self._alike.setdefault(layout, _Alike(layout, self.columns))
         alike.add(len(self.stamps), data)
-        self.stamps.append(alike.layout.stamp(data))
+        self.stamps.append(layout.stamp(data))
         self._log_times.append(log_time)
 
     def leave_out_strays(self) -> int:

@@ -45,6 +45,9 @@ _ORDERS = {
 """First bytes of a message -> order of its bytes."""
 
 
+MOST_SEEN, LARGEST_SEEN = 16, 65_536  # layouts that are remembered, and their size [byte]
+
+
 class DamagedMessageError(ValueError):
     """Bytes that are no message of the type."""
 
@@ -87,11 +90,26 @@ class Layout(NamedTuple):
         return len(data) == self.size
 
 
+_SEEN: dict[tuple[str, int], Layout] = {}  # latest one of a type and size
+
+
 def layout_of(kind: str, data: bytes) -> Layout:
-    """Return how a message of one of the four types is laid out.
+    """Return how a message of one of the four types is laid out, mostly as one before it was.
 
     Raises DamagedMessageError where the bytes are none.
     """
+    seen = _SEEN.get((kind, len(data)))
+    if seen is not None and seen.fits(data):
+        return seen
+    layout = _read_layout(kind, data)
+    if layout.size <= LARGEST_SEEN:
+        if len(_SEEN) == MOST_SEEN:
+            _SEEN.clear()
+        _SEEN[kind, layout.size] = layout
+    return layout
+
+
+def _read_layout(kind: str, data: bytes) -> Layout:
     try:
         order = _ORDERS[data[:2]]
         order.stamp.unpack_from(data, _BODY)
