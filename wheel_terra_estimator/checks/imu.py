@@ -430,19 +430,6 @@ def _is_mounting(tilt: FloatArray, floor: float, turns: FloatArray, gyro: FloatA
     return probability(math.log(TILT_IS_MOUNTING / (1.0 - TILT_IS_MOUNTING)) + odds)
 
 
-def yaw_of_imu(evidence: Evidence) -> Estimate | None:
-    """Return the yaw of the IMU in ``base_link`` [rad]; None where starts and stops do not tell it.
-
-    Slopes at the places of starts and stops fall off faster than these: a rover that goes to and
-    fro feels the same ones each time.
-    """
-    seen, quick = felt_yaw(evidence), felt_yaw(evidence, 0.5 * DRIFT)
-    if seen is None or quick is None:
-        return None
-    apart = math.remainder(seen.value - quick.value, 2.0 * math.pi)
-    return Estimate(seen.value, math.hypot(seen.std, 0.5 * apart, YAW_MODEL_STD))
-
-
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return an IMU whose x axis does not point forward, and the evidence with that mended."""
     starts, curves = felt_senses(evidence)
@@ -452,9 +439,13 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         signs = np.array([-1.0 if name == axis else 1.0 for name in 'xyz'])
         told_of = evidence.found('force_mirrored', 0.95, value=-1.0, axis=axis)
         return [told_of], replace(evidence, force=evidence.force * signs)
-    seen = yaw_of_imu(evidence)
-    if seen is None:
+    seen, quick = felt_yaw(evidence), felt_yaw(evidence, 0.5 * DRIFT)
+    if seen is None or quick is None:
         return [untold('mounting', 'no_starts')], evidence
+    # Slopes at the places of starts and stops fall off faster than these: a rover that goes to and
+    # fro feels the same ones each time.
+    apart = math.remainder(seen.value - quick.value, 2.0 * math.pi)
+    seen = Estimate(seen.value, math.hypot(seen.std, 0.5 * apart, YAW_MODEL_STD))
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
         return [], evidence

@@ -39,6 +39,7 @@ MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
 LEAST_UNIT_RATIO = 1.3  # speed over rim speed below which it may be the radius, not the unit [-]
 NO_SCALE = 30.0  # speed over rim speed that is a unit, however much the rover slips [-]
 MOSTLY = 0.4  # mean over median rim speed of wheels most of which turn one way [-]
+CLEAR_SPEED = 5.0  # speed over the noise of the reference that a ratio of speeds needs [-]
 LEAST_ROWS = 5  # velocities beside rims that a ratio needs
 KNOWN_UNITS = {
     'kilometres per hour': 3.6,
@@ -149,9 +150,15 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     rim, rows = ahead(evidence, reference, 0.4)
     if rows.sum() < LEAST_ROWS:
         return [], evidence
+    if hardly_moves(reference.velocity[:, 0], rows):
+        return [], evidence
     sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim))
     ratio = float(np.median(sense * reference.velocity[rows, 0] / rim[rows]))
-    fitting = reference_units(ratio)
+    fitting = {
+        unit: factor
+        for unit, factor in KNOWN_UNITS.items()
+        if max(min(MOST_SLIPPING * factor, NO_SCALE), LEAST_UNIT_RATIO) < ratio < 1.25 * factor
+    }
     near = {unit: f for unit, f in fitting.items() if abs(ratio / f - 1.0) < WITHOUT_SLIP}
     if len(fitting) > 1 and not near:  # which of them, the slip hides
         several = ' or '.join(fitting)
@@ -168,13 +175,9 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [], evidence
 
 
-def reference_units(ratio: float) -> dict[str, float]:
-    """Return the units of a reference that a ratio of speeds may come from."""
-    return {
-        unit: factor
-        for unit, factor in KNOWN_UNITS.items()
-        if max(min(MOST_SLIPPING * factor, NO_SCALE), LEAST_UNIT_RATIO) < ratio < 1.25 * factor
-    }
+def hardly_moves(speed: FloatArray, rows: Mask) -> bool:
+    """Return whether a speed (k,) is little more than its noise in some rows: no unit is told."""
+    return float(np.quantile(np.abs(speed[rows]), 0.8)) < CLEAR_SPEED * bend_noise(speed)
 
 
 def check_jumps(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

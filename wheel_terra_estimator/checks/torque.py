@@ -225,11 +225,6 @@ def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
     return Slopes(block_fit(design, pushed)[0], trial, scatter)
 
 
-def whole_gain(evidence: Evidence, left: float) -> FloatArray:
-    """Return the gains (n,) of which a factor ``left`` remains behind those stated."""
-    return left * evidence.facts.errors.torque.gain
-
-
 def whole_zeros(evidence: Evidence, left: list[Estimate]) -> list[Estimate]:
     """Return the zeros [N m] of which ``left`` remains behind those stated."""
     errors = evidence.facts.errors.torque
@@ -270,7 +265,7 @@ def _gain(evidence: Evidence) -> list[Outcome]:
     sigmas = Estimate(gain, math.hypot(std, open_yet)).sigmas_from(1.0)
     if sigmas < GAIN_SIGMAS:
         return _not_told('left_open', gain=gain, std=std)
-    whole = whole_gain(evidence, gain)
+    whole = gain * facts.errors.torque.gain
     middle, mass = float(np.mean(whole)), facts.mass * gain
     words = {'gain': gain, 'off': std, 'mass': mass, 'gains': listed(whole, '.3f')}
     words['trial'] = fit.trial.words('gain left', '')

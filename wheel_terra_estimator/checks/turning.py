@@ -69,7 +69,6 @@ LEAST_TURNED = 0.1  # turn in that time, which no rolling of a pitched body is [
 LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
 TIE = 1e-3  # residuals [-] that differ by less are the same
 NOISE_FLOOR = 0.02  # residual [-] by which hypotheses must differ at least
-MOST_SCALED = 0.2  # residual in turns beside such a gyro, at most [-]
 
 
 @dataclass(frozen=True)
@@ -524,33 +523,32 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     ratio = track_ratio(evidence)
     if ratio is None:
         return [untold('unit', 'gyro_no_turn')], evidence
-    # Of exchanged wheels the sides turn alike, but not the wheels of a side.
     times = 1.0 / abs(ratio)
     scaled = IN_DEGREES_BY_WHEELS[0] < times < IN_DEGREES_BY_WHEELS[1]
     moving = evidence.moving
     turned = np.quantile(np.abs(evidence.yaw[moving]), 0.95) * np.ptp(facts.lateral)
     slips = turned < np.nanquantile(np.abs(evidence.speed[moving]), 0.95)
-    if not scaled or slips or left_in_turns(evidence) > MOST_SCALED:
+    if not scaled or slips:
         return [], evidence
-    return _in_degrees(evidence, times, 'turning of the wheels')
-
-
-def _in_degrees(evidence: Evidence, times: float, how: str) -> tuple[list[Outcome], Evidence]:
-    """Return a gyro in degrees per second, and the evidence with that mended."""
-    told = evidence.found('gyro_degrees', 0.95, value=math.radians(1.0), times=times, how=how)
-    imu, gyro = evidence.recording.imu, evidence.gyro
-    assert imu is not None and gyro is not None
+    words = {'times': times, 'how': 'turning of the wheels'}
+    told = evidence.found('gyro_degrees', 0.95, value=math.radians(1.0), **words)
     mended = evidence.with_channel('imu', rate=np.radians(imu.rate))
-    return [told], replace(mended, gyro=np.radians(gyro))
+    return [told], replace(mended, gyro=np.radians(evidence.gyro))
+
+
+def _as_stated(evidence: Evidence, within: Mask) -> Fit | None:
+    """Return how well the rover file accounts for wheels and gyro; None for too few rows."""
+    there, rows = _known(evidence)
+    rows = rows & within
+    if rows.sum() < LEAST_TURNING_ROWS:
+        return None
+    return fits_of([Fix((1,) * there.size)], stretch_of(evidence, there, rows))[0]
 
 
 def track_ratio(evidence: Evidence) -> float | None:
     """Return effective over stated track from the turns; None without turns."""
-    there, rows = _known(evidence)
-    if evidence.gyro is None or not evidence.facts.has_sides() or rows.sum() < LEAST_TURNING_ROWS:
-        return None
-    nothing = Fix((1,) * there.size)
-    return fits_of([nothing], stretch_of(evidence, there, rows))[0].clear_track or None
+    fit = _as_stated(evidence, evidence.moving)
+    return fit.clear_track or None if fit is not None else None
 
 
 def gyro_unit_known(evidence: Evidence) -> bool:
@@ -573,10 +571,9 @@ def skids(evidence: Evidence) -> bool:
 
 
 def left_in_turns(evidence: Evidence) -> float:
-    """Return the residual of the wheels in turns [-]."""
-    there, rows = _known(evidence)
-    stretch = stretch_of(evidence, there, rows & evidence.turning)
-    return fits_of([Fix((1,) * there.size)], stretch)[0].cost
+    """Return the residual of the wheels in turns [-]; 0 without any."""
+    fit = _as_stated(evidence, evidence.turning)
+    return fit.cost if fit is not None else 0.0
 
 
 def ordinary_track(ratio: float) -> bool:

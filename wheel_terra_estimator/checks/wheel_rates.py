@@ -14,10 +14,9 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, untold
-from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead
+from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, hardly_moves
 from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import (
-    bend_noise,
     correlation,
     lonely,
     robust_std,
@@ -30,7 +29,6 @@ ONLY_BY_SPEED = ('thousandths of rad/s',)  # turns of a skidding rover do not te
 UNIT_BAND = (0.7, 1.25)  # ratio of speeds over its unit's factor; slip makes it smaller [-]
 LEAST_BAND, OUTRUN = 0.4, 1.05  # the same of units that may be counts [-]
 TELLING = 0.15  # difference of two units' distances from a ratio that tells them apart [ln]
-CLEAR_SPEED = 5.0  # speed over the noise of the reference that a ratio of speeds needs [-]
 SAME_SCALE = 0.1  # of rates by speeds and by turns of a rover that rolls [-]
 OF_RADII = (0.3, 1.4)  # speed over rim speed of a wrong radius [-]
 LEAST_ROLLING_TRACK = 0.9  # effective over stated track of rates in rad/s, at least [-]
@@ -262,7 +260,7 @@ def _speed_ratio(evidence: Evidence) -> float | None:
     speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
     if rows.sum() < LEAST_ROWS:
         return None
-    if np.quantile(speed[rows], 0.8) < CLEAR_SPEED * bend_noise(speed):
+    if hardly_moves(speed, rows):
         return None  # stuck, not another unit
     if correlation(np.nan_to_num(rim), np.nan_to_num(speed)) < 0.8:
         return None
