@@ -36,7 +36,6 @@ SETTLING = 0.5  # A speed counts as steady this long after it changed [s]
 STRAIGHT_SHARE = 0.25  # speed of the sides against the middle of a straight, at most [-]
 LEAST_MOVING_ROWS = 30  # fewer rows of driving than these tell nothing
 EVEN_GROUND_STD = math.radians(0.8)  # deviation of a tilt by circles on a plane, at most [rad]
-LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
 NO_NOISE = 5e-4  # noise of rates that have none, over the working rate, at most [-]
 BEND_OF_NOISE = math.sqrt(70.0)  # deviation of fourth differences, in which no motion is left [-]
 AROUND = 0.25  # half of the time around a velocity that rim speeds are averaged over [s]
@@ -139,17 +138,7 @@ class Evidence:
         still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * self.rate_noise)
         still &= np.isfinite(self.rate).any(axis=1)
         still[: width - 1] = False
-        return _shared(self._after(still, SHORTEST_REST) & self.heard)
-
-    @cached_property
-    def heard(self) -> Mask:
-        """Rows that lie in no gap of the IMU, all without one."""
-        imu = self.recording.imu
-        if imu is None or imu.stamp.size < 2:
-            return np.ones(self.time.size, dtype=bool)
-        at = np.sort(self.seconds(imu))
-        after = np.clip(np.searchsorted(at, self.time), 1, at.size - 1)
-        return _shared(at[after] - at[after - 1] < LONGEST_GAP)
+        return _shared(self._after(still, SHORTEST_REST))
 
     def _after(self, condition: Mask, duration: float) -> Mask:
         """Return where a condition has held for some time [s]."""
@@ -215,7 +204,7 @@ class Evidence:
     @cached_property
     def unturned(self) -> Mask:
         """Rows of driving without a turn, neither by the gyro nor by the wheels."""
-        rim, rows = np.abs(self.rim), self.moving & self.heard
+        rim, rows = np.abs(self.rim), self.moving.copy()
         difference = self.side_difference
         if np.isfinite(difference).any():
             rows &= np.abs(moving_mean(difference, self.rows_in(SETTLING))) < STRAIGHT_SHARE * rim
@@ -244,7 +233,7 @@ class Evidence:
         if self.gyro is None:
             return _shared(np.zeros(self.time.size, dtype=bool))
         rate = np.abs(self.gyro[:, 2])
-        return _shared(self.moving & self.heard & (rate > 0.3 * np.quantile(rate, 0.98)))
+        return _shared(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
 
     def rim_at(self, stamp: IntArray, values: FloatArray) -> FloatArray:
         """Return means of (k,) values within `AROUND` of stamps [ns]; nan for none."""

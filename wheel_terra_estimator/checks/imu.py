@@ -19,7 +19,6 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import (
     EVEN_GROUND_STD,
     LEAST_YAW,
-    LONGEST_GAP,
     YAW_SIGMAS,
     Evidence,
     felt_senses,
@@ -65,6 +64,7 @@ UPSIDE_TILT = math.radians(35.0)  # mean tilt that no rover drives at [rad]
 STEEPEST_MEAN = math.radians(20.0)  # mean slope of a drive, at most [rad]
 LEAST_SHOWN = 0.01  # change of an angle [deg] below which a cure leaves it out
 LEAST_MOUNTING = math.radians(1.5)  # mounting errors below this [rad] are left to calibration
+LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
 LEAST_TURN = 4.5  # heading that a drive has to cover for the mounting to be told from a slope [rad]
 FLAT_TURN_STD = math.radians(0.1)  # unevenness of the ground leaves open [rad]
 TURNED_ROUND = 0.75  # probability that an IMU is turned round, not its x axis reversed [-]

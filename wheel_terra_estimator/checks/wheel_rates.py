@@ -281,7 +281,7 @@ def check_noise(evidence: Evidence) -> list[Outcome]:
         bend = np.diff(rate, 2)[rows[1:-1]] / math.sqrt(6.0)
         bend = bend[np.isfinite(bend)]
         enough = bend.size > 50
-        noise.append(_scatter(bend) if enough else 0.0)
+        noise.append(robust_std(bend) if enough else 0.0)
         by_steps.append(rate_step(rate[rows], interval) * COUNTING_STD if enough else 0.0)
     figures, working = evidence.figures, evidence.working_rate
     figures['wheels.rate_noise_rad_s'] = float(f'{np.median(noise):.3g}')
@@ -300,12 +300,6 @@ def check_noise(evidence: Evidence) -> list[Outcome]:
     told |= {'share': 100.0 * step / max(working, 1e-9), 'counts': 2.0 * math.pi / (step * period)}
     wheel = None if 2 * wrong.sum() > wrong.size else evidence.facts.named(wrong)
     return [evidence.found(key, 0.95, wheel=wheel, value=float(f'{seen:.2g}'), **told)]
-
-
-def _scatter(bend: FloatArray) -> float:
-    """Return the deviation of values many of which may be 0, and few wild."""
-    inner = np.clip(bend, *np.quantile(bend, [0.05, 0.95]))
-    return max(robust_std(bend), 0.5 * float(np.std(inner)))
 
 
 def _intervals(time: FloatArray) -> FloatArray:
