@@ -301,7 +301,18 @@ def _of_sides(evidence: Evidence) -> Estimate:
     apart = (evidence.side_difference - track * evidence.yaw)[rows]
     rim = evidence.rim[rows]
     trial = tried(lambda part: block_fit(rim[part, None], apart[part])[0].value, 0.0, rim**2)
-    return block_fit(rim[:, None], apart)[0] if trial.falls else Estimate(0.0, math.inf)
+    told = block_fit(rim[:, None], apart)[0]
+    alike = _unlike(evidence) < 0.5 * abs(told.value)  # else it is one wheel
+    return told if trial.falls and alike else Estimate(0.0, math.inf)
+
+
+def _unlike(evidence: Evidence) -> float:
+    """Return by how much the speeds of the wheels of one side differ on the straight [-]."""
+    shares = evidence.speed[evidence.straight] / evidence.rim[evidence.straight, None]
+    of_sides = [
+        np.nanmedian(shares[:, evidence.facts.side == side], axis=0) for side in (1.0, -1.0)
+    ]
+    return max(float(np.ptp(one)) for one in of_sides if one.size)
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
