@@ -24,6 +24,7 @@ LEAST_TIME = 5.0  # time of driving in which a reading that stays is frozen [s]
 ZERO_TIME = 20.0  # the same of a vector of zeros [s]
 LEAST_MESSAGES = 10  # messages in which it stays, at least
 LEAST_NOISY = 4  # the same of a reading with noise
+LONGER = 10.0  # so many times longer than a reading usually stays [-]
 FINE = 50  # different readings of a sensor whose steps are not what makes it stay
 MOST_REPEATED = 0.5  # share of rates that repeat themselves: more are rounded, or noiseless
 LEAST_BESIDE = 30  # other readings that tell whether a sensor has noise
@@ -149,13 +150,21 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
             continue
         if np.interp(at[first:last], evidence.time, evidence.exactly_even).mean() > AT_ONCE:
             continue
+        usual = _usual(beside)
         others = np.delete(readings, np.s_[first : last + 1], axis=0)
         coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
             FINE, len(others) // 2
         )
-        if coarse or share * (last - first) < (LEAST_NOISY if noisy else LEAST_MESSAGES):
+        needed = LEAST_NOISY if noisy else max(LEAST_MESSAGES, LONGER * usual)
+        if coarse or share * (last - first) < needed:
             continue
         rows[np.flatnonzero(known)[first : last + 1]] = True
         if lasts > longest:
             longest, value = lasts, float(readings[first, 0]) if values.shape[1] == 1 else math.nan
     return Stays(rows, longest, value) if longest else None
+
+
+def _usual(same: Mask) -> float:
+    """Return over how many messages a reading stays, given (k - 1,) whether it repeats itself."""
+    changes = np.flatnonzero(~same)
+    return float(np.quantile(np.diff(changes), 0.9)) if changes.size > LEAST_MESSAGES else 1.0
