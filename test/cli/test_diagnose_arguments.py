@@ -5,6 +5,8 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from wheel_terra_estimator.cli.main import main
 
 
@@ -33,6 +35,17 @@ def test_a_soil_that_nobody_stated_is_said(tmp_path, printed):
     assert main(['predict', *rig, *rows]) == 0
     command = ['diagnose', str(tmp_path / 'rig.csv'), *rig, '-o', str(tmp_path / 'out')]
     assert 'no soil was stated' in printed([*command, '--no-pictures', '--only', 'cohesion'])
+
+
+@pytest.mark.parametrize('soil', ['grenville_loam_24', 'snow_us'])
+def test_a_soil_that_nobody_stated_may_be_any(tmp_path, capsys, soil):
+    rig, rows = ['--config', 'generic_six_wheel'], str(tmp_path / 'rows.csv')
+    noise = ['--slip', '0:0.6:12', '--load', '30', '--noise', '0.0005,0.8,0.05']
+    assert main(['predict', *rig, '--config', soil, *noise, '-o', rows]) == 0
+    capsys.readouterr()
+    out = ['-o', str(tmp_path / 'out'), '--no-pictures', '--json']
+    assert main(['diagnose', rows, *rig, *out]) == 0
+    assert json.loads(capsys.readouterr().out)['verdict'] == 'agrees'
 
 
 def test_json_is_the_report_and_nothing_else(tmp_path, capsys, printed):
