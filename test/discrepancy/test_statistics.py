@@ -356,7 +356,7 @@ def test_confidence_follows_what_speaks_for_a_name():
         values['margin_two'] = values['margin'] * values['two']
         return confidence.confidence(values).of_name
 
-    assert len(confidence._WEIGHTS['name']) == len(confidence.FEATURES)
+    assert len(confidence._weights()['name']) == len(confidence.FEATURES)
     assert of_name() > 0.95
     behind = of_name(margin=-1.0, margin_of_set=-0.5)
     assert behind < 0.6 < of_name(margin=1.0) < of_name()

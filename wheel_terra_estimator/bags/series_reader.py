@@ -161,7 +161,8 @@ class _Alike:
 
     def numbers(self, field: int) -> FloatArray:
         """Return one of the lists of numbers of all these messages."""
-        self._read()
+        if self._raw:
+            self._read()
         return np.vstack(self._lists[field])
 
 

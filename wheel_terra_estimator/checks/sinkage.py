@@ -43,7 +43,7 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         why = ('zero', 'sinkage_few') if few else ('placeholder', 'sinkage_zero')
         return [*outcomes, untold(*why)], evidence
     unit, table = _unit(evidence, table)
-    middle = np.nanmedian(table, axis=0)
+    middle = np.array([_median(column) for column in table.T])
     evidence.figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
     evidence.figures['sinkage.noise_m'] = noise = float(f'{_reading_noise(table):.3g}')
     facts = evidence.facts
@@ -75,6 +75,11 @@ def without_stated_errors(
     rows = [own.index(name) for name in names]
     table = sinkage.sinkage[:, [sinkage.names.index(name) for name in names]]
     return names, LinearErrors(errors.zero[rows], errors.gain[rows]).true(table)
+
+
+def _median(column: FloatArray) -> float:
+    known = column[np.isfinite(column)]
+    return float(np.median(known)) if known.size else math.nan
 
 
 def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatArray]:

@@ -16,13 +16,7 @@ from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, r
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, untold
 from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, hardly_moves
 from wheel_terra_estimator.checks.repeats import stays
-from wheel_terra_estimator.checks.statistics import (
-    correlation,
-    lonely,
-    robust_std,
-    runs,
-    step_of,
-)
+from wheel_terra_estimator.checks.statistics import correlation, lonely, robust_std, runs, step_of
 
 MOST_COUNT = 0.07  # speed over rim speed of counts (90 in a turn), at most [-]
 ONLY_BY_SPEED = ('thousandths of rad/s',)  # turns of a skidding rover do not tell it

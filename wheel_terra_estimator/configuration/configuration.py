@@ -148,8 +148,11 @@ class Configuration:
 
     @property
     def soil_source(self) -> str:
-        """Class of the source of soil numbers whose deviation is not stated."""
-        return str(self._values['soil.source'])
+        """Class of the source of soil numbers whose deviation is not stated.
+
+        A soil that nobody stated is another soil.
+        """
+        return str(self._values['soil.source']) if self.soil_stated else 'proxy'
 
     @property
     def soil_std_stated(self) -> dict[str, float]:

@@ -39,7 +39,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
-_UNSTATED = 'proxy'  # class of the source of a soil that nobody stated: it is another soil
 _CLEARLY_MISREAD = 10.0  # nats by which another unit must explain the rows better
 
 
@@ -92,8 +91,7 @@ def diagnose(
     configured = _check_soil_carries(both, forward)
     check_pull_against_model(both, configured[:, 1])
     # soil.relative_std is the estimator's doubt of a soil on its way, not that of a measured soil.
-    stated_std = configuration.soil_std_stated
-    source = configuration.soil_source if configuration.soil_stated else _UNSTATED
+    stated_std, source = configuration.soil_std_stated, configuration.soil_source
     nuisance = (
         *soil_coordinates(configuration.soil, stated_std, source, chosen.soil_known_to),
         *base_coordinates(configuration.effects, configuration.effects_std, known),

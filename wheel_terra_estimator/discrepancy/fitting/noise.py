@@ -155,9 +155,11 @@ def find_outliers(
     """
     jacobian = problem.rotation @ fitted.sensitivity / np.sqrt(fitted.prior)
     target = problem.wanted - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
-    sizes = [_ROBUST_FLOOR, np.maximum(amplitude, _ROBUST_FLOOR)]
+    sizes: list[FloatArray | float] = [_ROBUST_FLOOR]
+    if np.max(amplitude) > _ROBUST_FLOOR:
+        sizes.append(np.maximum(amplitude, _ROBUST_FLOOR))
     best, found, chosen = -np.inf, [], None
-    for variance in map(problem.variance, sizes[: 1 + bool(np.max(amplitude) > _ROBUST_FLOOR)]):
+    for variance in map(problem.variance, sizes):
         inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
         score, cells = _rejected_cells(problem, inverse, target)
         if score > best:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.resources import files
 
 import numpy as np
@@ -42,9 +43,6 @@ FEATURES = (
 )
 
 
-_WEIGHTS: dict[str, list[float]] = json.loads(
-    files(__package__).joinpath('confidence_map.json').read_text()
-)
 # The odds of a model family that is never quite right, tempered: 1.5 to 2.4 on mixed campaigns.
 _TEMPERATURE = 1.5
 
@@ -95,11 +93,19 @@ def confidence(values: Mapping[str, float], alike: int = 0, odds: float = 1.0) -
     that are known to look like the name and were not tried: each may be the truth as well, and the
     set does not have it.
     """
+    weights = _weights()
     vector = np.array([values[name] for name in FEATURES])
-    of_name = float(expit(vector @ np.array(_WEIGHTS['name']) + np.log(odds)))
+    of_name = float(expit(vector @ np.array(weights['name']) + np.log(odds)))
     # Never more than the rows themselves say: two names that fit alike share what there is.
     margin = 8.0 * np.arctanh(np.clip(values['margin'] / 4.0, -0.999, 0.999))  # of the odds
     of_name = min(of_name, float(expit(margin / _TEMPERATURE)))
-    of_set = float(expit(vector @ np.array(_WEIGHTS['set']) + np.log(odds)))
+    of_set = float(expit(vector @ np.array(weights['set']) + np.log(odds)))
     share = 1.0 / (1.0 + alike)
     return Confidence(min(of_name, share), min(max(of_name, of_set), share))
+
+
+@lru_cache(maxsize=1)
+def _weights() -> dict[str, list[float]]:
+    text = files(__package__).joinpath('confidence_map.json').read_text()
+    loaded: dict[str, list[float]] = json.loads(text)
+    return loaded
