@@ -174,6 +174,18 @@ def test_smoothing_does_not_put_a_ramp_behind(wheels):
     assert wheels.rim_speeds(1.0)[0] == pytest.approx(radius, rel=0.002)
 
 
+def test_a_wheel_in_messages_of_its_own_is_smoothed_by_its_own_rate(wheels):
+    """Six wheels at 20 Hz in turns, on a ramp that ends at 1 s."""
+    radius = Parts(reader.load(SAND)).rover.slip_radius[0]
+    for i in range(126):
+        time, rates = i / 120, np.full(6, NAN)
+        rates[i % 6] = min(time, 1.0)
+        wheels.update(time, odometry(rates, [NAN] * 6))
+        if time == 0.95:
+            np.testing.assert_allclose(wheels.rim_speeds(time), 0.95 * radius, rtol=0.02)
+    np.testing.assert_allclose(wheels.state.rim_speed, radius, rtol=0.03)
+
+
 def test_sinkage_and_leaving_angle_are_kept_wheel_by_wheel():
     sinkage = SinkageInput(2)
     for value in (0.01, 0.03):

@@ -19,7 +19,7 @@ _SMOOTHING_TIME = 0.05
 """Time constant of the rim speeds [s]: fast odometry is noisy or quantised; less than any use
 of the rim speed needs."""
 _LONGEST_SMOOTHED = 0.06
-"""Odometry that is this slow [s between messages] is not smoothed."""
+"""A wheel that is heard this slowly [s between messages] is not smoothed."""
 _SLOPE_GAIN = 0.5  # smoothing of the rim speeds' rate of change, per message
 _LONGEST_CARRIED = 0.15
 """Time [s] over which a rim speed is carried on at its rate of change: over the lag of its
@@ -37,7 +37,7 @@ class WheelOdometryState(NamedTuple):
     rim_speed: Floats  # [m/s], nan = never known
     rate_time: Floats  # [s]
     rim_slope: Floats  # rate of change of the rim speeds, smoothed [m/s^2]
-    lag: float  # by which the smoothed rim speeds are behind the readings [s]
+    lag: Floats  # by which the smoothed rim speeds are behind the readings [s]
     torque_time: float
     torque_sum: Floats  # since the last cycle
     torque_count: tuple[int, ...]
@@ -55,7 +55,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
             (NAN,) * n,
             (never,) * n,
             (0.0,) * n,
-            0.0,
+            (0.0,) * n,
             never,
             (0.0,) * n,
             (0,) * n,
@@ -73,14 +73,14 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         state = self.state
         if odometry.steering is not None and all(isnan(rate) for rate in odometry.rate.tolist()):
             return  # steering angles alone
-        dt = time - state.time
-        keep = 0.0 if dt >= _LONGEST_SMOOTHED else math.exp(-dt / _SMOOTHING_TIME)
         rim_speed, rate_time = list(state.rim_speed), list(state.rate_time)
-        rim_slope = list(state.rim_slope)
+        rim_slope, lag = list(state.rim_slope), list(state.lag)
         for i, rate in enumerate(odometry.rate.tolist()):
             if not isnan(rate):
                 rim, old = rate * self._radius[i], rim_speed[i]
                 gap = time - rate_time[i]
+                keep = 0.0 if gap >= _LONGEST_SMOOTHED else math.exp(-gap / _SMOOTHING_TIME)
+                lag[i] = keep * gap / (1.0 - keep) if 0.0 < keep < 1.0 else 0.0
                 rim_speed[i] = rim if isnan(old) else keep * old + (1.0 - keep) * rim
                 if 0.0 < gap < _LONGEST_GAP:
                     slope = (rim_speed[i] - old) / gap
@@ -100,7 +100,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
             rim_speed=tuple(rim_speed),
             rate_time=tuple(rate_time),
             rim_slope=tuple(rim_slope),
-            lag=keep * dt / (1.0 - keep) if 0.0 < keep < 1.0 else 0.0,
+            lag=tuple(lag),
             torque_time=torque_time,
             torque_sum=tuple(torque_sum),
             torque_count=tuple(torque_count),
@@ -127,13 +127,11 @@ class WheelOdometryInput(Component[WheelOdometryState]):
     def rim_speeds(self, time: float) -> Floats:
         """Return the rim speeds [m/s], nan where the rate is unknown or too old."""
         state, silence = self.state, self._silence
-        lag = state.lag
+        each = zip(state.rim_speed, state.rim_slope, state.rate_time, state.lag, strict=True)
         return tuple(
             [
                 self._carried(rim, slope, time - when + lag) if time - when <= silence else NAN
-                for rim, slope, when in zip(
-                    state.rim_speed, state.rim_slope, state.rate_time, strict=True
-                )
+                for rim, slope, when, lag in each
             ]
         )
 
