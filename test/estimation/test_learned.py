@@ -120,6 +120,8 @@ def test_zeros_of_the_gyro_are_learned_at_rest_on_top_of_those_stated():
     np.testing.assert_allclose(
         core.learned()['sensors.angular_rate_bias'], [0.0, -0.004, 0.012], atol=4e-4
     )
+    core.reset()
+    assert not core.learned() and not core.taught()
 
 
 def test_the_bias_of_the_accelerometer_has_the_sign_of_the_sensor():

@@ -125,6 +125,16 @@ def test_a_rate_that_changes_on_the_way_counts_from_then_on():
     assert after[0].forward_velocity == pytest.approx(before[-1].forward_velocity, rel=0.2)
 
 
+@pytest.mark.parametrize(('clock_step', 'steps'), [(1.0, 1), (5.0, 0)])
+def test_a_clock_step_that_is_set_on_the_way_counts_from_then_on(clock_step, steps):
+    settings = {**DEFAULT, 'history': 5.0}
+    core = EstimatorCore(configuration(**settings, filter__clock_step=6.0 - clock_step))
+    play(core, [odometry(0.1 * i) for i in range(100)], flush=False)
+    core.retune(configuration(**settings, filter__clock_step=clock_step))
+    play(core, [odometry(6.5 + 0.1 * i) for i in range(50)])
+    assert core.health()['clock_steps_back'] == steps
+
+
 def test_inputs_before_what_a_shorter_history_kept_are_too_old():
     core = EstimatorCore(configuration(**{**DEFAULT, 'history': 0.0}))
     play(core, [odometry(0.01 * i) for i in range(300)], flush=False)

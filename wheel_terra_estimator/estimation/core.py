@@ -140,6 +140,7 @@ ReferenceVelocity
     def reset(self) -> None:
         """Forget the state, keep the parameters; the next measurement begins a new run."""
         self._resets += 1
+        self._latest = None
         self.warning.clear()
         self._watch = self._new_watch()
         self._end_run(keep_soil=False)
@@ -155,6 +156,7 @@ ReferenceVelocity
         self._settings = _time_settings(configuration)
         self._lags.fixed = _max_lag(configuration)
         self._clock_step = _nanoseconds(configuration.filter.clock_step)
+        self._watch.retune(self._clock_step, self._lags.longest, self._settings.history)
         self._classes.retune(configuration)
         self.warning.retune(configuration)
         grid = StepGrid(self._settings.output_rate)

@@ -72,13 +72,17 @@ class ClockWatch:
     """
 
     def __init__(self, channels: int, clock_step: int, max_lag: int, history: int) -> None:
-        self._clock_step = max(clock_step, max_lag)
-        self._reach = max(history + max_lag, clock_step)
+        self.retune(clock_step, max_lag, history)
         self._newest_of: list[int | None] = [None] * channels
         self._held: list[Arrival] = []
         self._suspicion = Suspicion.BEHIND
         self._odometry_astray = 0
         self.newest: int | None = None
+
+    def retune(self, clock_step: int, max_lag: int, history: int) -> None:
+        """Go on with other limits."""
+        self._clock_step = max(clock_step, max_lag)
+        self._reach = max(history + max_lag, clock_step)
 
     def judge(self, channel: int, measurement: Measurement) -> Judgement:
         """Return what to do with a message, and with those held before it."""
