@@ -127,14 +127,35 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
     assert again.soil.cohesion > 0.0 and 'soil.cohesion' in again.stated
     assert json.loads(soil.with_name('soil.yaml.state.json').read_text())['stuck'] is False
 
+    assert call(node, until, ros.SetBool, 'set_enabled', data=False).success
     assert change(ros.Transition.TRANSITION_DEACTIVATE)
     assert change(ros.Transition.TRANSITION_CLEANUP)
     assert state() == 'unconfigured'
     until(lambda: not wheels.get_subscription_count())
     assert change(ros.Transition.TRANSITION_CONFIGURE)
+    assert change(ros.Transition.TRANSITION_ACTIVATE)
+    count = len(slip)
+    drive(lambda: len(slip) > count + 2)
     status, words = process.stop(signal.SIGTERM)
     assert status == 0 and 'Traceback' not in words, words
     assert 'no transition 1 from active\n' in words
+
+
+def test_what_is_stated_is_the_same_after_a_cleanup(listener, parameters):
+    """Declaring a parameter states no value: of a default the estimator is less sure."""
+    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
+
+    estimator = EstimatorNode(context=listener[0].context, cli_args=[*ROVER, parameters])
+    try:
+        before = estimator._pipeline.configuration
+        estimator.trigger_deactivate()
+        estimator.trigger_cleanup()
+        estimator.trigger_configure()
+        after = estimator._pipeline.configuration
+        assert after.stated == before.stated
+        assert (after.soil_stated, after.soil_std) == (before.soil_stated, before.soil_std)
+    finally:
+        estimator.destroy_node()
 
 
 def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener, tmp_path):

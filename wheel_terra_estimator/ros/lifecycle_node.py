@@ -167,6 +167,7 @@ class EstimatorNode(LifecycleNode):
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop listening and forget the state."""
         self._release()
+        self._enabled = True
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -552,8 +553,10 @@ class EstimatorNode(LifecycleNode):
     def _on_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         """Take changes of tuning at once; all else only while the node is not configured."""
         values = {change.name: change.value for change in changes}
+        if self._declaring:  # values of the node's own, which nobody has stated
+            return SetParametersResult(successful=True)
         if self._pipeline is None:
-            reason = '' if self._declaring else parameters.why_refused(self._given, values)
+            reason = parameters.why_refused(self._given, values)
             if not reason:
                 self._given.update(values)
             return SetParametersResult(successful=not reason, reason=reason)
