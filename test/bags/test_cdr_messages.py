@@ -53,7 +53,7 @@ def messages(factory: MessageFactory, name: str, count: int, dice: random.Random
 
 
 def with_rosbags(store: Any, kind: str, data: bytes, empty: int = 0) -> Message | None:
-    """As `rmw_serialize` leaves them, up to four bytes for each empty list of numbers may follow."""
+    """As `rmw_serialize` leaves them, four bytes for each empty list of numbers may follow."""
     try:
         message = store.deserialize_cdr(data, kind)
     except Exception:
@@ -129,9 +129,7 @@ def test_messages_that_rclpy_serialised_are_read(lists):
         data = serialize_message(JointState(name=names, **dict.fromkeys(lists, values)))
         message = unpack(JOINT_STATE, data)
         assert message.names == tuple(names)
-        for numbers, name in zip(
-            message.numbers, ('position', 'velocity', 'effort'), strict=True
-        ):
+        for numbers, name in zip(message.numbers, ('position', 'velocity', 'effort'), strict=True):
             assert numbers.tolist() == (values if name in lists else [])
 
 
