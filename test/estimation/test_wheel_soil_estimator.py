@@ -331,6 +331,18 @@ def test_a_jolt_at_the_start_does_not_stop_the_speed_without_a_reference():
     assert np.abs(error).max() < 0.3
 
 
+def test_wheel_rates_that_come_once_a_second_count():
+    """Between them cycles go on without wheels; the next one may have come just before a rate."""
+    d, speeds, sets = plain_drive(), [], []
+    for period in (100_000_000, 1_000_000_000):
+        core = EstimatorCore(d.configuration)
+        for m in inputs_of_mode(d.arrivals, 'no_reference'):
+            if not isinstance(m, WheelOdometry) or m.stamp % period < 100_000_000:
+                sets = core.add(m) or sets
+        speeds.append(sets[-1].forward_velocity)
+    assert speeds[0] > 0.03 and speeds[1] == pytest.approx(speeds[0], rel=0.2)
+
+
 def test_a_steered_rover_is_judged_along_its_wheels():
     """On an arc the inner wheels of a steered rover are slow because they are on inner circles."""
     arcs = {

@@ -234,7 +234,8 @@ class WheelSoilEstimator:
             floor = self._sensors.reference_std_floor**2
             self._sideways.correct(inputs.reference.lateral, max(stated, floor))
         is_due = (rolled or silent) and self._is_due(time, self._speed.state.cycle_time)
-        if inputs.reference is not None or is_due:
+        heard_again = rolled and isnan(self._speed.state.rims.typical)
+        if inputs.reference is not None or is_due or heard_again:
             self._run_cycle(time, inputs.reference)
         if rolled or silent:
             self._judge(time)
