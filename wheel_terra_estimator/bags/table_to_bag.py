@@ -239,7 +239,9 @@ class _Sender:
         self.last: dict[str, tuple[list[str], int]] = {}  # a reading, and rows since
         self.sent = 0
         self.short: dict[int, None] = {}  # lines, in order
-        self.places: deque[tuple[int, float, float]] = deque()  # stamp [ns], place
+        self.places: deque[tuple[int, float, float, float]] = deque()  # stamp, place, turned
+        self.turned = 0.0  # how far all wheels have turned together [rad]
+        self.common = 0, 0.0  # stamp [ns] and rate that the wheels last had in common
         self.one_way = self.any_way = 0.0  # common rate and mean size of rates, times speed
 
     def send(self, line: int, row: list[str]) -> None:
@@ -254,6 +256,10 @@ class _Sender:
             [self.value(line, row, columns.get(field)) for columns in joints.values()]
             for field in _JOINT
         )
+        if _any_told(rates):
+            (before, was), rate = self.common, _mean(rates)
+            self.turned += 0.5 * (was + rate) * (stamp - before) * 1e-9 if before else 0.0
+            self.common = stamp, rate
         if _any_told(rates) or _any_told(angles):
             message = pack.joint_state(
                 stamp,
@@ -301,11 +307,14 @@ class _Sender:
         self.bag.write('/imu/data', pack.imu(stamp, force, rate, orientation), stamp)
 
     def _speed(self, stamp: int, place: list[float], *, degrees: bool) -> tuple[int, float]:
-        """Return the speed between two positions, at the stamp in their middle; nan for none."""
+        """Return the speed between two positions, at the stamp in their middle; nan for none.
+
+        Its sense is that in which the wheels turned from one to the other.
+        """
         x, y = place
         if math.isnan(x) or math.isnan(y):
             return stamp, math.nan
-        self.places.append((stamp, x, y))
+        self.places.append((stamp, x, y, self.turned))
         first = self.places[0]
         seconds = (stamp - first[0]) * 1e-9
         if seconds < BASELINE:
@@ -314,7 +323,8 @@ class _Sender:
         there, across = x - first[1], y - first[2]
         if degrees:  # latitude, longitude [rad], on a sphere
             there, across = EARTH_RADIUS * there, EARTH_RADIUS * across * math.cos(x)
-        return (stamp + first[0]) // 2, math.hypot(there, across) / seconds
+        speed = math.copysign(math.hypot(there, across) / seconds, self.turned - first[3])
+        return (stamp + first[0]) // 2, speed
 
     def _sinkage(self, line: int, row: list[str], stamp: int) -> None:
         columns = self.layout.sinkage
@@ -325,16 +335,14 @@ class _Sender:
 
     def _reference(self, line: int, row: list[str], stamp: int, rates: list[float]) -> None:
         columns, arrival = self.layout.reference, stamp
-        common = _mean(rates)
         speed = self.value(line, row, columns.get('linear.x'))
         for pair in _PLACES:
             if set(pair) <= set(columns):
                 place = [self.value(line, row, columns[key]) for key in pair]
                 stamp, speed = self._speed(stamp, place, degrees=pair == _PLACES[1])
                 if not math.isnan(speed):
-                    self.one_way += speed * abs(common)
-                    self.any_way += speed * _mean([abs(rate) for rate in rates])
-                speed *= -1.0 if common < 0.0 else 1.0
+                    self.one_way += abs(speed * _mean(rates))
+                    self.any_way += abs(speed) * _mean([abs(rate) for rate in rates])
         if math.isnan(speed):
             return
         variance = self.value(line, row, columns.get('variance'))
