@@ -89,9 +89,12 @@ def test_time_in_class_counts_no_pauses():
             some_estimates(
                 stamp=STAMP + round(time * SECOND),
                 slip_class=np.array([value, 255], dtype=np.uint8),
+                slip_velocity=np.array([-0.02, 0.5]),
             )
         )
-    times = recorder.history().figures().seconds_in_class
+    figures = recorder.history().figures()
+    assert figures.slip_travel == pytest.approx([0.02, 0.0])
+    times = figures.seconds_in_class
     assert [times[c][0] for c in SlipClass] == pytest.approx([1.0, 0.0, 0.5, 0.5, 0.0])
     assert times[SlipClass.UNKNOWN][1] == pytest.approx(2.0)
 

@@ -170,7 +170,7 @@ def test_a_drive_with_high_slip_stuck_wheels_or_nothing_known_is_shown_as_a_warn
     assert _tone(SimpleNamespace(wheels=wheels)) == tone
 
 
-def test_a_drive_of_which_no_slip_is_known_is_not_called_a_good_one():
+def test_a_drive_is_called_good_where_slip_is_known_and_no_wheel_travelled_by_it():
     seconds = {c.name.lower(): 0.0 for c in SlipClass}
     wheel = WheelSummary('a', seconds, seconds, None, None, None, 0, 0, 0, None, None, None)
     verdict = DriveSummary('drive', 0.0, 1, (wheel,), (), (), ()).verdict
@@ -178,6 +178,12 @@ def test_a_drive_of_which_no_slip_is_known_is_not_called_a_good_one():
     known = dataclasses.replace(wheel, slip=(0.0, 0.1), max_slip=0.1)
     verdict = DriveSummary('drive', 0.0, 1, (wheel, known), (), (), ()).verdict
     assert verdict == 'No stuck warning, no wheel in the classes high or stuck.'
+    noisy = dataclasses.replace(known, seconds={**seconds, 'stuck': 2.2}, slip_travel=0.004)
+    verdict = DriveSummary('drive', 0.0, 1, (wheel, noisy), (), (), ()).verdict
+    assert verdict.endswith('no wheel in the classes high or stuck for more than a centimetre.')
+    slid = dataclasses.replace(noisy, name='b', seconds={**seconds, 'high': 0.5}, slip_travel=0.2)
+    verdict = DriveSummary('drive', 0.0, 1, (noisy, slid), (), (), ()).verdict
+    assert 'b slipped most: 20 cm in 0.5 s of the classes' in verdict
 
 
 def test_errors_in_the_report_are_in_millimetres_degrees_and_per_cent():

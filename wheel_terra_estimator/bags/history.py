@@ -115,6 +115,8 @@ class DriveFigures:
         self.duration = 0.0  # from the first set to the latest stamp [s]
         self._seconds = np.zeros((len(SlipClass), wheels))
         self._wheel = np.arange(wheels)
+        self.slip_travel = np.zeros(wheels)  # (n,) in the classes high and stuck [m]
+        self._slipping = np.zeros(wheels)  # slip velocity in them at the last set [m/s]
         self.max_slip = np.zeros(wheels)  # (n,) greatest |slip| outside of class unknown [-]
         # ``max_sinkage``, ``max_sinkage_std``: (n,) greatest sinkage and its standard deviation [m]
         self.max_sinkage = np.full(wheels, -np.inf)
@@ -147,9 +149,12 @@ class DriveFigures:
             step = (stamp - self._stamp) * 1e-9
             if 0.0 <= step <= LONGEST_STEP:
                 self._seconds[_ROW[self._class], self._wheel] += step
+                self.slip_travel += self._slipping * step
         self.sets += 1
         self._stamp, self._class = stamp, slip_class
         self.duration = max(self.duration, (stamp - self._first) * 1e-9)
+        high = np.isin(slip_class, (SlipClass.HIGH, SlipClass.STUCK))
+        self._slipping = np.where(high, np.abs(values['slip_velocity']), 0.0)
         known = slip_class != SlipClass.UNKNOWN
         self._pull += np.where(known, values['drawbar_pull'], 0.0)
         self._known += known

@@ -19,6 +19,8 @@ from wheel_terra_estimator.reporting import truth_scores
 from wheel_terra_estimator.reporting.drive_style import NOT_KNOWN, Border, known
 
 PERCENTILES = (5.0, 95.0)
+LEAST_TRAVEL = 0.01
+"""What the rates of a wheel that stands add up to is no slip to be named for [m]; assumed."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class WheelSummary:
     ``slip`` (of |slip|), ``sinkage`` [m] and ``slip_angle`` [rad] are percentiles 5 and 95, of a
     long drive over the sets that were kept; ``sinkage_std`` and ``slip_angle_std`` are median
     deviations. They and the extremes are None where slip or sinkage was never known.
+    ``slip_travel`` is how far it slipped in the classes high and stuck [m].
     """
 
     name: str
@@ -57,6 +60,7 @@ class WheelSummary:
     sinkage_std: float | None = field(default=None, compare=False)
     slip_angle: tuple[float, float] | None = field(default=None, compare=False)
     slip_angle_std: float | None = field(default=None, compare=False)
+    slip_travel: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -93,16 +97,19 @@ class DriveSummary:
             more = f' and {len(self.warnings) - 5} more' if len(self.warnings) > 5 else ''
             kind = 'A stuck warning' if len(self.warnings) == 1 else 'Stuck warnings'
             return f'{kind} at {times}{more}: {self.warnings[0].reason or "no reason given"}.'
-        worst = max(self.wheels, key=lambda wheel: wheel.seconds['stuck'] + wheel.seconds['high'])
-        high = worst.seconds['high'] + worst.seconds['stuck']
-        if high > 0.0:
-            return (
-                f'No stuck warning. {worst.name} slipped most: {high:.1f} s in the classes high '
-                f'and stuck, at most |slip| {shown(worst.max_slip, ".2f")}.'
-            )
         if all(wheel.slip is None for wheel in self.wheels):
             return 'No stuck warning, but no slip was known at any time: nothing can be concluded.'
-        return 'No stuck warning, no wheel in the classes high or stuck.'
+        high = [wheel.seconds['high'] + wheel.seconds['stuck'] for wheel in self.wheels]
+        far = [wheel.slip_travel for wheel in self.wheels]
+        worst = far.index(max(far))
+        if far[worst] < LEAST_TRAVEL:
+            some = ' for more than a centimetre' if any(high) else ''
+            return f'No stuck warning, no wheel in the classes high or stuck{some}.'
+        name, far_in_cm = self.wheels[worst].name, 100.0 * far[worst]
+        return (
+            f'No stuck warning. {name} slipped most: {far_in_cm:.0f} cm in {high[worst]:.1f} s of '
+            'the classes high and stuck.'
+        )
 
 
 def summarise(
@@ -182,6 +189,7 @@ def _wheels(history: EstimateHistory, border: Border) -> tuple[WheelSummary, ...
                 sinkage_std=_median_std(history, 'sinkage', sinkages, i),
                 slip_angle=_percentiles(angles[:, i]),
                 slip_angle_std=_median_std(history, 'slip_angle', angles, i),
+                slip_travel=float(figures.slip_travel[i]),
             )
         )
     return tuple(result)
