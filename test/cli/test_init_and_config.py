@@ -19,6 +19,7 @@ from wheel_terra_estimator.configuration.rover_template import passes
 from wheel_terra_estimator.configuration.urdf import _origin, read_urdf
 
 PATHFINDER = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
+STAMP = 1_700_000_000_000_000_000  # [ns]
 MEASURES = ('--radius', 0.11, '--track', 0.6, '--wheelbase', 0.5, '--mass', 22)
 
 
@@ -177,6 +178,17 @@ def test_from_a_recording_then_checked_and_calibrated(init, tmp_path, capsys):
     command = ['calibrate', str(PATHFINDER), '--config', str(output), '-o', str(better)]
     assert main(command) == 0
     assert np.allclose(reader.load([better]).wheels.radius, 0.117, atol=0.001)
+
+
+@pytest.mark.parametrize('names', ['FLWheel FrontRightWheel RearWheelL RearWheelR', 'a b c d'])
+def test_wheels_are_where_their_names_say_or_a_guess(init, make_bag, factory, capsys, names):
+    order = [names.split()[i] for i in (3, 1, 2, 0)]
+    joints = factory.joint_state(factory.header(STAMP), order, velocity=[1.0] * 4)
+    rover = init('--bag', make_bag([('/joint_states', joints, STAMP)]), *MEASURES)
+    assert rover.wheels.y.tolist() == [0.3, -0.3] * 2
+    guessed = 'wheels.y is a guess' in capsys.readouterr().out
+    assert rover.wheels.names == tuple(order if guessed else names.split())
+    assert guessed is (names == 'a b c d')
 
 
 def test_a_turning_joint_that_is_left_out_is_told(init, tmp_path, capsys):

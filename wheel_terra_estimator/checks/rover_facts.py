@@ -23,6 +23,7 @@ _RIGHT = re.compile(r'(^|[^a-z])(right|r|fr|mr|rr|rf|rm|br|rb)([^a-z]|$)')
 _FRONT = re.compile(r'front|(^|[^a-z])(f[lr]?|[lr]f)([^a-z]|$)')
 _MIDDLE = re.compile(r'mid|cent(re|er)|(^|[^a-z])(m[lr]?|[lr]m)([^a-z]|$)')
 _WHEEL = re.compile(r'wheel|drive|traction')
+_CAMEL = re.compile(r'(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])')
 
 
 @dataclass(frozen=True)
@@ -115,14 +116,19 @@ def wheel_names(joints: Sequence[str]) -> tuple[str, ...]:
     return tuple(sorted(wheels, key=_place))
 
 
+def in_words(name: str) -> str:
+    """Return the name of a joint in small letters, its words apart: ``frontLeft``: front_left."""
+    return _CAMEL.sub('_', name).lower()
+
+
 def side_of(name: str) -> int:
     """Return +1 for a name of the left side, -1 for the right, 0 where it does not say."""
-    low = name.lower()
+    low = in_words(name)
     left, right = bool(_LEFT.search(low)), bool(_RIGHT.search(low))
     return int(left) - int(right)
 
 
 def _place(name: str) -> tuple[int, int]:
-    low = name.lower()
+    low = in_words(name)
     row = 0 if _FRONT.search(low) else 1 if _MIDDLE.search(low) else 2
     return row, -side_of(name)

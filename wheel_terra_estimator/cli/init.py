@@ -165,6 +165,7 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
         words = {name: f'--{name} {unit} ({meaning})' for name, unit, meaning in _MEASURES}
         raise UserError(f'missing: {", ".join(words[name] for name in missing)}')
     sides = [side_of(name) for name in wheels]
+    told = 0 not in sides or arguments.wheels is not None  # whose order is asked for
     if 0 in sides:  # left before right, as the file has it
         sides = [1 if i % 2 == 0 else -1 for i in range(len(wheels))]
     if len(wheels) == 1:
@@ -175,7 +176,8 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
     x = [base * (0.5 - row / last) if last else 0.0 for row in rows]
     count = len(wheels)
     guessed = {'rover.centre_of_gravity'} | (set() if measures['width'] else {'wheels.width'})
-    guessed |= ({'wheels.x'} if last > 1 else set()) | ({'wheels.y'} if sum(sides) else set())
+    guessed |= {'wheels.x'} if last > 1 else set()
+    guessed |= {'wheels.y'} if sum(sides) or not told else set()
     return RoverSketch(
         name=arguments.name or 'my rover',
         wheels=wheels,
