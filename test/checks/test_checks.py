@@ -16,7 +16,7 @@ from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.checks.clocks import lag
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.imu import ImuState, check_imu
-from wheel_terra_estimator.checks.names import _pairs, check_wheel_names
+from wheel_terra_estimator.checks.names import _at_places_of, _pairs, check_wheel_names
 from wheel_terra_estimator.checks.rover_facts import from_configuration
 from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import JointSeries, Recording, rows_of
@@ -457,6 +457,20 @@ def test_joints_that_steer(stated):
     cures = [str(outcome.cure) for outcome in outcomes]
     told = f'wheels.steering_joints: {STEERED}'
     assert cures == ([] if stated else [told])
+
+
+@pytest.mark.parametrize(
+    ('wheels', 'steering', 'told'),
+    [
+        ('drive_lf drive_rf drive_lr drive_rr', 'steer_rf steer_lf', 'steer_lf steer_rf - -'),
+        ('WheelFL WheelFR WheelRL WheelRR', 'SteerRL SteerRR', '- - SteerRL SteerRR'),
+        ('flwheel frwheel', 'flsteer frsteer', 'flsteer frsteer'),
+        ('left right', 'front_steer', '- -'),
+    ],
+)
+def test_steering_joints_are_those_whose_names_hold_the_place_of_a_wheel(wheels, steering, told):
+    paired = _at_places_of(wheels.split(), steering.split())
+    assert [joint or '-' for joint in paired] == told.split()
 
 
 def test_names_that_are_like_none_are_taken_in_the_usual_order():
