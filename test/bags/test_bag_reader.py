@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings as measurements: topics, remaps, names, damaged and unknown messages."""
 
+import re
 import sqlite3
 from collections import Counter
 from typing import Any
@@ -11,7 +12,9 @@ from rosbags.interfaces import ConnectionExtRosbag2
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from wheel_terra_estimator.bags.reader import MeasurementReader, in_one_line, parse_remaps
+from wheel_terra_estimator.bags.series_reader import read_series
 from wheel_terra_estimator.bags.storage import jazzy_types, open_bag
+from wheel_terra_estimator.bags.topic_choice import choose_topics
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
 
@@ -61,6 +64,42 @@ def test_missing_wheel_odometry_says_which_and_what_is_there(make_bag, rover, dr
     assert '/joint_states is not in the bag' in text
     assert '/imu/data (sensor_msgs/msg/Imu)' in text
     assert '-p wheel_odometry:=odom --remap odom:=/reference_odom' in text
+
+
+@pytest.fixture
+def open_topics(make_bag, drive):
+    """Open a bag with a message on each of some topics, by name odometry, IMU or joint states."""
+    first = {topic: message for topic, message, _ in reversed(drive)}
+
+    def opened(*topics):
+        like = {'odom': '/reference_odom', 'imu': '/imu/data', '': '/joint_states'}
+        told = {t: first[next(like[part] for part in like if part in t)] for t in topics}
+        return open_bag(make_bag((topic, message, 1) for topic, message in told.items()))
+
+    return opened
+
+
+def test_visual_odometry_is_the_reference_beside_joint_states(open_topics):
+    with open_topics('/drive', '/zed/visual_odometry', '/wheel_odom') as bag:
+        chosen = choose_topics(bag, {})
+    assert chosen['joint_states'] == '/drive'
+    assert chosen['reference_odom'] == '/zed/visual_odometry'
+    assert chosen['odom'] == '/wheel_odom'
+
+
+def test_of_two_rovers_in_a_bag_all_topics_are_of_one_and_the_other_is_named(open_topics, rover):
+    rates, imu, reference = 'joint_states', 'imu/data', 'reference_odom'
+    a = {rates: '/a/joint_states', imu: '/a/imu/data'}
+    b = {rates: '/b/joint_states', imu: '/b/imu/data', reference: '/b/gps_odom'}
+    with open_topics(*a.values(), *b.values()) as bag:
+        assert choose_topics(bag, {}) == a
+        assert choose_topics(bag, {imu: b[imu]}) == b
+        mixed = {reference: b[reference], rates: a[rates]}
+        assert choose_topics(bag, mixed) == {**a, **mixed}
+        (other,) = read_series(bag, {}, 'bag').notes
+        assert parse_remaps(re.findall(r'--remap (\S+)', other)) == b
+        with pytest.raises(UserError, match='of another rover, with --remap joint_states:=/b/'):
+            MeasurementReader(bag, {}, rover)
 
 
 def test_topics_of_estimates_are_named_as_such_and_together():

@@ -10,9 +10,6 @@ import pytest
 import rolling_rover as rolling
 from rolling_rover import checked
 
-from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.series_reader import choose_topics
-from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.checks.clocks import lag
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.imu import ImuState, check_imu
@@ -22,7 +19,6 @@ from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import JointSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import MOST_TIMES, even_times
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.messages import pack
 
 WHOLE = rolling.recording()
 
@@ -310,23 +306,6 @@ def test_degrees_per_second_behind_a_side_that_counts_backwards():
         ('sign', '/joint_states', 'front_left, rear_left'),
     }
     assert not any('wheel rates' in entry.reason for entry in report.not_checked)
-
-
-def test_visual_odometry_is_the_reference_beside_joint_states(tmp_path):
-    topics = {
-        '/drive': 'sensor_msgs/msg/JointState',
-        '/zed/visual_odometry': 'nav_msgs/msg/Odometry',
-        '/wheel_odom': 'nav_msgs/msg/Odometry',
-    }
-    with BagFile(tmp_path / 'bag', topics) as file:
-        file.write('/drive', pack.joint_state(1, ('a',), [0.0], [1.0]), 1)
-        for topic in ('/zed/visual_odometry', '/wheel_odom'):
-            file.write(topic, pack.odometry(1, 0.1, 0.0, [0.0] * 36), 1)
-    with open_bag(tmp_path / 'bag') as bag:
-        chosen = choose_topics(bag, {})
-    assert chosen['joint_states'] == '/drive'
-    assert chosen['reference_odom'] == '/zed/visual_odometry'
-    assert chosen['odom'] == '/wheel_odom'
 
 
 def test_wheels_that_are_named_otherwise_half_way_are_told():

@@ -9,6 +9,12 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag
+from wheel_terra_estimator.bags.topic_choice import (
+    NO_INPUTS,
+    as_options,
+    choose_topics,
+    other_rovers,
+)
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
 from wheel_terra_estimator.errors import UserError
@@ -21,9 +27,6 @@ from wheel_terra_estimator.messages.convert import (
     names_in_words,
 )
 from wheel_terra_estimator.messages.unpack import DamagedMessageError, Message, unpack
-
-NO_INPUTS = ('/wheel_terra_estimator/', '/ground_truth/')
-"""Topics that look like inputs and are estimates or truth."""
 
 
 def in_one_line(topics: Iterable[tuple[str, str]]) -> str:
@@ -136,7 +139,11 @@ class MeasurementReader:
             and topic.name not in others
         ]
         remedy = f'name the right one with --remap {name}:={fitting[0] if fitting else "/TOPIC"}'
-        if name == 'joint_states' and not fitting:
+        chosen = choose_topics(self.bag, {})
+        if name == 'joint_states' and chosen.get(name) in fitting:
+            ways = [as_options(chosen), *other_rovers(self.bag, chosen)]
+            remedy = f'choose with {"; or, of another rover, with ".join(ways)}'
+        elif name == 'joint_states' and not fitting:
             odometry = [t.name for t in there if t.type == INPUT_TYPES['odom'] and t.message_count]
             if odometry:
                 remedy = f'use -p wheel_odometry:=odom --remap odom:={odometry[0]}'

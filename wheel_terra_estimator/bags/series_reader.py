@@ -6,15 +6,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
-from wheel_terra_estimator.bags.reader import NO_INPUTS
 from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag
+from wheel_terra_estimator.bags.topic_choice import choose_topics, other_rovers
 from wheel_terra_estimator.checks.series import (
     ImuSeries,
     JointSeries,
@@ -29,50 +29,6 @@ MOST_MESSAGES = 400_000
 """Messages of a topic that are kept; a longer recording is judged by its beginning."""
 MOST_BYTES = 4_000_000  # of messages that are not read yet
 MOST_JOINTS = 64  # joints of a topic that are kept
-
-_REFERENCE_WORDS = ('reference', 'truth', 'visual', 'vio', 'gps', 'gnss', 'rtk', 'mocap', 'vo')
-_JOINT_WORDS = ('joint_states', 'wheel', 'joint')
-_IMU_WORDS = ('imu/data', 'imu')
-
-
-def choose_topics(bag: Bag, remaps: Mapping[str, str]) -> dict[str, str]:
-    """Return {estimator's topic: topic in the bag}: as named, else the likeliest one."""
-    chosen: dict[str, str] = {}
-    there = [
-        topic
-        for topic in bag.topics.values()
-        if topic.message_count and not topic.name.startswith(NO_INPUTS)
-    ]
-    # A slip-free velocity first: what is left may be wheel odometry.
-    for name in sorted(INPUT_TYPES, key=lambda name: name == 'odom'):
-        kind = INPUT_TYPES[name]
-        wanted = remaps.get(name, f'/{name}')
-        fitting = [topic.name for topic in there if topic.type == kind]
-        if wanted in fitting:
-            chosen[name] = wanted
-        elif name not in remaps:
-            guess = _likeliest(name, [t for t in fitting if t not in chosen.values()])
-            if guess:
-                chosen[name] = guess
-    return chosen
-
-
-def _likeliest(name: str, topics: Sequence[str]) -> str | None:
-    words = {
-        'joint_states': _JOINT_WORDS,
-        'imu/data': _IMU_WORDS,
-        'reference_odom': _REFERENCE_WORDS,
-        'leaving_angle': ('leaving',),
-        'odom': ('wheel', 'odom'),
-    }.get(name, (name,))
-    for word in words:
-        for topic in topics:
-            slip_free = any(w in topic.lower().replace('/', '_').split('_') for w in words)
-            if word in topic.lower() and (name != 'reference_odom' or slip_free):
-                return topic
-    if name in ('joint_states', 'imu/data') and len(topics) == 1:
-        return topics[0]
-    return None
 
 
 def read_series(
@@ -104,6 +60,7 @@ def read_series(
     left_out = [
         f'{n} damaged messages on {topic} were left out' for topic, n in garbage.items() if n
     ]
+    others = [f'another rover in it: {options}' for options in other_rovers(bag, chosen)]
 
     def made(own: str) -> Any:
         collector = collectors.get(own)
@@ -118,7 +75,7 @@ def read_series(
         reference=made('reference_odom'),
         wheel_odometry=made('odom'),
         shortened=shortened,
-        notes=(*bag.notes, *left_out),
+        notes=(*bag.notes, *left_out, *others),
     )
 
 

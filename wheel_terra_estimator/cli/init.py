@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wheel_terra_estimator.cli.outputs import add_output
+from wheel_terra_estimator.cli.outputs import add_output, add_remaps
 from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     for name, unit, meaning in _MEASURES:
         parser.add_argument(f'--{name}', type=_positive, metavar=unit, help=meaning)
+    add_remaps(parser)
     parser.add_argument('--name', default='', metavar='TEXT', help='name of the rover, for reports')
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 
@@ -103,7 +104,7 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
     if described is not None:
         return replace(described, name=arguments.name or described.name)
     if arguments.bag:
-        wheels = wheels or _wheels_of(arguments.bag)
+        wheels = wheels or _wheels_of(arguments.bag, arguments.remap)
     elif not wheels:
         raise UserError('give --urdf, --bag or --wheels')
     return _from_measures(arguments, wheels)
@@ -130,15 +131,17 @@ def _description_of(arguments: argparse.Namespace) -> RoverSketch | None:
     return read_urdf(Path(f'{arguments.bag}:{DESCRIPTION}'), _names(arguments.wheels), text)
 
 
-def _wheels_of(path: Path) -> list[str]:
+def _wheels_of(path: Path, remaps: list[str]) -> list[str]:
+    from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.bags.series_reader import read_series
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.checks.rover_facts import wheel_names
 
     with open_bag(path) as bag:
-        recording = read_series(bag, {}, path.name)
+        recording = read_series(bag, parse_remaps(remaps), path.name)
         if recording.joints is None:
             raise UserError(f'{path}: no joint states in it; name the wheels with --wheels')
+    print(*(f'note: {note}\n' for note in recording.notes), sep='', end='')
     joints = recording.joints
     names = list(wheel_names(joints.names))
     rates = zip(joints.names, joints.rate.T, strict=True)
