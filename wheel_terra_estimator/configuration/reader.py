@@ -35,6 +35,9 @@ STANDARD_PARAMETERS = ('use_sim_time', 'start_type_description_service')
 STANDARD_PREFIXES = ('qos_overrides.',)
 
 LEAST, MOST = 1e-30, 1e30  # of numbers but 0: squares and inverses are finite
+_SMALLER_UNITS = {'m': 'mm', 'kg': 'g'}  # that a number which is too large may be in
+
+_MISTAKEN = {'rover.weight': 'rover.mass', 'wheels.diameter': 'wheels.radius'}  # keys for others
 
 _Sourced = dict[str, tuple[Any, str]]
 
@@ -147,7 +150,8 @@ def _checked(
             continue
         parameter = spellings.get(key)
         if parameter is None:
-            close = nearest(key, spellings)
+            close = nearest(key, [*spellings, *_MISTAKEN])
+            close = _MISTAKEN.get(close, close)
             raise UserError(
                 f"{source}: unknown parameter '{key}'; the nearest known one is '{close}' "
                 f'({spellings[close].allowed})'
@@ -263,7 +267,10 @@ def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]
         raise refuse(f'{value!r} is no quantity ({LEAST} to {MOST})')
     too_low = value <= parameter.lower if parameter.open_lower else value < parameter.lower
     if too_low or value > parameter.upper:
-        raise refuse(f'{value!r} is out of range')
+        unit = parameter.unit
+        small = _SMALLER_UNITS.get(unit) if abs(value) > parameter.upper else None
+        asked = f' (in {small}, not {unit}?)' if small else ''
+        raise refuse(f'{value!r} is out of range{asked}')
     return value
 
 
