@@ -11,6 +11,7 @@ from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.topic_choice import (
     NO_INPUTS,
+    WHEEL_RATES,
     as_options,
     choose_topics,
     other_rovers,
@@ -128,25 +129,15 @@ class MeasurementReader:
 
     def _advice(self, name: str) -> str:
         """Say what is there and how to use it."""
-        there = self.bag.topics.values()
-        others = {f'/{other}' for other in INPUT_TYPES if other != name}
-        fitting = [
-            topic.name
-            for topic in there
-            if topic.type == INPUT_TYPES[name]
-            and topic.message_count
-            and not topic.name.startswith(NO_INPUTS)
-            and topic.name not in others
-        ]
-        remedy = f'name the right one with --remap {name}:={fitting[0] if fitting else "/TOPIC"}'
-        chosen = choose_topics(self.bag, {})
-        if name == 'joint_states' and chosen.get(name) in fitting:
-            ways = [as_options(chosen), *other_rovers(self.bag, chosen)]
-            remedy = f'choose with {"; or, of another rover, with ".join(ways)}'
-        elif name == 'joint_states' and not fitting:
+        there, chosen = self.bag.topics.values(), choose_topics(self.bag, {})
+        remedy = f'name the right one with --remap {name}:={chosen.get(name, "/TOPIC")}'
+        if name == 'joint_states' and name not in chosen:
             odometry = [t.name for t in there if t.type == INPUT_TYPES['odom'] and t.message_count]
             if odometry:
                 remedy = f'use -p wheel_odometry:=odom --remap odom:={odometry[0]}'
+        elif name == 'joint_states' and chosen[name] != WHEEL_RATES:
+            ways = [as_options(chosen), *other_rovers(self.bag, chosen)]
+            remedy = f'choose with {"; or, of another rover, with ".join(ways)}'
         return f'there are: {in_one_line((t.name, t.type) for t in there)}; {remedy}'
 
     def _check_wheel_names(self) -> None:

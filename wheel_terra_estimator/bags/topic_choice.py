@@ -42,7 +42,8 @@ def choose_topics(bag: Bag, remaps: Mapping[str, str]) -> dict[str, str]:
         if wanted in fitting:
             chosen[name] = wanted
         elif name not in remaps:
-            guess = _likeliest(name, [t for t in fitting if t not in chosen.values()])
+            taken = {*chosen.values(), *(f'/{other}' for other in INPUT_TYPES)}
+            guess = _likeliest(name, [topic for topic in fitting if topic not in taken])
             if guess:
                 chosen[name] = guess
     return chosen
