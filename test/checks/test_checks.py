@@ -253,19 +253,38 @@ def test_a_clock_that_was_set_is_one_finding_whatever_it_stamps(by):
     assert all(topic in told[0].words for topic in ('/imu/data', '/sinkage', '/reference_odom'))
 
 
-def test_drives_that_send_a_message_each_repeat_no_stamp():
-    joints = WHOLE.joints
+def in_messages_of_their_own(joints, apart):
+    """Each wheel in its own message, so many seconds after the one before."""
     wheels = len(joints.names)
     own = np.tile(np.eye(wheels, dtype=bool), (joints.stamp.size, 1))
-    each = {
-        'stamp': np.repeat(joints.stamp, wheels),
-        'log_time': np.repeat(joints.log_time, wheels),
-        'rate': np.where(own, np.repeat(joints.rate, wheels, axis=0), np.nan),
-        'torque': np.where(own, np.repeat(joints.torque, wheels, axis=0), np.nan),
-    }
-    assert not kinds(checked(joints=replace(joints, **each)))
-    again = {key: np.repeat(getattr(joints, key), 2, axis=0) for key in each}
-    only(checked(joints=replace(joints, **again)), 'order')
+    after = np.tile((1e9 * apart * np.arange(wheels)).astype(np.int64), joints.stamp.size)
+    all_of_them = rows_of(joints, np.repeat(np.arange(joints.stamp.size), wheels))
+    return replace(
+        all_of_them,
+        stamp=all_of_them.stamp + after,
+        log_time=all_of_them.log_time + after,
+        rate=np.where(own, all_of_them.rate, np.nan),
+        torque=np.where(own, all_of_them.torque, np.nan),
+    )
+
+
+def one_wheel_seldom(joints):
+    there = np.arange(joints.stamp.size)[:, None] % 3 == [0, 0, 0, 0]
+    there[:, :3] = True
+    rate, torque = (np.where(there, table, np.nan) for table in (joints.rate, joints.torque))
+    return replace(joints, rate=rate, torque=torque)
+
+
+@pytest.mark.parametrize('apart', [0.0, 0.0002, 0.025, None])
+def test_messages_that_hold_some_of_the_wheels_are_checked_as_whole_ones(apart):
+    usual, joints = checked(), WHOLE.joints
+    some = one_wheel_seldom(joints) if apart is None else in_messages_of_their_own(joints, apart)
+    report = checked(joints=some)
+    assert not report.findings and report.not_checked == usual.not_checked
+    assert report.figures['joints.rate_hz'] == pytest.approx(rolling.RATE)
+    assert report.figures['torque.gain'] == pytest.approx(usual.figures['torque.gain'], abs=0.02)
+    assert report.figures['wheels.rate_noise_rad_s'] == pytest.approx(0.004, rel=0.1)  # the truth
+    only(checked(joints=rows_of(some, np.repeat(np.arange(some.stamp.size), 2))), 'order')
 
 
 def test_without_a_rover_file_signs_are_found_all_the_same():
@@ -318,17 +337,6 @@ def test_wheels_that_are_named_otherwise_half_way_are_told():
         replace(WHOLE, joints=renamed), from_configuration(rolling.rover())
     )
     assert 'but a, b, c, d' in outcome.words and outcome.wheel == ', '.join(rolling.NAMES)
-
-
-def test_drives_that_send_a_message_each_drop_nothing():
-    joints = WHOLE.joints
-    stamp = np.add.outer(joints.stamp, [0, 200_000, 400_000, 600_000]).ravel()
-    rate, torque = (np.full((stamp.size, 4), np.nan) for _ in range(2))
-    for i in range(4):
-        rate[i::4, i], torque[i::4, i] = joints.rate[:, i], joints.torque[:, i]
-    one = replace(joints, stamp=stamp, log_time=stamp + 2_000_000, rate=rate, torque=torque)
-    report = checked(joints=one)
-    assert not report.findings and report.figures['joints.rate_hz'] == pytest.approx(rolling.RATE)
 
 
 def test_both_imus_are_named_where_neither_is_listened_to():

@@ -82,6 +82,15 @@ def reverse_reference(m):
     return replace(m, forward=-m.forward) if isinstance(m, ReferenceVelocity) else m
 
 
+def first_backwards_in_two_messages(m):
+    """Every other wheel in each, at 10 Hz together."""
+    if not isinstance(m, WheelOdometry):
+        return m
+    there = np.arange(len(m.rate)) % 2 == m.stamp // 100_000_000 % 2
+    told = np.where(there, 1.0, np.nan)
+    return on_wheels(told * FIRST_BACKWARDS, told)(m)
+
+
 FIRST_BACKWARDS = np.array([-1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
 LEFT_BACKWARDS = np.array([-1.0, 1.0] * 3)
 UPSIDE_DOWN = np.array([1.0, -1.0, -1.0])
@@ -90,6 +99,10 @@ FAULTS = {
     'one_wheel': (on_wheels(FIRST_BACKWARDS), 'sign', 'joint_states', '[-1, 1, 1, 1, 1, 1]', REST),
     'one_wheel_with_torque': (
         on_wheels(FIRST_BACKWARDS, FIRST_BACKWARDS),
+        *('sign', 'joint_states', '[-1, 1, 1, 1, 1, 1]', REST),
+    ),
+    'in_two_messages': (
+        first_backwards_in_two_messages,
         *('sign', 'joint_states', '[-1, 1, 1, 1, 1, 1]', REST),
     ),
     'left_side': (

@@ -19,14 +19,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome, found, of_offset, untold
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import (
-    Channel,
-    JointSeries,
-    Recording,
-    SinkageSeries,
-    rows_of,
-    shifted,
-)
+from wheel_terra_estimator.checks.series import Channel, Recording, of_one_wheel, shifted
 from wheel_terra_estimator.checks.statistics import (
     Trial,
     averaged,
@@ -294,7 +287,6 @@ def _fits(table: FloatArray, second: FloatArray) -> FloatArray:
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
 GAP_SHARE = 0.05  # share of missing messages of a stuttering channel
-IN_MOST = 0.6  # share of messages with a wheel below which others hold other wheels [-]
 SEVERAL = 10  # messages over which a period is taken where stamps jitter
 OFF_PERIOD, REGULAR = 0.2, 0.6
 """Distance of a step from a multiple of the period, as a share of it, and the share of steps nearer
@@ -320,7 +312,7 @@ def check_transport(
         if channel is None or channel.stamp.size < 3:
             continue
         most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
-        one = _of_one_wheel(channel, facts)
+        one = of_one_wheel(channel, facts.names)
         order, jumps = _order(one, most_back), _steps(channel)
         step = float(jumps[np.argmax(np.abs(jumps))])
         outcomes += order
@@ -399,16 +391,6 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     if not words:
         return []
     return [found('order', channel.topic, 0.99, how='; '.join(words))]
-
-
-def _of_one_wheel(channel: Channel, facts: RoverFacts) -> Channel:
-    """Return the messages of the wheel that is told most often, where they hold one or few each."""
-    if not isinstance(channel, JointSeries | SinkageSeries):
-        return channel
-    there = np.isfinite(channel.rate if isinstance(channel, JointSeries) else channel.sinkage)
-    there[:, [name not in facts.names for name in channel.names]] = False
-    one = there[:, np.argmax(there.sum(axis=0))]
-    return rows_of(channel, one) if 0.0 < one.mean() < IN_MOST else channel
 
 
 def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Outcome]:

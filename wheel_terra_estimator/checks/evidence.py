@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
 from wheel_terra_estimator.checks.finding import FAULTS, Finding, found
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import Channel, JointSeries, Recording
+from wheel_terra_estimator.checks.series import (
+    Channel,
+    JointSeries,
+    Recording,
+    nearest,
+    of_one_wheel,
+    rows_of,
+)
 from wheel_terra_estimator.checks.statistics import (
     DRIFT,
     Estimate,
@@ -67,14 +74,14 @@ class Evidence:
 
     @property
     def joints(self) -> JointSeries:
-        """The wheel odometry."""
+        """The wheel odometry, a message per row."""
         assert self.recording.joints is not None
         return self.recording.joints
 
     @property
     def origin(self) -> int:
         """Stamp of time 0 [ns]."""
-        return int(self.joints.stamp[self.joints.stamp > 0].min())
+        return int(self.joints.stamp[0])
 
     def seconds(self, channel: Channel) -> FloatArray:
         """Return stamps of a channel since time 0 [s]."""
@@ -265,31 +272,38 @@ class Evidence:
 def gather(
     recording: Recording, facts: RoverFacts, rotation: FloatArray, figures: dict[str, Any]
 ) -> Evidence | None:
-    """Return the evidence of a recording; None where no wheel of the rover is in it."""
+    """Return the evidence of a recording; None where no wheel of the rover is in it.
+
+    Messages may hold some of the wheels only: a row has the nearest reading of each.
+    """
     joints = recording.joints
     if joints is None or not (joints.stamp > 0).any():
         return None
-    usable = np.flatnonzero(joints.stamp > 0)
-    rows = usable[np.unique(joints.stamp[usable], return_index=True)[1]]
-    time = (joints.stamp[rows] - joints.stamp[rows[0]]) * 1e-9
+    rows = of_one_wheel(joints, facts.names)
+    rows = rows_of(rows, rows.stamp > 0)
+    rows = rows_of(rows, np.unique(rows.stamp, return_index=True)[1])
+    recording = replace(recording, joints=rows)
+    time = rows.seconds
     rate, torque, steering = np.full((3, time.size, len(facts.names)), np.nan)
     for index, name in enumerate(facts.names):
         if name in joints.names:
-            column = joints.names.index(name)
-            rate[:, index] = facts.direction[index] * joints.rate[rows, column]
-            torque[:, index] = facts.direction[index] * joints.torque[rows, column]
+            column, sign = joints.names.index(name), facts.direction[index]
+            rate[:, index] = sign * nearest(joints.stamp, joints.rate[:, column], rows.stamp)
+            torque[:, index] = sign * nearest(joints.stamp, joints.torque[:, column], rows.stamp)
     if joints.position is not None:
         for index, name in enumerate(facts.configuration.wheels.steering_joints):
             if name in joints.names:
-                angle = joints.position[rows, joints.names.index(name)]
-                known = np.isfinite(angle)
-                if known.any():
-                    steering[:, index] = np.interp(time, time[known], angle[known])
+                angle = joints.position[:, joints.names.index(name)]
+                known = np.flatnonzero(np.isfinite(angle) & (joints.stamp > 0))
+                known = known[np.argsort(joints.stamp[known], kind='stable')]
+                if known.size:
+                    at = (joints.stamp[known] - rows.stamp[0]) * 1e-9
+                    steering[:, index] = np.interp(time, at, angle[known])
     torque = facts.errors.torque.true(torque)
     force = gyro = None
     imu = recording.imu
     if imu is not None and imu.stamp.size > 1 and time.size > 1:
-        at = (imu.stamp - joints.stamp[rows[0]]) * 1e-9
+        at = (imu.stamp - rows.stamp[0]) * 1e-9
         width = float(np.median(np.diff(time)))
         force, gyro = (
             averaged(at, np.nan_to_num(values) @ rotation.T, time, width) - bias

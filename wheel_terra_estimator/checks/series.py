@@ -8,14 +8,17 @@ Stamps and log times are integer nanoseconds; ``nan`` marks what a message did n
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray, IntArray
 
 ASIDE = math.radians(30.0)  # direction of a velocity that no rover slides in all along [rad]
+IN_MOST = 0.6  # share of messages with a wheel below which others hold other wheels [-]
+REACH = 1.5  # A reading counts for so many of its usual periods before and after its stamp [-]
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,8 @@ class Channel:
 Series = TypeVar('Series', bound=Channel)
 
 
-def rows_of(series: Series, kept: BoolArray) -> Series:
-    """Return some messages (k,) of a channel."""
+def rows_of(series: Series, kept: BoolArray | IndexArray) -> Series:
+    """Return some messages of a channel."""
     values = {f.name: getattr(series, f.name) for f in fields(series)}
     arrays: dict[str, Any] = {k: v[kept] for k, v in values.items() if isinstance(v, np.ndarray)}
     return replace(series, **arrays)
@@ -99,6 +102,32 @@ class VelocitySeries(Channel):
         """Whether it is no velocity along x of the rover."""
         forward, side = np.nanmedian(np.abs(self.velocity[:, :2]), axis=0)
         return bool(side > math.tan(ASIDE) * forward)
+
+
+def of_one_wheel(series: Series, wheels: Sequence[str]) -> Series:
+    """Return the messages of the wheel that is told most often, where they hold one or few each."""
+    if not isinstance(series, JointSeries | SinkageSeries):
+        return series
+    there = np.isfinite(series.rate if isinstance(series, JointSeries) else series.sinkage)
+    there[:, [name not in wheels for name in series.names]] = False
+    one = there[:, np.argmax(there.sum(axis=0))]
+    return rows_of(series, one) if 0.0 < one.mean() < IN_MOST else series
+
+
+def nearest(stamp: IntArray, values: FloatArray, at: IntArray) -> FloatArray:
+    """Return the reading, of values (k,) at stamps (k,), nearest to each of other stamps (m,) [ns].
+
+    Each is one that was measured, so that its noise and its steps are; nan where none is near.
+    """
+    known = np.flatnonzero(np.isfinite(values) & (stamp > 0))
+    known = known[np.unique(stamp[known], return_index=True)[1]]
+    if known.size < 2:
+        return np.full(at.size, np.nan)
+    own = stamp[known]
+    after = np.clip(np.searchsorted(own, at), 1, own.size - 1)
+    near = np.where(at - own[after - 1] <= own[after] - at, after - 1, after)
+    reached = np.abs(own[near] - at) <= REACH * np.median(np.diff(own))
+    return np.where(reached, values[known[near]], np.nan)
 
 
 @dataclass(frozen=True)
