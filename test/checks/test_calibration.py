@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from wheel_terra_estimator.checks.calibration import as_file, calibrate
 from wheel_terra_estimator.checks.imu import gross_tilt
 from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.configuration import reader
 
 WRONG = {
@@ -45,6 +46,16 @@ def test_radius_track_and_mounting(seed):
     assert abs(radius.after[0] - rolling.RADIUS) < 2.0 * radius.std
     assert track.after[0] == pytest.approx(rolling.HALF_TRACK, rel=0.02)
     assert told['sensors.imu_mounting_pitch_deg'].after == pytest.approx(0.0, abs=0.3)
+
+
+def test_nothing_is_told_from_where_there_is_no_imu():
+    """It comes up in a circle at 0.2 rad/s, which is no bias at rest."""
+    imu = rolling.recording().imu
+    calibration, _ = calibrated(imu=rows_of(imu, imu.seconds > 170.0))
+    told = {change.key: change.after for change in calibration.changes}
+    bias = told.get('sensors.angular_rate_bias', [0.0, 0.0, 0.0])
+    assert bias == pytest.approx([0.0, 0.0, 0.0], abs=0.002)
+    assert not {'zero', 'unit'} & {finding.kind for finding in calibration.findings}
 
 
 @pytest.mark.parametrize('factor', [-1.0, 1000.0])

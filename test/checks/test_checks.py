@@ -158,6 +158,9 @@ def test_a_wheel_without_torque_leaves_the_scale_open():
     assert not report.findings
     untold = {o.kind for o in report.not_checked if 'a wheel without torque' in o.reason}
     assert untold == {'gain', 'mass'}
+    ends = np.where(WHOLE.joints.seconds[:, np.newaxis] < 80.0, WHOLE.joints.torque, np.nan)
+    whole = checked(joints=replace(WHOLE.joints, torque=ends))  # what is left tells it
+    assert whole.figures['torque.gain'] == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(('share', 'soft'), [(0.1, False), (0.2, True)])

@@ -19,6 +19,7 @@ from wheel_terra_estimator.checks.series import (
     Channel,
     JointSeries,
     Recording,
+    beside,
     nearest,
     of_one_wheel,
     rows_of,
@@ -231,8 +232,9 @@ class Evidence:
 
     @cached_property
     def straight(self) -> Mask:
-        """Steady rows without a turn."""
-        return _shared(self.steady & self.unturned)
+        """Steady rows without a turn, and with all torques of a rover that has such."""
+        there = np.isfinite(self.torque)
+        return _shared(self.steady & self.unturned & (there.all(axis=1) | ~there.any(axis=0).all()))
 
     @cached_property
     def turning(self) -> Mask:
@@ -274,7 +276,8 @@ def gather(
 ) -> Evidence | None:
     """Return the evidence of a recording; None where no wheel of the rover is in it.
 
-    Messages may hold some of the wheels only: a row has the nearest reading of each.
+    Messages may hold some of the wheels only: a row has the nearest reading of each. Rows are where
+    there is an IMU as well, unless hardly any are.
     """
     joints = recording.joints
     if joints is None or not (joints.stamp > 0).any():
@@ -282,7 +285,17 @@ def gather(
     rows = of_one_wheel(joints, facts.names)
     rows = rows_of(rows, rows.stamp > 0)
     rows = rows_of(rows, np.unique(rows.stamp, return_index=True)[1])
+    if recording.imu is not None:
+        together = beside(rows, recording.imu)
+        if together.sum() < LEAST_MOVING_ROWS:
+            recording = replace(recording, imu=None)
+        else:
+            rows = rows_of(rows, together)
     recording = replace(recording, joints=rows)
+    for name in ('imu', 'sinkage', 'reference'):
+        channel = getattr(recording, name)
+        if channel is not None and (kept := beside(channel, rows)).any():
+            recording = replace(recording, **{name: rows_of(channel, kept)})
     time = rows.seconds
     rate, torque, steering = np.full((3, time.size, len(facts.names)), np.nan)
     for index, name in enumerate(facts.names):

@@ -363,7 +363,7 @@ def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
     imu, gyro = evidence.recording.imu, evidence.gyro
     if imu is None or gyro is None:
         return None
-    rest = evidence.at_rest & (evidence.time <= evidence.seconds(imu).max())
+    rest = evidence.at_rest
     if rest.sum() * evidence.period < LEAST_STANDSTILL:
         return None
     spread = np.array([robust_std(column) for column in gyro[rest].T])

@@ -18,6 +18,7 @@ from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray, IntA
 
 ASIDE = math.radians(30.0)  # direction of a velocity that no rover slides in all along [rad]
 IN_MOST = 0.6  # share of messages with a wheel below which others hold other wheels [-]
+LONGEST_HELD = 1_000_000_000  # time for which a reading stands before and after it [ns]
 REACH = 1.5  # A reading counts for so many of its usual periods before and after its stamp [-]
 
 
@@ -54,6 +55,16 @@ def rows_of(series: Series, kept: BoolArray | IndexArray) -> Series:
     values = {f.name: getattr(series, f.name) for f in fields(series)}
     arrays: dict[str, Any] = {k: v[kept] for k, v in values.items() if isinstance(v, np.ndarray)}
     return replace(series, **arrays)
+
+
+def beside(channel: Channel, other: Channel) -> BoolArray:
+    """Return the messages (k,) of a channel that are not far from any of another one."""
+    stamp = np.unique(other.stamp[other.stamp > 0])
+    if stamp.size < 2:
+        return np.zeros(channel.stamp.size, dtype=bool)
+    after = np.clip(np.searchsorted(stamp, channel.stamp), 1, stamp.size - 1)
+    off = np.minimum(np.abs(channel.stamp - stamp[after - 1]), np.abs(stamp[after] - channel.stamp))
+    return np.asarray(off <= max(LONGEST_HELD, REACH * np.median(np.diff(stamp))))
 
 
 def shifted(channel: Any, offset: int | IntArray) -> Any:
