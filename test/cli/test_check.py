@@ -45,6 +45,13 @@ def test_a_remap_to_nothing_names_the_topic_that_is_not_there(make_bag, drive, r
     )
 
 
+def test_all_topics_of_a_long_recording_end_at_one_time():
+    with open_bag(PATHFINDER) as bag:
+        told = read_series(bag, {'reference_odom': '/truth/odometry'}, 'bag', most=500)
+    ends = [channel.log_time[-1] * 1e-9 for channel in (told.joints, told.imu, told.reference)]
+    assert np.ptp(ends) < 0.1 and told.notes[-1].endswith('judged by its first 0.167 minutes')
+
+
 def test_a_bag_of_ros_1_names_its_converter(tmp_path, refused):
     (tmp_path / 'drive.bag').write_bytes(b'#ROSBAG V2.0\n')
     refused(['check', str(tmp_path / 'drive.bag')], 'rosbags-convert --src')

@@ -26,7 +26,7 @@ from wheel_terra_estimator.messages.convert import INPUT_TYPES
 from wheel_terra_estimator.messages.unpack import DamagedMessageError, Layout, layout_of
 
 MOST_MESSAGES = 400_000
-"""Messages of a topic that are kept; a longer recording is judged by its beginning."""
+"""Messages of a topic up to which a recording is read: all topics end at the same time."""
 MOST_BYTES = 4_000_000  # of messages that are not read yet
 MOST_JOINTS = 64  # joints of a topic that are kept
 
@@ -36,8 +36,8 @@ def read_series(
 ) -> Recording:
     """Read the input topics of an open bag.
 
-    Of a topic at most ``most`` messages are kept, its beginning; ``name`` is what reports call the
-    recording, ``remaps`` are the estimator's topics to the bag's.
+    It is read until one of them has ``most`` messages; ``name`` is what reports call the recording,
+    ``remaps`` are the estimator's topics to the bag's.
     """
     chosen = choose_topics(bag, remaps)
     by_topic = {topic: own for own, topic in chosen.items()}
@@ -46,21 +46,25 @@ def read_series(
         for own, topic in chosen.items()
         if own in _COLLECTORS
     }
-    shortened = False
+    first = end = None  # log times
     for log_time, topic, data in bag.messages([chosen[own] for own in collectors]):
-        collector = collectors[by_topic[topic]]
+        collector, first = collectors[by_topic[topic]], first or log_time
         if len(collector.arrivals) >= most:
-            shortened = True
-        elif len(data) <= limits.MESSAGE:
+            end = end or log_time
+        if not end and len(data) <= limits.MESSAGE:
             collector.add(log_time, data)
     garbage = Counter({c.topic: len(c.arrivals) - len(c.stamps) for c in collectors.values()})
     if garbage.total() or bag.damaged:
         for collector in collectors.values():
             garbage[collector.topic] += collector.leave_out_strays()
-    left_out = [
-        f'{n} damaged messages on {topic} were left out' for topic, n in garbage.items() if n
+    notes = [
+        *bag.notes,
+        *(f'{n} damaged messages on {topic} were left out' for topic, n in garbage.items() if n),
     ]
-    others = [f'another rover in it: {options}' for options in other_rovers(bag, chosen)]
+    if first and end:
+        minutes = (end - first) * 1e-9 / 60.0
+        notes.append(f'a long recording: judged by its first {minutes:.3g} minutes')
+    notes += [f'another rover in it: {options}' for options in other_rovers(bag, chosen)]
 
     def made(own: str) -> Any:
         collector = collectors.get(own)
@@ -74,8 +78,7 @@ def read_series(
         sinkage=made('sinkage'),
         reference=made('reference_odom'),
         wheel_odometry=made('odom'),
-        shortened=shortened,
-        notes=(*bag.notes, *left_out, *others),
+        notes=tuple(notes),
     )
 
 

@@ -146,7 +146,7 @@ class Recording:
     """What the checks look at; None where the recording has no such topic.
 
     ``topics`` lists (name, type, number of messages) of everything that was recorded; ``notes`` say
-    what is damaged.
+    what is damaged, and whether it is read to its end.
     """
 
     name: str
@@ -156,5 +156,4 @@ class Recording:
     sinkage: SinkageSeries | None
     reference: VelocitySeries | None
     wheel_odometry: VelocitySeries | None
-    shortened: bool = False
     notes: tuple[str, ...] = ()

@@ -21,7 +21,7 @@ EXAMPLES = (
     'wheel-terra check my_drive --config my_rover.yaml --json',
 )
 
-NOTES = 'recording.notes'  # figure: what is damaged
+NOTES = 'recording.notes'  # figure: what is damaged, or not read
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,6 +89,4 @@ def as_text(recording: Recording, report: CheckReport, without_rover: bool) -> s
     width = max((len(key) for key in figures), default=0)
     lines += [f'    {key:{width}}  {value}' for key, value in figures.items()]
     lines += [f'  note: {note}' for note in recording.notes]
-    if recording.shortened:
-        lines += ['', '  a long recording: judged by its beginning']
     return '\n'.join(lines)
