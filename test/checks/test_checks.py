@@ -242,6 +242,16 @@ def test_transport():
     assert 'step by +10 s against their arrival' in told.words
 
 
+@pytest.mark.parametrize('name', ['joints', 'imu', 'reference'])
+def test_an_input_that_is_not_there_at_an_end_is_told(name):
+    channel = getattr(WHOLE, name)
+    dies = only(checked(**{name: rows_of(channel, channel.seconds < 280.0)}), 'drop_outs')
+    assert dies.topic == channel.topic and 'in the last 20 s' in dies.words
+    late = checked(**{name: rows_of(channel, channel.seconds > 8.0)})
+    words = [finding.words for finding in late.findings]
+    assert ['in the first 8 s' in told for told in words] == [True] * (name != 'reference')
+
+
 @pytest.mark.parametrize('by', [-3.0, 30.0])
 def test_a_clock_that_was_set_is_one_finding_whatever_it_stamps(by):
     changes = {}

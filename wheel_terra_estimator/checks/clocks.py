@@ -284,6 +284,8 @@ def _fits(table: FloatArray, second: FloatArray) -> FloatArray:
 
 # Stamps against arrival ---------------------------------------------------------------------------
 
+CHECKED = ('joints', 'imu', 'sinkage', 'reference')
+LONGEST_SILENCE = 5.0  # of an input at an end of a recording in which others come [s]
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
 GAP_SHARE = 0.05  # share of missing messages of a stuttering channel
@@ -304,10 +306,10 @@ def check_transport(
     recording: Recording, facts: RoverFacts, figures: dict[str, Any]
 ) -> tuple[list[Outcome], Recording]:
     """Return what is wrong with the stamps, and the recording with that mended by log time."""
-    outcomes: list[Outcome] = []
+    outcomes = _silent(recording)
     late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
     mended: dict[str, Any] = {}
-    for name in ('joints', 'imu', 'sinkage', 'reference'):
+    for name in CHECKED:
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
             continue
@@ -391,6 +393,26 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     if not words:
         return []
     return [found('order', channel.topic, 0.99, how='; '.join(words))]
+
+
+def _silent(recording: Recording) -> list[Outcome]:
+    """Return inputs that end before others do, and wheel rates or an IMU that begin after them."""
+    channels = {name: getattr(recording, name) for name in CHECKED}
+    heard = {
+        name: (channel.log_time.min() * 1e-9, channel.log_time.max() * 1e-9)
+        for name, channel in channels.items()
+        if channel is not None
+    }
+    begin = min((first for first, _ in heard.values()), default=0.0)
+    end = max((last for _, last in heard.values()), default=0.0)
+    outcomes: list[Outcome] = []
+    for name, (first, last) in heard.items():
+        late = first - begin if name in ('joints', 'imu') else 0.0
+        for where, silence in (('first', late), ('last', end - last)):
+            if silence > LONGEST_SILENCE:
+                topic = channels[name].topic
+                outcomes.append(found('silent', topic, 0.99, where=where, silence=silence))
+    return outcomes
 
 
 def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Outcome]:
