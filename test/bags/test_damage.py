@@ -96,6 +96,15 @@ def test_every_command_says_what_is_damaged(make_bag, config, tmp_path, capsys):
         assert 'whole messages recovered' in said.out + said.err, command
 
 
+def test_a_check_of_a_bag_that_is_cut_in_half_begins_with_the_loss(make_bag, capsys):
+    bag = make_bag()
+    (file,) = bag.glob('*.mcap')
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    assert main(['check', str(bag)]) == 1
+    _, note, finding, *_ = capsys.readouterr().out.splitlines()
+    assert 'whole messages recovered' in note and 'of the recording are lost' in finding
+
+
 @pytest.mark.parametrize('closed', [True, False])
 @pytest.mark.parametrize('chunk_size', [0, 900])
 def test_a_file_by_topic_without_index_gives_all_topics_in_order(read_mcap, chunk_size, closed):

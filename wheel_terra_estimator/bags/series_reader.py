@@ -78,6 +78,7 @@ def read_series(
         sinkage=made('sinkage'),
         reference=made('reference_odom'),
         wheel_odometry=made('odom'),
+        lost=bag.lost,
         notes=tuple(notes),
     )
 

@@ -72,6 +72,13 @@ class Bag:
         return any(source.notes() for source in self._sources)
 
     @property
+    def lost(self) -> float:
+        """Share of the messages that are known to be lost of those that were asked for [-]."""
+        losses = [source.losses for source in self._sources]
+        lost = sum(one.lost().total() for one in losses)
+        return lost / max(lost + sum(sum(one.recovered.values()) for one in losses), 1)
+
+    @property
     def message_count(self) -> int:
         """Number of messages on all topics."""
         return sum(topic.message_count for topic in self.topics.values())

@@ -48,7 +48,7 @@ from wheel_terra_estimator.checks.series import Recording, Series, rows_of
 from wheel_terra_estimator.checks.statistics import moving_mean
 from wheel_terra_estimator.configuration.configuration import Configuration
 
-LEAST_LOST = 0.01  # share of messages with nan that is told [-]
+LEAST_LOST = 0.01  # share of messages that are lost, or with nan, that is told [-]
 LEAST_RIM_SPEED = 0.005  # rim speed that no drive stays below [m/s]
 ORIENTATION = 'the orientation'  # what a gyro is said to turn against
 _LOGGER = logging.getLogger(__name__)
@@ -131,6 +131,9 @@ def _examined(
     recording = clocks.corrected(recording, facts)
     own = facts.configuration.wheel_odometry
     mended = Mended(report)
+    topic = recording.joints.topic if recording.joints is not None else ''
+    if recording.lost > LEAST_LOST:
+        report.take([found('damaged', topic, 0.99, share=100.0 * recording.lost)])
     mended('drop_outs', None, lambda: names.check_required(recording, own))
     mended('unknown_name', None, lambda: names.check_topics(recording, remapped, own))
     checks = AGAINST_EACH_OTHER
@@ -149,7 +152,6 @@ def _examined(
     if evidence is None:
         report.not_checked.append(untold('sign', 'no_rates'))
     if not report.findings and not _drives(evidence):
-        topic = recording.joints.topic if recording.joints is not None else ''
         report.take([found('no_drive', topic, 0.99)])
     return evidence
 

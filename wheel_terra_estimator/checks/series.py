@@ -145,8 +145,9 @@ def nearest(stamp: IntArray, values: FloatArray, at: IntArray) -> FloatArray:
 class Recording:
     """What the checks look at; None where the recording has no such topic.
 
-    ``topics`` lists (name, type, number of messages) of everything that was recorded; ``notes`` say
-    what is damaged, and whether it is read to its end.
+    ``topics`` lists (name, type, number of messages) of everything that was recorded; ``lost`` is
+    the share of its messages that a damage took, as far as it is known; ``notes`` say what is
+    damaged, and whether it is read to its end.
     """
 
     name: str
@@ -156,4 +157,5 @@ class Recording:
     sinkage: SinkageSeries | None
     reference: VelocitySeries | None
     wheel_odometry: VelocitySeries | None
+    lost: float = 0.0
     notes: tuple[str, ...] = ()

@@ -72,6 +72,7 @@ def as_text(recording: Recording, report: CheckReport, without_rover: bool) -> s
 
     count = len(report.findings)
     lines = [f'{recording.name}: {count or "no"} finding{"" if count == 1 else "s"}']
+    lines += [f'  note: {note}' for note in recording.notes]
     lines += [f'  {line}' for line in shown(report.findings)]
     if without_rover:
         lines += ['', '  topics']
@@ -88,5 +89,4 @@ def as_text(recording: Recording, report: CheckReport, without_rover: bool) -> s
     lines += ['', '  figures'] if figures else []
     width = max((len(key) for key in figures), default=0)
     lines += [f'    {key:{width}}  {value}' for key, value in figures.items()]
-    lines += [f'  note: {note}' for note in recording.notes]
     return '\n'.join(lines)
