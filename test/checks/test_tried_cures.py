@@ -70,9 +70,14 @@ def test_a_scale_of_the_reference_is_no_radius(factor):
     (finding,) = rolling.checked(whole=recording).findings
     assert (finding.kind, finding.topic) == ('gain', '/reference_odom')
     assert finding.value == pytest.approx(1.0 / factor, abs=3.0 * finding.std)
-    skidding = rolling.checked(rolling.rover(**SKID), whole=recording).findings
-    assert {f.kind for f in skidding} == {'radius', 'gain'}
-    assert all(f.confidence < 0.9 and 'ten metres' in f.cure for f in skidding)
+    report = rolling.checked(rolling.rover(**SKID), whole=recording)
+    skidding = {f.kind: f for f in report.findings}
+    assert set(skidding) == {'radius', 'gain'}
+    assert all(f.confidence < 0.9 and 'ten metres' in f.cure for f in skidding.values())
+    radius = skidding['radius'].confidence > skidding['gain'].confidence
+    turned = factor if radius else 1.0  # the track by turns is that of the likelier
+    track = report.figures['rover.effective_track_m'] / (2.0 * rolling.HALF_TRACK)
+    assert track == pytest.approx(turned, rel=0.02)
 
 
 @pytest.mark.parametrize('zero', [8.0, -8.0])

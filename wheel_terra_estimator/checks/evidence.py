@@ -67,6 +67,7 @@ class Evidence:
     rotation: FloatArray  # (3, 3) from the IMU's frame into base_link
     figures: dict[str, Any]  # what the report shows beside findings; the checks write into it
     steering: FloatArray  # (k, n) angles, positive left [rad]; nan of a wheel that has none
+    likelier_radius: float = 1.0  # over those of ``facts``, of a finding that has a rival [-]
 
     def found(self, key: str, confidence: float, **told: Any) -> Finding:
         """Return a finding on the topic of its fault's channel; see `finding.found`."""

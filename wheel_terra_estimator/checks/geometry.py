@@ -280,7 +280,7 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         evidence.found('reference_scale', (1.0 - share) * sure, value=times, std=std, **words),
     ]
     if not alone:
-        return found, evidence
+        return found, replace(evidence, likelier_radius=ratio.value if share > 0.5 else 1.0)
     if share < 0.5:
         return found[1:], evidence
     return found[:1], replace(evidence, facts=replace(facts, radius=facts.radius * scale))
@@ -397,10 +397,11 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     if isinstance(told, NotChecked):
         return [told]
     (ratio, trial, alone), stated = told, stated_track(evidence)
-    figures['rover.effective_over_stated_track'] = round(ratio.value, 3)
-    figures['rover.effective_track_m'] = round(ratio.value * stated, 4)
+    times = ratio.value * evidence.likelier_radius
+    figures['rover.effective_over_stated_track'] = round(times, 3)
+    figures['rover.effective_track_m'] = round(times * stated, 4)
     if turning.skids(evidence):
-        return [untold('track', 'skids', track=ratio.value * stated)]
+        return [untold('track', 'skids', track=times * stated)]
     rolling = rolling_track(evidence)
     if isinstance(rolling, NotChecked):
         return [NotChecked(kind, rolling.reason) for kind in ('track', 'radius')]
