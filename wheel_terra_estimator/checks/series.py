@@ -121,8 +121,10 @@ def of_one_wheel(series: Series, wheels: Sequence[str]) -> Series:
         return series
     there = np.isfinite(series.rate if isinstance(series, JointSeries) else series.sinkage)
     there[:, [name not in wheels for name in series.names]] = False
+    if not there.any():
+        return series
     one = there[:, np.argmax(there.sum(axis=0))]
-    return rows_of(series, one) if 0.0 < one.mean() < IN_MOST else series
+    return rows_of(series, one) if one.mean() < IN_MOST else series
 
 
 def nearest(stamp: IntArray, values: FloatArray, at: IntArray) -> FloatArray:
