@@ -47,12 +47,14 @@ def read_series(
         if own in _COLLECTORS
     }
     first = end = None  # log times
+    heard: dict[str, int] = {}
     for log_time, topic, data in bag.messages([chosen[own] for own in collectors]):
         collector, first = collectors[by_topic[topic]], first or log_time
         if len(collector.arrivals) >= most:
             end = end or log_time
         if not end and len(data) <= limits.MESSAGE:
             collector.add(log_time, data)
+        heard[topic] = log_time
     garbage = Counter({c.topic: len(c.arrivals) - len(c.stamps) for c in collectors.values()})
     if garbage.total() or bag.damaged:
         for collector in collectors.values():
@@ -78,6 +80,7 @@ def read_series(
         sinkage=made('sinkage'),
         reference=made('reference_odom'),
         wheel_odometry=made('odom'),
+        heard={} if bag.damaged else heard,  # by then any time may be
         lost=bag.lost,
         notes=tuple(notes),
     )

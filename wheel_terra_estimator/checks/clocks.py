@@ -397,20 +397,19 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
 
 def _silent(recording: Recording) -> list[Outcome]:
     """Return inputs that end before others do, and wheel rates or an IMU that begin after them."""
-    channels = {name: getattr(recording, name) for name in CHECKED}
-    heard = {
-        name: (channel.log_time.min() * 1e-9, channel.log_time.max() * 1e-9)
-        for name, channel in channels.items()
-        if channel is not None
-    }
+    heard: dict[str, tuple[float, float]] = {}
+    for name in CHECKED:
+        if (channel := getattr(recording, name)) is not None:
+            end = recording.heard.get(channel.topic, int(channel.log_time.max()))
+            heard[name] = int(channel.log_time.min()) * 1e-9, end * 1e-9
     begin = min((first for first, _ in heard.values()), default=0.0)
-    end = max((last for _, last in heard.values()), default=0.0)
+    latest = max((last for _, last in heard.values()), default=0.0)
     outcomes: list[Outcome] = []
     for name, (first, last) in heard.items():
         late = first - begin if name in ('joints', 'imu') else 0.0
-        for where, silence in (('first', late), ('last', end - last)):
+        for where, silence in (('first', late), ('last', latest - last)):
             if silence > LONGEST_SILENCE:
-                topic = channels[name].topic
+                topic = getattr(recording, name).topic
                 outcomes.append(found('silent', topic, 0.99, where=where, silence=silence))
     return outcomes
 

@@ -8,8 +8,8 @@ Stamps and log times are integer nanoseconds; ``nan`` marks what a message did n
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -147,9 +147,10 @@ def nearest(stamp: IntArray, values: FloatArray, at: IntArray) -> FloatArray:
 class Recording:
     """What the checks look at; None where the recording has no such topic.
 
-    ``topics`` lists (name, type, number of messages) of everything that was recorded; ``lost`` is
-    the share of its messages that a damage took, as far as it is known; ``notes`` say what is
-    damaged, and whether it is read to its end.
+    ``topics`` lists (name, type, number of messages) of everything that was recorded; ``heard``
+    has the last log time [ns] of a topic where more is there than was read; ``lost`` is the share
+    of messages that a damage took, as far as it is known; ``notes`` say what is damaged, and
+    whether it is read to its end.
     """
 
     name: str
@@ -159,5 +160,6 @@ class Recording:
     sinkage: SinkageSeries | None
     reference: VelocitySeries | None
     wheel_odometry: VelocitySeries | None
+    heard: Mapping[str, int] = field(default_factory=dict)
     lost: float = 0.0
     notes: tuple[str, ...] = ()
