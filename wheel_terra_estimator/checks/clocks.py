@@ -408,9 +408,10 @@ def _silent(recording: Recording) -> list[Outcome]:
     for name, (first, last) in heard.items():
         late = first - begin if name in ('joints', 'imu') else 0.0
         for where, silence in (('first', late), ('last', latest - last)):
-            if silence > LONGEST_SILENCE:
-                topic = getattr(recording, name).topic
-                outcomes.append(found('silent', topic, 0.99, where=where, silence=silence))
+            channel = getattr(recording, name)
+            usual = (last - first) / max(channel.log_time.size - 1, 1)
+            if silence > max(LONGEST_SILENCE, GAP_PERIODS * usual):
+                outcomes.append(found('silent', channel.topic, 0.99, where=where, silence=silence))
     return outcomes
 
 
