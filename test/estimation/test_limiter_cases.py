@@ -233,6 +233,14 @@ def test_where_the_clocks_disagree_age_is_by_how_much_later_than_the_quickest_a_
         assert rover.drive(0.5, 0.1, age=offset - 1e4).scale == 1.0, step
 
 
+def test_a_topic_that_ended_is_no_clock_that_disagrees():
+    """Its sets go on with those of the others, and grow old as time goes by."""
+    rover = Rover()
+    rover.drive(1.0, 0.1)
+    late = [rover.drive(STEP, 0.1, age=STEP * i).scale for i in range(round(90.0 / STEP))]
+    assert late == sorted(late, reverse=True) and late[-1] == 0.3
+
+
 def test_an_estimate_grows_old_where_none_follows():
     rover = Rover()
     rover.drive(3.0, 0.1, age=0.5)

@@ -289,7 +289,11 @@ def _clock_offset(
     """
     if -tuning.stale_after <= delay <= LONGEST_DELAY:
         return None
-    stepped = delay - state.delay > now - state.judged_at + CLOCK_JITTER
+    elapsed = now - state.judged_at
+    stepped = delay - state.delay > elapsed + CLOCK_JITTER
+    agreed = state.clock_offset is None and math.isfinite(elapsed)
+    if agreed and delay > 0.0 and not stepped:
+        return None  # a topic that ended, or lasts: no clock stepped
     return delay if state.clock_offset is None or stepped else min(state.clock_offset, delay)
 
 
