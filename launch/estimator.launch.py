@@ -18,10 +18,10 @@ ARGUMENTS = {
         'parameter files, separated by commas, later ones win: paths, or names of shipped files',
     ),
     'namespace': ('', 'namespace of the node and its topics'),
-    'use_sim_time': ('false', 'take the time from /clock'),
+    'use_sim_time': ('', 'true: take the time from /clock'),
     'log_level': ('info', 'debug, info, warn, error, fatal'),
     'soil_file': ('', 'file that keeps what was learned over a restart'),
-    'autostart': ('true', 'false: a life cycle manager configures and activates the node'),
+    'autostart': ('', 'false: a life cycle manager configures and activates the node'),
     'record_arrival': ('', 'file that logs the order in which inputs arrive'),
 }
 
@@ -32,7 +32,8 @@ def start(context):
     """Make the node, once the arguments are known."""
     values = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     files = [str(shipped.find(name.strip())) for name in values['params_file'].split(',')]
-    own = {name: values[name].lower() in TRUE for name in ('use_sim_time', 'autostart')}
+    # What is not given is left to the files.
+    own = {n: values[n].lower() in TRUE for n in ('use_sim_time', 'autostart') if values[n]}
     own |= {name: values[name] for name in ('soil_file', 'record_arrival') if values[name]}
     return [
         Node(
@@ -40,7 +41,7 @@ def start(context):
             executable='estimator_node',
             name='wheel_terra_estimator',
             namespace=values['namespace'],
-            parameters=[*files, own],
+            parameters=[*files, *([own] if own else [])],
             arguments=['--ros-args', '--log-level', values['log_level']],
             output='screen',
         )

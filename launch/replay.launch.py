@@ -47,6 +47,7 @@ def start(context):
         launch_arguments={
             'params_file': values['params_file'],
             'use_sim_time': 'true',
+            'autostart': 'true',
         }.items(),
     )
     actions = [
