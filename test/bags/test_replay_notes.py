@@ -3,6 +3,7 @@
 """What a replay says of stamps that stand still and of a filter that fails."""
 
 import csv
+import json
 import re
 import tracemalloc
 from dataclasses import replace
@@ -15,7 +16,8 @@ from estimate_sets import some_estimates as estimate_set
 from recordings import beginning
 
 from wheel_terra_estimator.bags.history import HistoryRecorder, ThinnedRows, read_estimates
-from wheel_terra_estimator.bags.replay import replay
+from wheel_terra_estimator.bags.reader import MeasurementReader
+from wheel_terra_estimator.bags.replay import Options, replay
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.cli.demo import DRIVES
@@ -23,6 +25,7 @@ from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+from wheel_terra_estimator.messages.pipeline import Pipeline
 from wheel_terra_estimator.reporting.drive_summary import summarise
 
 
@@ -72,6 +75,33 @@ def test_odometry_that_might_be_the_reference_is_named(tmp_path):
         with_reference = replay(bag, reader.load(drive.configuration), used)
     assert not [note for note in with_reference.notes if 'reference_odom:=' in note]
     assert 'started anew' not in ' '.join((*with_reference.notes, *result.notes))
+
+
+def test_a_log_of_arrivals_holds_parameters_and_may_know_more_than_the_bag(tmp_path):
+    """The node hears messages before the recorder does; what a log of another bag is, is told."""
+    recording = beginning(shipped.demo_recording('entrapment'), tmp_path / 'drive', 6.0)
+    rover, log = reader.load(['generic_six_wheel', 'test_sand']), tmp_path / 'order.txt'
+    tuned = {'filter.gate': 6.0, 'filter.class_thresholds': [0.2, 0.5, 0.8]}
+    with open_bag(recording) as bag:
+        messages = list(MeasurementReader(bag, {}, rover).messages())
+        half, pipeline, expected = len(messages) // 2, Pipeline(rover), []
+        for i, (_, name, message) in enumerate(messages):
+            if i == half:
+                pipeline.retune(rover.replace(tuned))
+            expected += pipeline.hear(name, message)
+        expected += pipeline.flush()
+        lines = [f'{name} {message.stamp}' for _, name, message in messages]
+        early = ['imu/data 999']
+        log.write_text(
+            '\n'.join([*early, *lines[:half], f'set {json.dumps(tuned)}', *lines[half:]])
+        )
+        result = replay(bag, rover, {}, options=Options(arrival=log, every_set=True))
+        assert any('order.txt: 1 messages of it are not in the bag' in n for n in result.notes)
+        slip = np.array([estimates.slip for estimates in expected])
+        np.testing.assert_array_equal(result.history.values['slip'], slip)
+        log.write_text('\n'.join(early * len(lines) + lines))
+        with pytest.raises(UserError, match='line 1: no message "imu/data 999"'):
+            replay(bag, rover, {}, options=Options(arrival=log))
 
 
 # Figures of a whole drive, and the truth beside it.

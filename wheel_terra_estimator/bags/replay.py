@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-import re
+import json
 import signal
 import sys
 import threading
@@ -29,13 +29,13 @@ from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.input_file import read_text
 from wheel_terra_estimator.messages.convert import ODOMETRY
 from wheel_terra_estimator.messages.diagnostics import Diagnostics, Status
-from wheel_terra_estimator.messages.pipeline import RESET, Pipeline
+from wheel_terra_estimator.messages.pipeline import RESET, TUNE, Pipeline
 
 LONG_DRIVE = 20_000  # number of messages from which a progress bar is shown
 
 LARGEST_ARRIVAL_LOG = 256 * 2**20  # size [byte] of an arrival log of ten hours
 
-_STAMP = re.compile(r'-?[0-9]{1,19}')
+_MOST_MISSING = 0.1  # share of a log that the bag may lack: recorder and node start apart
 TRUTH_TOPICS = ('/ground_truth/', '/truth/')
 """Topics that are compared with the estimates, never heard."""
 
@@ -103,7 +103,8 @@ def replay(
     pipeline = Pipeline(configuration, estimator=smoother.estimator if smoother else None)
     pipeline.on_measurement = tracker.hear
     most = None if options.every_set else MOST_ROWS
-    messages = _in_order_of(arrival, reader) if arrival else reader.messages()
+    of_order: list[str] = []
+    messages = _in_order_of(arrival, reader, of_order) if arrival else reader.messages()
     if options.progress:
         messages = _progress(messages, reader)
     with ExitStack() as stack:
@@ -139,6 +140,7 @@ def replay(
         rejected=reader.rejected + pipeline.rejected,
         notes=(
             *([SMOOTHED] if smooth else []),
+            *of_order,
             *_notes(bag, reader, pipeline, interrupted.is_set()),
         ),
         interrupted=interrupted.is_set(),
@@ -160,6 +162,9 @@ def events(
         if name == RESET:
             pipeline.core.reset()
             yield Event(log_time)
+            continue
+        if name == TUNE:
+            pipeline.retune(pipeline.configuration.replace(message))
             continue
         for estimates in pipeline.hear(name, message):
             yield Event(log_time, estimates)
@@ -222,27 +227,35 @@ def _times(count: int) -> str:
     return 'once' if count == 1 else f'{count} times'
 
 
-def _in_order_of(arrival: Path, reader: MeasurementReader) -> Iterator[tuple[int, str, Any]]:
+def _in_order_of(
+    arrival: Path, reader: MeasurementReader, notes: list[str]
+) -> Iterator[tuple[int, str, Any]]:
     """Yield the messages of a bag in the order in which a live node heard them."""
     lines = read_text(arrival, LARGEST_ARRIVAL_LOG).splitlines()
-    stored: dict[tuple[str, int], deque[tuple[int, Any]]] = defaultdict(deque)
+    stored: dict[str, deque[tuple[int, str, Any]]] = defaultdict(deque)
     for log_time, name, message in reader.messages():
-        stored[name, message.stamp].append((log_time, message))
+        stored[f'{name} {message.stamp}'].append((log_time, name, message))
+    wanted = Counter(line for line in lines if line.partition(' ')[0] not in (RESET, TUNE))
+    missing = wanted - Counter({line: len(those) for line, those in stored.items()})
+    if missing.total() > _MOST_MISSING * wanted.total():
+        number, line = next((n, x) for n, x in enumerate(lines, start=1) if x in missing)
+        raise UserError(
+            f'{arrival}: line {number}: no message "{line}" in {reader.bag.path}; '
+            'the log belongs to another bag'
+        )
+    if missing:
+        notes.append(f'{arrival}: {missing.total()} messages of it are not in the bag: left out')
     log_time = 0
-    for number, line in enumerate(lines, start=1):
+    for line in lines:
         if line == RESET:
             yield log_time, RESET, None
-            continue
-        name, _, stamp = line.rpartition(' ')
-        if not _STAMP.fullmatch(stamp) or not stored[name, int(stamp)]:
-            raise UserError(
-                f'{arrival}: line {number}: no message "{line}" in {reader.bag.path}; '
-                'the log belongs to another bag'
-            )
-        logged, message = stored[name, int(stamp)].popleft()
-        # Time of arrival does not go back, so the estimates lie in the order of their publication.
-        log_time = max(log_time, logged)
-        yield log_time, name, message
+        elif line.startswith(TUNE):
+            yield log_time, TUNE, json.loads(line.removeprefix(TUNE))
+        elif stored[line]:
+            logged, name, message = stored[line].popleft()
+            # Time of arrival does not go back, so estimates lie in the order of their publication.
+            log_time = max(log_time, logged)
+            yield log_time, name, message
 
 
 def _progress(messages: Iterator[Any], reader: MeasurementReader) -> Iterator[Any]:

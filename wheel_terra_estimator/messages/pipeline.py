@@ -22,6 +22,7 @@ from wheel_terra_estimator.messages.convert import InputConverter, input_layout
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
 
 RESET = 'reset'  # line of an arrival log for a call of ``~/reset``
+TUNE = 'set'  # begin of one for parameters that are changed, which follow in JSON
 
 
 class Pipeline:

@@ -11,7 +11,7 @@ from typing import TextIO
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
-from wheel_terra_estimator.messages.pipeline import RESET
+from wheel_terra_estimator.messages.pipeline import RESET, TUNE
 from wheel_terra_estimator.output_folder import check_target
 
 LONGEST_LINE = 100  # [byte]
@@ -23,11 +23,11 @@ def why_no_arrival_log(path: Path) -> str:
         topic, _, stamp = file.readline(LONGEST_LINE).decode(errors='replace').partition(' ')
     if topic in INPUT_TYPES and stamp.strip().lstrip('-').isdigit():
         return ''
-    return '' if topic.strip() == RESET else 'is no arrival log of this program'
+    return '' if topic.strip() in (RESET, TUNE) else 'is no arrival log of this program'
 
 
 class ArrivalLog:
-    """Line after line, ``TOPIC STAMP`` or `RESET`, to a file.
+    """Line after line, ``TOPIC STAMP``, `RESET` or `TUNE`, to a file.
 
     ``inputs``: files that the node reads. ``complain``: is told, once, why the log ends early: a
     disk that is full ends the log, not the node. Raises UserError where it may not, or cannot, be

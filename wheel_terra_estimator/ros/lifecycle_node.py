@@ -10,6 +10,7 @@ watch over silence.
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections import Counter
@@ -39,7 +40,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages.convert import DAMAGED, INPUT_TYPES
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, Status
-from wheel_terra_estimator.messages.pipeline import RESET, Pipeline
+from wheel_terra_estimator.messages.pipeline import RESET, TUNE, Pipeline
 from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
 from wheel_terra_estimator.ros import parameters
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog
@@ -570,6 +571,7 @@ class EstimatorNode(LifecycleNode):
                 self._pipeline.retune(self._pipeline.configuration.replace(values))
             except UserError as error:
                 return SetParametersResult(successful=False, reason=str(error))
+            self._arrival.write(f'{TUNE} {json.dumps(values, default=list)}')
             self._given.update(values)
         return SetParametersResult(successful=True)
 
