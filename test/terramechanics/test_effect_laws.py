@@ -88,8 +88,7 @@ def test_bulldozing_after_terzaghi():
     soil = Soil(**{**SAND.__dict__, 'friction_angle': phi})
     z, pull, _ = state(0.2, LOAD, soil=soil).outputs()[0]
     pushed = model(0.2, 'bulldozing:terzaghi', values={'kb': 1.0}, soil=soil)[1]
-    t1 = math.acos(1.0 - z / WHEEL.radius)
-    a = 0.5 * (math.pi - t1)
+    a = math.acos(1.0 - z / WHEEL.radius)  # Bekker's angle of approach: cos a = 1 - 2 z/D
     k_c = (37.2 - math.tan(phi)) * math.cos(phi) ** 2
     k_g = (2.0 * 19.7 / math.tan(phi) + 1.0) * math.cos(phi) ** 2
     front = math.sin(a + phi) / (2.0 * math.sin(a) * math.cos(phi))

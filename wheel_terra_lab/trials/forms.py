@@ -71,7 +71,7 @@ def _by_height(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hid
 
 
 def _terzaghi(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    """Terzaghi's bearing factors after Hettiaratchi and Reece, front plate at half of t1."""
+    """Terzaghi's bearing factors in Bekker's resistance, angle of approach t1."""
 
     def drag(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
         z, phi = out['geometric_sinkage'], np.arctan(setup.tan_phi)
@@ -81,7 +81,7 @@ def _terzaghi(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidd
         ng = 2 * (nq + 1) * np.tan(phi) / (1 + 0.4 * np.sin(4 * phi))
         kc = (nc - np.tan(phi)) * np.cos(phi) ** 2
         kg = (2 * ng / np.tan(phi) + 1) * np.cos(phi) ** 2
-        plate = np.pi / 2 - out['entrance_angle'] / 2
+        plate = out['entrance_angle']
         edge = np.sin(plate + phi) / (2 * np.sin(plate) * np.cos(phi))
         weight = setup.density * rows['gravity'] * z
         return np.asarray(-size * setup.width * edge * z * (2 * setup.cohesion * kc + weight * kg))

@@ -55,13 +55,13 @@ def _earth_pressure(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     n_gamma = 2.0 * (n_q + 1.0) * tan / (1.0 + 0.4 * np.sin(4.0 * friction))
     k_c = (n_c - tan) * cos * cos
     k_gamma = (2.0 * n_gamma / tan + 1.0) * cos * cos
-    depth = contact.radius * (1.0 - np.cos(contact.entrance_angle))
+    approach = contact.entrance_angle  # arccos(1 - 2 z/D)
+    depth = contact.radius * (1.0 - np.cos(approach))
     weight = contact.density * contact.gravity
-    # Front of the wheel as a blade at half the entrance angle from the horizontal.
-    rake = 0.5 * np.pi - 0.5 * contact.entrance_angle
-    front = np.sin(rake + friction) / (2.0 * np.sin(rake) * cos)
+    # z sin(a + phi) / (2 sin a cos phi), which also holds at a = 0
+    front = 0.5 * (depth + contact.radius * np.tan(0.5 * approach) * np.cos(approach) * tan)
     pressure = 2.0 * contact.cohesion * k_c + weight * depth * k_gamma
-    resistance = _blade(contact) * front * depth * pressure
+    resistance = _blade(contact) * front * pressure
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 
@@ -84,14 +84,15 @@ BULLDOZING = Effect(
     other_forms=(
         Form(
             name='terzaghi',
-            claim='soil is pushed ahead of the wheel, after Terzaghi and Hettiaratchi',
+            claim='soil is pushed ahead of the wheel, after Terzaghi and Bekker',
             symbol='F -= kb b sin(a + phi)/(2 sin a cos phi) z (2 c Kc + rho g z Kg), '
-            'Kc = (Nc - tan phi) cos^2 phi, Kg = (2 Ng/tan phi + 1) cos^2 phi, a = (pi - t_1)/2',
+            'Kc = (Nc - tan phi) cos^2 phi, Kg = (2 Ng/tan phi + 1) cos^2 phi, a = t_1',
             parameters=(_KB,),
             validity='friction angle 10 to 45 degrees; sinkage below half the radius',
             source="Terzaghi's bearing factors in the bulldozing resistance of Bekker 1969 (book, "
-            'no DOI) and the passive resistance of Hettiaratchi and Reece 1974 '
-            '(doi 10.1680/geot.1974.24.3.289); Ng by the usual approximation',
+            'no DOI), angle of approach a = arccos(1 - 2 z/D) as in Li and Bingham 2022 (NASA '
+            'report 20220010732); Hettiaratchi and Reece 1974 (doi 10.1680/geot.1974.24.3.289); '
+            'Ng by the usual approximation',
             on_outputs=_earth_pressure,
         ),
     ),
