@@ -86,13 +86,12 @@ BULLDOZING = Effect(
             name='terzaghi',
             claim='soil is pushed ahead of the wheel, after Terzaghi and Bekker',
             symbol='F -= kb b sin(a + phi)/(2 sin a cos phi) z (2 c Kc + rho g z Kg), '
-            'Kc = (Nc - tan phi) cos^2 phi, Kg = (2 Ng/tan phi + 1) cos^2 phi, a = t_1',
+            'Kc = (Nc - tan phi) cos^2 phi, Kg = (2 Ng/tan phi + 1) cos^2 phi, '
+            'a = t_1 = arccos(1 - 2 z/D)',
             parameters=(_KB,),
             validity='friction angle 10 to 45 degrees; sinkage below half the radius',
-            source="Terzaghi's bearing factors in the bulldozing resistance of Bekker 1969 (book, "
-            'no DOI), angle of approach a = arccos(1 - 2 z/D) as in Li and Bingham 2022 (NASA '
-            'report 20220010732); Hettiaratchi and Reece 1974 (doi 10.1680/geot.1974.24.3.289); '
-            'Ng by the usual approximation',
+            source="Terzaghi's bearing factors in the resistance of Bekker 1969 (book, no DOI), as "
+            'in Li and Bingham 2022 (NASA report 20220010732); Ng by the usual approximation',
             on_outputs=_earth_pressure,
         ),
     ),
