@@ -302,13 +302,20 @@ def test_outliers_are_found_and_a_hump_is_none(forward, setting):
 def test_noise_is_estimated_beside_an_effect_and_never_none(forward, setting):
     soil, truth, std, inputs, scale = setting
 
-    def estimated(measured):
+    def estimated(measured, row=0):
         guess = np.broadcast_to(0.01 * scale, truth.shape)
         problem = build_problem(measured, guess, inputs, scale)
         nothing = of_soil(forward, problem, soil, problem.variance(0.1))
         origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
-        after = noise.estimate_noise(Noise(guess, origin), nothing, problem)
-        return after.std[0, :3]
+        after = noise.estimate_noise(
+            Noise(guess, origin),
+            nothing,
+            [np.ones(len(truth)), shape],
+            lambda std: build_problem(measured, std, inputs, scale),
+        )
+        return after.std[row, :3]
+
+    shape = np.repeat([0.35, 1.37], 8)  # of another noise: four times as large at the heavier load
 
     rng, bent = np.random.default_rng(7), truth.copy()
     bent[:, 0] += 0.006 * forward.points.slip  # an effect of many deviations
@@ -318,6 +325,8 @@ def test_noise_is_estimated_beside_an_effect_and_never_none(forward, setting):
     assert np.all(np.exp(np.mean(np.log(ratios), axis=0)) == pytest.approx(1.0, rel=0.3))
     # Rows without scatter, read off a curve: half a per cent of the range at least.
     assert (estimated(truth) > 0.005 * scale[:3]).all()
+    loud = truth + std * shape[:, None] * rng.standard_normal(truth.shape)
+    assert (estimated(loud, -1) > 3.0 * estimated(loud)).any()
 
 
 def test_repeats_give_the_noise():

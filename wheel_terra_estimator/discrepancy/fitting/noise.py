@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +35,7 @@ _LEAST = 1e-4  # of the range: noise below it is a matter of rounding
 # A few smooth rows, read off a figure or averaged, hide by how much they are off: an estimate is at
 # least what it would be if so many cells more were off by this share of the range.
 _UNSEEN, _UNSEEN_NOISE = 4.0, 0.02
+_CLEARLY = 3.0  # nats by which noise of another shape must be more likely
 
 
 def stated_noise(table: SteadyTable, scale: FloatArray) -> Noise:
@@ -83,37 +85,51 @@ def repeats(table: SteadyTable, quantity: int) -> tuple[float, int]:
     return (float(np.sqrt(square / freedom)), freedom) if freedom else (np.nan, 0)
 
 
-def estimate_noise(noise: Noise, fitted: Fit, problem: Problem) -> Noise:
+def estimate_noise(
+    noise: Noise,
+    fitted: Fit,
+    shapes: Sequence[FloatArray],  # (N,) noise of each row over its mean: the usual one first
+    build: Callable[[FloatArray], Problem],  # the problem with deviations (N, 4)
+) -> Noise:
     """Estimate what was neither stated nor repeated, beside soil and a smooth misfit.
 
     The marginal likelihood of a Gaussian process (any amplitude) plus the soil's tangent space plus
     white noise is maximised over the noise of each quantity, so that effects do not pass for noise.
-    ``problem`` was built with ``noise``.
     """
     unknown = [q for q in range(len(QUANTITIES)) if noise.origin.get(QUANTITIES[q]) == 'estimated']
-    if not unknown:
-        return noise
-    here = fitted.within(problem)
-    target = here.residual + here.jacobian @ here.u
-    std = noise.std.copy()
-    for q in unknown:
-        mine = problem.block == q
-        if not mine.any():
-            mine = problem.quantity == q  # slip errors mix the axes: the cells stand for them
-        value, count = _white_part(
-            target[mine], here.jacobian[mine], problem.roughness[mine], _LEAST / _FIRST_GUESS
-        )
-        std[:, q] *= value
-        unseen = _UNSEEN * (_UNSEEN_NOISE * problem.scale[q]) ** 2
-        weighed = (count * std[:, q] ** 2 + unseen) / (count + _UNSEEN)
-        std[:, q] = np.maximum(std[:, q], np.sqrt(weighed))
+    best, std = dict.fromkeys(unknown, -np.inf), noise.std.copy()
+    usual = {q: math.sqrt(np.nanmean(std[:, q] ** 2)) for q in unknown}
+    for shape in shapes if unknown else ():
+        guess = noise.std.copy()
+        for q in unknown:
+            guess[:, q] = usual[q] * shape
+        problem = build(guess)
+        here = fitted.within(problem)
+        target = here.residual + here.jacobian @ here.u
+        for q in unknown:
+            cells = problem.quantity == q
+            mine = problem.block == q
+            if not mine.any():
+                mine = cells  # slip errors mix the axes: the cells stand for them
+            value, count, score = _white_part(
+                target[mine], here.jacobian[mine], problem.roughness[mine], _LEAST / _FIRST_GUESS
+            )
+            score -= float(np.log(problem.std[cells]).sum())
+            if score < best[q] + _CLEARLY:
+                continue
+            best[q] = score
+            square = (value * usual[q]) ** 2
+            unseen = _UNSEEN * (_UNSEEN_NOISE * problem.scale[q]) ** 2
+            weighed = (count * square + unseen) / (count + _UNSEEN)
+            known = np.isfinite(noise.std[:, q])
+            std[known, q] = math.sqrt(max(square, weighed)) * shape[known]
     return replace(noise, std=std)
 
 
 def _white_part(
     target: FloatArray, jacobian: FloatArray, roughness: FloatArray, least: float
-) -> tuple[float, float]:
-    """Return the most probable noise factor and its degrees of freedom."""
+) -> tuple[float, float, float]:
+    """Return the most probable noise factor, its degrees of freedom and its log likelihood."""
     factors = np.geomspace(least, 30.0, 90)
     best, chosen = -np.inf, (1.0, 0.0)
     outer = jacobian @ jacobian.T
@@ -128,7 +144,7 @@ def _white_part(
         if score[top] > best:
             share = factors[top] ** 2 / variance[top]
             best, chosen = float(score[top]), (float(factors[top]), float((share**2).sum()))
-    return chosen[0], max(chosen[1], 2.0)
+    return chosen[0], max(chosen[1], 2.0), best
 
 
 _ROBUST_FLOOR = 0.02  # structural error beside which outliers are sought [share of the range]

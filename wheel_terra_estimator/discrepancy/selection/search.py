@@ -298,7 +298,7 @@ class _Builder:
         return problem, fit(self.forward, problem, one, [start], variance, angles, 12)[0]
 
     def estimate(self, noise: Noise, fitted: Fit, outliers: Outliers) -> Noise:
-        """Estimate the noise that was not stated."""
-        if 'estimated' not in noise.origin.values():
-            return noise
-        return noises.estimate_noise(noise, fitted, self.build(noise.std, outliers))
+        """Estimate the noise that was not stated: alike in all rows, or a share of the load."""
+        load = self.table.columns['normal_load']
+        shapes = np.ones(len(load)), load / np.sqrt(np.mean(load**2))
+        return noises.estimate_noise(noise, fitted, shapes, lambda std: self.build(std, outliers))
