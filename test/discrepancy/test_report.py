@@ -22,8 +22,9 @@ from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.report.page import write_report
-from wheel_terra_estimator.discrepancy.report.words import FACTORS, in_words
+from wheel_terra_estimator.discrepancy.report.words import FACTORS, _leaves, in_words
 from wheel_terra_estimator.discrepancy.result import QuantityGap
+from wheel_terra_estimator.discrepancy.selection.verdict import Remainder
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_lab.studies.campaigns import Plan, make_campaign, scoring
 
@@ -288,3 +289,11 @@ def test_noise_of_a_cell_is_its_own_part_of_the_covariance():
         setting=SimpleNamespace(problem=problem), noise=SimpleNamespace(std=np.full((2, 3), 7.0))
     )
     assert _cell_noise(findings) == pytest.approx(np.array([[2.0, 3.0, 1.0], [7.0, 7.0, 7.0]]))
+
+
+@pytest.mark.parametrize(
+    ('probability', 'p_value', 'said'),
+    [(0.9, 0.5, 'smooth misfit'), (0.1, 1e-6, 'more scatter'), (0.1, 0.5, 'doubtful')],
+)
+def test_a_candidate_that_was_not_named_leaves_what_it_leaves(probability, p_value, said):
+    assert said in _leaves(Remainder(probability, probability, 0.1, p_value, 1.0))

@@ -36,7 +36,13 @@ from wheel_terra_estimator.discrepancy.result import (
     SoilShift,
 )
 from wheel_terra_estimator.discrepancy.selection.search import Findings
-from wheel_terra_estimator.discrepancy.selection.verdict import LARGEST_Z_SCORE, Verdict
+from wheel_terra_estimator.discrepancy.selection.verdict import (
+    IMPROBABLE,
+    LARGEST_Z_SCORE,
+    Remainder,
+    Verdict,
+    remainder,
+)
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS as QUANTITY_UNITS
 from wheel_terra_estimator.terramechanics.effects import catalogue
@@ -165,13 +171,24 @@ def why_not(
     if verdict.status == 'agrees':
         return f'no gap that needs it ({behind:.1f} nats behind nothing)'
     if verdict.status == 'unexplained':
-        return 'leaves a smooth misfit that it does not explain'
+        return _leaves(remainder(selection, index, findings.setting.problem))
     if chosen < set(names):
         extra = joined(sorted(set(names) - chosen))
         return f'{extra} adds nothing that the data ask for ({behind:.1f} nats behind)'
     if set(names) < chosen:
         return f'leaves what {joined(sorted(chosen - set(names)))} explains ({behind:.1f} nats)'
     return f'fits worse: {behind:.1f} nats behind {joined(sorted(chosen))}'
+
+
+def _leaves(left: Remainder) -> str:
+    """Return what an explanation leaves, for which it is not given."""
+    if left.probability > 0.5:
+        return 'leaves a smooth misfit that it does not explain'
+    if left.p_value <= IMPROBABLE:
+        return 'leaves more scatter than the noise allows'
+    if left.z_score >= LARGEST_Z_SCORE:
+        return 'needs a configured number too far off to be believed'
+    return 'too doubtful to be named'
 
 
 def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
