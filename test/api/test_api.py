@@ -244,6 +244,13 @@ def test_a_fit_says_what_the_soil_does_not_explain():
     rows['drawbar_pull'] = rows['drawbar_pull'] + 20.0 * np.sin(7.0 * slip)
     with pytest.warns(UserWarning, match=r'does not explain .*drawbar_pull.*diagnose'):
         api.Soil.fit(rows, wheel, start='dlr_mss')
+    wheel = api.Wheel(0.157, 0.165)
+    slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.05, 0.7, 8), [40.0, 80.0, 160.0]))
+    rows = api.Model(wheel, 'dlr_mss').curve(slip, load).columns()
+    rows |= {'drawbar_pull_std': 0.01 * load, 'torque_std': 0.0016 * load}
+    rows |= {'sinkage': rows['sinkage'] + 0.004, 'sinkage_std': np.full(len(load), 3e-4)}
+    with pytest.warns(UserWarning, match=r'zero error of some millimetres'):
+        api.Soil.fit(rows, wheel, start='dlr_mss')
 
 
 def test_a_worse_model_is_not_given_in_silence(named):

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 _KNOWN_TO = 1.0
 """Share of the start's value to which a fit of a soil takes each of its numbers as known."""
+_ZERO = {'sinkage_offset': {'offset': 0.0, 'offset_std': 0.003}}  # [m], of a sensor; assumed
+_TELLS = 2.0  # times what such a zero leaves open of the exponent: a shift that tells of it
 _DEGREES = 'friction_angle_deg'
 _MODULI = ('cohesive_modulus', 'frictional_modulus')
 """Without a unit in the law of Reece."""
@@ -120,7 +122,8 @@ class Soil(terramechanics_soil.Soil):
         start, so that what the rows cannot tell (kc apart from kphi on one wheel width, angles
         without pull or torque) stays near it. Density and pressure law are those of the start;
         ``std`` has the deviation of each fitted number. Warns if more is left than noise and a
-        model error of 2 % of the range permit.
+        model error of 2 % of the range permit, or if a zero error of the sinkage would mean
+        another soil.
 
         Parameters
         ----------
@@ -164,7 +167,19 @@ class Soil(terramechanics_soil.Soil):
                 f'the soil alone does not explain {", ".join(over)}: ask diagnose what is missing'
             )
             warnings.warn(words, stacklevel=2)
-        return cls._of(corrected(diagnosis)[0])
+        fitted = cls._of(corrected(diagnosis)[0])
+        if not over and 'sinkage' in rows.quantities and 'sinkage_offset' not in rest[0]:
+            believed = configuration_of(wheel, start, {**rest[0], **_ZERO}, *rest[1:])
+            free = cls._of(corrected(diagnose(rows, believed, None, options))[0])
+            with_zero, own = free.sinkage_exponent, fitted.std['sinkage_exponent']
+            doubt = math.sqrt(max(free.std['sinkage_exponent'] ** 2 - own**2, own**2))
+            if abs(with_zero - fitted.sinkage_exponent) > _TELLS * doubt:
+                words = (
+                    f'sinkage_exponent is {fitted.sinkage_exponent:.2f}, or {with_zero:.2f} if the '
+                    'sinkage sensor has a zero error of some millimetres: read it on a hard floor'
+                )
+                warnings.warn(words, stacklevel=2)
+        return fitted
 
     def replace(self, **changes: Any) -> Soil:
         """Return a soil with other values of some fields, or of ``friction_angle_deg`` [deg].
