@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_workflow import make, run
@@ -21,6 +23,7 @@ from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_lab.studies.campaigns.scoring import diagnose as diagnose_campaign
 from wheel_terra_lab.trials.campaign import Plan, make_campaign
+from wheel_terra_lab.trials.truth import solve
 
 
 def with_effect(design, seed, name, **parameters):
@@ -81,6 +84,20 @@ def test_a_channel_that_is_off_on_unseen_rows_does_not_agree(unproposed):
     item = found.to_dict()
     assert item['verdict'] in ('undecided', 'unexplained')
     assert item['floor'] >= 0.0
+
+
+def test_beds_that_differ_from_sweep_to_sweep_are_no_effect():
+    table, values, soil, rows = make('sweep40')
+    plain, load = solve(rows, soil), rows['normal_load']
+    for share, one in zip((0.8, 1.1, 1.25, 0.9, 1.05), np.unique(load), strict=True):
+        other = replace(soil, frictional_modulus=share * soil.frictional_modulus)
+        change = solve(rows, other)
+        for key in ('sinkage', 'drawbar_pull', 'torque'):
+            table[key] = table[key] + np.where(load == one, change[key] - plain[key], 0.0)
+    found = run(table, values)
+    assert (found.verdict, found.effects) == ('agrees', ())
+    assert 'fresh bed' in found.next_measurement[0].what
+    assert any('beds differ' in note for note in found.notes)
 
 
 def test_pulls_of_the_other_sign_are_refused_with_the_cure():

@@ -80,6 +80,22 @@ class Decision:
     # Quantity -> factor by which its unit looks wrong; nothing is named then
     misread: Mapping[str, float] = field(default_factory=dict)
     proposal: Proposal | None = None  # A law, where something is missing and no name is given
+    beds_differ: float = 0.0  # probability that only the beds of the sweeps differ, where notable
+
+    def unless(self, apart: Decision, probability: float) -> Decision:
+        """Return the decision where the beds of the sweeps may differ.
+
+        ``apart`` is the one if they do: it stands where it is the more probable one. Else the names
+        are less sure, and no law is proposed.
+        """
+        if not apart.verdict.left.accounted_for:
+            return self  # nor do beds
+        if probability > _LIKELY:
+            return replace(apart, beds_differ=probability)
+        names = tuple(
+            replace(n, confidence=n.confidence.times(1.0 - probability)) for n in self.names
+        )
+        return replace(self, names=names, proposal=None, beds_differ=probability)
 
     @property
     def floor(self) -> float:
@@ -96,6 +112,7 @@ class Decider:
     findings: Findings
     allowed_error: float  # model error that is no reason for doubt [share of the range]
     misread: Mapping[str, float] = field(default_factory=dict)  # as in the decision
+    beds_differ: bool = False  # from sweep to sweep: unseen rows may be off by more than noise
     # The best law beside each floor, soil held or not: it competes with doubtful names, or is
     # proposed
     laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
@@ -110,7 +127,8 @@ class Decider:
             barred = everything if enough else frozenset(tried)
             verdict = choose(selection, problem, off=off, excluded=barred)
             decision = self._judged(verdict)
-            if verdict.status == 'agrees' and not off and channels_off(decision.gap):
+            agrees = verdict.status == 'agrees' and not off and not self.beds_differ
+            if agrees and channels_off(decision.gap):
                 off = True
                 continue
             if verdict.status != 'named':
@@ -123,8 +141,9 @@ class Decider:
 
     def _law(self, decision: Decision, hold_soil: bool = False) -> Proposal | None:
         """Return the law for what a decision's refit of the soil leaves."""
-        if self.misread or LAW in self.findings.setting.forward.base_effects:
-            return None  # not for a wrong unit, nor on top of another law
+        on_top = LAW in self.findings.setting.forward.base_effects
+        if self.misread or self.beds_differ or on_top:
+            return None  # not for a wrong unit, nor for what beds do, nor on top of another law
         key = decision.floor, hold_soil
         if key not in self.laws:
             self.laws[key] = propose(self._gap(decision), hold_soil=hold_soil)

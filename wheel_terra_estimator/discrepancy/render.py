@@ -68,7 +68,7 @@ def render(
         not_visible=dict(findings.not_visible),
         smallest_visible=_smallest_visible(findings, known),
         where=locate(both, setting.problem, decision.findings.nothing, len(table)),
-        next_measurement=_next(decision),
+        next_measurement=(*words.fresh_bed(decision.beds_differ, table), *_next(decision)),
         curves=decision.curves,
         noise=replace(findings.noise, std=findings.noise.std[: len(table)]),
         soil=soil,
@@ -83,6 +83,7 @@ def render(
         notes=(
             *words.notes(both, findings, after, moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
+            *words.own_beds(decision.beds_differ, table),
             *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
         ),
         base_effects=tuple(configuration.effects),

@@ -40,6 +40,8 @@ from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 _CLEARLY_MISREAD = 10.0  # nats by which another unit must explain the rows better
+_UNLIKELY = 0.05  # odds of beds that differ, below which nothing is said of them
+_BEDS_DIFFER = 0.2  # prior probability, where every sweep has a bed of its own; assumed
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,16 @@ def diagnose(
         if gain > _CLEARLY_MISREAD:
             misread[quantity] = times
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
+    sweeps = table.sweeps() if reference is None and not misread else None
+    if sweeps is not None and decision.verdict.status != 'agrees':
+        known_noise = replace(table, stated_std=findings.noise.std)
+        apart = search(known_noise, forward, nuisance, effects, floors, sweeps)
+        odds = math.exp(min(apart.selection.best - findings.selection.best, _CLEARLY_MISREAD))
+        odds *= _BEDS_DIFFER / (1.0 - _BEDS_DIFFER)
+        if odds > _UNLIKELY:
+            apart = replace(apart, noise=findings.noise)
+            other = Decider(table, both, apart, chosen.allowed_error, beds_differ=True).decision()
+            decision = decision.unless(other, odds / (1.0 + odds))
     notes: tuple[str, ...] = ()
     if decision.verdict.status in OPEN and reference is None and not misread:
         for name, forms in _other_forms(forward, chosen).items():

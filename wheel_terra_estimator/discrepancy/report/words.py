@@ -43,7 +43,11 @@ from wheel_terra_estimator.discrepancy.selection.verdict import (
     Verdict,
     remainder,
 )
-from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    ON_ONE_BED,
+    QUANTITIES,
+    SteadyTable,
+)
 from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS as QUANTITY_UNITS
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
@@ -254,6 +258,29 @@ def _repeatability(noise: Noise) -> list[str]:
     return found
 
 
+def own_beds(probability: float, table: SteadyTable) -> tuple[str, ...]:
+    """Return a remark where every sweep has a bed of its own, and the beds may differ."""
+    if not probability:
+        return ()
+    return (
+        f'{_swept(table)} and bed changed together, from sweep to sweep: that the beds differ '
+        f'(a tenth of the stiffness is usual) is {percent(probability)} likely',
+    )
+
+
+def fresh_bed(probability: float, table: SteadyTable) -> tuple[NextMeasurement, ...]:
+    """Return the measurement that tells beds that differ from an effect."""
+    if not probability:
+        return ()
+    competitors = 'another bed', f'an effect of {_swept(table)}'
+    what = 'one sweep again on a fresh bed, with a column trial'
+    return (NextMeasurement(what, competitors, 0.0, math.inf),)
+
+
+def _swept(table: SteadyTable) -> str:
+    return ' and '.join(plain(name) for name in table.varying() if name not in ON_ONE_BED)
+
+
 def untried(alike: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
     """Return remarks on effects that look like a named one and were not tried."""
     return tuple(
@@ -308,6 +335,8 @@ def sentence(
         )
     if verdict.status == 'agrees':
         agreed = 'Model and measurement agree once the soil is refitted'
+        if decision.beds_differ:
+            agreed += ' and the bed of each sweep may be another'
         return f'{agreed}{within}.'
     if verdict.status == 'unexplained' and stretch:
         return (

@@ -54,6 +54,10 @@ class Confidence:
     of_name: float
     of_set: float
 
+    def times(self, probability: float) -> Confidence:
+        """Return both beside something else that may be the truth."""
+        return Confidence(self.of_name * probability, self.of_set * probability)
+
 
 def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, float]:
     """Return the features of the name at ``place`` in the named set."""

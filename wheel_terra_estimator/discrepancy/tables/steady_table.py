@@ -35,6 +35,9 @@ STD_COLUMNS = ('slip_std', *(f'{quantity}_std' for quantity in QUANTITIES), 'lea
 # When and how the rows were taken: no inputs of the model, but residuals may change along them.
 ORDER_COLUMNS = ('row_order', 'trial', 'date', 'direction')
 COLUMNS = (*INPUT_UNITS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS, *ORDER_COLUMNS)
+ON_ONE_BED = ('slip', 'pass_number')  # inputs that change within a sweep
+_LEAST_ROWS = 3  # of a sweep, in the mean
+_APART = 0.05  # of the range, between loads (...) of two sweeps
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,19 @@ class SteadyTable:
                 found.append(name)
         return tuple(found)
 
+    def sweeps(self) -> IndexArray | None:
+        """(N,) sweep of each row, alike but for the slip (and of one trial); None without several.
+
+        Each sweep has a bed of its own: what differs between them may be the bed.
+        """
+        inputs = zip(self.varying(), self.scaled_inputs().T, strict=True)
+        keys = [column for name, column in inputs if name not in ON_ONE_BED]
+        if 'trial' in self.columns:
+            keys.append(np.nan_to_num(self.columns['trial']))
+        levels = np.column_stack([np.zeros(len(self)), *map(_level, keys)])
+        sweep = np.ravel(np.unique(levels, axis=0, return_inverse=True)[1])
+        return sweep if 0 < sweep.max() < len(self) / _LEAST_ROWS else None
+
     def scaled_inputs(self) -> FloatArray:
         """(N, d) varying inputs, each scaled to a range of 1; what is not stated at its mean."""
         columns = []
@@ -96,6 +112,13 @@ class SteadyTable:
             columns={name: values[rows] for name, values in self.columns.items()},
             **{name: getattr(self, name)[rows] for name in _BY_ROW},
         )
+
+
+def _level(values: FloatArray) -> FloatArray:
+    """Return the place of each value among those that lie apart."""
+    order, place = np.argsort(values), np.zeros(len(values))
+    place[order[1:]] = np.cumsum(np.diff(values[order]) > _APART)
+    return place
 
 
 _BY_ROW = ('lines', 'measured', 'stated_std', 'slip_std', 'leaving_angle_std', 'true_rows')
