@@ -171,12 +171,12 @@ class Soil(terramechanics_soil.Soil):
         if not over and 'sinkage' in rows.quantities and 'sinkage_offset' not in rest[0]:
             believed = configuration_of(wheel, start, {**rest[0], **_ZERO}, *rest[1:])
             free = cls._of(corrected(diagnose(rows, believed, None, options))[0])
-            with_zero, own = free.sinkage_exponent, fitted.std['sinkage_exponent']
-            doubt = math.sqrt(max(free.std['sinkage_exponent'] ** 2 - own**2, own**2))
-            if abs(with_zero - fitted.sinkage_exponent) > _TELLS * doubt:
+            n, with_zero = float(fitted.sinkage_exponent), float(free.sinkage_exponent)
+            own, std = fitted.std['sinkage_exponent'], free.std['sinkage_exponent']
+            if abs(with_zero - n) > _TELLS * max(math.sqrt(max(std**2 - own**2, 0.0)), own):
                 words = (
-                    f'sinkage_exponent is {fitted.sinkage_exponent:.2f}, or {with_zero:.2f} if the '
-                    'sinkage sensor has a zero error of some millimetres: read it on a hard floor'
+                    f'sinkage_exponent is {n:.2f}, or {with_zero:.2f} if the sinkage sensor has a '
+                    'zero error of some millimetres: read it on a hard floor'
                 )
                 warnings.warn(words, stacklevel=2)
         return fitted

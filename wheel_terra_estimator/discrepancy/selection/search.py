@@ -91,8 +91,8 @@ def search(
     builder = _Builder(table, forward, nuisance)
     noise = noises.stated_noise(table, builder.scale)
     problem, nothing = builder.fit_nothing(noise.std, (), None)
-    for _ in range(0 if beds is None else 2):  # one bed may end far from where several do
-        builder.part_beds(beds, problem, nothing)
+    for each in () if beds is None else (beds, beds):  # one bed may end far from where several do
+        builder.part_beds(each, problem, nothing)
         problem, nothing = builder.fit_nothing(noise.std, (), nothing)
     if (table.slip_std > 0.0).any():
         builder.linearise(nothing, noise.std)
