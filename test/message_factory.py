@@ -85,9 +85,10 @@ class MessageFactory:
         twist = self.twist_with_covariance(forward, yaw_rate, covariance)
         return self.make('geometry_msgs/msg/TwistWithCovarianceStamped', header=header, twist=twist)
 
-    def odometry(self, header: Any, twist: Any) -> Any:
-        """Return an Odometry that states a twist only (pose at the origin, placeholder 0.1)."""
-        pose = {'pose': {'orientation': {'w': 1.0}}, 'covariance': 0.1 * np.eye(6)}
+    def odometry(self, header: Any, twist: Any, x: float = 0.0) -> Any:
+        """Return an Odometry that states a twist, and a place along x; placeholder 0.1."""
+        pose = {'pose': {'position': {'x': x}, 'orientation': {'w': 1.0}}}
+        pose['covariance'] = 0.1 * np.eye(6)
         kind = 'nav_msgs/msg/Odometry'
         return self.make(kind, header=header, child_frame_id=BASE_FRAME, pose=pose, twist=twist)
 

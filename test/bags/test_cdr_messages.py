@@ -18,6 +18,7 @@ from wheel_terra_estimator.messages.pack import BASE_FRAME
 from wheel_terra_estimator.messages.unpack import (
     IMU,
     JOINT_STATE,
+    ODOMETRY,
     TWIST,
     DamagedMessageError,
     Message,
@@ -76,7 +77,8 @@ def with_rosbags(store: Any, kind: str, data: bytes, empty: int = 0) -> Message 
     else:
         twist = message.twist.twist
         fields = [vector(twist.linear), vector(twist.angular), message.twist.covariance]
-    return Message(stamp, (), (np.concatenate(fields),))
+    place = [] if kind != ODOMETRY else [np.array(vector(message.pose.pose.position))]
+    return Message(stamp, (), (np.concatenate(fields), *place))
 
 
 def vector(value: Any) -> list[float]:

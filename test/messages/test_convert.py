@@ -316,3 +316,16 @@ def test_a_reference_tells_a_lateral_speed_where_it_knows_one(
 ):
     found = odometry(converter, 'reference_odom', 0.7, 0.0, lateral, (4e-4, stated))
     np.testing.assert_equal((found.lateral, found.lateral_variance), (told, variance))
+
+
+def test_a_pose_alone_is_no_velocity(converter, factory):
+    """Of a rover that is stuck it does not move: zero is its velocity."""
+    still, rolls = (factory.twist_with_covariance(v, 0.0, np.zeros(36)) for v in (0.0, 0.1))
+    messages = [(still, 0.0), (still, 0.0), (still, 0.1), (still, 0.2), (still, 0.2), (rolls, 0.3)]
+    found = [
+        converter.convert('reference_odom', factory.odometry(factory.header(STAMP), twist, x))
+        for twist, x in messages
+    ]
+    assert [f and f.forward for f in found] == [0.0, 0.0, None, None, 0.0, 0.1]
+    ((topic, why),) = converter.rejected
+    assert topic == 'reference_odom' and why.startswith('tells a pose alone')

@@ -102,6 +102,7 @@ class InputConverter:
         self._index = {name: i for i, name in enumerate(layout.names)}
         self._all = list(range(len(layout.names)))
         self._reversed = bool(np.any(layout.directions != 1.0))
+        self._place: list[float] | None = None  # of the last reference velocity [m]
         self._mounted = layout.imu_mounting.magnitude() > 0.0
         self._rotation = layout.imu_mounting.as_matrix()
         squares = np.square(self._rotation)
@@ -218,9 +219,15 @@ class InputConverter:
         values = self._wheel_values(topic, message, message.numbers[0], 'position')
         return None if values is None else kind(message.stamp, values)
 
-    def _reference_odom(self, message: Message) -> ReferenceVelocity:
-        """Body velocity from a slip-free source."""
-        values = message.numbers[0].tolist()
+    def _reference_odom(self, message: Message) -> ReferenceVelocity | None:
+        """Body velocity from a slip-free source; none where it moves and tells no velocity."""
+        values, place = message.numbers[0].tolist(), message.numbers[1].tolist()
+        before, self._place = self._place, place
+        if place != before and before is not None and not any(values):
+            self.rejected[
+                'reference_odom', 'tells a pose alone: twist and its covariance are 0'
+            ] += 1
+            return None
         forward, lateral, covariance = values[0], values[1], values[6:]
         variance = covariance[7]
         # Zero is what a source that tells no lateral speed sends; 1e6 what it says of it.

@@ -59,7 +59,7 @@ class Message(NamedTuple):
 
     ``numbers`` of a JointState: position, velocity and effort. Of an Imu: attitude (4, then 9
     covariances), angular rate (3 and 9), specific force (3 and 9). Of Odometry and stamped twist:
-    linear and angular velocity (3 each), then 36 covariances.
+    linear and angular velocity (3 each), then 36 covariances; of Odometry the position (3), too.
     """
 
     stamp: int
@@ -129,6 +129,8 @@ def _read_layout(kind: str, data: bytes) -> Layout:
             if count:
                 at += -(at - _BODY) % 8
             lists.append((at + 8 * passed_over, count))
+            if kind == ODOMETRY:
+                lists.append((at, 3))
             since = at = at + 8 * (passed_over + count)
         empty = sum(count == 0 for _, count in lists)
         if not 0 <= len(data) - at <= _LONGEST_PADDING + _PER_EMPTY_LIST * empty:
