@@ -105,7 +105,9 @@ class _Alike:
         self.layout, self._columns = layout, columns
         self.places: list[int] = []  # among those of the topic
         self._raw = bytearray()
-        self._lists: tuple[list[FloatArray], ...] = tuple([] for _ in layout.lists)
+        # Columns are those of the first list, the only one then.
+        self._fields = layout.lists if isinstance(columns, slice) else layout.lists[:1]
+        self._lists: tuple[list[FloatArray], ...] = tuple([] for _ in self._fields)
 
     def add(self, place: int, data: bytes) -> None:
         """Take one more message."""
@@ -117,7 +119,7 @@ class _Alike:
     def _read(self) -> None:
         """Read the numbers out of the bytes."""
         table = np.frombuffer(self._raw, np.uint8).reshape(-1, self.layout.size)
-        for (at, count), kept in zip(self.layout.lists, self._lists, strict=True):
+        for (at, count), kept in zip(self._fields, self._lists, strict=True):
             values = np.ascontiguousarray(table[:, at : at + 8 * count])
             numbers = values.view(self.layout.order.number).astype(np.float64)
             kept.append(numbers[:, self._columns])

@@ -59,6 +59,9 @@ _OF_THE_FILTER = (
     'time_to_stuck',
     'rim_travel_left',
     'pull_margin',
+    'normal_load',
+    'normal_load_std',
+    'sideways',
     'reasons',
     'faults',
 )
