@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from test_workflow import make, run
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision
+from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
@@ -98,6 +100,9 @@ def test_beds_that_differ_from_sweep_to_sweep_are_no_effect():
     assert (found.verdict, found.effects) == ('agrees', ())
     assert 'fresh bed' in found.next_measurement[0].what
     assert any('beds differ' in note for note in found.notes)
+    repeated = SimpleNamespace(columns={'trial': rows['slip']}, varying=lambda: ('normal_load',))
+    (again,) = words.fresh_bed(0.5, repeated)
+    assert again.what.startswith('the sweeps of least and greatest normal load again')
 
 
 def test_pulls_of_the_other_sign_are_refused_with_the_cure():

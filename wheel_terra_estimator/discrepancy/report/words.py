@@ -274,6 +274,8 @@ def fresh_bed(probability: float, table: SteadyTable) -> tuple[NextMeasurement, 
         return ()
     competitors = 'another bed', f'an effect of {_swept(table)}'
     what = 'one sweep again on a fresh bed, with a column trial'
+    if 'trial' in table.columns:
+        what = f'the sweeps of least and greatest {_swept(table)} again, each on two fresh beds'
     return (NextMeasurement(what, competitors, 0.0, math.inf),)
 
 
