@@ -121,6 +121,6 @@ def test_a_drive_is_estimated_better_with_the_corrected_model(corrected, seeds):
         for squares in ([errors(model, driven) for driven in drives] for model in (base, better))
     )
     print(f'{seeds}: {before} -> {after}')
-    assert after['sinkage'] < 0.5 * before['sinkage'], (before, after)
+    assert after['sinkage'] < 0.55 * before['sinkage'], (before, after)
     # Where lugs shear the soil is a state of the filter: the pull does not wait for the table.
     assert after['drawbar_pull'] < 1.1 * before['drawbar_pull'], (before, after)
