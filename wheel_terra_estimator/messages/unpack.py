@@ -28,8 +28,9 @@ _NUMBERS = {IMU: (0, 37), ODOMETRY: (43, 42), TWIST: (0, 42)}
 _BODY = 4  # where the fields begin, and from where they are aligned [byte]
 _AFTER_STAMP = 12  # [byte]
 _LONGEST_PADDING = 3  # [byte] behind the last field
-_PER_EMPTY_LIST = 4
-"""Bytes that rmw_serialize leaves behind the last field for each list without numbers, at most."""
+_WORD = 4
+"""Bytes that rmw_serialize leaves behind the last field for each list without numbers, and once
+more where there is any, at most."""
 
 
 class _Order(NamedTuple):
@@ -133,7 +134,8 @@ def _read_layout(kind: str, data: bytes) -> Layout:
                 lists.append((at, 3))
             since = at = at + 8 * (passed_over + count)
         empty = sum(count == 0 for _, count in lists)
-        if not 0 <= len(data) - at <= _LONGEST_PADDING + _PER_EMPTY_LIST * empty:
+        spare = _LONGEST_PADDING + (_WORD * (empty + 1) if empty else 0)
+        if not 0 <= len(data) - at <= spare:
             raise ValueError('other bytes than fields')
     except (struct.error, KeyError, ValueError) as error:
         raise DamagedMessageError(str(error)) from None
