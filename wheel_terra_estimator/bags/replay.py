@@ -104,7 +104,7 @@ def replay(
     pipeline.on_measurement = tracker.hear
     most = None if options.every_set else MOST_ROWS
     of_order: list[str] = []
-    messages = _in_order_of(arrival, reader, of_order) if arrival else reader.messages()
+    messages = _in_order_of(arrival, reader, of_order, smooth) if arrival else reader.messages()
     if options.progress:
         messages = _progress(messages, reader)
     with ExitStack() as stack:
@@ -228,10 +228,12 @@ def _times(count: int) -> str:
 
 
 def _in_order_of(
-    arrival: Path, reader: MeasurementReader, notes: list[str]
+    arrival: Path, reader: MeasurementReader, notes: list[str], smooth: bool
 ) -> Iterator[tuple[int, str, Any]]:
     """Yield the messages of a bag in the order in which a live node heard them."""
     lines = read_text(arrival, LARGEST_ARRIVAL_LOG).splitlines()
+    if smooth and any(line.startswith(TUNE) for line in lines):
+        raise UserError(f'{arrival}: tuning changes in it, over which a smoother cannot go')
     stored: dict[str, deque[tuple[int, str, Any]]] = defaultdict(deque)
     for log_time, name, message in reader.messages():
         stored[f'{name} {message.stamp}'].append((log_time, name, message))
