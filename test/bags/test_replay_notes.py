@@ -101,6 +101,9 @@ def test_a_log_of_arrivals_holds_parameters_and_may_know_more_than_the_bag(tmp_p
         np.testing.assert_array_equal(result.history.values['slip'], slip)
         with pytest.raises(UserError, match='tuning changes in it'):
             replay(bag, rover, {}, options=Options(arrival=log, smooth=True))
+        log.write_text('\n'.join([*lines, 'set {"filter.ga']))
+        with pytest.raises(UserError, match='remove the line'):
+            replay(bag, rover, {}, options=Options(arrival=log))
         log.write_text('\n'.join(early * len(lines) + lines))
         with pytest.raises(UserError, match='line 1: no message "imu/data 999"'):
             replay(bag, rover, {}, options=Options(arrival=log))

@@ -153,9 +153,9 @@ class DriveFigures:
         self.sets += 1
         self._stamp, self._class = stamp, slip_class
         self.duration = max(self.duration, (stamp - self._first) * 1e-9)
-        high = np.isin(slip_class, (SlipClass.HIGH, SlipClass.STUCK))
-        self._slipping = np.where(high, np.abs(values['slip_velocity']), 0.0)
         known = slip_class != SlipClass.UNKNOWN
+        high = known & (slip_class >= SlipClass.HIGH)
+        self._slipping = np.where(high, np.abs(values['slip_velocity']), 0.0)
         self._pull += np.where(known, values['drawbar_pull'], 0.0)
         self._known += known
         self.max_slip = np.maximum(self.max_slip, np.where(known, np.abs(values['slip']), 0.0))

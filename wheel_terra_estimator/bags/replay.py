@@ -252,12 +252,19 @@ def _in_order_of(
         if line == RESET:
             yield log_time, RESET, None
         elif line.startswith(TUNE):
-            yield log_time, TUNE, json.loads(line.removeprefix(TUNE))
+            yield log_time, TUNE, _tuning(line, arrival)
         elif stored[line]:
             logged, name, message = stored[line].popleft()
             # Time of arrival does not go back, so estimates lie in the order of their publication.
             log_time = max(log_time, logged)
             yield log_time, name, message
+
+
+def _tuning(line: str, arrival: Path) -> dict[str, Any]:
+    try:
+        return dict(json.loads(line.removeprefix(TUNE)))
+    except (ValueError, TypeError):  # cut off where the node was killed
+        raise UserError(f'{arrival}: no parameters in "{line}": remove the line') from None
 
 
 def _progress(messages: Iterator[Any], reader: MeasurementReader) -> Iterator[Any]:

@@ -62,9 +62,14 @@ def beside(channel: Channel, other: Channel) -> BoolArray:
     stamp = np.unique(other.stamp[other.stamp > 0])
     if stamp.size < 2:
         return np.zeros(channel.stamp.size, dtype=bool)
-    after = np.clip(np.searchsorted(stamp, channel.stamp), 1, stamp.size - 1)
-    off = np.minimum(np.abs(channel.stamp - stamp[after - 1]), np.abs(stamp[after] - channel.stamp))
+    off = np.abs(channel.stamp - stamp[_nearest_of(stamp, channel.stamp)])
     return np.asarray(off <= max(LONGEST_HELD, REACH * np.median(np.diff(stamp))))
+
+
+def _nearest_of(stamp: IntArray, at: IntArray) -> IndexArray:
+    """Return which of two or more ascending stamps is the nearest to each of others (m,)."""
+    after = np.clip(np.searchsorted(stamp, at), 1, stamp.size - 1)
+    return np.where(at - stamp[after - 1] <= stamp[after] - at, after - 1, after)
 
 
 def shifted(channel: Any, offset: int | IntArray) -> Any:
@@ -137,8 +142,7 @@ def nearest(stamp: IntArray, values: FloatArray, at: IntArray) -> FloatArray:
     if known.size < 2:
         return np.full(at.size, np.nan)
     own = stamp[known]
-    after = np.clip(np.searchsorted(own, at), 1, own.size - 1)
-    near = np.where(at - own[after - 1] <= own[after] - at, after - 1, after)
+    near = _nearest_of(own, at)
     reached = np.abs(own[near] - at) <= REACH * np.median(np.diff(own))
     return np.where(reached, values[known[near]], np.nan)
 
