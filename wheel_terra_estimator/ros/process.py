@@ -63,9 +63,9 @@ def run_node(module: str, name: str, args: list[str] | None = None) -> int:
             words = str(error).splitlines()[0].partition(', at ')[0]
             print(f'unknown: {words}' if words.startswith('[') else words, file=sys.stderr)
             return 2
-        node = factory()
         if signals is not None:
             signals.serving = True
+        node = factory()
         gc.freeze()
         gc.enable()
         _spin(node, lambda: signals is not None and signals.stopped)
