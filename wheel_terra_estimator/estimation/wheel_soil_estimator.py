@@ -486,7 +486,8 @@ class WheelSoilEstimator:
         """Return forces, what is known of their sum, pulls of standing wheels, and the rows."""
         ekf = self._ekf
         forces = self._linearisation.update(ekf.mean, cycle, self._ruts.state.depth)
-        pulls, stationary = self._stationary.update(ekf.mean, cycle)
+        speed_std = math.sqrt(float(ekf.covariance[SPEED, SPEED]))
+        pulls, stationary = self._stationary.update(ekf.mean, speed_std, cycle)
         start = self._contact_age.shear_variance
         repeats = correlated_cycles(cycle.rims, cycle.dt) * self._reference.model_variance_factor
         rows = self._torque.update(

@@ -30,6 +30,7 @@ from wheel_terra_estimator.estimation.scalars import NAN
 # Tuned on simulated drives with locked wheels, seeds 1000 to 1019, unless said otherwise.
 _SLIDING_RATIO = 3.0
 """v/(r w) taken for a locked wheel: its shear is saturated long before [-]."""
+_SLIDING_DEVIATIONS = 2.0  # of the speed, from which a wheel that stands is known to slide
 _MOST_DRAG = 2.0  # of the load: friction and the soil pushed ahead
 _STRAIGHT = 0.1
 """Lateral motion above which a torque against the drag is no sign of a jammed drive [-]."""
@@ -58,11 +59,12 @@ class StationaryWheels:
         self._gain_std = sensors.torque_gain_std
 
     def update(
-        self, x: FloatArray, cycle: Cycle
+        self, x: FloatArray, speed_std: float, cycle: Cycle
     ) -> tuple[tuple[float, ...], list[StationaryPull | None]]:
         """Return the pulls of a cycle at a state `x` (size,), and what to expect of each wheel.
 
-        Pulls are [N], nan where no torque tells; None stands for a wheel that turns.
+        `speed_std` is the deviation of the body's speed [m/s]. Pulls are [N], nan where no torque
+        tells; None stands for a wheel that turns.
         """
         loads, share = cycle.loads, cycle.loads.slope_share
         told = [
@@ -73,13 +75,13 @@ class StationaryWheels:
         ]
         pulls = [NAN] * len(told)
         if any(told):
-            pulls = np.where(told, self._pulls(x, cycle), NAN).tolist()
+            pulls = np.where(told, self._pulls(x, speed_std, cycle), NAN).tolist()
         return tuple(pulls), [
             None if turns else self.expectation(pull, load, share, cycle.lateral_motion)
             for turns, pull, load in zip(cycle.turns, pulls, loads.load, strict=True)
         ]
 
-    def _pulls(self, x: FloatArray, cycle: Cycle) -> FloatArray:
+    def _pulls(self, x: FloatArray, speed_std: float, cycle: Cycle) -> FloatArray:
         """Return the pulls of wheels that stand, from their torques, (n,) [N]; nan without one.
 
         A locked wheel slides: its shear is saturated, and torque gives the pull whatever the
@@ -106,9 +108,8 @@ class StationaryWheels:
         gain = np.where(tells, by_pull / np.where(tells, by_torque, 1.0), 0.0)
         pull = forces.pull + gain * (direction * torques - forces.torque)
         most = _MOST_DRAG * loads
-        return np.where(
-            np.abs(speed) < rover.rest_speed, held, direction * np.clip(pull, -most, most)
-        )
+        stands = np.abs(speed) < max(rover.rest_speed, _SLIDING_DEVIATIONS * speed_std)
+        return np.where(stands, held, direction * np.clip(pull, -most, most))
 
     def expectation(
         self, pull: float, load: float, slope_share: float, lateral_motion: float
