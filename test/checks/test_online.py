@@ -128,15 +128,16 @@ LONGEST = 15.0
 class AlwaysStuck:
     """An estimator that takes every wheel for stuck, as the real one does of a wrong rate."""
 
-    def __init__(self, wheels):
-        self.wheels, self.stamp = wheels, 0
+    def __init__(self, wheels, **more):
+        self.wheels, self.stamp, self.more = wheels, 0, more
 
     def step(self, stamp, inputs):
         self.stamp = stamp
 
     def estimates(self):
         classes = np.full(self.wheels, SlipClass.STUCK, dtype=np.uint8)
-        return some_estimates(self.wheels, stamp=self.stamp, slip_class=classes, stuck=True)
+        said = {'stamp': self.stamp, 'slip_class': classes, 'stuck': True, **self.more}
+        return some_estimates(self.wheels, **said)
 
     def health(self):
         return {}
@@ -151,11 +152,11 @@ class AlwaysStuck:
         self.stamp = stamp
 
 
-def sets_of(drive, fault, seconds=END, stands=END):
+def sets_of(drive, fault, seconds=END, stands=END, **said):
     """Sets of a drive with a fault, until the fault has been told for so many seconds."""
     core = EstimatorCore(
         drive.configuration,
-        AlwaysStuck(drive.configuration.wheels.count),
+        AlwaysStuck(drive.configuration.wheels.count, **said),
         judged_by=InputJudge,
     )
     begin = drive.arrivals[0].arrival
@@ -187,8 +188,12 @@ def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(name):
     assert (found[0].stamp - start) * 1e-9 < begins + LONGEST
     assert set(told(found[-1])) == {f'check of {topic}'}
     assert cure in told(found[-1])[f'check of {topic}']
+    alone = name in ('one_wheel', 'one_wheel_with_torque', 'in_two_messages', 'one_torque')
     for estimates in found:
-        assert set(estimates.slip_class) == {SlipClass.UNKNOWN} and not estimates.stuck
+        assert estimates.slip_class[0] == SlipClass.UNKNOWN
+        others = set(estimates.slip_class[1:])
+        assert others == {SlipClass.LOW if alone else SlipClass.UNKNOWN}, 'one wheel alone'
+        assert estimates.stuck == alone
     assert found[-1] is sets[-1], 'it stands'
 
 
@@ -200,6 +205,24 @@ def test_a_warning_that_is_confirmed_does_not_wait(confirmed):
         stamp = 10**12 + second * 10**9
         said = some_estimates(6, stamp=stamp, stuck=True, stuck_confirmed=confirmed)
         assert judge.judged(said, {}).stuck == confirmed
+
+
+def test_a_rover_that_may_slide_back_on_a_slope_has_no_reversed_reference():
+    def slides_back(m):
+        if isinstance(m, InertialReading):
+            return replace(m, specific_force=m.specific_force + np.array([3.0, 0.0, 0.0]))
+        return reverse_reference(m)
+
+    sets = sets_of(drive_of(SIX), slides_back, STRAIGHT)
+    assert not any('linear.x' in words for s in sets for words in told(s).values())
+    assert any(s.stuck for s in sets)
+
+
+def test_a_confirmed_warning_is_not_taken_back_by_what_is_found_later():
+    drive = drive_of(SIX)
+    fault = FAULTS['rpm'][0]
+    sets = sets_of(drive, fault, REST + LONGEST + 2.0, stands=3.0, stuck_confirmed=True)
+    assert any(told(s) for s in sets) and all(s.stuck for s in sets)
 
 
 @pytest.mark.parametrize('rover', [SIX, FOUR])

@@ -1,6 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The judge of the inputs: no slip class and no stuck warning from what is wrong."""
+"""The judge of the inputs: no slip class and no new stuck warning from what is wrong.
+
+A finding about single wheels silences these alone, and none a warning that a reference at rest or a
+torque at its limit confirms.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +13,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, Finding
 from wheel_terra_estimator.checks.online import OnlineChecks
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.estimation.estimates import (
-    NO_ENTRAPMENT_IN_SIGHT,
-    EstimateSet,
-    SlipClass,
-)
+from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.measurements import StepInputs
 
 _LOGGER = logging.getLogger(__name__)
@@ -41,10 +39,11 @@ class InputJudge:
     """The checks while driving as what runs beside an estimator, kept states included."""
 
     def __init__(self, configuration: Configuration) -> None:
+        self._names = tuple(configuration.wheels.names)
         self._checks = OnlineChecks(configuration)
         self._failed = False  # the checks of this run
         self._stuck_since: int | None = None  # [ns] of the warning; None = there is none
-        self._warning_waits = False
+        self._waits_for = ''  # what a warning waits for that is not out yet
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Look at the inputs of a step; stamps [ns] increase."""
@@ -61,35 +60,54 @@ class InputJudge:
 
         ``health``: what the estimator says of itself.
         """
-        self._follow(estimates)
         faults = _told({**estimates.faults, **_misfits(health)}, self._checks.remarks)
         if self._failed:
             faults |= _NOT_CHECKED
-        estimates = replace(estimates, faults=faults)
-        findings = self._checks.findings
-        if findings:
-            return without_judgement(estimates, findings)
-        if self._warning_waits:
-            reason = f'stuck warning waits: {self._checks.undecided}'
-            reasons = (reason,) * len(estimates.reasons)
-            return replace(estimates, stuck=False, stuck_direction=0, reasons=reasons)
-        return estimates
+        silenced = self._silenced(self._checks.findings)
+        classes, reasons = estimates.slip_class.copy(), list(estimates.reasons)
+        for i, why in silenced.items():
+            classes[i], reasons[i] = SlipClass.UNKNOWN, why
+        estimates = replace(
+            estimates,
+            slip_class=classes,
+            reasons=tuple(reasons),
+            faults=_told(faults, self._checks.findings),
+        )
+        self._follow(estimates, reasons[0] if len(silenced) == len(self._names) else '')
+        if not self._waits_for:
+            return estimates
+        reasons = [self._waits_for] * len(reasons)
+        return replace(estimates, stuck=False, stuck_direction=0, reasons=tuple(reasons))
 
-    def _follow(self, estimates: EstimateSet) -> None:
-        """Follow the stuck warning; one that has waited once is out until it falls."""
+    def _silenced(self, findings: tuple[Finding, ...]) -> dict[int, str]:
+        """Return the wheels whose slip means nothing, and why: all, where it is half of them."""
+        names, silenced = self._names, dict[int, str]()
+        for finding in reversed(findings):
+            named = finding.wheel.split(', ') if finding.wheel else names
+            why = f'not judged: {finding.words}'
+            silenced |= {i: why for i, name in enumerate(names) if name in named}
+        if 2 * len(silenced) < len(names):
+            return silenced
+        return dict.fromkeys(range(len(names)), f'not judged: {findings[0].words}')
+
+    def _follow(self, estimates: EstimateSet, silenced: str) -> None:
+        """Follow the stuck warning: what it waits for, if anything; a doubt holds it up once.
+
+        `silenced`: why no wheel is judged, if so.
+        """
         if not estimates.stuck:
-            self._stuck_since, self._warning_waits = None, False
+            self._stuck_since, self._waits_for = None, ''
             return
         rises = self._stuck_since is None
         begun = estimates.stamp if self._stuck_since is None else self._stuck_since
-        undecided = (
-            bool(self._checks.undecided)
-            and not self._failed
-            and not estimates.stuck_confirmed
-            and estimates.stamp - begun < LONGEST_WAIT
-        )
-        self._stuck_since = begun
-        self._warning_waits = (rises or self._warning_waits) and undecided
+        held_up = (rises or bool(self._waits_for)) and estimates.stamp - begun < LONGEST_WAIT
+        self._stuck_since, self._waits_for = begun, ''
+        if estimates.stuck_confirmed:
+            return
+        if silenced:
+            self._waits_for = silenced
+        elif held_up and not self._failed and self._checks.undecided:
+            self._waits_for = f'stuck warning waits: {self._checks.undecided}'
 
     def snapshot(self) -> Any:
         """Return the state of the checks."""
@@ -123,21 +141,6 @@ def _misfits(health: Mapping[str, Any]) -> dict[str, str]:
     if _NOISE in health:
         told['noise'] = f'{health[_NOISE]} -> state it so'
     return told
-
-
-def without_judgement(estimates: EstimateSet, findings: tuple[Finding, ...]) -> EstimateSet:
-    """Return the set with classes unknown, no stuck warning, and the findings in words."""
-    wheels = len(estimates.slip_class)
-    return replace(
-        estimates,
-        slip_class=np.full(wheels, SlipClass.UNKNOWN, dtype=np.uint8),
-        stuck=False,
-        stuck_direction=0,
-        stuck_probability=np.zeros(wheels),
-        rim_travel_left=np.full(wheels, NO_ENTRAPMENT_IN_SIGHT),
-        reasons=(f'not judged: {findings[0].words}',) * wheels,
-        faults=_told(estimates.faults, findings),
-    )
 
 
 def _told(faults: Mapping[str, str], findings: tuple[Finding, ...]) -> dict[str, str]:

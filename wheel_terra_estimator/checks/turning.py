@@ -61,6 +61,7 @@ MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2  # residual of a cure; of steered wheels
 UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
 CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
+SLIDES_BACK = 0.15  # slope against the wheels from which a rover may slide back on them [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES = (30.0, 110.0)  # gyro over orientation if in degrees per second [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # the same over wheels, which slip and skid in turns [-]
@@ -318,6 +319,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if blame == 'reference' and evidence.recording.reference is not None:
         alone = bool(turn) or told[1] is not None
         sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels count backwards')
+        if told[1] is None and _climbs(evidence, rows):
+            sure, rival = 0.5 * sure, f'{rival}, or the rover slides back'
         outcomes.append(evidence.found('reference_reversed', sure, value=-1.0, rival=rival))
         velocity = -evidence.recording.reference.velocity
         mended = mended.with_channel('reference', velocity=velocity)
@@ -393,6 +396,14 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
         if isinstance(slopes, Slopes) and slopes.gain.sigmas_from(0.0) > SCALE_SIGMAS:
             by_force = float(np.sign(slopes.gain.value))
     return by_reference, by_force
+
+
+def _climbs(evidence: Evidence, rows: Mask) -> bool:
+    """Whether the wheels drive uphill, so steeply that a rover may slide back on them."""
+    if evidence.force is None:
+        return False
+    ahead = np.median(evidence.force[rows, 0] * np.sign(evidence.rim[rows]))
+    return bool(ahead > SLIDES_BACK * evidence.facts.gravity)
 
 
 def _backwards(
