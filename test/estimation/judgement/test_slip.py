@@ -191,6 +191,23 @@ def test_a_driving_wheel_that_is_stuck_has_no_travel_left(slip, left):
     assert published.time_to_stuck == pytest.approx([left] * 2)
 
 
+def test_what_lies_ahead_is_held_where_it_cannot_be_told():
+    """At rest, where the inputs are not judged, and under a warning where the slip is in doubt."""
+    classes = PublishedClasses(configuration())
+    near, far = ({'rim_travel_left': np.full(2, left)} for left in (0.5, 10.0))
+    unknown = {'slip_class': np.full(2, SlipClass.UNKNOWN, dtype=np.uint8)}
+    doubtful = {'slip_std': np.full(2, 0.5)}
+    (given,) = sets_of([0.5])
+    for said, left in (
+        (near, 0.5),
+        (far | unknown, 0.5),
+        (far | doubtful | {'stuck': True}, 0.5),
+        (far | doubtful, 10.0),
+        (near | unknown, 10.0),
+    ):
+        assert classes.follow(replace(given, **said)).rim_travel_left == pytest.approx([left] * 2)
+
+
 def test_a_new_run_begins_without_a_class():
     config = configuration()
     core = EstimatorCore(config)
@@ -214,6 +231,20 @@ def test_a_wheel_that_begins_to_turn_is_not_sure_to_spin():
     assert not any(wheel.judged for wheel in standing)
     lost = SlipJudge(parts.rover, parts.sensors).update(0.0, rims, body._replace(speed_std=9.0))[0]
     assert lost.std == 1.0, 'no slip is further off'
+
+
+@pytest.mark.parametrize('v', [-0.0005, 0.0, 0.0005])
+def test_noise_of_the_rates_is_no_spin_of_wheels_that_stand(v):
+    """A rate beyond rest by 2.5 of its deviations, and one beyond 3."""
+    parts = Parts(reader.load(SAND).replace({'sensors.wheel_rate_std': 0.1}))
+    std = 0.1 * parts.rover.slip_radius[0]
+    assert std > 2.0 * parts.rover.rest_speed
+    body = BodyMotion(v, 0.0005, 0.0, 0.0, straight_headings(parts.rover), 0.0, stopped=False)
+    judge = SlipJudge(parts.rover, parts.sensors)
+    for time in np.arange(0.0, 1.0, 0.05):
+        still = judge.update(time, (2.5 * std,) * parts.rover.wheel_count, body)
+    assert all(wheel.resting and wheel.slip == 0.0 for wheel in still)
+    assert slip_and_deviation(3.1 * std, -0.0005, 0.0005, std, 0.002)[1] > 0.3
 
 
 @pytest.mark.parametrize(('rim', 'v'), [(0.05, 0.03), (0.05, 0.08), (-0.05, -0.03), (-0.05, -0.08)])

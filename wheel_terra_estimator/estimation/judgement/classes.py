@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.scalars import NAN, NANOSECOND, TIME_ROUNDING
@@ -88,7 +89,8 @@ class PublishedClasses:
     """Gives the sets of a drive their classes, in the order in which they are published."""
 
     def __init__(self, configuration: Configuration) -> None:
-        self._states = [ClassState()] * configuration.wheels.count
+        self._count = configuration.wheels.count
+        self.reset()
         self.retune(configuration)
 
     def retune(self, configuration: Configuration) -> None:
@@ -103,13 +105,15 @@ class PublishedClasses:
 
     def reset(self) -> None:
         """Forget the classes: a new run begins."""
-        self._states = [ClassState()] * len(self._states)
+        self._states = [ClassState()] * self._count
+        self._outlook: FloatArray | None = None  # that was published last
 
     def follow(self, estimates: EstimateSet) -> EstimateSet:
         """Return a set with the classes that follow from its slips and those before it.
 
-        A wheel whose class is unknown in the set given stays so; one that drives and is stuck
-        has no rim travel and no time left.
+        A wheel whose class is unknown in the set given stays so, and its outlook is held; under a
+        warning also that of one whose slip is in doubt. One that drives and is stuck has no rim
+        travel and no time left.
         """
         time = estimates.stamp * NANOSECOND
         update, most_std = self._classifier.update, self._most_std
@@ -125,9 +129,16 @@ class PublishedClasses:
         ]
         classes = np.array([state.current for state in self._states], dtype=np.uint8)
         stuck = (classes == SlipClass.STUCK) & (estimates.slip > 0.0)
+        left = np.stack([estimates.rim_travel_left, estimates.time_to_stuck])
+        outlook = np.vstack([np.where(stuck, 0.0, left), estimates.stuck_probability])
+        if self._outlook is not None:
+            told = classes if estimates.stuck else estimates.slip_class
+            outlook = np.where(told == UNKNOWN, self._outlook, outlook)
+        self._outlook = outlook
         return replace(
             estimates,
             slip_class=classes,
-            rim_travel_left=np.where(stuck, 0.0, estimates.rim_travel_left),
-            time_to_stuck=np.where(stuck, 0.0, estimates.time_to_stuck),
+            rim_travel_left=outlook[0],
+            time_to_stuck=outlook[1],
+            stuck_probability=outlook[2],
         )

@@ -77,8 +77,8 @@ class StuckMonitor(Component[StuckState]):
         old, settings = self.state, self._settings
         situation = observe(old.memory, time, motion)
         ahead = outlook(situation, settings)
-        digs = situation.settled and situation.slip > _DIGGING_SLIP
-        digs = digs and situation.slip_std < USUAL_STD
+        digs = situation.slip > _DIGGING_SLIP and situation.slip_std < USUAL_STD
+        digs = digs and (situation.settled or _stands(situation))
         likely = ahead.probability > settings.threshold or digs
         there = likely and not situation.braked, situation.standing
         since = tuple(
@@ -119,8 +119,12 @@ def _confirmed(s: Situation) -> bool:
     In a wrong unit rim speeds make a slip near 1 of any speed, but no speed of zero; torques are
     then far beyond their limit.
     """
-    still = abs(s.motion.speed) < s.slip_std * s.fastest
-    return (s.motion.speed_known and still) or NEAR_LIMIT < s.strain < 1.0 / NEAR_LIMIT
+    return _stands(s) or NEAR_LIMIT < s.strain < 1.0 / NEAR_LIMIT
+
+
+def _stands(s: Situation) -> bool:
+    """Whether a reference says that the rover stands, to the accuracy of the slip."""
+    return s.motion.speed_known and abs(s.motion.speed) < s.slip_std * s.fastest
 
 
 def _in_words(s: Situation, ahead: Outlook, settings: StuckSettings, held: list[bool]) -> str:
