@@ -184,7 +184,7 @@ def test_the_error_that_lasts_keeps_its_deviation_over_any_step():
 
 
 def rest(parts, ekf, seconds, yaw=0.0):
-    update = ZeroVelocityUpdate()
+    update = ZeroVelocityUpdate(parts.rover.gravity)
     for i in range(round(10 * seconds)):
         window = InertialWindow(readings=5, rates=5, pitch_rate=5 * 0.002)
         cycle = parts.cycle((0.0,) * 6, time=0.1 * i, still=True, window=window, yaw_rate=yaw)
@@ -209,6 +209,10 @@ def test_a_fast_rover_is_not_stopped_at_once(parts):
     assert fast.mean[SPEED] > 0.8
     rest(parts, fast, 4.0)
     assert abs(fast.mean[SPEED]) < 0.01
+    slow = parts.filter()
+    slow.set(SPEED, 0.06, 0.002**2)
+    rest(parts, slow, 0.4)
+    assert abs(slow.mean[SPEED]) < 0.01, 'locked wheels stop it in a twentieth of a second'
 
 
 # -- Sinkage ----------------------------------------------------------------------------------

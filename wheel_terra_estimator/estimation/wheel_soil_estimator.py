@@ -160,7 +160,7 @@ class WheelSoilEstimator:
         self._sinkage_process = SinkageProcess(rover, layout, models, angle_std)
         self._soil_process = SoilProcess(configuration, layout)
         self._reference = ReferenceUpdate(configuration, rover, sensors, layout)
-        self._zero_velocity = ZeroVelocityUpdate()
+        self._zero_velocity = ZeroVelocityUpdate(rover.gravity)
         self._sinkage = SinkageUpdate(configuration, layout)
         self._torque = TorqueUpdate(configuration, rover, layout)
         self._balance = ForceBalance(configuration, rover, sensors, layout)

@@ -19,8 +19,9 @@ from wheel_terra_estimator.estimation.scalars import NAN
 # Tuned on simulated drives, seeds 1000 to 1019.
 _SETTLING_TIME = 0.15  # [s] of standing wheels before the rover counts as standing
 _STD = 0.0005  # of a rover that stands [m/s]
-_COASTING_TIME = 2.0
-"""Time [s] for which a fast rover may slide on: it is not stopped against its accelerometer."""
+_COASTING = 0.1
+"""Deceleration [g] of a fast rover that slides on: so long it is not stopped against its
+accelerometer."""
 _COASTING_GATE = 9.0
 _GYRO_SETTLING_TIME = 0.5  # [s]
 _MOST_YAW_RATE = 0.05  # [rad/s]: what turns faster does not stand
@@ -39,8 +40,9 @@ class ZeroVelocityState(NamedTuple):
 class ZeroVelocityUpdate(Component[ZeroVelocityState]):
     """Fuses standing still; learns the zero of the gyro meanwhile."""
 
-    def __init__(self) -> None:
+    def __init__(self, gravity: float) -> None:
         super().__init__(ZeroVelocityState())
+        self._coasting = _COASTING * gravity  # [m/s^2]
 
     def keep_zero_of(self, old: ZeroVelocityState) -> None:
         """Begin a run with the gyro's zero of an old one, at less weight."""
@@ -68,13 +70,13 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         settled = time - self.state.since
         if settled < _SETTLING_TIME:
             return
-        variance = _STD**2
-        if settled < _COASTING_TIME:
-            speed, P = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
+        variance, speed = _STD**2, float(ekf.mean[SPEED])
+        if settled < abs(speed) / self._coasting:
+            P = float(ekf.covariance[SPEED, SPEED])
             variance += chi_square_gate(speed, P + variance, _COASTING_GATE)
         row = np.zeros(len(ekf.mean))
         row[SPEED] = 1.0
-        ekf.fuse([Row(0.0 - float(ekf.mean[SPEED]), row, variance)])
+        ekf.fuse([Row(-speed, row, variance)])
         turning = abs(yaw_rate) >= _MOST_YAW_RATE
         if settled > _GYRO_SETTLING_TIME and window.rates and not turning:
             self._learn_zero(yaw_rate, window.pitch_rate / window.rates)
