@@ -335,6 +335,8 @@ def test_a_median_above_0_9_is_warned_of_also_right_after_a_start():
     )
     assert first(sees) == pytest.approx(1.0, abs=0.11)
     assert not any(a.stuck for a in guesses)
+    spins = held(StuckMonitor(SETTINGS), doubtful, 3.0, speed_known=True, turning=True)
+    assert not any(a.stuck for a in spins), 'a rover that turns on the spot stands, too'
 
 
 @pytest.mark.parametrize('threshold', [0.2, 0.5, 0.8])
