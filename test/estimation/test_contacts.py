@@ -14,13 +14,17 @@ from wheel_terra_estimator.estimation.contacts.contact_age import DECAY, START_V
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
-from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
+from wheel_terra_estimator.estimation.contacts.pulls import (
+    KnownSum,
+    PullEvidence,
+    Pulls,
+    distributed,
+)
 from wheel_terra_estimator.estimation.contacts.ruts import Ruts, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
 from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
-from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     RUT_SHARE,
@@ -30,6 +34,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     SPEED,
 )
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.sideways import Sideways
 
 NAN = float('nan')
 FORWARD = (0.05,) * 6
@@ -433,28 +438,23 @@ def test_behind_a_reversal_all_wheels_roll_in_ruts_at_first(parts):
 # -- Pulls ------------------------------------------------------------------------------------
 
 
-def test_the_residual_of_the_sum_is_distributed_as_least_squares_does(parts):
+def test_the_residuals_of_known_sums_are_distributed_as_least_squares_does():
     rng = np.random.default_rng(4)
     root = rng.normal(size=(6, 6))
     covariance = root @ root.T
     pulls = rng.normal(scale=20.0, size=6)
-    total, variance = float(pulls.sum()) + 6.0, 2.0
-    found = Pulls(parts.rover, parts.sensors, (300.0,) * 6).distributed(
-        pulls.tolist(),
-        covariance.sum(axis=1),
-        np.ones(6),
-        SumOfPulls(total, 1800.0, variance),
-        (300.0,) * 6,
-        0.0,
-    )
-    # Six priors and one sum, each row in units of its own deviation.
-    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-    rows = np.vstack([whiten, np.ones(6) / np.sqrt(variance)])
-    values = np.append(whiten @ pulls, total / np.sqrt(variance))
+    shares, variances = rng.normal(size=(2, 6)), np.array([2.0, 0.5])
+    sums = shares @ pulls + np.array([6.0, -3.0])
+    known = [KnownSum(*each) for each in zip(shares, sums, variances, strict=True)]
+    found = distributed(pulls, covariance, known, (300.0,) * 6)
+    # Six priors and two sums, each row in units of its own deviation.
+    whiten, deviations = np.linalg.inv(np.linalg.cholesky(covariance)), np.sqrt(variances)
+    rows = np.vstack([whiten, shares / deviations[:, None]])
+    values = np.append(whiten @ pulls, sums / deviations)
     assert found == pytest.approx(np.linalg.lstsq(rows, values, rcond=None)[0])
 
 
-def published_pull(parts, excess, lateral_motion=0.0):
+def published_pull(parts, excess, lateral_motion=0.0, aside=None):
     """Pulls after 40 cycles in which all torques read `excess` more than the model."""
     pulls = Pulls(parts.rover, parts.sensors, (300.0,) * 6)
     forces, cycle = forces_at(parts), parts.cycle(lateral_motion=lateral_motion)
@@ -470,6 +470,7 @@ def published_pull(parts, excess, lateral_motion=0.0):
                 cycle=cycle,
                 readings=tuple((forces.torque + excess).tolist()),
                 stationary=(np.nan,) * 6,
+                aside=aside,
             ),
             tilt=0.0,
         )
@@ -483,6 +484,19 @@ def test_the_pull_follows_a_torque_that_the_model_does_not_explain(parts):
     # In a turn, too; what the sensor's zero may be is not believed.
     assert published_pull(parts, 6.0, lateral_motion=0.5)[0] == pytest.approx(pull)
     assert published_pull(parts, 0.05)[0] == pytest.approx(forces.pull, abs=1e-3)
+
+
+def test_in_a_steady_turn_the_moments_of_pulls_and_lateral_forces_cancel(parts):
+    x, y = np.array(parts.rover.longitudinal), np.array(parts.rover.lateral)
+    plain, _ = published_pull(parts, 0.0)
+    known = Sideways.unknown((60.0,) * 6)
+    for force in (-20.0 * np.sign(x), 5.0 * x):
+        aside = replace(known, force=tuple(force), force_std=(1e-6,) * 6)
+        pull, _ = published_pull(parts, 0.0, aside=aside)
+        assert np.sum(x * force - y * pull) == pytest.approx(0.0, abs=1e-6)
+        assert pull.sum() == pytest.approx(plain.sum(), abs=0.5)
+    doubted = replace(aside, force_std=(1e6,) * 6)
+    assert published_pull(parts, 0.0, aside=doubted)[0] == pytest.approx(plain, abs=1e-6)
 
 
 def test_the_doubt_of_the_shear_model_is_the_stated_one_at_a_contact_length(parts):

@@ -88,15 +88,18 @@ from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, Ste
 from wheel_terra_estimator.estimation.outputs import Outputs, Sources
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, NANOSECOND, known, median
-from wheel_terra_estimator.estimation.sideways import SidewaysInputs, SidewaysMotion
+from wheel_terra_estimator.estimation.sideways import Sideways, SidewaysInputs, SidewaysMotion
 from wheel_terra_estimator.estimation.smoothing.history_buffer import Gaussian, HistoryBuffer
 from wheel_terra_estimator.estimation.taught import Taught, Teaching, with_model_errors
 from wheel_terra_estimator.estimation.words import COST
 
 _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
+_TURN = 0.1
+"""Lateral motion above which what turns the rover tells of the pulls [-]."""
+_ANGLE_KNOWN = 0.6  # deviation of slip angles up to which they tell the lateral forces [rad]
 _SHARP_TURN = 0.3
-"""Lateral motion above which slip comes from turning and says nothing of an entrapment [-]."""
+"""The same above which slip comes from turning and says nothing of an entrapment."""
 
 
 class Instant(NamedTuple):
@@ -331,6 +334,7 @@ class WheelSoilEstimator:
                 ]
             ),
             stationary=stationary,
+            aside=self._lateral_forces(cycle),
         )
         tilt = rut_tilt(self._rover, layout, ekf.mean)
         self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)
@@ -621,6 +625,13 @@ class WheelSoilEstimator:
                 shear_modulus=float(soil.shear_modulus) * math.exp(float(ekf.mean[SHEAR_MODULUS])),
             ),
         )
+
+    def _lateral_forces(self, cycle: Cycle) -> Sideways | None:
+        """Return the lateral forces in a turn, None where nothing tells them."""
+        told = self._sideways.state.told
+        if told is None or cycle.lateral_motion < _TURN or max(told.angle_std) > _ANGLE_KNOWN:
+            return None
+        return told
 
     def _instant(self, time: float, body: BodyMotion) -> Instant:
         """Return what a smoother judges anew."""

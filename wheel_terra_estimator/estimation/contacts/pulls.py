@@ -3,12 +3,14 @@
 """Drawbar pull of each wheel after the update of a cycle.
 
 The filter is slow to learn soil, on purpose; a pull need not be, since torque gives it whatever the
-strength, and the specific force gives the sum. Both corrections stay outside the state.
+strength, and the specific force gives the sum; in a turn the pulls turn the rover against what
+pushes its wheels aside. These corrections stay outside the state.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from math import isnan
 from typing import NamedTuple
 
@@ -22,6 +24,7 @@ from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import TINY, clipped
+from wheel_terra_estimator.estimation.sideways import Sideways
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _GUESS_STD = 0.1  # of the load, where no model holds
@@ -47,6 +50,15 @@ class PullEvidence(NamedTuple):
     cycle: Cycle
     readings: Floats  # last torque of each wheel [N m], nan = never known
     stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
+    aside: Sideways | None  # lateral forces in a sharp turn; None elsewhere
+
+
+class KnownSum(NamedTuple):
+    """A weighted sum of the pulls that is known."""
+
+    shares: FloatArray  # (n,) with which each counts in it
+    value: float
+    variance: float
 
 
 class PullState(NamedTuple):
@@ -77,7 +89,7 @@ class Pulls(Component[PullState]):
 
         `tilt` is that of the body against the ground by its ruts [rad].
         """
-        forces, total, cycle, readings, stationary = evidence
+        forces, total, cycle, readings, stationary, aside = evidence
         loads, lateral_motion = cycle.loads, cycle.lateral_motion
         state, share = self.state, loads.slope_share
         n = self._rover.wheel_count
@@ -119,35 +131,31 @@ class Pulls(Component[PullState]):
                 own[i] += noises[i] ** 2
                 std[i] = math.sqrt(max(shared[i], 0.0) + own[i] + scrub[i])
         model_pull = tuple(pull)
-        if forces is not None and total is not None:
-            along = np.array(cycle.headings.along)
-            shares = (joint + np.diag(own)) @ along + np.array(scrub)
-            pull = self.distributed(pull, shares, along, total, loads.load, tilt)
+        if forces is not None:
+            sums = self._known(cycle, total, aside, tilt)
+            if sums:
+                errors = joint + np.diag(np.array(own) + scrub)
+                pull = distributed(np.array(pull), errors, sums, loads.load)
         self.state = PullState(tuple(pull), tuple(std), model_pull, tuple(torque), tuple(excess))
 
-    def distributed(
-        self,
-        pull: list[float],
-        shares: FloatArray,
-        along: FloatArray,
-        total: SumOfPulls,
-        loads: Floats,
-        tilt: float,
-    ) -> list[float]:
-        """Return the pulls with the residual of their sum distributed among them.
+    def _known(
+        self, cycle: Cycle, total: SumOfPulls | None, aside: Sideways | None, tilt: float
+    ) -> list[KnownSum]:
+        """Return what is known of the pulls together.
 
-        The shares (n,) are the covariances of each pull with the sum [N^2], in which it counts with
-        `along` (n,), the cosine of its steering angle. The deviations stay:
-        what parts the wheels from one another is not known better for it.
+        In a steady turn the moments of pulls and lateral forces about the body's z axis cancel.
         """
-        seen = sum(f * c for f, c in zip(pull, along.tolist(), strict=True))
-        residual = total.along - total.weight * tilt - seen
-        gains = shares / (float(along @ shares) + total.variance)
-        most = _MOST_DRAG
-        return [
-            clipped(f + gain * residual, -most * load, load)
-            for f, gain, load in zip(pull, gains.tolist(), loads, strict=True)
-        ]
+        along, across = np.array(cycle.headings.along), np.array(cycle.headings.across)
+        known = []
+        if total is not None:
+            known.append(KnownSum(along, total.along - total.weight * tilt, total.variance))
+        if aside is not None:
+            x, y = np.array(self._rover.longitudinal), np.array(self._rover.lateral)
+            arms = x * along + y * across
+            doubt = arms * aside.force_std
+            moment = -float(arms @ aside.force)
+            known.append(KnownSum(x * across - y * along, moment, float(doubt @ doubt)))
+        return known
 
     def _own_variance(
         self, i: int, pull: float, torque: float, load: float, *, level: bool
@@ -181,3 +189,21 @@ class Pulls(Component[PullState]):
         square = max(excess * excess, TINY)
         believed = max(1.0 - _SHRINKAGE * noise / square, 0.0)
         return excess * believed
+
+
+def distributed(
+    pull: FloatArray, errors: FloatArray, known: Sequence[KnownSum], loads: Floats
+) -> list[float]:
+    """Return the pulls (n,) [N] with the residuals of known sums distributed.
+
+    `errors` (n, n) is their covariance [N^2]. The deviations stay: what parts the wheels from one
+    another is not known better for it.
+    """
+    shares = np.array([each.shares for each in known])
+    residual = np.array([each.value for each in known]) - shares @ pull
+    covariance = errors @ shares.T
+    noise = np.diag([each.variance for each in known])
+    moved = pull + covariance @ np.linalg.solve(shares @ covariance + noise, residual)
+    return [
+        clipped(f, -_MOST_DRAG * load, load) for f, load in zip(moved.tolist(), loads, strict=True)
+    ]
