@@ -80,6 +80,14 @@ def test_simulated_drive_and_its_bag_give_the_same_numbers(drive, direct, tmp_pa
         np.testing.assert_allclose(direct[name], bag[name], rtol=1e-5, atol=1e-5, err_msg=name)
 
 
+def test_parameters_count_for_a_simulated_drive(drive, direct):
+    other = api.estimate(drive, parameters=['rover.mass:=400.0'], as_frame=False)
+    load = f'normal_load.{drive.configuration.wheels.names[0]}'
+    assert other[load][-1] != pytest.approx(direct[load][-1])
+    with pytest.raises(api.UserError, match=r'no\.such\.key'):
+        api.taught(drive, parameters=['no.such.key:=1'])
+
+
 def logged(drive):
     """Return the measurements of a drive as a table of logged values, merged by stamp."""
     wheels = drive.configuration.wheels.names

@@ -70,7 +70,7 @@ def estimate(
     rover : str, path, sequence or Configuration
         Configuration files, or bare names of shipped ones; not needed for a simulated drive.
     parameters : sequence of str
-        ``NAME:=VALUE``, winning over the files.
+        ``NAME:=VALUE``, winning over ``rover``.
     remaps : mapping, optional
         For a bag: the estimator's topic -> the bag's.
     as_frame : bool
@@ -212,7 +212,7 @@ def _inputs(
 ) -> tuple[Configuration, Path | Iterable[Measurement]]:
     """Return the configuration, and the path of a bag or the measurements."""
     if isinstance(drive, SimulatedDrive):
-        configuration = drive.configuration if rover is None else _rover(rover, parameters)
+        configuration = _rover(drive.configuration if rover is None else rover, parameters)
         return configuration, (a.measurement for a in drive.arrivals)
     if rover is None:
         raise UserError("rover is missing; name its configuration files, such as ['my_rover']")
@@ -227,9 +227,7 @@ def _rover(
     rover: str | Path | Sequence[str | Path] | Configuration, parameters: Sequence[str]
 ) -> Configuration:
     if isinstance(rover, Configuration):
-        if parameters:
-            raise UserError('parameters go with names of files; use Configuration.replace instead')
-        return rover
+        return rover.replace({}, parameters) if parameters else rover
     files = [rover] if isinstance(rover, str | Path) else list(rover)
     return reader.load(files, parameters)
 

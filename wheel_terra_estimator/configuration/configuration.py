@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -199,12 +199,15 @@ class Configuration:
         """Return canonical key -> value of every declared parameter, as it would be written."""
         return dict(self._values)
 
-    def replace(self, changes: Mapping[str, Value]) -> Configuration:
-        """Return a configuration in which some keys have other values, checked like a file."""
+    def replace(self, changes: Mapping[str, Value], overrides: Sequence[str] = ()) -> Configuration:
+        """Return a configuration in which some keys have other values, checked like a file.
+
+        ``overrides``: ``NAME:=VALUE`` each.
+        """
         from wheel_terra_estimator.configuration import reader
 
         stated = {key: self._values[key] for key in self.stated}
-        return reader.from_parameters({**stated, **changes}, complete=False)
+        return reader.from_parameters({**stated, **changes}, overrides, complete=False)
 
     def write(self, path: str | Path, keys: Iterable[str] | None = None, comment: str = '') -> None:
         """Write a parameter file that the commands and the node accept.

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -62,13 +62,16 @@ def load(
             if key == 'effect_file' and value:
                 value = str(path.parent / str(value))
             sourced.append((key, str(path), value))
+    return _checked([*sourced, *_assigned(overrides)], complete, allow_effect_files)
+
+
+def _assigned(overrides: Iterable[str]) -> Iterator[tuple[str, str, Value]]:
+    """Yield key, what messages name, and value."""
     for override in overrides:
         key, separator, text = override.partition(':=')
         if not separator or not key.strip():
             raise UserError(f"-p {override}: must be NAME:=VALUE, such as 'rover.mass:=120.0'")
-        key = key.strip()
-        sourced.append((key, f'-p {override}', ros_yaml.parse_value(text, f'-p {override}')))
-    return _checked(sourced, complete, allow_effect_files)
+        yield key.strip(), f'-p {override}', ros_yaml.parse_value(text, f'-p {override}')
 
 
 def files_behind(name: str | Path) -> list[Path]:
@@ -85,6 +88,7 @@ def files_behind(name: str | Path) -> list[Path]:
 
 def from_parameters(
     parameters: Mapping[str, Any],  # key -> scalar or sequence; arrays of any kind will do
+    overrides: Sequence[str] = (),  # ``NAME:=VALUE``
     *,
     source: str = 'parameters',  # what messages name in place of the file
     # As for ``load``. An effect file may be run: a program that makes a mapping is trusted.
@@ -95,7 +99,7 @@ def from_parameters(
         (key, source, value.tolist() if hasattr(value, 'tolist') else value)
         for key, value in parameters.items()
     ]
-    return _checked(sourced, complete, True)
+    return _checked([*sourced, *_assigned(overrides)], complete, True)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
