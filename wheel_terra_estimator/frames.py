@@ -7,7 +7,7 @@ Units go with a DataFrame in ``attrs['units']``: column -> unit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -49,17 +49,26 @@ def unit_of(column: str) -> str:
     return SI_UNITS.get(column.partition('.')[0].removesuffix('_std'), '-')
 
 
-def units_in(table: Any) -> Mapping[str, str]:
-    """Return column -> unit as a DataFrame carries them; empty where it does not."""
+def units_in(table: Any, name: str, known: Callable[[str], object]) -> Mapping[str, str]:
+    """Return column -> unit as a DataFrame carries them; empty where it does not.
+
+    pandas keeps the units of columns that were taken out; a name that neither is a column nor is
+    ``known`` as that of one raises UserError, unless its unit is what it would be taken for.
+    """
     units: Mapping[str, str] = getattr(table, 'attrs', {}).get('units', {})
+    for key, unit in units.items():
+        if key not in table and unit != unit_of(key) and not known(key):
+            raise UserError(f"{name}: attrs['units'] has {key!r}, which is no column; correct it")
     return units
 
 
-def to_frame(columns: Mapping[str, NDArray[Any]], stamp: IntArray | None = None) -> DataFrame:
+def to_frame(
+    columns: Mapping[str, NDArray[Any]], stamp: IntArray | None = None, zone: Any = None
+) -> DataFrame:
     """Return columns as a DataFrame with their units in ``attrs['units']``.
 
     ``columns``: columns of one length, in SI units. ``stamp``: (N,) ROS time [ns]; becomes the
-    index, as dates (UTC). Raises UserError if pandas is not installed.
+    index, as dates (UTC; with a time zone, in that). Raises UserError if pandas is not installed.
     """
     try:
         from pandas import DataFrame, DatetimeIndex
@@ -69,7 +78,8 @@ def to_frame(columns: Mapping[str, NDArray[Any]], stamp: IntArray | None = None)
         ) from None
     frame = DataFrame(dict(columns))
     if stamp is not None:
-        frame.index = DatetimeIndex(stamp.astype('datetime64[ns]'), name='ros_time')
+        index = DatetimeIndex(stamp.astype('datetime64[ns]'), name='ros_time')
+        frame.index = index.tz_localize('UTC').tz_convert(zone) if zone else index
     frame.attrs['units'] = {name: unit_of(name) for name in columns}
     return frame
 
@@ -93,18 +103,23 @@ def arrays_of(table: Any, name: str, dtype: type | None = None) -> dict[str, NDA
     return columns
 
 
-def columns_of(table: Any, name: str) -> dict[str, FloatArray]:
+def dates_of(table: Any) -> IntArray | None:
+    """Return the index of a DataFrame as ROS time [ns]; None unless of dates or durations."""
+    index = getattr(table, 'index', None)
+    kind = getattr(getattr(index, 'dtype', None), 'kind', None)  # dates of a time zone are M, too
+    return np.asarray(index, f'{kind}8[ns]').astype(np.int64) if kind in ('m', 'M') else None
+
+
+def columns_of(table: Any, name: str, known: Callable[[str], object]) -> dict[str, FloatArray]:
     """Return the columns of a DataFrame or mapping as arrays of one length.
 
-    An index of dates or durations of a DataFrame stands for a column ``time`` that is not there.
-
-    ``table``: the columns, in SI units unless ``attrs['units']`` says otherwise. Raises UserError
-    for a column that is no list of numbers, of another length than the others, or in a unit that is
-    not known.
+    ``table``: the columns, in SI units unless ``attrs['units']`` says otherwise; ``known``: as for
+    `units_in`. Raises UserError for a column that is no list of numbers, of another length than the
+    others, or in a unit that is not known.
     """
     from wheel_terra_estimator.configuration.column_map import UNITS, factor
 
-    units = units_in(table)
+    units = units_in(table, name, known)
     columns: dict[str, FloatArray] = {}
     for key, column in arrays_of(table, name, np.float64).items():
         si = unit_of(str(key))
@@ -113,7 +128,4 @@ def columns_of(table: Any, name: str) -> dict[str, FloatArray]:
         if times is None:
             raise UserError(f'{name}: column {key!r} is in {given!r} (attrs); give it in {si}')
         columns[str(key)] = times * column
-    index = np.asarray(getattr(table, 'index', ()))
-    if 'time' not in columns and index.dtype.kind in 'mM':
-        columns['time'] = (index - index[:1]).astype('timedelta64[ns]').astype(np.float64) * 1e-9
     return columns

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,7 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.estimation.taught import Taught
-from wheel_terra_estimator.frames import Columns, columns_of, to_frame
+from wheel_terra_estimator.frames import Columns, columns_of, dates_of, to_frame
 from wheel_terra_estimator.simulation.drive import SimulatedDrive
 
 if TYPE_CHECKING:
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 
 
 NANOSECONDS = 1_000_000_000
+LONGEST_STEP = 5.0
+"""Median time between rows of a log [s]; after half a second without rates nothing is known."""
+LATEST = 2.0**31  # time that the stamp of a message can hold [s]
 AXES = ('x', 'y', 'z')
 PER_WHEEL = ('rate', 'torque', 'sinkage', 'leaving_angle', 'steering')
 WHOLE = (
@@ -74,9 +78,10 @@ def estimate(
     remaps : mapping, optional
         For a bag: the estimator's topic -> the bag's.
     as_frame : bool
-        True: a DataFrame (needs pandas), its index the ROS time as dates (UTC), so that
-        ``resample``, slices of time and ``join`` with ``truth.to_frame()`` work, its units in
-        ``attrs['units']``; False: the same columns as a dict of arrays.
+        True: a DataFrame (needs pandas), its index the ROS time as dates (UTC, or the time zone of
+        a log's index), so that ``resample``, slices of time and ``join`` with the log or
+        ``truth.to_frame()`` work, its units in ``attrs['units']``; False: the same columns as a
+        dict of arrays.
 
     Returns
     -------
@@ -101,7 +106,7 @@ def estimate(
     >>> bool(abs(columns[f'slip.{wheel}'][-1]) < 0.3)
     True
     """
-    return _result(_run(drive, rover, parameters, remaps)[0], as_frame)
+    return _result(_run(drive, rover, parameters, remaps)[0], drive, as_frame)
 
 
 def smooth(
@@ -124,7 +129,7 @@ def smooth(
     >>> columns.keys() == estimate(drive, as_frame=False).keys()
     True
     """
-    return _result(_run(drive, rover, parameters, remaps, smoothed=True)[0], as_frame)
+    return _result(_run(drive, rover, parameters, remaps, smoothed=True)[0], drive, as_frame)
 
 
 def simulate(
@@ -194,33 +199,23 @@ def _run(
     smoothed: bool = False,
 ) -> tuple[Any, tuple[Taught, ...]]:
     """Return the history of the estimates of a drive, and what it taught."""
-    configuration, inputs = _inputs(drive, rover, parameters)
-    if not isinstance(inputs, Path):
-        return _estimated(inputs, configuration, smoothed)
-    from wheel_terra_estimator.bags.replay import Options, replay
-    from wheel_terra_estimator.bags.storage import open_bag
-
-    with open_bag(inputs) as bag:
-        replayed = replay(bag, configuration, remaps or {}, options=Options(smooth=smoothed))
-    return replayed.history, tuple(replayed.taught)
-
-
-def _inputs(
-    drive: Any,
-    rover: str | Path | Sequence[str | Path] | Configuration | None,
-    parameters: Sequence[str],
-) -> tuple[Configuration, Path | Iterable[Measurement]]:
-    """Return the configuration, and the path of a bag or the measurements."""
     if isinstance(drive, SimulatedDrive):
         configuration = _rover(drive.configuration if rover is None else rover, parameters)
-        return configuration, (a.measurement for a in drive.arrivals)
+        return _estimated((a.measurement for a in drive.arrivals), configuration, smoothed)
     if rover is None:
         raise UserError("rover is missing; name its configuration files, such as ['my_rover']")
     configuration = _rover(rover, parameters)
-    if isinstance(drive, str | Path):
-        return configuration, Path(drive)
-    rows = columns_of(drive, 'drive')
-    return configuration, _measurements(rows, configuration.wheels.names)
+    if not isinstance(drive, str | Path):
+        rows, start = _logged(drive, configuration.wheels.names)
+        measurements = _measurements(rows, configuration.wheels.names)
+        history, learned = _estimated(measurements, configuration, smoothed)
+        return replace(history, stamp=history.stamp + start - NANOSECONDS), learned
+    from wheel_terra_estimator.bags.replay import Options, replay
+    from wheel_terra_estimator.bags.storage import open_bag
+
+    with open_bag(Path(drive)) as bag:
+        replayed = replay(bag, configuration, remaps or {}, options=Options(smooth=smoothed))
+    return replayed.history, tuple(replayed.taught)
 
 
 def _rover(
@@ -256,7 +251,7 @@ def _estimated(
     return recorder.history(), core.taught()
 
 
-def _result(history: Any, as_frame: bool) -> DataFrame | Columns:
+def _result(history: Any, drive: Any, as_frame: bool) -> DataFrame | Columns:
     columns: Columns = {
         'stamp': history.stamp,
         'time': history.seconds,
@@ -266,25 +261,44 @@ def _result(history: Any, as_frame: bool) -> DataFrame | Columns:
     }
     for field, values in {**history.values, 'slip_class': history.slip_class}.items():
         columns |= {f'{field}.{name}': values[:, i] for i, name in enumerate(history.names)}
-    return to_frame(columns, history.stamp) if as_frame else columns
+    zone = getattr(getattr(drive, 'index', None), 'tz', None)  # of a log
+    return to_frame(columns, history.stamp, zone) if as_frame else columns
 
 
-def _measurements(
-    columns: Mapping[str, FloatArray], wheels: Sequence[str]
-) -> Iterator[Measurement]:
-    """Yield what each row of logged values measured, in the order of the rows."""
+def _logged(drive: Any, wheels: Sequence[str]) -> tuple[dict[str, FloatArray], int]:
+    """Return the columns of logged values, checked, and the ROS time of the first row [ns]."""
     known = {*WHOLE, *(f'{field}.{wheel}' for field in PER_WHEEL for wheel in wheels)}
+    columns, dates = columns_of(drive, 'drive', known.__contains__), dates_of(drive)
     for key in columns:
         if key not in known:
             raise UserError(
                 f'drive: unknown column {key!r}; known are {", ".join(WHOLE)} and '
                 f'{", ".join(PER_WHEEL)} with .<wheel>, wheels being {", ".join(wheels)}'
             )
+    start = 0
+    if 'time' not in columns and dates is not None:  # a float does not hold the nanoseconds
+        start = int(dates[0]) if dates.size else 0
+        columns['time'] = (dates - start).astype(np.float64) * 1e-9
     if 'time' not in columns or not any(f'rate.{wheel}' in columns for wheel in wheels):
         raise UserError(f"drive: needs the columns 'time' and 'rate.{wheels[0]}' (all wheels)")
     time = columns['time']
-    if not np.isfinite(time).all() or (np.diff(time) < 0.0).any():
+    gaps = np.diff(time)
+    if not np.isfinite(time).all() or (gaps < 0.0).any():
         raise UserError('drive: time must be finite and must not go back; sort the rows')
+    if (gaps.size and np.median(gaps) > LONGEST_STEP) or (np.abs(time) > LATEST).any():
+        raise UserError(
+            f'drive: time goes from {time[0]:g} to {time[-1]:g} s in {time.size} rows; is its unit '
+            "right? Give it in s, or say its unit in attrs['units']"
+        )
+    whole, rest = divmod(float(time[0]) if time.size else 0.0, 1.0)
+    return columns, start + int(whole) * NANOSECONDS + round(rest * NANOSECONDS)
+
+
+def _measurements(
+    columns: Mapping[str, FloatArray], wheels: Sequence[str]
+) -> Iterator[Measurement]:
+    """Yield what each row of logged values measured, stamps counted from 1 s on, in their order."""
+    time = columns['time']
     blank = np.full(time.size, np.nan)
 
     def block(names: Iterable[str]) -> FloatArray:
@@ -298,7 +312,7 @@ def _measurements(
     attitude = block(f'orientation.{axis}' for axis in (*AXES, 'w'))
     velocity = columns.get('reference_velocity', blank)
     deviation = columns.get('reference_velocity_std', blank)
-    # Not 0, which is no stamp; the numbers depend on differences of stamps only.
+    # 0 is no stamp; the numbers depend on differences of stamps only.
     stamps = np.round((time - time[:1]) * NANOSECONDS).astype(np.int64) + NANOSECONDS
     for k, stamp in enumerate(stamps.tolist()):
         if np.isfinite(force[k]).all() and np.isfinite(turn[k]).all():

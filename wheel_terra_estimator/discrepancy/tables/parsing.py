@@ -93,7 +93,7 @@ def table_of(data: Any, name: str, choice: Choice | None = None) -> SteadyTable:
     Its rows count from line 2, as below a header; ``attrs['units']`` of a DataFrame has the units
     of columns that do not say them. Messages call it ``name``.
     """
-    units = units_in(data)
+    units = units_in(data, name, meaning_of)
     columns = {
         with_unit(str(key).strip(), units.get(key, '')): column
         for key, column in arrays_of(data, name).items()
