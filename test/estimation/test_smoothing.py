@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import warnings
 from itertools import takewhile
 from types import SimpleNamespace
 
@@ -195,15 +196,14 @@ def test_a_spool_forgets_what_is_wound_back():
     disk_buffer.truncate(4)
     assert len(disk_buffer) == 4 and disk_buffer[3][0] == 3
     disk_buffer.append('next')
-    assert [disk_buffer[i] if i > 3 else disk_buffer[i][0] for i in range(5)] == [
-        0,
-        1,
-        2,
-        3,
-        'next',
-    ]
+    found = [disk_buffer[i] if i > 3 else disk_buffer[i][0] for i in range(5)]
+    assert found == [0, 1, 2, 3, 'next']
     with pytest.raises(IndexError):
         disk_buffer[5]
+    with warnings.catch_warnings(record=True) as told:  # that a file was not closed
+        warnings.simplefilter('always')
+        del disk_buffer
+    assert not told
 
 
 def moment(time, value, rim=0.1):

@@ -18,6 +18,7 @@ from __future__ import annotations
 import os
 import pickle
 import tempfile
+import weakref
 from array import array
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -43,6 +44,7 @@ class DiskBuffer(Generic[Item]):
     def __init__(self) -> None:
         lasting = LASTING if not os.environ.get('TMPDIR') and LASTING.is_dir() else None
         self._file = tempfile.TemporaryFile(dir=lasting)  # noqa: SIM115 - closed with the object
+        weakref.finalize(self, self._file.close)
         self._places = array('q', [0])  # where each item begins, and where the next one will
         self._at_end = True
 
