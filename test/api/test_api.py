@@ -6,6 +6,7 @@ import csv
 import doctest
 import importlib
 import io
+import pickle
 from dataclasses import replace
 
 import matplotlib as mpl
@@ -48,6 +49,7 @@ def test_a_model_of_objects_is_that_of_its_files():
     loaded = api.Model.load('hit_wh3', 'hit_fit')
     built = api.Model(loaded.wheel, loaded.soil, loaded.effects)
     again = api.Model(loaded.wheel, api.Soil.load('hit_fit'), loaded.effects)
+    again = pickle.loads(pickle.dumps(again))  # as multiprocessing does
     slip = np.linspace(-0.5, 0.9, 9)
     for model in (built, again):
         np.testing.assert_allclose(
@@ -55,10 +57,40 @@ def test_a_model_of_objects_is_that_of_its_files():
         )
 
 
+WHEEL = api.Wheel(0.13, 0.16)
+SLIPS = np.arange(1, 10) / 20
+TOO_HEAVY = {'slip': SLIPS, 'normal_load': [1e5] * 9, 'sinkage': 0.1 * SLIPS}
+
+
+@pytest.mark.parametrize(
+    ('call', 'words'),
+    [
+        (lambda: api.Model(api.Wheel([0.1, 0.2], 0.1), 'dlr_mss'), 'wheel: radius has 2 values'),
+        (lambda: api.Model(api.Wheel(0.1, 0.1, 0.0, 12.6), 'dlr_mss'), r'12\.6 is not an integer'),
+        (lambda: api.Model(WHEEL, 'dlr_mss', {'lug_digging': None}), 'effect lug_digging is of'),
+        (lambda: api.Soil.fit(TOO_HEAVY, None), 'wheel is of type NoneType'),
+        (lambda: api.Soil.fit(TOO_HEAVY, WHEEL), 'no shipped soil carries .*: start'),
+        (
+            lambda: api.Model(WHEEL, 'dlr_mss').sweep(0.1, 80.0, parameters={'soil.density': []}),
+            r'no value for soil\.density',
+        ),
+        (lambda: api.simulate(seed=-1), 'seed is -1; give a whole number'),
+        (lambda: api.simulate(seed=1.5), r'seed is 1\.5; give a whole number'),
+        (lambda: api.simulate(duration=0.01), r'duration is 0\.01 s; the wheels are read every'),
+        (lambda: api.plot_curve(api.Model(WHEEL, 'dlr_mss')), 'curves is of type Model; give'),
+        (lambda: api.plot_estimates({}), 'there are none: give what estimate returned'),
+    ],
+)
+def test_arguments_that_cannot_be_used(call, words):
+    with pytest.raises(api.UserError, match=words):
+        call()
+
+
 def test_a_load_that_the_soil_cannot_carry_is_nan():
     curve = api.Model.load('hit_wh3', 'dlr_mss').curve([0.2, 0.2], [50.0, 1e6])
     assert np.isfinite(curve.sinkage[0])
     assert np.isnan(curve.sinkage[1])
+    assert repr(api.Model.load('hit_wh3', 'dlr_mss').curve([], 50.0)) == 'Curve of 0 points'
 
 
 @pytest.fixture(scope='module')
@@ -348,6 +380,8 @@ def test_a_sweep_is_the_curves_of_its_models():
             curve = other.curve(grid['slip'], load)
             np.testing.assert_array_equal(rows['slip'][kept], curve.slip)
             np.testing.assert_allclose(rows['torque'][kept], curve.torque, rtol=1e-9)
+    one = model.sweep(**grid, parameters={'soil.friction_angle_deg': 35.0}, as_frame=False)
+    np.testing.assert_array_equal(one['torque'], rows['torque'][6:])
 
 
 def test_without_pandas_it_says_so(monkeypatch):

@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wheel_terra_estimator.api.arguments import check_kind
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -162,9 +164,10 @@ def simulate(
     from wheel_terra_estimator.simulation import drive as simulation
     from wheel_terra_estimator.simulation.scenario import load
 
-    if duration is not None and not duration > 0.0:
-        raise UserError(f'simulate: duration is {duration}; give seconds above 0')
-    result = simulation.simulate(load(scenario), seed, duration)
+    check_kind(scenario, str | Path | Mapping, 'scenario', 'its name, a file, or keys with values')
+    if not isinstance(seed, Integral) or seed < 0:
+        raise UserError(f'simulate: seed is {seed!r}; give a whole number from 0 on')
+    result = simulation.simulate(load(scenario), int(seed), duration)
     if output is not None:
         from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
 
@@ -223,6 +226,7 @@ def _rover(
 ) -> Configuration:
     if isinstance(rover, Configuration):
         return rover.replace({}, parameters) if parameters else rover
+    check_kind(rover, Iterable, 'rover', "names of files, such as ['my_rover.yaml']")
     files = [rover] if isinstance(rover, str | Path) else list(rover)
     return reader.load(files, parameters)
 
@@ -268,6 +272,7 @@ def _result(history: Any, drive: Any, as_frame: bool) -> DataFrame | Columns:
 def _logged(drive: Any, wheels: Sequence[str]) -> tuple[dict[str, FloatArray], int]:
     """Return the columns of logged values, checked, and the ROS time of the first row [ns]."""
     known = {*WHOLE, *(f'{field}.{wheel}' for field in PER_WHEEL for wheel in wheels)}
+    check_kind(drive, Iterable, 'drive', 'a bag, a DataFrame, a mapping, or what simulate gave')
     columns, dates = columns_of(drive, 'drive', known.__contains__), dates_of(drive)
     for key in columns:
         if key not in known:

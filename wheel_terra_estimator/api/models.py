@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wheel_terra_estimator.api.arguments import check_kind
 from wheel_terra_estimator.api.soils import Soil, configuration_of
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration import reader
@@ -64,10 +65,10 @@ class Curve:
 
     def __repr__(self) -> str:
         """Return the ranges of slip, load and answers."""
-        return f'Curve of {self.slip.size} points\n  ' + '\n  '.join(
-            f'{name} {np.nanmin(values):.4g} to {np.nanmax(values):.4g} {unit_of(name)}'
+        return f'Curve of {self.slip.size} points' + ''.join(
+            f'\n  {name} {np.nanmin(values):.4g} to {np.nanmax(values):.4g} {unit_of(name)}'
             for name, values in self.columns().items()
-            if name in ('slip', *OUTPUTS)
+            if name in ('slip', *OUTPUTS) and values.size
         )
 
 
@@ -117,17 +118,6 @@ class Model:
     ) -> None:
         if isinstance(soil, str | Path):
             soil = Soil.load(soil)
-        for given, kind in ((wheel, Wheel), (soil, terramechanics_soil.Soil)):
-            if not isinstance(given, kind):
-                raise UserError(
-                    f'Model: {given!r} is no {kind.__name__}; give Wheel(radius=0.13, width=0.16) '
-                    "and Soil.load('dlr_mss'), or use Model.load('hit_wh3', 'hit_fit')"
-                )
-        if effects is not None and not isinstance(effects, Mapping):
-            raise UserError(
-                f"Model: effects are a mapping, not {effects!r}; give {{'lug_digging': {{}}}}, or "
-                "{'lug_digging': {'kd': 1.0}}"
-            )
         self._set(configuration_of(wheel, soil, effects or {}, slip_radius, gravity), method)
 
     @classmethod
@@ -221,7 +211,7 @@ class Model:
         normal_load: ArrayLike,
         slope: ArrayLike = 0.0,
         *,
-        parameters: Mapping[str, Sequence[Any]] | None = None,
+        parameters: Mapping[str, Any] | None = None,
         as_frame: bool = True,
     ) -> DataFrame | Columns:
         """Return the curves of every combination of operating points and parameters.
@@ -234,8 +224,8 @@ class Model:
         slip, normal_load, slope : array_like
             One-dimensional, or one number: slip ratio [-], load [N], slope [rad].
         parameters : mapping of str to sequence
-            Key of the configuration -> values, such as ``{'soil.cohesion': [100.0, 300.0]}`` [Pa]
-            or ``{'soil.friction_angle_deg': [25, 30, 35]}`` [deg].
+            Key of the configuration -> values or one value, such as
+            ``{'soil.cohesion': [100.0, 300.0]}`` [Pa] or ``{'soil.friction_angle_deg': 30}`` [deg].
         as_frame : bool
             True: a DataFrame (needs pandas); False: the same columns as a dict of arrays.
 
@@ -249,9 +239,16 @@ class Model:
         axes = (np.atleast_1d(np.asarray(a, dtype=np.float64)) for a in (slip, normal_load, slope))
         # Transposed, so that slip changes fastest and each curve stands in one piece.
         points = [grid.T.ravel() for grid in np.meshgrid(*axes, indexing='ij')]
-        keys = dict(parameters or {})
+        keys = parameters or {}
+        check_kind(keys, Mapping, 'sweep: parameters', "{'soil.cohesion': [100.0, 300.0]}")
+        choices = [
+            list(v) if np.iterable(v) and not isinstance(v, str) else [v] for v in keys.values()
+        ]
+        if [] in choices:
+            empty = list(keys)[choices.index([])]
+            raise UserError(f'sweep: no value for {empty}; give one, or leave it out')
         found: dict[str, list[NDArray[Any]]] = {}
-        for values in product(*keys.values()):
+        for values in product(*choices):
             changes = dict(zip(keys, values, strict=True))
             model = Model.of(self.configuration.replace(changes), method=self._model.method)
             answer = model.curve(*points).columns()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.api.arguments import check_kind
 from wheel_terra_estimator.api.models import Curve
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label, plain
 from wheel_terra_estimator.errors import UserError
@@ -32,7 +33,10 @@ def plot_curve(
     ``curves``: one, or several by their labels. ``axes``: (3,), where to draw; default: a new
     figure.
     """
-    named = {'': curves} if isinstance(curves, Curve) else dict(curves)
+    named = {'': curves} if isinstance(curves, Curve) else curves
+    check_kind(named, Mapping, 'curves', 'model.curve(slip, load), or several by their labels')
+    for name, curve in named.items():
+        check_kind(curve, Curve, f'curve {name!r}', 'model.curve(slip, load)')
     with picture_style():
         panels = _panels(len(OUTPUTS), (10.5, 3.2), columns=True) if axes is None else axes
         for panel, quantity in zip(panels, OUTPUTS, strict=True):
@@ -62,7 +66,8 @@ def plot_estimates(estimates: Any, quantity: str = 'slip', axes: Axes | None = N
     wheels = [key.partition('.')[2] for key in estimates if str(key).startswith(f'{quantity}.')]
     if not wheels:
         known = dict.fromkeys(str(key).partition('.')[0] for key in estimates if '.' in str(key))
-        raise UserError(f'no quantity {quantity!r}; there are {", ".join(known)}')
+        there = ', '.join(known) or 'none: give what estimate returned'
+        raise UserError(f'no quantity {quantity!r}; there are {there}')
     with picture_style():
         panel = _panels(1, (9.0, 3.4))[0] if axes is None else axes
         time = np.asarray(estimates['time'], dtype=float)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wheel_terra_estimator.api.arguments import check_kind, one_number
 from wheel_terra_estimator.configuration import reader, ros_yaml, shipped
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import declared, nearest
@@ -20,7 +21,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_file, new_file
 from wheel_terra_estimator.terramechanics import soil as terramechanics_soil
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
-from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.model import OVERLOADED, SteadyState, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
 from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS
 from wheel_terra_estimator.terramechanics.wheel import Wheel
@@ -244,7 +245,7 @@ def parameters_of(soil: terramechanics_soil.Soil) -> dict[str, ros_yaml.Value]:
         std, values['soil.source'] = soil.std, soil.source
     for name in SOIL_NUMBERS:
         ending, factor = ('_deg', math.degrees(1.0)) if name == 'friction_angle' else ('', 1.0)
-        values[f'soil.{name}{ending}'] = factor * float(getattr(soil, name))
+        values[f'soil.{name}{ending}'] = factor * one_number(getattr(soil, name), f'soil: {name}')
         if name in std:
             values[f'soil.{name}_std{ending}'] = factor * float(std[name])
     return values
@@ -258,14 +259,19 @@ def configuration_of(
     gravity: float,
 ) -> Configuration:
     """Return the parameters that say the same as these objects."""
+    check_kind(wheel, Wheel, 'wheel', 'Wheel(radius=0.13, width=0.16)')
+    check_kind(soil, terramechanics_soil.Soil, 'soil', "Soil.load('dlr_mss')")
+    check_kind(effects, Mapping, 'effects', "{'lug_digging': {}} or {'lug_digging': {'kd': 1.0}}")
+    for name, settings in effects.items():
+        check_kind(settings, Mapping, f'effect {name}', 'its parameters, {} for the usual values')
     values: dict[str, Any] = {
         'wheels.names': ['wheel'],
         'slip_radius': slip_radius,
         'rover.gravity': float(gravity),
         **parameters_of(soil),
     }
-    values |= {f'wheels.{f.name}': [float(getattr(wheel, f.name))] for f in fields(wheel)}
-    values['wheels.lug_count'] = [round(float(wheel.lug_count))]
+    for f in fields(wheel):
+        values[f'wheels.{f.name}'] = [one_number(getattr(wheel, f.name), f'wheel: {f.name}')]
     for name, settings in effects.items():
         values[f'effects.{name}.enabled'] = True
         values |= {f'effects.{name}.{key}': value for key, value in settings.items()}
@@ -278,14 +284,23 @@ def _nearest(
     """Return the soil of Bekker's law whose plain model is nearest to the measured rows."""
     from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, operating_points
 
-    def distance(soil: Soil) -> float:
+    def answer_of(soil: Soil) -> SteadyState:
         points = operating_points(table.columns, configuration_of(wheel, soil, *rest), table.name)
-        answer = WheelSoilModel(soil, rest[0], 'closed_form', strict=False).steady_state(points)
-        total = 10.0 * float(np.mean(answer.flags & 1))  # rows that the soil does not carry
+        return WheelSoilModel(soil, rest[0], 'closed_form', strict=False).steady_state(points)
+
+    def distance(soil: Soil) -> float:
+        answer = answer_of(soil)
+        total = 10.0 * float(np.mean(answer.flags & OVERLOADED))  # rows that it does not carry
         for quantity, measured in zip(QUANTITIES, table.measured.T, strict=True):
             if np.isfinite(measured).any():
                 error = np.sqrt(np.nanmean((getattr(answer, quantity) - measured) ** 2))
                 total += float(error / max(np.nanmax(np.abs(measured)), 1e-9))
         return total
 
-    return min((soil for soil in soils if soil.pressure_law == 'bekker'), key=distance)
+    found = min((soil for soil in soils if soil.pressure_law == 'bekker'), key=distance)
+    if (answer_of(found).flags & OVERLOADED).any():
+        raise UserError(
+            f'{table.name}: no shipped soil carries these loads on this wheel; check the units of '
+            'normal_load and wheel, or give the soil where the fit begins: start'
+        )
+    return found

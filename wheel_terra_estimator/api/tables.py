@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wheel_terra_estimator.api.arguments import check_kind
 from wheel_terra_estimator.api.models import Model
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.discrepancy.result import Diagnosis
@@ -118,10 +118,7 @@ def _configuration(
     if isinstance(model, Configuration):
         return model
     files = [model] if isinstance(model, str | Path) else model
-    if not isinstance(files, Sequence):
-        raise UserError(
-            f"diagnose: {model!r} is no model; give Model(wheel, soil) or ['hit_wh3', 'hit_fit']"
-        )
+    check_kind(files, Sequence, 'model', "Model(wheel, soil) or ['hit_wh3', 'hit_fit']")
     return reader.load(files, complete=False)
 
 

@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.simulation.drives import Command, Drives
 from wheel_terra_estimator.simulation.plant import RoverPlant
 from wheel_terra_estimator.simulation.scenario import SENSOR_FAULTS, Fault, Scenario
@@ -137,6 +139,10 @@ class Drive:
         stamps: list[int] = []
         rows: list[Truth] = []
         period = self.sensors.odometry_period
+        if not period <= duration < math.inf:
+            raise UserError(
+                f'duration is {duration:g} s; the wheels are read every {period:g} s: give more'
+            )
         due = period
         factor = self.speed_factor
         for _ in range(round(duration / self.step_length)):

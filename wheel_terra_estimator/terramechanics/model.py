@@ -82,8 +82,11 @@ class WheelSoilModel:
         self.effects = check_settings(effects or {})
         self.method = method
         self.strict = strict
-        self._law = _FORCES[method]
         self._soil = {name: getattr(soil, name) for name in SOIL_NUMBERS}
+
+    @property
+    def _law(self) -> Any:
+        return _FORCES[self.method]
 
     def steady_state(self, points: OperatingPoints) -> SteadyState:
         """Solve the load balance and return sinkage, drawbar pull and torque.

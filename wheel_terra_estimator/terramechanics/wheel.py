@@ -16,7 +16,8 @@ from wheel_terra_estimator.terramechanics.checks import check_range
 class Wheel:
     """A rigid wheel with straight lugs across its width.
 
-    Every field is a float, or an (n,) array for n wheels (or table rows).
+    Every field is a float, or an (n,) array for n wheels (or table rows); ``api.Model`` and
+    ``api.Soil.fit`` take one wheel.
 
     Attributes
     ----------
