@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""CSV files as people export them: comma, semicolon or tab, point or decimal comma, UTF-8."""
+"""CSV files as people export them: comma, semicolon or tab, point or decimal comma, Unicode."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import check_size
@@ -45,8 +45,8 @@ class CsvFile:
 def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
     """Open a table for one pass over its rows.
 
-    Raises UserError where it is not there, too large, or no CSV text in UTF-8; also while its rows
-    are read.
+    Raises UserError where it is not there, too large, or no CSV text in UTF-8, or in UTF-16 with a
+    mark of it; also while its rows are read.
     """
     check_size(path, largest)
     try:
@@ -54,21 +54,15 @@ def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
             head = file.read(4)
         if head == b'PK\x03\x04':
             raise UserError(f'{path}: a spreadsheet or archive, not text; export the table as CSV')
-        if head.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
-            raise UserError(
-                f'{path}: text in UTF-16; save it as CSV (UTF-8), or: iconv -f utf-16 -t utf-8'
-            )
-        with path.open(newline='', encoding='utf-8-sig') as text:
-            first = text.readline()
-            stated = _STATED_DELIMITER.fullmatch(first)
-            before = 1 if stated else 0
-            titles = text.readline() if stated else first
+        wide = head.startswith((BOM_UTF16_LE, BOM_UTF16_BE))  # as spreadsheets save Unicode text
+        with path.open(newline='', encoding='utf-16' if wide else 'utf-8-sig') as text:
+            above, titles, stated = _titles(text)
             text.seek(0)
-            delimiter = stated[1] if stated else max(DELIMITERS, key=_QUOTED.sub('', titles).count)
+            for _ in range(above):
+                text.readline()
+            delimiter = stated or max(DELIMITERS, key=_QUOTED.sub('', titles).count)
             reader = csv.reader(text, delimiter=delimiter)
-            for _ in range(before):
-                next(reader)
-            cells = ((reader.line_num, [cell.strip() for cell in row]) for row in reader)
+            cells = ((above + reader.line_num, [cell.strip() for cell in row]) for row in reader)
             rows = ((line, row) for line, row in cells if any(row))
             line, header = next(rows, (1, []))
             yield CsvFile(path, header, line, delimiter, rows)
@@ -78,6 +72,24 @@ def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
         ) from None
     except csv.Error as error:
         raise UserError(f'{path}: not a CSV text ({error}); export it again') from None
+
+
+def _titles(text: TextIO) -> tuple[int, str, str]:
+    """Return how many lines stand above that of the titles, this, and a delimiter that one states.
+
+    Above it may stand comments (#); one that numbers follow is the line of the titles itself.
+    """
+    comment, stated = (0, ''), ''
+    for above, line in enumerate(iter(text.readline, '')):
+        delimiter = _STATED_DELIMITER.fullmatch(line)
+        if delimiter:
+            stated = delimiter[1]
+        elif line.startswith('#'):
+            comment = above, line
+        elif line.strip():
+            numbers = any(is_number(cell.strip('" \r\n')) for cell in re.split('[,;\t]', line))
+            return (*(comment if comment[1] and numbers else (above, line)), stated)
+    return (*comment, stated)
 
 
 def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:

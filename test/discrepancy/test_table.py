@@ -69,7 +69,7 @@ def test_reads_numbers_gaps_and_extra_columns(tmp_path):
         (HEADER.replace(',', ';'), ('line 2', "separated by ';', the cells are not")),
         (HEADER.replace(',', '|'), ('line 1', "separated by '|'", 'commas')),
         ('Rig test 12\n' + HEADER, ('line 1', 'stand in line 2', 'delete')),
-        (HEADER + '\n-,N,m,N,N m', ('line 2', 'no numbers', 'delete')),
+        (HEADER + '\n-,Newton,low,a,b', ('line 2', 'no numbers', 'delete')),
         ('PK\x03\x04', ('not text', 'CSV')),
     ],
 )
@@ -82,12 +82,22 @@ def test_columns_misspelt_or_missing(tmp_path, header, parts):
     assert all(part in message for part in parts), message
 
 
-@pytest.mark.parametrize('encoding', ['utf-16', 'utf-16-be'])
-def test_a_spreadsheets_unicode_text_is_told_with_its_own_cure(tmp_path, encoding):
-    path = tmp_path / 'table.csv'
-    path.write_bytes(('\ufeff' * (encoding != 'utf-16') + HEADER + '\n').encode(encoding))
-    with pytest.raises(UserError, match='iconv -f utf-16 -t utf-8'):
-        read_table(path)
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-16-le', 'utf-16-be'])
+def test_an_export_of_a_laboratory_is_read(tmp_path, encoding):
+    """Comments above the titles, a row of units below; of comments alone the last is titles."""
+    plain, body = read_table(write(tmp_path, '\n'.join([HEADER, *lines()]))), '\n'.join(lines())
+    for above, line, factor in (
+        (f'# wheel of 8" width, bed 3\n\n{HEADER}\n-,N,[mm],N,Nm', 5, 1e-3),
+        (f'# from numpy, savetxt\n# {HEADER}', 3, 1.0),
+    ):
+        path = tmp_path / 'export.csv'
+        path.write_bytes(f'\ufeff{above}\n{body}\n'.encode(encoding))
+        found = read_table(path)
+        np.testing.assert_allclose(found.measured, plain.measured * [factor, 1, 1, 1])
+        assert found.lines[0] == line
+    with pytest.raises(UserError, match="line 2: 'm' below 'sinkage_mm'; correct one"):
+        titles = HEADER.replace('sinkage', 'sinkage_mm')
+        read_table(write(tmp_path, '\n'.join([titles, '-,N,m,N,Nm', *lines()])))
 
 
 def test_capitals_units_and_semicolons_are_read_with_a_note(tmp_path):

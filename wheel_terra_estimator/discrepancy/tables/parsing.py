@@ -9,13 +9,14 @@ import re
 from array import array
 from collections.abc import Iterable, Sequence
 from datetime import datetime, timezone
-from itertools import chain, islice
+from itertools import chain, islice, zip_longest
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
+from wheel_terra_estimator.configuration.column_map import factor, is_unit
 from wheel_terra_estimator.csv_file import (
     CsvFile,
     check_width,
@@ -25,7 +26,14 @@ from wheel_terra_estimator.csv_file import (
     value_of,
 )
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
-from wheel_terra_estimator.discrepancy.tables.header import Choice, Header, meaning_of, with_unit
+from wheel_terra_estimator.discrepancy.tables.header import (
+    Choice,
+    Header,
+    Title,
+    meaning_of,
+    unit_of,
+    with_unit,
+)
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     COLUMNS,
     ONE_OF,
@@ -47,12 +55,12 @@ _TITLE_LINES = 20
 
 
 def read_table(path: str | Path, choice: Choice | None = None) -> SteadyTable:
-    """Read and check a CSV file (header row, UTF-8).
+    """Read and check a CSV file (header row, Unicode).
 
-    Capital letters, names of the field, units beside a name, and decimal commas where cells are
-    separated otherwise are read, with a note. ``choice`` says which columns are used and which are
-    not, where the titles do not. Raises UserError for everything that makes the table unusable: one
-    line with file, row and remedy.
+    Capital letters, names of the field, units beside or below a name, and decimal commas where
+    cells are separated otherwise are read, with a note. ``choice`` says which columns are used and
+    which are not, where the titles do not. Raises UserError for everything that makes the table
+    unusable: one line with file, row and remedy.
     """
     lines, values, notes = read_columns(Path(path), choice or Choice(), one_of=ONE_OF)
     return check_table(str(path), values, lines, notes)
@@ -76,7 +84,8 @@ def read_columns(
             )
         first = list(islice(file.rows, _TITLE_LINES))
         _check_layout(file, first)
-        header = Header(f'{path}, line {file.line}', file.header, choice, wanted)
+        titles = _with_row_of_units(file, first, choice.ignored)
+        header = Header(f'{path}, line {file.line}', titles, choice, wanted)
         header.check(REQUIRED, one_of)
         rows = chain(first, file.rows)
         lines, values = _read_rows(str(path), header, rows, file.decimal_comma)
@@ -131,6 +140,29 @@ def _check_layout(file: CsvFile, rows: Sequence[tuple[int, list[str]]]) -> None:
                 f'{file.path}, line {line}: one cell but {len(header)} columns; the column names '
                 f'are separated by {file.delimiter!r}, the cells are not'
             )
+
+
+def _with_row_of_units(
+    file: CsvFile, rows: list[tuple[int, list[str]]], ignored: Sequence[str]
+) -> list[str]:
+    """Return the titles with the units that a row below them has; take that out of ``rows``."""
+    line, cells = rows[0] if rows else (0, [])
+    units = [cell.strip('[]()') for cell in cells]
+    if any(is_number(cell, decimal_comma=True) for cell in cells) or not any(
+        is_unit(unit) and unit != '-' for unit in units
+    ):
+        return file.header
+    del rows[0]
+    titles = []
+    for title, unit in zip_longest(file.header, units[: len(file.header)], fillvalue=''):
+        said = meaning_of(title) or Title('')
+        if said.unit and unit:
+            si = unit_of(said.name)
+            if factor(si, said.unit) != factor(si, unit):
+                raise UserError(f'{file.path}, line {line}: {unit!r} below {title!r}; correct one')
+        plain = said.unit or not (title and unit) or title in ignored
+        titles.append(title if plain else f'{title} [{unit}]')
+    return titles
 
 
 def _read_rows(
