@@ -259,8 +259,9 @@ def configuration_of(
     gravity: float,
 ) -> Configuration:
     """Return the parameters that say the same as these objects."""
-    check_kind(wheel, Wheel, 'wheel', 'Wheel(radius=0.13, width=0.16)')
-    check_kind(soil, terramechanics_soil.Soil, 'soil', "Soil.load('dlr_mss')")
+    of_files = "(of files: use Model.load('hit_wh3', 'hit_fit'))"
+    check_kind(wheel, Wheel, 'wheel', f'Wheel(radius=0.13, width=0.16) {of_files}')
+    check_kind(soil, terramechanics_soil.Soil, 'soil', f"Soil.load('dlr_mss') {of_files}")
     check_kind(effects, Mapping, 'effects', "{'lug_digging': {}} or {'lug_digging': {'kd': 1.0}}")
     for name, settings in effects.items():
         check_kind(settings, Mapping, f'effect {name}', 'its parameters, {} for the usual values')
