@@ -340,17 +340,18 @@ def test_repeats_give_the_noise():
             'torque': 3.0 + slip + 0.05 * rng.standard_normal(40),
         },
     )
-    std, freedom = noise.repeats(table, 2)
+    one = np.zeros(40)
+    std, freedom = noise.repeats(table, 2, one)
     assert freedom == 32
     assert std == pytest.approx(0.05, rel=0.3)
     wild = table.measured.copy()
     wild[7, 2] += 5.0
-    assert noise.repeats(replace(table, measured=wild), 2)[0] < 1.6 * std
-    found = noise.stated_noise(table, np.ones(len(QUANTITIES)))
+    assert noise.repeats(replace(table, measured=wild), 2, one)[0] < 1.6 * std
+    found = noise.stated_noise(table, np.ones(len(QUANTITIES)), one)
     assert found.origin == {'torque': 'repeats'} and found.repeatability == {'torque': (std, 32)}
     for stated, notes in ((0.02, 1), (0.05, 0), (0.2, 1)):
         given = replace(table, stated_std=np.full_like(table.stated_std, stated))
-        said = _repeatability(noise.stated_noise(given, np.ones(len(QUANTITIES))))
+        said = _repeatability(noise.stated_noise(given, np.ones(len(QUANTITIES)), one))
         assert len(said) == notes and all('scatter by' in text for text in said)
 
 

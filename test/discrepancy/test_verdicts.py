@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_workflow import make, run
+from test_workflow import make, noisy, run
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
@@ -100,6 +100,14 @@ def test_beds_that_differ_from_sweep_to_sweep_are_no_effect():
     assert (found.verdict, found.effects) == ('agrees', ())
     assert 'fresh bed' in found.next_measurement[0].what
     assert any('beds differ' in note for note in found.notes)
+    # Two trials at the same points: what another bed adds is no noise.
+    first, values, soil, rows = make('basic16', stds=False, seed=5)
+    stiff = solve(rows, replace(soil, frictional_modulus=1.25 * soil.frictional_modulus))
+    second = noisy(rows, solve(rows, soil), stiff, np.random.default_rng(9))
+    trials = {key: np.r_[column, second[key]] for key, column in first.items()}
+    found = run({**trials, 'trial': np.repeat([1.0, 2.0], 16)}, values)
+    assert found.verdict == 'agrees'
+    assert found.noise.std[0, 0] == pytest.approx(second['sinkage_std'][0], rel=0.4)
     repeated = SimpleNamespace(columns={'trial': rows['slip']}, varying=lambda: ('normal_load',))
     (again,) = words.fresh_bed(0.5, repeated)
     assert again.what.startswith('the sweeps of least and greatest normal load again')
@@ -159,6 +167,8 @@ def test_two_tables_with_other_lugs_share_one_soil_and_tell_more():
     assert found.gap['sinkage'].after == pytest.approx(whole.gap['sinkage'].after, rel=0.05)
     assert any('2 tables share one soil' in note for note in found.notes)
     assert together(parts[:1]) is parts[0]
+    copied = together([*parts, parts[0]])
+    assert len(copied) == len(both) and any('counted once' in note for note in copied.notes)
 
 
 def test_a_name_leaves_room_for_an_effect_that_looks_like_it_and_was_not_tried():

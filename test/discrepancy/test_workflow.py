@@ -368,6 +368,19 @@ def test_reference_cancels_a_common_structural_error():
     assert [effect.name for effect in diagnosis.effects] == ['drivetrain_friction']
     assert len(diagnosis.curves.after) == len(table['slip'])
     assert diagnosis.gap['torque'].after < diagnosis.gap['torque'].refit
+    # Rows of the table do not repeat those of the reference: what the friction adds is no noise.
+    plain = [{k: v for k, v in t.items() if not k.endswith('_std')} for t in (table, reference)]
+    options['reference'] = check_table('a.csv', plain[1])
+    found = run(plain[0], values, **options)
+    assert [effect.name for effect in found.effects] == ['drivetrain_friction']
+    assert found.noise.std[0, 2] == pytest.approx(table['torque_std'][0], rel=0.4)
+    # Rows that stand in both are of the reference.
+    both = {key: np.r_[plain[1][key], column] for key, column in plain[0].items()}
+    again = run(both, values, **options)
+    assert again.effects == found.effects
+    assert any('16 rows are exact copies' in note for note in again.notes)
+    with pytest.raises(UserError, match=r't.csv: 16 rows are exact copies of rows of a.csv'):
+        run(plain[1], values, **options)
 
 
 @pytest.mark.slow

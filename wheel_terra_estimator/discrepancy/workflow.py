@@ -75,7 +75,9 @@ def diagnose(
     """
     started = time.perf_counter()
     chosen = options or Options()
-    both, active = (table, None) if reference is None else join(table, reference)
+    both, active = table, None
+    if reference is not None:
+        table, both, active = join(table, reference)
     points = operating_points(both.columns, configuration, both.name)
     wheels, stated = configuration.wheels, configuration.stated
     check_wheel_of_model(

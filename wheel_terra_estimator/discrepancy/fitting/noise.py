@@ -38,8 +38,11 @@ _UNSEEN, _UNSEEN_NOISE = 4.0, 0.02
 _CLEARLY = 3.0  # nats by which noise of another shape must be more likely
 
 
-def stated_noise(table: SteadyTable, scale: FloatArray) -> Noise:
-    """Return the stated deviations, those from repeats, and a first guess for the rest."""
+def stated_noise(table: SteadyTable, scale: FloatArray, apart: FloatArray) -> Noise:
+    """Return the stated deviations, those from repeats, and a first guess for the rest.
+
+    ``apart``: (N,) rows of other numbers do not repeat one another (another bed, a reference).
+    """
     std = table.stated_std.copy()
     origin: dict[str, str] = {}
     repeatability: dict[str, tuple[float, int]] = {}
@@ -47,7 +50,7 @@ def stated_noise(table: SteadyTable, scale: FloatArray) -> Noise:
         here = np.isfinite(table.measured[:, q])
         if not here.any():
             continue
-        pooled, count = repeats(table, q)
+        pooled, count = repeats(table, q, apart)
         if count:
             repeatability[quantity] = pooled, count
         stated = here & np.isfinite(std[:, q])
@@ -65,10 +68,10 @@ def stated_noise(table: SteadyTable, scale: FloatArray) -> Noise:
     return Noise(std, origin, repeatability)
 
 
-def repeats(table: SteadyTable, quantity: int) -> tuple[float, int]:
+def repeats(table: SteadyTable, quantity: int, apart: FloatArray) -> tuple[float, int]:
     """Return the pooled deviation of rows with equal inputs, and its degrees of freedom."""
     inputs = [values for name, values in table.columns.items() if name in INPUT_UNITS]
-    keys = np.round(np.nan_to_num(np.column_stack(inputs)), 9)
+    keys = np.round(np.nan_to_num(np.column_stack([*inputs, apart])), 9)
     _, group = np.unique(keys, axis=0, return_inverse=True)
     group = np.ravel(group)
     values = table.measured[:, quantity]

@@ -126,6 +126,7 @@ def build_problem(
     # Errors of inputs (slip, leaving angle), common to the quantities of a row
     common: Sequence[CommonError] = (),
     moved: FloatArray | None = None,  # (N, 4) by which readings and what is wanted differ
+    group: FloatArray | None = None,  # (N,) rows of other numbers share no structural error
 ) -> Problem:
     """Return the problem of an (N, 4) table."""
     row, quantity = np.nonzero(np.isfinite(measured))
@@ -135,6 +136,8 @@ def build_problem(
         apart |= (row == r) & (quantity == q)
     deviation[apart] *= OUTLIER_FACTOR
     correlation = kernel(inputs)
+    if group is not None:
+        correlation = correlation * (group[:, None] == group[None, :])
     m = len(row)
     if not common:
         rotation, roughness = np.zeros((m, m)), np.empty(m)

@@ -89,7 +89,7 @@ def search(
 ) -> Findings:
     """Find noise, outliers and the weights of all explanations by effects that may be named."""
     builder = _Builder(table, forward, nuisance)
-    noise = noises.stated_noise(table, builder.scale)
+    noise = noises.stated_noise(table, builder.scale, builder.apart)
     problem, nothing = builder.fit_nothing(noise.std, (), None)
     for each in () if beds is None else (beds, beds):  # one bed may end far from where several do
         builder.part_beds(each, problem, nothing)
@@ -102,9 +102,10 @@ def search(
             'leaving_angle', nothing.coordinates, nothing.u, nothing.angle
         )
     noise = builder.estimate(noise, nothing, ())
+    _, nothing = builder.fit_nothing(noise.std, (), nothing)
     # A smooth misfit of any size is allowed here, so that an effect does not look like outliers.
-    problem, nothing = builder.fit_nothing(noise.std, (), nothing)
-    outliers = find_outliers(problem, nothing, _FLEXIBLE, builder.narrow)
+    free = builder.build(noise.std, (), free=True)
+    outliers = find_outliers(free, nothing, _FLEXIBLE, builder.narrow)
     if outliers:
         noise = builder.estimate(noise, nothing, outliers)
     lug_height = np.broadcast_to(forward.points.wheel.lug_height, (len(table),))
@@ -249,6 +250,9 @@ class _Builder:
         self.by_slip: FloatArray | None = None
         self.by_angle: FloatArray | None = None
         self.by_bed: list[CommonError] = []
+        # What differs between trials, each on its bed, or from a reference is no noise.
+        trials = np.zeros(len(table)) if table.sweeps() is None else table.trials()
+        self.apart = trials if forward.active is None else 2.0 * trials + forward.active
         self._moved: FloatArray | None = None
         # Rows share a reading of the slip that is equal to the last digit and no set value.
         slip = table.columns['slip']
@@ -293,8 +297,8 @@ class _Builder:
                 scatter = np.full(len(self.table), BED_SCATTER[c.name])
                 self.by_bed.append(CommonError(slope, scatter, beds))
 
-    def build(self, std: FloatArray, outliers: Outliers) -> Problem:
-        """Return the problem without some cells."""
+    def build(self, std: FloatArray, outliers: Outliers, *, free: bool = False) -> Problem:
+        """Return the problem without some cells; ``free``: trials share no structural error."""
         common = list(self.by_bed)
         if self.by_slip is not None:
             common.append(CommonError(self.by_slip, self.table.slip_std, self._group))
@@ -303,7 +307,14 @@ class _Builder:
             common.append(CommonError(self.by_angle, self.table.leaving_angle_std, rows))
         rejected = [(row, quantity) for row, quantity, _ in outliers]
         return build_problem(
-            self.table.measured, std, self.inputs, self.scale, rejected, common, self._moved
+            self.table.measured,
+            std,
+            self.inputs,
+            self.scale,
+            rejected,
+            common,
+            self._moved,
+            self.apart if free else None,
         )
 
     def fit_nothing(
@@ -320,4 +331,6 @@ class _Builder:
         """Estimate the noise that was not stated: alike in all rows, or a share of the load."""
         load = self.table.columns['normal_load']
         shapes = np.ones(len(load)), load / np.sqrt(np.mean(load**2))
-        return noises.estimate_noise(noise, fitted, shapes, lambda std: self.build(std, outliers))
+        return noises.estimate_noise(
+            noise, fitted, shapes, lambda std: self.build(std, outliers, free=True)
+        )

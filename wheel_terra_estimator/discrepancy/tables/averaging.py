@@ -18,6 +18,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
     SteadyTable,
     concatenated,
+    new_rows,
 )
 from wheel_terra_estimator.errors import UserError
 
@@ -79,19 +80,26 @@ def together(tables: Sequence[SteadyTable]) -> SteadyTable:
     if len(tables) == 1:
         return tables[0]
     share = MOST_ROWS // len(tables)
-    parts = [averaged(t, share) if len(t) > share else t for t in tables]
+    parts: list[SteadyTable] = []
+    copied = []
+    for part in tables:
+        part, copies = new_rows(averaged(part, share) if len(part) > share else part, parts)
+        parts.append(part)
+        copied += [f'{copies} and were counted once'] if copies else []
     listed = ', '.join(f'{part.name} ({len(part)} rows)' for part in parts)
     notes = (
         f'{len(parts)} tables share one soil: {listed}; a line number is that of its own table',
+        *copied,
         *dict.fromkeys(f'{part.name}: {note}' for part in parts for note in part.notes),
     )
     return concatenated(' + '.join(part.name for part in parts), parts, notes)
 
 
-def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, BoolArray]:
-    """Return both tables as one, and which rows candidate effects act on.
+def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, SteadyTable, BoolArray]:
+    """Return the table less the rows of the reference, both as one, and which are not reference.
 
-    Raises UserError if the two share no measured quantity, or only one of them states a column.
+    Raises UserError if the two share no measured quantity, only one of them states a column, or the
+    table has no row of its own.
     """
     if not set(table.quantities) & set(reference.quantities):
         raise UserError(
@@ -104,9 +112,13 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, BoolA
             raise UserError(
                 f'{lacks.name}: no column {column!r}, which {has.name} has; state it in both'
             )
+    table, copies = new_rows(table, [reference])
+    if not len(table):
+        raise UserError(f'{copies}; add rows that may have the effect, or leave --reference out')
     notes = (*table.notes, f'{len(reference)} rows of {reference.name} as reference')
+    notes = (*notes, f'{copies} and were taken for reference only') if copies else notes
     joined = concatenated(table.name, (table, reference), notes)
-    return joined, np.arange(len(joined)) < len(table)
+    return table, joined, np.arange(len(joined)) < len(table)
 
 
 def _halved(scaled: FloatArray, cells: list[IndexArray], most: int) -> list[IndexArray]:

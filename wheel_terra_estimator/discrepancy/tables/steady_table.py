@@ -86,11 +86,13 @@ class SteadyTable:
         """
         inputs = zip(self.varying(), self.scaled_inputs().T, strict=True)
         keys = [column for name, column in inputs if name not in ON_ONE_BED]
-        if 'trial' in self.columns:
-            keys.append(np.nan_to_num(self.columns['trial']))
-        levels = np.column_stack([np.zeros(len(self)), *map(_level, keys)])
+        levels = np.column_stack([self.trials(), *map(_level, keys)])
         sweep = np.ravel(np.unique(levels, axis=0, return_inverse=True)[1])
         return sweep if 0 < sweep.max() < len(self) / _LEAST_ROWS else None
+
+    def trials(self) -> FloatArray:
+        """(N,) number of the trial of each row: each has a bed of its own; all 0 if not stated."""
+        return _level(np.nan_to_num(self.columns.get('trial', np.zeros(len(self)))))
 
     def scaled_inputs(self) -> FloatArray:
         """(N, d) varying inputs, each scaled to a range of 1; what is not stated at its mean."""
@@ -112,6 +114,23 @@ class SteadyTable:
             columns={name: values[rows] for name, values in self.columns.items()},
             **{name: getattr(self, name)[rows] for name in _BY_ROW},
         )
+
+
+def new_rows(table: SteadyTable, earlier: Sequence[SteadyTable]) -> tuple[SteadyTable, str]:
+    """Return the table without what is copied from earlier ones, and what is to be said of it.
+
+    A copy has all inputs and readings alike: a repeated measurement would scatter.
+    """
+
+    def rows(part: SteadyTable) -> list[tuple[float, ...]]:
+        stated = [part.columns.get(key, np.full(len(part), np.nan)) for key in INPUT_UNITS]
+        return list(map(tuple, np.nan_to_num([*stated, *part.measured.T], nan=np.inf).T.tolist()))
+
+    known = {row for part in earlier for row in rows(part)}
+    kept = np.array([row not in known for row in rows(table)])
+    names = ', '.join(part.name for part in earlier)
+    copies = f'{table.name}: {np.sum(~kept)} rows are exact copies of rows of {names}'
+    return (table, '') if kept.all() else (table.select(kept), copies)
 
 
 def _level(values: FloatArray) -> FloatArray:
