@@ -11,7 +11,9 @@ from scipy.integrate import quad
 from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, second_model, state
 
 from wheel_terra_estimator.terramechanics import quadrature
+from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import METHODS, WheelSoilModel
+from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS, Terms, build_contact
 
 FLANK = {'side_bulldozing': {'ks': 0.8}}
 
@@ -57,6 +59,21 @@ def test_reverse_slides_to_the_same_side():
     backward = state([0.3], slip_angle=math.pi - 0.4, angular_velocity=-1.0)
     assert backward.drawbar_pull == pytest.approx(-forward.drawbar_pull)
     assert backward.lateral_force == pytest.approx(forward.lateral_force)
+
+
+def test_no_effect_turns_the_slip_angle():
+    at = points([0.1, -0.3], slip_angle=0.2, angular_velocity=0.5)
+    numbers = {name: getattr(SAND, name) for name in SOIL_NUMBERS}
+    for name, effect in catalogue().items():
+        usual = {p.name: p.default for p in effect.parameters}
+        for radius in ('lug_tip', 'shear'):
+            terms = Terms({} if effect.sparse else {name: usual})
+            contact = build_contact(replace(at, slip_radius=radius), numbers, 'bekker', terms)
+            assert np.arctan2(*contact.heading()[::-1]) == pytest.approx(0.2), name
+    # A misread slip: as at the true one.
+    biased = state([0.1], slip_angle=0.2, effects={'wheel_radius_bias': {'bias': 0.1}})
+    true = state([1.0 - 0.9 / 1.1], slip_angle=0.2)
+    assert biased.lateral_force == pytest.approx(true.lateral_force)
 
 
 @pytest.mark.parametrize('method', ['quadrature', 'closed_form'])

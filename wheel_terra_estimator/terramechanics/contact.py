@@ -85,6 +85,12 @@ class Contact(Generic[Q]):
         """Whether no wheel slides sideways: lateral force is zero and need not be worked out."""
         return isinstance(self.lateral_ratio, float) and self.lateral_ratio == 0.0
 
+    def scale_speed(self, factor: Any) -> None:
+        """Multiply v/w, along the wheel and across it: the slip angle stays."""
+        self.velocity_ratio = self.velocity_ratio * factor
+        if not self.straight:
+            self.lateral_ratio = self.lateral_ratio * factor
+
     def heading(self) -> tuple[Quantity, Quantity]:
         """Cosine and sine (positive left) of the slip angle, from the two speeds of the hub [-]."""
         if self.straight:

@@ -105,7 +105,7 @@ def build_contact(
     contact.lateral_ratio = _lateral_ratio(points, contact)
     terms.apply('on_inputs', contact)
     if points.slip_radius == 'shear':
-        contact.velocity_ratio = contact.velocity_ratio / contact.radius * contact.shear_radius
+        contact.scale_speed(contact.shear_radius / contact.radius)
     return contact
 
 

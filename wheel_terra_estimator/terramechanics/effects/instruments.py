@@ -194,7 +194,7 @@ DRIVETRAIN_FRICTION = Effect(
 
 def _bias(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     scale = 1.0 + p.bias
-    contact.velocity_ratio = contact.velocity_ratio / scale
+    contact.scale_speed(1.0 / scale)
     ratio = speed_ratio(contact.slip) / scale
     contact.slip = slip_of_speed_ratio(ratio)
 

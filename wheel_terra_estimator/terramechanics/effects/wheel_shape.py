@@ -60,7 +60,7 @@ def _flatten(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.radius = contact.radius * flatter
     # The belt runs at the rim's speed along a longer contact: j and its force grow alike.
     contact.shear_radius = contact.shear_radius * flatter
-    contact.velocity_ratio = contact.velocity_ratio * flatter
+    contact.scale_speed(flatter)
 
 
 def _arm(contact: Contact[Quantity], p: SimpleNamespace) -> None:
