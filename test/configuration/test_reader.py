@@ -290,6 +290,11 @@ def test_later_files_win_key_by_key_and_overrides_last(tmp_path):
     c = reader.load(['frostyboy', two, one], ['rover.mass:=7', 'soil.frictional_modulus:=1.8e6'])
     assert (c.rover.mass, c.soil.frictional_modulus) == (7.0, 1.8e6)
     assert 'rover.mass' in c.stated and 'rover.load_shares' not in c.stated
+    number, switch = 'effects.lug_digging.kd', 'effects.lug_digging.enabled'
+    with pytest.warns(ConfigurationWarning, match=f'{number}: changes nothing .* {switch}:=true'):
+        reader.load(['frostyboy'], [f'{number}:=2.0'])
+    three = parameter_file(tmp_path, 'three.yaml', f'{number}: 2.0')
+    reader.load(['frostyboy', three], [f'{switch}:=false', f'{number}:=1.0'])
 
 
 @pytest.mark.parametrize('override', ['rover.mass', 'rover.mass=3', ':=3', 'rover.mass:='])

@@ -251,6 +251,8 @@ class Model:
         for values in product(*choices):
             changes = dict(zip(keys, values, strict=True))
             model = Model.of(self.configuration.replace(changes), method=self._model.method)
+            if not found:
+                reader.warn_of_idle(list(keys), model.configuration)
             answer = model.curve(*points).columns()
             for name, column in {**changes, **answer}.items():
                 found.setdefault(name, []).append(np.broadcast_to(column, points[0].shape))

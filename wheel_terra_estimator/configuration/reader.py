@@ -62,7 +62,19 @@ def load(
             if key == 'effect_file' and value:
                 value = str(path.parent / str(value))
             sourced.append((key, str(path), value))
-    return _checked([*sourced, *_assigned(overrides)], complete, allow_effect_files)
+    return _overridden(sourced, overrides, complete, allow_effect_files)
+
+
+def _overridden(
+    sourced: list[tuple[str, str, Any]],
+    overrides: Sequence[str],
+    complete: bool,
+    allow_effect_files: bool,
+) -> Configuration:
+    assigned = list(_assigned(overrides))
+    configuration = _checked([*sourced, *assigned], complete, allow_effect_files)
+    warn_of_idle([key for key, _, _ in assigned], configuration)
+    return configuration
 
 
 def _assigned(overrides: Iterable[str]) -> Iterator[tuple[str, str, Value]]:
@@ -72,6 +84,15 @@ def _assigned(overrides: Iterable[str]) -> Iterator[tuple[str, str, Value]]:
         if not separator or not key.strip():
             raise UserError(f"-p {override}: must be NAME:=VALUE, such as 'rover.mass:=120.0'")
         yield key.strip(), f'-p {override}', ros_yaml.parse_value(text, f'-p {override}')
+
+
+def warn_of_idle(given: Sequence[str], configuration: Configuration) -> None:
+    """Warn of parameters, given one by one, of effects that are off: nothing reads them."""
+    for key in given:
+        section, _, name = key.rpartition('.')[0].partition('.')
+        switch = f'{section}.{name}.enabled'
+        if section == 'effects' and name not in configuration.effects and switch not in given:
+            _warn(f'{key}: changes nothing while the effect is off; add {switch}:=true')
 
 
 def files_behind(name: str | Path) -> list[Path]:
@@ -99,7 +120,7 @@ def from_parameters(
         (key, source, value.tolist() if hasattr(value, 'tolist') else value)
         for key, value in parameters.items()
     ]
-    return _checked([*sourced, *_assigned(overrides)], complete, True)
+    return _overridden(sourced, overrides, complete, True)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
