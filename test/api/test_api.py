@@ -322,7 +322,8 @@ def test_units_go_with_frames(drive):
     frame.attrs['units']['sinkage'] = 'mm'
     frame['Fx'] = -frame.pop('drawbar_pull') / 1000.0
     frame.attrs['units']['Fx'] = 'kN'
-    other = api.diagnose(frame, model, effects=[], columns={'drawbar_pull': '-Fx'})
+    other = api.diagnose(frame, model, effects='cohesion', columns={'drawbar_pull': '-Fx'})
+    assert 'cohesion' not in other.not_tried
     for name, column in plain.table.columns.items():
         np.testing.assert_allclose(other.table.columns[name], column)
     frame.attrs['units'] = {'sinkag': 'mm'}
@@ -382,6 +383,10 @@ def test_a_sweep_is_the_curves_of_its_models():
             np.testing.assert_allclose(rows['torque'][kept], curve.torque, rtol=1e-9)
     one = model.sweep(**grid, parameters={'soil.friction_angle_deg': 35.0}, as_frame=False)
     np.testing.assert_array_equal(one['torque'], rows['torque'][6:])
+    number, switch = 'effects.hard_layer.depth', 'effects.hard_layer.enabled'
+    with pytest.warns(api.ConfigurationWarning, match=f'{number}: changes nothing .* {switch}'):
+        model.sweep(**grid, parameters={number: [0.01, 0.02]}, as_frame=False)
+    model.sweep(**grid, parameters={switch: [False, True], number: [0.01]}, as_frame=False)
 
 
 def test_without_pandas_it_says_so(monkeypatch):

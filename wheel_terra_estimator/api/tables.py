@@ -28,7 +28,7 @@ def diagnose(
     model: Model | Configuration | str | Path | Sequence[str | Path],
     *,
     reference: Any = None,
-    effects: Sequence[str] | None = None,
+    effects: str | Sequence[str] | None = None,
     remaps: Mapping[str, str] | None = None,
     smooth: bool = False,
     columns: Mapping[str, Any] | str | Path | None = None,
@@ -49,7 +49,7 @@ def diagnose(
     reference : DataFrame, mapping or path, optional
         Measurements in which the effect in question is absent; fitted first, so that structural
         error common to both cancels.
-    effects : sequence of str, optional
+    effects : str or sequence of str, optional
         Effects that may be named; default: all of the catalogue. None at all (``[]``) fits the soil
         alone, as ``Soil.fit`` does.
     remaps : mapping, optional
@@ -81,7 +81,8 @@ def diagnose(
     before = None
     if reference is not None:
         before = _table(reference, 'reference', configuration, remaps or {}, smooth, choice)
-    options = Options(tuple(effects) if effects is not None else None)
+    named = [effects] if isinstance(effects, str) else effects
+    options = Options(None if named is None else tuple(named))
     return run(table, configuration, before, options)
 
 
