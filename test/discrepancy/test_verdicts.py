@@ -203,15 +203,17 @@ def test_a_patchwork_of_doubtful_names_is_not_given(monkeypatch):
         ('sinkage', 10.0, 'mm in place of cm'),
         ('sinkage', 0.1, 'cm in place of mm'),
         ('torque', 0.1, 'kgf m in place of N m'),
+        ('normal_load', 1.0 / 4.4482216, 'lbf in place of N'),
+        ('normal_load', 2.0, 'of one wheel or of a pair?'),
     ],
 )
 def test_a_wrong_unit_is_said_before_any_effect(column, factor, units):
     campaign = make_campaign(92_510_001, 'sweep40', Plan(hide='none'))
-    for name in (column, f'{column}_std'):
+    for name in {column, f'{column}_std'} & campaign.table.keys():
         campaign.table[name] = factor * campaign.table[name]
     found = diagnose_campaign(campaign)
     assert found.verdict == 'unexplained'
     assert not found.effects
     assert not found.proposal
     assert list(found.misread) == [column]
-    assert f'The unit of {column} looks wrong ({units})' in found.sentence
+    assert f'The unit of {column.replace("_", " ")} looks wrong ({units})' in found.sentence

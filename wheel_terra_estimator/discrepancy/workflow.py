@@ -21,8 +21,9 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
-from wheel_terra_estimator.discrepancy.selection.search import search
-from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
+from wheel_terra_estimator.discrepancy.selection.search import Findings, search
+from wheel_terra_estimator.discrepancy.selection.verdict import choose
+from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors, weigh
 from wheel_terra_estimator.discrepancy.tables.averaging import join
 from wheel_terra_estimator.discrepancy.tables.checks import (
     check_against_wheel,
@@ -40,6 +41,8 @@ from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 _CLEARLY_MISREAD = 10.0  # nats by which another unit must explain the rows better
+# Factors by which loads may be off: of a pair of wheels, or one of it; units of force read as N.
+_LOADS = (0.5, 2.0, *(f**s for f in (9.80665, 4.4482216) for s in (-1, 1)))
 _UNLIKELY = 0.05  # odds of beds that differ, below which nothing is said of them
 _BEDS_DIFFER = 0.2  # prior probability, where every sweep has a bed of its own; assumed
 
@@ -111,6 +114,8 @@ def diagnose(
         gain = scaled.selection.best + cells * math.log(times) - findings.selection.best
         if gain > _CLEARLY_MISREAD:
             misread[quantity] = times
+    if misread or choose(findings.selection, findings.setting.problem).status != 'agrees':
+        misread = _load_misread(findings) or misread
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
     if sweeps is not None and decision.verdict.status != 'agrees':
@@ -143,6 +148,20 @@ def diagnose(
     seconds = time.perf_counter() - started
     notes = (*notes, *diagnosis.notes)
     return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
+
+
+def _load_misread(findings: Findings) -> dict[str, float]:
+    """Return by what the loads are off, where soil alone then agrees and beats any explanation."""
+    setting, best, found = findings.setting, findings.selection.best + _CLEARLY_MISREAD, {}
+    start = [np.zeros(len(setting.nuisance))]
+    for times in _LOADS:
+        points = setting.forward.points
+        points = replace(points, normal_load=times * points.normal_load)
+        other = replace(setting, forward=setting.forward.at(points))
+        alone = weigh([other.explain(fit) for fit in other.fit([()], start)], setting.floors, ())
+        if alone.best > best and choose(alone, setting.problem).status == 'agrees':
+            best, found = alone.best, {'normal_load': times}
+    return found
 
 
 def _effects_to_try(

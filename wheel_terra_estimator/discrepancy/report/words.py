@@ -43,12 +43,12 @@ from wheel_terra_estimator.discrepancy.selection.verdict import (
     Verdict,
     remainder,
 )
+from wheel_terra_estimator.discrepancy.tables.header import unit_of
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     ON_ONE_BED,
     QUANTITIES,
     SteadyTable,
 )
-from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS as QUANTITY_UNITS
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
@@ -297,14 +297,15 @@ def wrong_units(misread: Mapping[str, float]) -> str:
     """Return which columns look as if they had another unit than was said, and the remedy."""
     parts = []
     for name, times in misread.items():
-        units = UNITS[QUANTITY_UNITS[name]]
+        units = UNITS[unit_of(name)]
+        usual = ' (of one wheel or of a pair?)' if name == 'normal_load' else ''
         alike = (
             f' ({found} in place of {said})'
             for said, found in itertools.product(units, units)
             if abs(math.log(units[found] / units[said] / times)) < _SAME_FACTOR
         )
         parts.append(
-            f'the unit of {plain(name)} looks wrong{next(alike, "")}: times {times:g} the rows '
+            f'the unit of {plain(name)} looks wrong{next(alike, usual)}: times {times:g} the rows '
             'are explained far better than by any effect'
         )
     text = '; '.join(parts)

@@ -98,8 +98,7 @@ def together(tables: Sequence[SteadyTable]) -> SteadyTable:
 def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, SteadyTable, BoolArray]:
     """Return the table less the rows of the reference, both as one, and which are not reference.
 
-    Raises UserError if the two share no measured quantity, only one of them states a column, or the
-    table has no row of its own.
+    Raises UserError if the two share no measured quantity, or only one of them states a column.
     """
     if not set(table.quantities) & set(reference.quantities):
         raise UserError(
@@ -112,11 +111,12 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, Stead
             raise UserError(
                 f'{lacks.name}: no column {column!r}, which {has.name} has; state it in both'
             )
-    table, copies = new_rows(table, [reference])
-    if not len(table):
-        raise UserError(f'{copies}; add rows that may have the effect, or leave --reference out')
+    own, copies = new_rows(table, [reference])
     notes = (*table.notes, f'{len(reference)} rows of {reference.name} as reference')
-    notes = (*notes, f'{copies} and were taken for reference only') if copies else notes
+    if copies:
+        taken = 'were taken for reference only' if len(own) else 'no row is its own to differ'
+        notes = (*notes, f'{copies} and {taken}')
+    table = own if len(own) else table
     joined = concatenated(table.name, (table, reference), notes)
     return table, joined, np.arange(len(joined)) < len(table)
 
