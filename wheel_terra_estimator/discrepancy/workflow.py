@@ -114,7 +114,8 @@ def diagnose(
         gain = scaled.selection.best + cells * math.log(times) - findings.selection.best
         if gain > _CLEARLY_MISREAD:
             misread[quantity] = times
-    if misread or choose(findings.selection, findings.setting.problem).status != 'agrees':
+    verdict = choose(findings.selection, findings.setting.problem)
+    if chosen.effects is None and (misread or verdict.status != 'agrees'):
         misread = _load_misread(findings) or misread
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None

@@ -306,15 +306,9 @@ class _Builder:
             rows = np.arange(len(self.table), dtype=np.intp)
             common.append(CommonError(self.by_angle, self.table.leaving_angle_std, rows))
         rejected = [(row, quantity) for row, quantity, _ in outliers]
+        group = self.apart if free else None
         return build_problem(
-            self.table.measured,
-            std,
-            self.inputs,
-            self.scale,
-            rejected,
-            common,
-            self._moved,
-            self.apart if free else None,
+            self.table.measured, std, self.inputs, self.scale, rejected, common, self._moved, group
         )
 
     def fit_nothing(

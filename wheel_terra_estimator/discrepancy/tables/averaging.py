@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -81,15 +82,11 @@ def together(tables: Sequence[SteadyTable]) -> SteadyTable:
         return tables[0]
     share = MOST_ROWS // len(tables)
     parts: list[SteadyTable] = []
-    copied = []
     for part in tables:
-        part, copies = new_rows(averaged(part, share) if len(part) > share else part, parts)
-        parts.append(part)
-        copied += [f'{copies} and were counted once'] if copies else []
+        parts.append(new_rows(averaged(part, share) if len(part) > share else part, parts))
     listed = ', '.join(f'{part.name} ({len(part)} rows)' for part in parts)
     notes = (
         f'{len(parts)} tables share one soil: {listed}; a line number is that of its own table',
-        *copied,
         *dict.fromkeys(f'{part.name}: {note}' for part in parts for note in part.notes),
     )
     return concatenated(' + '.join(part.name for part in parts), parts, notes)
@@ -111,12 +108,9 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, Stead
             raise UserError(
                 f'{lacks.name}: no column {column!r}, which {has.name} has; state it in both'
             )
-    own, copies = new_rows(table, [reference])
+    own = new_rows(table, [reference])
+    table = own if len(own) else replace(table, notes=own.notes)
     notes = (*table.notes, f'{len(reference)} rows of {reference.name} as reference')
-    if copies:
-        taken = 'were taken for reference only' if len(own) else 'no row is its own to differ'
-        notes = (*notes, f'{copies} and {taken}')
-    table = own if len(own) else table
     joined = concatenated(table.name, (table, reference), notes)
     return table, joined, np.arange(len(joined)) < len(table)
 

@@ -116,23 +116,6 @@ class SteadyTable:
         )
 
 
-def new_rows(table: SteadyTable, earlier: Sequence[SteadyTable]) -> tuple[SteadyTable, str]:
-    """Return the table without what is copied from earlier ones, and what is to be said of it.
-
-    A copy has all inputs and readings alike: a repeated measurement would scatter.
-    """
-
-    def rows(part: SteadyTable) -> list[tuple[float, ...]]:
-        stated = [part.columns.get(key, np.full(len(part), np.nan)) for key in INPUT_UNITS]
-        return list(map(tuple, np.nan_to_num([*stated, *part.measured.T], nan=np.inf).T.tolist()))
-
-    known = {row for part in earlier for row in rows(part)}
-    kept = np.array([row not in known for row in rows(table)])
-    names = ', '.join(part.name for part in earlier)
-    copies = f'{table.name}: {np.sum(~kept)} rows are exact copies of rows of {names}'
-    return (table, '') if kept.all() else (table.select(kept), copies)
-
-
 def _level(values: FloatArray) -> FloatArray:
     """Return the place of each value among those that lie apart."""
     order, place = np.argsort(values), np.zeros(len(values))
@@ -156,6 +139,21 @@ def concatenated(name: str, parts: Sequence[SteadyTable], notes: tuple[str, ...]
         notes=notes,
         **{key: np.concatenate([getattr(part, key) for part in parts]) for key in _BY_ROW},
     )
+
+
+def new_rows(table: SteadyTable, earlier: Sequence[SteadyTable]) -> SteadyTable:
+    """Return the table without rows that have all inputs and readings of one of earlier tables."""
+    whole = concatenated(table.name, [*earlier, table], table.notes)
+    inputs = [values for key, values in whole.columns.items() if key in INPUT_UNITS]
+    cells = np.nan_to_num(np.column_stack([*inputs, whole.measured]), nan=np.inf)
+    rows = list(map(tuple, cells.tolist()))
+    known = set(rows[: -len(table)])
+    kept = np.array([row not in known for row in rows[-len(table) :]])
+    if kept.all():
+        return table
+    names = ', '.join(part.name for part in earlier)
+    note = f'{np.sum(~kept)} rows are exact copies of rows of {names} and tell nothing new'
+    return replace(table.select(kept), notes=(*table.notes, note))
 
 
 WHEEL = {
