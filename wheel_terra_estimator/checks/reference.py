@@ -13,7 +13,9 @@ from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import Outcome, untold
 from wheel_terra_estimator.checks.series import VelocitySeries
 from wheel_terra_estimator.checks.statistics import (
+    Estimate,
     bend_noise,
+    block_fit,
     integrated,
     lonely,
     moving_mean,
@@ -34,6 +36,8 @@ LEAST_STD = 1e-4  # standard deviation [m/s] that is proposed at least
 AHEAD = 0.3  # mean of the rims over the usual size of one, above which the rover goes ahead [-]
 CLEAR_HEADING = 1.0  # turn in which a frame of the world is told from one of the rover [rad]
 STEADY = 0.9  # length of the mean direction of a velocity that keeps to a frame [-]
+TURNED_SIGMAS, TURNED_STD = 4.0, math.radians(1.0)  # of the direction on straights, at least [rad]
+LEAST_STRAIGHT = 12  # velocities on the straight that tell their direction
 MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
 """Speed over that without slip of a rover that slips much, and error of the ratio without slip."""
 LEAST_UNIT_RATIO = 1.3  # speed over rim speed below which it may be the radius, not the unit [-]
@@ -103,7 +107,7 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
     """Find a velocity that is given in a world frame: it keeps its direction there."""
     rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
     moving = np.abs(rim) > 0.3 * np.quantile(np.abs(rim), 0.9)
-    if not _sideways(reference) or moving.sum() < LEAST_ROWS:
+    if moving.sum() < LEAST_ROWS:
         return [], evidence
     velocity = reference.velocity[:, 0] + 1j * reference.velocity[:, 1]
     direction = (velocity * np.sign(rim) / np.maximum(np.abs(velocity), 1e-9))[moving]
@@ -115,10 +119,11 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         mended = evidence.with_channel('reference', velocity=along)
         return [evidence.found('reference_world', 0.95)], mended
     if in_body < STEADY:
-        return [untold('mounting', 'reference_frame')], evidence
-    if not reference.points_aside:
-        return [], evidence
-    angle, told = float(np.angle(direction.mean())), float(np.ptp(psi)) > CLEAR_HEADING
+        return [untold('mounting', 'reference_frame')] * _sideways(reference), evidence
+    told, off = float(np.ptp(psi)) > CLEAR_HEADING, _off_straights(evidence, reference)
+    if off.sigmas_from(0.0) < TURNED_SIGMAS or not (told or reference.points_aside):
+        return [], evidence  # a rover that keeps its heading may slide aside on a cross slope
+    angle = off.value
     turned = velocity * np.exp(-1j * angle)
     mended = evidence.with_channel(
         'reference', velocity=np.column_stack([turned.real, turned.imag, 0.0 * rim])
@@ -126,6 +131,23 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
     rival = '' if told else ', or it is given in the world frame: drive a circle'
     sure, words = 0.9 if told else 0.5, {'angle': math.degrees(angle), 'rival': rival}
     return [evidence.found('reference_turned', sure, value=words['angle'], **words)], mended
+
+
+def _off_straights(evidence: Evidence, reference: VelocitySeries) -> Estimate:
+    """Return by which angle a velocity points off where the wheels roll on the straight [rad]."""
+    steered = np.tan(np.nan_to_num(evidence.steering))
+    wheels = np.nan_to_num(evidence.speed * (1.0 + 1j * steered)).mean(axis=1)
+    wheels, turn = (evidence.rim_at(reference.stamp, one) for one in (wheels, evidence.yaw))
+    rows = evidence.rim_at(reference.stamp, evidence.straight.astype(float)) > 0.99
+    if rows.sum() < LEAST_STRAIGHT:
+        return Estimate(0.0, math.inf)
+    velocity = (reference.velocity[:, 0] + 1j * reference.velocity[:, 1]) * np.conj(wheels)
+    velocity, turn = velocity[rows] / np.abs(wheels[rows]), turn[rows]
+    angle = float(np.angle(velocity.sum()))
+    velocity = velocity * np.exp(-1j * angle)
+    # A velocity of another place has its distance times the turn aside.
+    rest = block_fit(np.column_stack([velocity.real, turn]), velocity.imag)[0]
+    return Estimate(angle + rest.value, math.hypot(rest.std, TURNED_STD))
 
 
 def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[FloatArray, Mask]:
