@@ -37,8 +37,9 @@ LONGEST = {'imu': 2.0, 'reference': 3.0}  # greatest lag that is looked for [s]
 IN_A_DRIVE = 15.0  # length of a drive over the greatest lag that it tells [-]
 LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
-FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part with it, at most
-LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1}  # of chassis and filters [s]
+FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75, 'log time': 1.0}  # unlike part with it, at most
+LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, 'log time': 0.5}
+"""Deviation of a lag by chassis and filters; by log time the age of a velocity is not known [s]."""
 APART = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS, SHARP_SIGMAS = 4.0, 10.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]
@@ -160,7 +161,7 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
         off = ' and '.join(f'{late:+.2f} s' for late in told.halves)
         return untold('delay', 'drifts', topic=channel.topic, off=off)
     std = _whole_std(evidence, name, told)
-    against = told.by + told.trial.words('unlike part', '')
+    against = told.by + ('' if told.by == 'log time' else told.trial.words('unlike part', ''))
     told_of = of_offset(name, told.value, std, against, evidence.facts)
     return evidence.found(f'{name}_offset', 0.97, **told_of)
 
@@ -210,9 +211,17 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     slow = time.size < 2 or float(np.median(np.diff(at[order]))) > SLOWEST
     if slow or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return untold('delay', 'no_change')
-    told = lag_of(time - STEP, rim, at[order], forward, 'reference', 'speeds')  # means up to then
+    own, wheels = (float(np.median(one.late)) for one in (reference, evidence.joints))
+    nears = (0.0, wheels - own)[: 2 if abs(wheels - own) > CLOCK_DIFFERENCE else 1]
+    lags = (
+        lag_of(time - STEP, rim, at[order], forward, 'reference', 'speeds', near)  # means up to it
+        for near in nears
+    )
+    told = next((lag for lag in lags if lag is not None), None)
+    if told is None and own < -CLOCK_DIFFERENCE < wheels:  # the future, whatever the speeds are
+        told = Lag(wheels - own, 'log time', (wheels - own,) * 2, Trial(1.0, 0.0))
     if told is None:
-        return untold('delay', 'does_not_follow')
+        return untold('delay', 'does_not_follow', limit=LONGEST['reference'])
     evidence.figures['reference.delay_s'] = round(told.value, 3)
     return told
 
@@ -222,13 +231,21 @@ def _even(evidence: Evidence, values: FloatArray, time: FloatArray) -> FloatArra
 
 
 def lag_of(
-    time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, of: str, by: str
+    time: FloatArray,
+    first: FloatArray,
+    at: FloatArray,
+    second: FloatArray,
+    of: str,
+    by: str,
+    near: float = 0.0,
 ) -> Lag | None:
     """Return by how much the second series lags the first; None where they are not alike.
 
+    Lags are looked for around ``near`` [s], which log time tells where it is far from 0.
     The halves share the changes of the motion evenly, wherever in the drive they are.
     """
     limit = min(LONGEST[of], float(time[-1] - time[0]) / IN_A_DRIVE)
+    at = at - near
     whole = lag(time, first, at, second, limit)
     if whole is None or whole[1] < LEAST_FIT[by]:
         return None
@@ -242,10 +259,10 @@ def lag_of(
     for part, other in zip(parts, late[::-1], strict=True):
         left = [
             1.0 - _fits(np.interp(at[part] - off, time, first)[None], second[part])[0]
-            for off in (0.0, other)
+            for off in (-near, other)
         ]
         trials.append(Trial(*left))
-    return Lag(whole[0], by, late, worst(trials))
+    return Lag(near + whole[0], by, (near + late[0], near + late[1]), worst(trials))
 
 
 def lag(
@@ -254,7 +271,7 @@ def lag(
     """Return how much later a series at ``at`` is than one on an even grid [s], and their fit then.
 
     The first is read where the second was measured, never the second in between. None: nothing to
-    correlate, or it is too short for lags up to ``limit`` [s].
+    correlate, too short for lags up to ``limit`` [s], or a lag beyond it.
     """
     if time.size < 2 or not at.size or at[-1] - at[0] < 6.0 * limit:
         return None
@@ -266,11 +283,12 @@ def lag(
         return None
     shifts = step * np.arange(-reach, reach + 1)
     fits = _fits(np.interp(at - shifts[:, None], time, first), second)
-    peak, offset = int(np.argmax(fits)), 0.0
-    if 0 < peak < fits.size - 1:  # top of a parabola through three points
-        left, middle, right = fits[peak - 1 : peak + 2]
-        bend = left - 2.0 * middle + right
-        offset = 0.5 * float(left - right) / float(bend) if bend else 0.0
+    peak = int(np.argmax(fits))
+    if not 0 < peak < fits.size - 1:
+        return None
+    left, middle, right = fits[peak - 1 : peak + 2]  # top of a parabola
+    bend = left - 2.0 * middle + right
+    offset = 0.5 * float(left - right) / float(bend) if bend else 0.0
     return step * (peak + offset - reach), float(fits[peak])
 
 
