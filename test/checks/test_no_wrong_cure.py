@@ -208,6 +208,17 @@ def test_radii_of_one_side_are_not_shared_out():
     np.testing.assert_allclose(told, rolling.RADIUS, rtol=0.02)
 
 
+def test_one_odd_wheel_of_a_tricycle_is_no_radius_of_a_side():
+    """One wheel on each side and one, in two joints, on the centre line."""
+    rate, half = WHOLE.joints.rate.copy(), rolling.HALF_TRACK
+    rate[:, 2:] = rate[:, :2].mean(axis=1, keepdims=True)
+    radii = [1.07 * rolling.RADIUS, *[rolling.RADIUS] * 3]
+    places = {'wheels.x': [0.1, 0.1, -0.1, -0.2], 'wheels.y': [half, -half, 0.0, 0.0]}
+    rover = rolling.rover(**{'wheels.radius': radii}, **places)
+    report = checked(rover, joints=replace(WHOLE.joints, rate=rate))
+    assert not report.findings and 'one wheel turns up to 7 %' in str(report.not_checked)
+
+
 def test_a_diameter_for_a_radius_is_one_finding():
     """Torque over radius is then half of what slopes ask for; that is no mass."""
     double = rolling.rover(**{'wheels.radius': [2.0 * rolling.RADIUS] * 4})

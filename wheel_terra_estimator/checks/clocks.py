@@ -37,9 +37,10 @@ LONGEST = {'imu': 2.0, 'reference': 3.0}  # greatest lag that is looked for [s]
 IN_A_DRIVE = 15.0  # length of a drive over the greatest lag that it tells [-]
 LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
-FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75, 'log time': 1.0}  # unlike part with it, at most
-LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, 'log time': 0.5}
-"""Deviation of a lag by chassis and filters; by log time the age of a velocity is not known [s]."""
+BY_LOG = 'log time'
+FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75, BY_LOG: 1.0}  # unlike part, at most
+LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
+"""Deviation of a lag by chassis and filters; log time leaves the age of a velocity open [s]."""
 APART = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS, SHARP_SIGMAS = 4.0, 10.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]
@@ -161,7 +162,7 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
         off = ' and '.join(f'{late:+.2f} s' for late in told.halves)
         return untold('delay', 'drifts', topic=channel.topic, off=off)
     std = _whole_std(evidence, name, told)
-    against = told.by + ('' if told.by == 'log time' else told.trial.words('unlike part', ''))
+    against = told.by + ('' if told.by == BY_LOG else told.trial.words('unlike part', ''))
     told_of = of_offset(name, told.value, std, against, evidence.facts)
     return evidence.found(f'{name}_offset', 0.97, **told_of)
 
@@ -219,7 +220,7 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     )
     told = next((lag for lag in lags if lag is not None), None)
     if told is None and own < -CLOCK_DIFFERENCE < wheels:  # the future, whatever the speeds are
-        told = Lag(wheels - own, 'log time', (wheels - own,) * 2, Trial(1.0, 0.0))
+        told = Lag(wheels - own, BY_LOG, (wheels - own,) * 2, Trial(1.0, 0.0))
     if told is None:
         return untold('delay', 'does_not_follow', limit=LONGEST['reference'])
     evidence.figures['reference.delay_s'] = round(told.value, 3)

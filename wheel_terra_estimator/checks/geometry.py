@@ -245,7 +245,12 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     evidence.figures['rover.rolling_radius_std_m'] = round(radius * ratio.std, 5)
     sides = _of_sides(evidence)
     lopsided = abs(sides.value) > max(LEAST_OF_SIDES, RADIUS_SIGMAS * sides.std)
-    sigmas = sides.sigmas_from(0.0) if lopsided else ratio.sigmas_from(1.0)
+    sigmas, unlike = (
+        sides.sigmas_from(0.0) if lopsided else ratio.sigmas_from(1.0),
+        _unlike(evidence),
+    )
+    if not lopsided and unlike > max(LEAST_OF_SIDES, abs(ratio.value - 1.0)):
+        return [untold('radius', 'one_wheel', unlike=100.0 * unlike)], evidence
     if not lopsided and (abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < UNCLEAR_SIGMAS):
         return [], evidence
     if sigmas < RADIUS_SIGMAS:
@@ -307,12 +312,17 @@ def _of_sides(evidence: Evidence) -> Estimate:
 
 
 def _unlike(evidence: Evidence) -> float:
-    """Return by how much the speeds of the wheels of one side differ on the straight [-]."""
+    """Return by how much the speeds of the wheels differ on the straight beside that of sides [-].
+
+    Half-way between the sides are the wheels on the centre line.
+    """
     shares = evidence.speed[evidence.straight] / evidence.rim[evidence.straight, None]
-    of_sides = [
-        np.nanmedian(shares[:, evidence.facts.side == side], axis=0) for side in (1.0, -1.0)
-    ]
-    return max(float(np.ptp(one)) for one in of_sides if one.size)
+    usual, side = np.nanmedian(shares, axis=0), evidence.facts.side
+    left, right, middle = (usual[(side == s) & np.isfinite(usual)] for s in (1.0, -1.0, 0.0))
+    if not left.size or not right.size:
+        return 0.0
+    off_middle = 2.0 * middle - left.mean() - right.mean()
+    return float(np.abs([np.ptp(left), np.ptp(right), *off_middle]).max())
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
