@@ -62,7 +62,7 @@ def test_a_pitch_of_the_imu_that_no_circle_shows_is_named_beside_zeros_of_all_to
 JOINTS = ('front_left_steer', 'front_right_steer', 'rear_left_steer', 'rear_right_steer')
 
 
-def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES):
+def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES, **other):
     """A rover with four steered wheels, long beside its track, in circles; angles changed."""
     motion, rover = rolling.ten_minute_drive(), rolling.rover(**{
         'wheels.x': list(x), 'wheels.steering_joints': list(JOINTS), 'wheels.names': list(names),
@@ -80,7 +80,7 @@ def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES):
         torque=np.hstack([WHOLE.joints.torque, none]),
         position=np.hstack([none, change(angle)]),
     )
-    return check_recording(replace(WHOLE, joints=joints), rover)
+    return check_recording(replace(WHOLE, joints=joints, **other), rover)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,16 @@ def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES):
 def test_steered_wheels_roll_where_they_point(change, faults):
     report = steered(change)
     assert [finding.fault for finding in report.findings] == faults
+    assert all('or wheels.x' in f.words for f in report.findings if f.kind == 'sign')  # mirrored
     assert report.figures['rover.effective_over_stated_track'] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize('same', [lambda angle: angle, lambda angle: np.nan * angle])
+def test_a_gyro_that_turns_against_wheels_and_reference_is_reversed(same):
+    """Curves tell nothing: the accelerometer has no y."""
+    flat, back = WHOLE.imu.force * [1.0, 0.0, 1.0], WHOLE.imu.rate * [1.0, 1.0, -1.0]
+    (finding,) = steered(same, imu=replace(WHOLE.imu, force=flat, rate=back)).findings
+    assert finding.fault == 'gyro_reversed' and finding.confidence > 0.8
 
 
 @pytest.mark.parametrize('order', [(2, 3, 0, 1), (2, 1, 0, 3)])

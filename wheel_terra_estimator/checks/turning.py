@@ -67,6 +67,7 @@ IN_DEGREES = (30.0, 110.0)  # gyro over orientation if in degrees per second [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # the same over wheels, which slip and skid in turns [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
 LEAST_TURNED = 0.1  # turn in that time, which no rolling of a pitched body is [rad]
+OF_TWIST = 'twist.angular'
 LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
 TIE = 1e-3  # residuals [-] that differ by less are the same
 NOISE_FLOOR = 0.02  # residual [-] by which hypotheses must differ at least
@@ -259,31 +260,31 @@ def check_steering_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def check_steering_sign(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels that are steered against the turn of gyro and rims, and these mended."""
-    facts, rows, track = evidence.facts, evidence.turning, track_ratio(evidence)
-    there = np.isfinite(evidence.steering).any()
-    if not there or track is None or track < 0.0 or rows.sum() < LEAST_TURNING_ROWS:
-        return [], evidence
-    steering, turn = np.nan_to_num(evidence.steering[rows]), evidence.yaw[rows, None]
-
-    def fits(angles: FloatArray) -> FloatArray:
-        """How well w_z x as of the wheels agrees with that by the gyro, per wheel."""
-        pairs = zip((evidence.speed[rows] * np.tan(angles)).T, (turn * wheels.x).T, strict=True)
-        return np.array([correlation(aside, by_gyro) for aside, by_gyro in pairs])
-
-    wheels = facts.configuration.wheels
-    wrong = fits(steering) < -LEAST_CORRELATION
-    if not wrong.any():
+    facts, track, steering = evidence.facts, track_ratio(evidence), evidence.steering
+    fits = _steered_as_turned(evidence, steering)
+    wrong, right = fits < -LEAST_CORRELATION, fits > LEAST_CORRELATION
+    if track is None or track < 0.0 or not wrong.any():
         return [], evidence
     order = [facts.names.index(name) for name in _sides_exchanged(facts)]
-    either = bool((fits(steering[:, order])[wrong] > LEAST_CORRELATION).all())  # on the spot
-    told = evidence.found(
-        'steering_sign',
-        0.5 if either else 0.95,
-        wheel=facts.named(wrong),
-        value=-1.0,
-        rival=', or left and right joints are exchanged' if either else '',
-    )
-    return [told], replace(evidence, steering=evidence.steering * np.where(wrong, -1.0, 1.0))
+    exchanged = _steered_as_turned(evidence, steering[:, order])[wrong]  # on the spot
+    sure, rival = 0.95, ''
+    if (exchanged > LEAST_CORRELATION).all():
+        sure, rival = 0.5, ', or left and right joints are exchanged'
+    elif not right.any():
+        sure, rival = 0.75, ', or wheels.x has the wrong sign (positive ahead)'
+    told = {'wheel': facts.named(wrong), 'value': -1.0, 'rival': rival}
+    finding = evidence.found('steering_sign', sure, **told)
+    return [finding], replace(evidence, steering=steering * np.where(wrong, -1.0, 1.0))
+
+
+def _steered_as_turned(evidence: Evidence, steering: FloatArray) -> FloatArray:
+    """Return how well w_z x as of each wheel and its angle (k, n) agrees with that by the gyro."""
+    rows, x = evidence.turning, evidence.facts.configuration.wheels.x
+    if rows.sum() < LEAST_TURNING_ROWS:
+        return np.zeros(len(evidence.facts.names))
+    aside = evidence.speed[rows] * np.tan(np.nan_to_num(steering[rows]))
+    pairs = zip(aside.T, (evidence.yaw[rows, None] * x).T, strict=True)
+    return np.array([correlation(wheel, by_gyro) for wheel, by_gyro in pairs])
 
 
 def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -310,12 +311,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         finding, mended = _backwards(evidence, mended, signs, chosen)
         outcomes.append(finding)
     if turn < 0.0:
-        outcomes += _swapped(evidence)
-        mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
-        if np.isfinite(mended.steering).any():  # steering joints are named as before, or with it
-            order = [facts.names.index(name) for name in _sides_exchanged(facts)]
-            both = mended, replace(mended, steering=mended.steering[:, order])
-            mended = min(both, key=left_in_turns)
+        told_of, mended = _swapped(mended)
+        outcomes += told_of
     if blame == 'reference' and evidence.recording.reference is not None:
         alone = bool(turn) or told[1] is not None
         sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels count backwards')
@@ -417,29 +414,62 @@ def _backwards(
     return finding, mended.with_rate(mended.rate * signs, mended.torque * signs)
 
 
-def _swapped(evidence: Evidence) -> list[Outcome]:
-    """Return what makes the wheels turn against the gyro: swapped sides or a reversed gyro."""
-    imu, facts = evidence.recording.imu, evidence.facts
-    assert imu is not None
-    # Curves are felt as the gyro says where it is right, and orientations turn as it does.
-    starts, curves = felt_senses(evidence)
-    curves = max(curves, 0) if starts < 1 else curves  # else the IMU may be turned round
-    curves = curves or int(_turns_as_oriented(evidence, imu))
-    alone = curves > 0
+def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return what makes the wheels turn against the gyro, its sign or swapped sides, and it mended.
+
+    Curves are felt, rovers are steered and references turn as the gyro says where it is right.
+    """
+    facts, (against, sense) = evidence.facts, _sense_of_gyro(evidence)
+    if sense < 0 and evidence.gyro is not None:
+        told = {'value': -1.0, 'axis': 'z', 'against': f'wheels and {against}'}
+        mended = replace(evidence, gyro=evidence.gyro * [1.0, 1.0, -1.0])
+        return [evidence.found('gyro_reversed', 0.9, **told)], mended
+    mended = replace(evidence, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
+    names = _sides_exchanged(facts)
+    if np.isfinite(evidence.steering).any():  # steering joints are named as before, or with it
+        order = [facts.names.index(name) for name in names]
+        both = mended, replace(mended, steering=mended.steering[:, order])
+        mended = min(both, key=left_in_turns)
     mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
     sides = evidence.found(
         'swapped_sides',
-        0.97 if alone else 0.5,
-        rival='' if alone else ', or the gyro counts yaw to the right',
-        names=', '.join(_sides_exchanged(facts)),
+        0.97 if sense else 0.5,
+        rival='' if sense else ', or the gyro counts yaw to the right',
+        names=', '.join(names),
         mirrored=f', or wheels.y: [{mirrored}]' if facts.known else '',
     )
-    if alone:
-        return [sides]
-    against = 'wheels and curves' if curves else 'the wheels, or left and right wheels are swapped'
-    sure = 0.9 if curves else 0.5
-    gyro_off = evidence.found('gyro_reversed', sure, value=-1.0, axis='z', against=against)
-    return [gyro_off] if curves else [sides, gyro_off]
+    if sense:
+        return [sides], mended
+    against = 'the wheels, or left and right wheels are swapped'
+    gyro_off = evidence.found('gyro_reversed', 0.5, value=-1.0, axis='z', against=against)
+    return [sides, gyro_off], mended
+
+
+def _sense_of_gyro(evidence: Evidence) -> tuple[str, int]:
+    """Return what beside the wheels tells the sense of the gyro; 1 as it has it, -1 not, 0 ''."""
+    imu = evidence.recording.imu
+    assert imu is not None
+    starts, curves = felt_senses(evidence)
+    curves = max(curves, 0) if starts < 1 else curves  # else the IMU may be turned round
+    if curves or _turns_as_oriented(evidence, imu):
+        return 'curves', curves or 1
+    heading, gyro = _heading_of_reference(evidence), integrated(evidence.time, evidence.yaw)
+    if heading is not None:  # what agrees may have been made of the gyro
+        fit = correlation(_turns(evidence, heading), _turns(evidence, gyro))
+        if fit < -LEAST_CORRELATION:
+            return f'{OF_TWIST} of the reference', -1
+    fits = _steered_as_turned(evidence, evidence.steering)
+    senses = set(np.sign(fits[np.abs(fits) > LEAST_CORRELATION]).astype(int).tolist())
+    return ('steering', senses.pop()) if len(senses) == 1 else ('', 0)
+
+
+def _heading_of_reference(evidence: Evidence) -> FloatArray | None:
+    """Return the heading by the yaw rate of the reference (k,) [rad]; None where there is none."""
+    reference = evidence.recording.reference
+    if reference is None or reference.stamp.size < 2:
+        return None
+    at, rate = evidence.seconds(reference), np.nan_to_num(reference.yaw_rate)
+    return integrated(evidence.time, np.interp(evidence.time, at, rate))
 
 
 def _turns(evidence: Evidence, heading: FloatArray) -> FloatArray:
@@ -474,18 +504,14 @@ def _heading(evidence: Evidence, imu: ImuSeries) -> FloatArray | None:
 
 def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return a gyro whose turns have another scale than heading or reference say, and it mended."""
-    imu, reference, pairs = evidence.recording.imu, evidence.recording.reference, []
+    imu = evidence.recording.imu
     if imu is None or evidence.gyro is None:
         return [], evidence
-    heading = _heading(evidence, imu)
-    if heading is not None:
-        pairs.append(('orientation', heading))
-    if reference is not None and reference.stamp.size > 1:
-        at = evidence.seconds(reference)
-        yaw = np.interp(evidence.time, at, np.nan_to_num(reference.yaw_rate))
-        pairs.append(('twist.angular', integrated(evidence.time, yaw)))
     gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
-    for name, other in pairs:
+    headings = ('orientation', _heading(evidence, imu)), (OF_TWIST, _heading_of_reference(evidence))
+    for name, other in headings:
+        if other is None:
+            continue
         seen = _turns(evidence, other)
         if _most(seen) < LEAST_TURNED or correlation(gyro, seen) < SAME_TURNS:
             continue
