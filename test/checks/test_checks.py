@@ -219,6 +219,19 @@ def test_sinkage():
         told = checked(sinkage=replace(sinkage, sinkage=even)).findings
         assert [finding.kind for finding in told] == ['sign', 'zero']
         assert max(finding.confidence for finding in told) <= 0.5
+    few = np.where([True, True, False, False], np.nan, sinkage.sinkage)
+    few[:, 2] = -5.0  # a dead sensor, and one that is left
+    only(checked(sinkage=replace(sinkage, sinkage=few)), 'frozen', 'rear_left')
+    few[:, 2] += sinkage.sinkage[:, 0]
+    few[:, :2] = sinkage.sinkage[:, :2]
+    only(checked(sinkage=replace(sinkage, sinkage=few)), 'placeholder', 'rear_left')
+
+
+def test_sinkage_counted_upwards_by_a_small_wheel():
+    small = {'wheels.radius': [0.035] * 4, 'wheels.width': [0.02] * 4}
+    micro = replace(WHOLE.sinkage, sinkage=-0.23 * WHOLE.sinkage.sinkage)
+    told = [f.fault for f in checked(rolling.rover(**small), sinkage=micro).findings]
+    assert 'sinkage_sign' in told and 'sinkage_zero' in told
 
 
 def test_stamps_of_the_sinkage_ahead_of_their_arrival():

@@ -40,8 +40,8 @@ def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not evidence.moving.any():
         return [], evidence
     sinkage = evidence.recording.sinkage
-    deep = [] if sinkage is None else _sinkage(evidence, sinkage)
-    outcomes, evidence = _reference(evidence)
+    deep, mended = ([], evidence) if sinkage is None else _sinkage(evidence, sinkage)
+    outcomes, evidence = _reference(mended)
     imu = evidence.recording.imu
     for name, field in (('force', 'linear_acceleration'), ('gyro', 'angular_velocity')):
         if imu is not None and getattr(evidence, name) is not None:
@@ -93,16 +93,17 @@ def _torques(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return outcomes, evidence.with_rate(evidence.rate, torque)
 
 
-def _sinkage(evidence: Evidence, sinkage: SinkageSeries) -> list[Outcome]:
+def _sinkage(evidence: Evidence, sinkage: SinkageSeries) -> tuple[list[Outcome], Evidence]:
     """Return wheels whose sinkage stays the same; 0 is right on firm ground."""
-    outcomes: list[Outcome] = []
+    outcomes, known = list[Outcome](), sinkage.sinkage.copy()
     middle = np.nan_to_num(np.nanmedian(np.abs(sinkage.sinkage), axis=0))
     for i, name in enumerate(sinkage.names):
         others = float(np.median(np.delete(middle, i))) if middle.size > 1 else 0.0
         dead = stays(evidence, evidence.seconds(sinkage), sinkage.sinkage[:, i : i + 1])
         if dead is not None and (dead.value != 0.0 or others > CLEAR_SINKAGE):
             outcomes.append(evidence.found('sinkage_frozen', 0.97, wheel=name, how=dead.how))
-    return outcomes
+            known[dead.rows, i] = np.nan
+    return outcomes, evidence.with_channel('sinkage', sinkage=known) if outcomes else evidence
 
 
 class Stays(NamedTuple):

@@ -20,8 +20,11 @@ from wheel_terra_estimator.checks.torque import thrust
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors
 
 DEEPEST = 1.2  # sinkage over radius that no wheel gets out of [-]
+NO_DEPTH = 3.0  # the same over the other wheels, either way, that is no zero of a sensor [-]
 LEAST_READINGS = 50
 ANOTHER_UNIT = 30.0  # noise over the stated one from which it may be another unit [-]
+USUAL_RADIUS = 0.15  # wheels below this [m] have smaller limits, as their radii are
+DEEP_SPELL = 0.004  # highest readings [m] from which what is below the ground is no sign
 BELOW_ZERO = 0.006  # median above the ground that no sinkage has [m] (lugs carry less)
 BURIED = 0.5  # depth over radius that no drive has all the time [-]
 DRAGS = 0.3  # correlation of depth and thrust that tells that deep wheels are dragged [-]
@@ -38,10 +41,13 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes: list[Outcome] = [untold('exchanged_wheels', 'sinkage_order')]
     outcomes.append(untold('delay', 'sinkage'))
     names, table = without_stated_errors(evidence.facts, sinkage)
+    nothing = [names[i] for i in np.flatnonzero(~np.isfinite(table).any(axis=0))]
     few = not names or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS
     if few or not np.nan_to_num(table).any():
         why = ('zero', 'sinkage_few') if few else ('placeholder', 'sinkage_zero')
         return [*outcomes, untold(*why)], evidence
+    if nothing:
+        outcomes.append(untold('zero', 'sinkage_no_number', wheels=', '.join(nothing)))
     unit, table = _unit(evidence, table)
     middle = np.array([_median(column) for column in table.T])
     evidence.figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
@@ -77,15 +83,17 @@ def without_stated_errors(
     return names, LinearErrors(errors.zero[rows], errors.gain[rows]).true(table)
 
 
+def _radius(evidence: Evidence) -> float:
+    return float(np.nanmean(evidence.facts.radius)) if evidence.facts.known else 0.5
+
+
 def _median(column: FloatArray) -> float:
     known = column[np.isfinite(column)]
     return float(np.median(known)) if known.size else math.nan
 
 
 def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatArray]:
-    facts = evidence.facts
-    radius = float(np.nanmean(facts.radius)) if facts.known else 0.5
-    stated = facts.sensors.sinkage_std
+    radius, stated = _radius(evidence), evidence.facts.sensors.sinkage_std
     noise = _reading_noise(table)
     level = float(np.nanmedian(np.abs(table)))
     off = {}
@@ -114,14 +122,15 @@ def _sign_and_zero(
     evidence: Evidence, names: list[str], table: FloatArray, middle: FloatArray
 ) -> list[Outcome]:
     lugs = float(np.max(evidence.facts.configuration.wheels.lug_height))
-    limit, usual = BELOW_ZERO + lugs, float(np.nanmedian(middle))
-    if usual < -limit:
+    small = min(_radius(evidence) / USUAL_RADIUS, 1.0)
+    limit, usual = BELOW_ZERO * small + lugs, float(np.nanquantile(middle, 0.5, method='higher'))
+    if usual < -limit:  # most wheels
         top = float(np.nanmedian(np.nanquantile(table, 0.98, axis=0)))
         dragged = _dragged_where_deep(evidence, table)
         told: dict[str, Any] = {'reading': 1000 * usual, 'others': '', 'of': ''}
         how = f'median sinkage {1000 * usual:.0f} mm: the wheels would float'
-        zero = _zero(evidence, names, usual, DEEP_STD, how)
-        if top > 0.004 or dragged > DRAGS:
+        zero = _zero(evidence, names, usual, DEEP_STD * small, how)
+        if top > DEEP_SPELL * small or dragged > DRAGS:
             return [zero]
         if dragged < -DRAGS:
             return [evidence.found('sinkage_sign', 0.9, value=-1.0, **told)]
@@ -139,10 +148,18 @@ def _sign_and_zero(
         far = own - typical
         spread = max(float(np.nanmax(others) - np.nanmin(others)), 0.1 * abs(far))
         how = f'reads {1000 * far:+.0f} mm off the other wheels all the time'
-        odd = max(ODD_ZERO, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
+        odd = max(ODD_ZERO * small, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
         if (abs(far) > odd or own < -limit) and _lasting(table, index, far):
-            outcomes.append(_zero(evidence, [name], far, spread, how))
+            no_zero = abs(far) > NO_DEPTH * _radius(evidence)
+            zero = _zero(evidence, [name], far, spread, how)
+            outcomes.append(_no_depth(evidence, name, own) if no_zero else zero)
     return outcomes
+
+
+def _no_depth(evidence: Evidence, wheel: str, level: float) -> Finding:
+    """Return the finding of a wheel whose readings are none of a sinkage."""
+    told = {'level': level, 'radius': _radius(evidence)}
+    return evidence.found('sinkage_none', 0.97, wheel=wheel, **told)
 
 
 def _dragged_where_deep(evidence: Evidence, table: FloatArray) -> float:
