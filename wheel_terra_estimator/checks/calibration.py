@@ -126,6 +126,10 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
 
 
 def _biases(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
+    told = next((f for f in _sure(report) if f.fault == 'force_bias'), None)
+    if told is not None:
+        off = report.figures['imu.specific_force_bias']
+        changes.add(str(told.parameter), off, told.std, told.words)
     seen = imu.gyro_bias(evidence)
     if seen is not None and not turning.gyro_unit_known(evidence):
         report.not_checked.append(untold('zero', 'gyro_unit'))
@@ -220,6 +224,8 @@ def as_file(calibration: Calibration, configuration: Configuration, recording: s
     lines = [f'Calibrated from the recording {recording}.', '']
     lines += ['Not seen in it, and left as it was:'] if calibration.not_seen else []
     lines += [f'  {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
+    lines += ['Still wrong:'] if calibration.findings else []
+    lines += [f'  {finding}' for finding in calibration.findings]
     after = {key: changes[key].after if key in changes else values[key] for key in keys}
     declared = {key: _as_declared(value, values.get(key)) for key, value in after.items()}
     notes = {key: _in_words(change) for key, change in changes.items()}
