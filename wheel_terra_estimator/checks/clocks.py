@@ -44,6 +44,7 @@ LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
 APART = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS, SHARP_SIGMAS = 4.0, 10.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]
+MANY = 60  # references from which it is averaged over starts and stops
 SLOWEST = 1.5  # period above which nothing is said of the stamps [s]
 SMOOTHED = 1.0  # speeds and turns are averaged over this to share a drive in halves [s]
 SMOOTHING = 0.4  # speeds and accelerations are averaged over this [s]
@@ -69,8 +70,10 @@ class Lag(NamedTuple):
 
     def counts(self, evidence: Evidence, name: str) -> bool:
         """Whether it is a lag of a channel and stood its trial."""
-        # Between the stamps of a reference nothing is known: two deviations.
-        between = 2.0 * BETWEEN * _channel(evidence, name).period if name == 'reference' else 0.0
+        # Between the stamps of a reference nothing is known; over many of them it is averaged.
+        reference = _channel(evidence, name) if name == 'reference' else None
+        between = BETWEEN * reference.period if reference is not None else 0.0
+        between *= SIGMAS if reference is not None and reference.stamp.size < MANY else 2.0
         clear = max(LEAST_OFFSET, 1.5 * evidence.period, between, SIGMAS * self.std)
         sharp = abs(self.value) > SHARP_SIGMAS * self.std  # what else is unlike, no stamp mends
         falls = self.trial.after < (1.0 if sharp else FALLS[self.by]) * self.trial.before

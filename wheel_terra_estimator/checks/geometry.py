@@ -54,6 +54,7 @@ LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
 MOST_HIDDEN = 0.7  # speed over rim speed of slip that torques off zero may hide, at least [-]
+MOST_SOFT = 0.93  # the same on soft ground that no sinkage tells
 UNSEEN_SLIP = 0.035  # slip that widens a track where no straight tells it, one deviation [-]
 STEERED_STD = 0.04  # slip of steered wheels in curves, as a share of the track, one deviation [-]
 MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steered, at most [-]
@@ -261,9 +262,9 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     scale, wheels = ratio.value * (1.0 + 0.5 * apart), facts.configuration.wheels
     rims = facts.radius * scale - (wheels.slip_radius - wheels.radius)  # lugs stay
     share = 1.0 if lopsided else _share_of_radius(evidence, ratio)
-    slips = MOST_HIDDEN < ratio.value < 1.0 and (
-        evidence.force is None or both_ways(evidence) is None
-    )
+    soft = MOST_SOFT < ratio.value < 1.0 and evidence.recording.sinkage is None
+    unsure = evidence.force is None or both_ways(evidence) is None
+    slips = soft or (unsure and MOST_HIDDEN < ratio.value < 1.0)
     sure = confidence(sigmas) * (SURE if lopsided else 0.5 if slips else 1.0)
     evidence.figures['rover.radius_ratio'] = round(ratio.value, 4)
     words: dict[str, Any] = {'ratio': ratio.value, 'off': ratio.std}
@@ -275,7 +276,9 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         )
     elif not alone:
         words['rival'] = ': the radius of the wheels, or the scale of the reference'
-        words['rival'] += ', or torques off zero hide slip' if slips else ''
+        words['rival'] += (
+            f', or {"soft ground makes" if soft else "torques off zero hide"} slip' * slips
+        )
         words['separate'] = '; drive ten metres by a tape: the rims or the reference must say ten'
     mean, off = float(np.mean(rims)), radius * ratio.std
     of_rims = {'value': round(mean, 5), 'std': round(off, 5), 'radii': listed(rims)}

@@ -68,6 +68,7 @@ LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
 LEAST_TURN = 4.5  # heading that a drive has to cover for the mounting to be told from a slope [rad]
 FLAT_TURN_STD = math.radians(0.1)  # unevenness of the ground leaves open [rad]
 TURNED_ROUND = 0.75  # probability that an IMU is turned round, not its x axis reversed [-]
+LEAN_STD = math.radians(0.5)  # of a body in turns, which is no mounting where both ways are driven
 YAW_MODEL_STD = math.radians(1.0)  # pitch and roll in starts and turns leave open [rad]
 LEAST_QUARTER = math.radians(45.0)  # least yaw of a quarter turn [rad]
 ALONG_AXIS = math.cos(math.radians(25.0))  # cosine within which an axis is meant [-]
@@ -312,6 +313,7 @@ class Mounting:
 
     roll: Estimate
     pitch: Estimate
+    ground: float  # deviation that uneven ground leaves in both [rad]
     turn: float  # heading covered [rad]
     sure: float  # probability that it is no zero of the accelerometer
 
@@ -405,7 +407,8 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     along, across = block_fit(design.reshape(-1, 4), target.ravel())[:2]
     facts = evidence.facts
     open_bias = facts.sensors.specific_force_bias_std if facts.known else 0.0
-    floor = math.hypot(FLAT_TURN_STD, open_bias / facts.gravity)
+    one_way = abs(float(np.sign(yaw * evidence.rim)[turning].mean()))
+    floor = math.hypot(FLAT_TURN_STD, LEAN_STD * one_way, open_bias / facts.gravity)
     turns = np.column_stack([yaw, np.ones(yaw.size)])[turning, : 2 if seen is None else 1]
     tilt = np.array([along.value, across.value])
     # A sensor whose x axis points up by p reads +g sin p on x; one rolled by q reads -g sin q on y.
@@ -413,6 +416,7 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
         sure=_is_mounting(tilt, floor, turns, evidence.gyro[turning, :2]),
         roll=Estimate(across.value, math.hypot(across.std, floor)),
         pitch=Estimate(-along.value, math.hypot(along.std, floor)),
+        ground=max(along.std, across.std),
         turn=covered,
     )
 
@@ -508,11 +512,12 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     evidence.figures['imu.tilt_roll_deg'] = round(math.degrees(tilt.roll.value), 3)
     evidence.figures['imu.tilt_pitch_deg'] = round(math.degrees(tilt.pitch.value), 3)
     evidence.figures['imu.tilt_std_deg'] = round(std, 3)
-    if not tilt.std <= EVEN_GROUND_STD:  # nan: an axis without a number
+    if not tilt.ground <= EVEN_GROUND_STD:  # nan: an axis without a number
         return [untold('mounting', 'uneven')], evidence
     size = math.hypot(tilt.roll.value, tilt.pitch.value)
     if size < LEAST_MOUNTING or tilt.sigmas < 4.0:
-        return [], evidence
+        told = [untold('mounting', 'zero_open', least=4.0 * std)]
+        return told if tilt.std > EVEN_GROUND_STD else [], evidence
     gravity, biases = evidence.facts.gravity, evidence.facts.sensors.specific_force_bias
     off = gravity * np.array([-tilt.pitch.value, tilt.roll.value, 0.0])
     zero = f'sensors.specific_force_bias: [{listed(biases + off, ".2f")}]'
@@ -521,6 +526,7 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if tilt.sure < 0.5:
         words['rival'] = ', or its axes are tilted'
         worst = int(np.argmax(np.abs(off)))
+        evidence.figures['imu.specific_force_bias'] = (biases + off).round(3).tolist()
         words |= {'value': round(float((biases + off)[worst]), 3), 'std': gravity * tilt.std}
         told_of = evidence.found('force_bias', sure, **words)
         return [told_of], replace(evidence, force=evidence.force - off)
