@@ -215,15 +215,15 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     slow = time.size < 2 or float(np.median(np.diff(at[order]))) > SLOWEST
     if slow or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return untold('delay', 'no_change')
+
+    def around(near: float) -> Lag | None:  # means are those up to a time
+        return lag_of(time - STEP, rim, at[order], forward, 'reference', 'speeds', near)
+
     own, wheels = (float(np.median(one.late)) for one in (reference, evidence.joints))
-    nears = (0.0, wheels - own)[: 2 if abs(wheels - own) > CLOCK_DIFFERENCE else 1]
-    lags = (
-        lag_of(time - STEP, rim, at[order], forward, 'reference', 'speeds', near)  # means up to it
-        for near in nears
-    )
-    told = next((lag for lag in lags if lag is not None), None)
+    by_log = wheels - own
+    told = around(0.0) or (around(by_log) if abs(by_log) > CLOCK_DIFFERENCE else None)
     if told is None and own < -CLOCK_DIFFERENCE < wheels:  # the future, whatever the speeds are
-        told = Lag(wheels - own, BY_LOG, (wheels - own,) * 2, Trial(1.0, 0.0))
+        told = Lag(by_log, BY_LOG, (by_log, by_log), Trial(1.0, 0.0))
     if told is None:
         return untold('delay', 'does_not_follow', limit=LONGEST['reference'])
     evidence.figures['reference.delay_s'] = round(told.value, 3)

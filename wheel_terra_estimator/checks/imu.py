@@ -516,8 +516,9 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [untold('mounting', 'uneven')], evidence
     size = math.hypot(tilt.roll.value, tilt.pitch.value)
     if size < LEAST_MOUNTING or tilt.sigmas < 4.0:
-        told = [untold('mounting', 'zero_open', least=4.0 * std)]
-        return told if tilt.std > EVEN_GROUND_STD else [], evidence
+        if tilt.std > EVEN_GROUND_STD:
+            return [untold('mounting', 'zero_open', least=4.0 * std)], evidence
+        return [], evidence
     gravity, biases = evidence.facts.gravity, evidence.facts.sensors.specific_force_bias
     off = gravity * np.array([-tilt.pitch.value, tilt.roll.value, 0.0])
     zero = f'sensors.specific_force_bias: [{listed(biases + off, ".2f")}]'

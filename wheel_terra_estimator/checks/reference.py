@@ -37,7 +37,6 @@ AHEAD = 0.3  # mean of the rims over the usual size of one, above which the rove
 CLEAR_HEADING = 1.0  # turn in which a frame of the world is told from one of the rover [rad]
 STEADY = 0.9  # length of the mean direction of a velocity that keeps to a frame [-]
 TURNED_SIGMAS, TURNED_STD = 4.0, math.radians(1.0)  # of the direction on straights, at least [rad]
-LEAST_STRAIGHT = 12  # velocities on the straight that tell their direction
 MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
 """Speed over that without slip of a rover that slips much, and error of the ratio without slip."""
 LEAST_UNIT_RATIO = 1.3  # speed over rim speed below which it may be the radius, not the unit [-]
@@ -139,7 +138,7 @@ def _off_straights(evidence: Evidence, reference: VelocitySeries) -> Estimate:
     wheels = np.nan_to_num(evidence.speed * (1.0 + 1j * steered)).mean(axis=1)
     wheels, turn = (evidence.rim_at(reference.stamp, one) for one in (wheels, evidence.yaw))
     rows = evidence.rim_at(reference.stamp, evidence.straight.astype(float)) > 0.99
-    if rows.sum() < LEAST_STRAIGHT:
+    if rows.sum() < LEAST_REFERENCES:
         return Estimate(0.0, math.inf)
     velocity = (reference.velocity[:, 0] + 1j * reference.velocity[:, 1]) * np.conj(wheels)
     velocity, turn = velocity[rows] / np.abs(wheels[rows]), turn[rows]

@@ -49,7 +49,7 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if nothing:
         outcomes.append(untold('zero', 'sinkage_no_number', wheels=', '.join(nothing)))
     unit, table = _unit(evidence, table)
-    middle = np.array([_median(column) for column in table.T])
+    middle = np.nanmedian(table, axis=0)
     evidence.figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
     evidence.figures['sinkage.noise_m'] = noise = float(f'{_reading_noise(table):.3g}')
     facts = evidence.facts
@@ -85,11 +85,6 @@ def without_stated_errors(
 
 def _radius(evidence: Evidence) -> float:
     return float(np.nanmean(evidence.facts.radius)) if evidence.facts.known else 0.5
-
-
-def _median(column: FloatArray) -> float:
-    known = column[np.isfinite(column)]
-    return float(np.median(known)) if known.size else math.nan
 
 
 def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatArray]:
