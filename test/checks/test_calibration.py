@@ -48,6 +48,18 @@ def test_radius_track_and_mounting(seed):
     assert told['sensors.imu_mounting_pitch_deg'].after == pytest.approx(0.0, abs=0.3)
 
 
+def test_a_zero_of_the_accelerometer_is_written_and_what_stays_wrong_is_told():
+    imu, reference = rolling.recording().imu, rolling.recording().reference
+    off = replace(imu, force=imu.force + np.array([0.6, 0.0, 0.0]))
+    back = replace(reference, velocity=-reference.velocity)
+    rover = rolling.rover()
+    calibration = calibrate(replace(rolling.recording(), imu=off, reference=back), rover)
+    told = {change.key: change.after for change in calibration.changes}
+    assert told['sensors.specific_force_bias'] == pytest.approx([0.6, 0.0, 0.0], abs=0.05)
+    head = as_file(calibration, rover, 'drive').partition('/**')[0]
+    assert 'Still wrong' in head and 'linear.x runs against the wheels' in head
+
+
 def test_nothing_is_told_from_where_there_is_no_imu():
     """It comes up in a circle at 0.2 rad/s, which is no bias at rest."""
     imu = rolling.recording().imu

@@ -67,8 +67,11 @@ def test_late_stamps_are_told_with_the_delay(late):
     assert not checks.findings and not checks.undecided
 
 
-@pytest.mark.parametrize('what', [{'late': 0.1}, {'slip': 0.6}, {'noise': 0.03}])
+@pytest.mark.parametrize(
+    'what', [{'late': 0.1}, {'slip': 0.6}, {'noise': 0.03}, {'late': 0.6, 'rate': 1.0}]
+)
 def test_honest_stamps_are_not(what):
+    """Nor what may lie between a few slow references: wheels that follow these do so late."""
     assert not after(**{'late': 0.0, **what}).remarks
 
 
