@@ -33,7 +33,7 @@ from wheel_terra_estimator.checks.statistics import (
 )
 
 STEP = 0.05  # time between the values that are compared [s]
-LONGEST = {'imu': 2.0, 'reference': 3.0}  # greatest lag that is looked for [s]
+LONGEST = {'turns': 2.0, 'starts': 2.0, 'speeds': 3.0}  # greatest lag that is looked for [s]
 IN_A_DRIVE = 15.0  # length of a drive over the greatest lag that it tells [-]
 LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
@@ -186,14 +186,14 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
         yaw = averaged(at, (imu.rate @ evidence.rotation.T)[:, 2:3], time, 2 * STEP)[:, 0]
         wheels = _even(evidence, difference, time)
         wheels = wheels * np.sign(correlation(wheels, yaw) or 1.0)
-        turned = lag_of(time, wheels, time, yaw, 'imu', 'turns')
+        turned = lag_of(time, wheels, time, yaw, 'turns')
     if evidence.force is not None and time.size > 2:
         width = round(SMOOTHING / STEP)
         speed = moving_mean(_even(evidence, evidence.rim, time), width)
         forward = averaged(at, (imu.force @ evidence.rotation.T)[:, :1], time, 2 * STEP)[:, 0]
         change = without_drift(np.gradient(speed, STEP), STEP)
         felt = without_drift(moving_mean(forward, width), STEP)
-        started = lag_of(time, change, time, felt, 'imu', 'starts')
+        started = lag_of(time, change, time, felt, 'starts')
     best = turned or started
     if best is None:
         return untold('delay', 'no_turns')
@@ -217,7 +217,7 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
         return untold('delay', 'no_change')
 
     def around(near: float) -> Lag | None:  # means are those up to a time
-        return lag_of(time - STEP, rim, at[order], forward, 'reference', 'speeds', near)
+        return lag_of(time - STEP, rim, at[order], forward, 'speeds', near)
 
     own, wheels = (float(np.median(one.late)) for one in (reference, evidence.joints))
     by_log = wheels - own
@@ -225,7 +225,7 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     if told is None and own < -CLOCK_DIFFERENCE < wheels:  # the future, whatever the speeds are
         told = Lag(by_log, BY_LOG, (by_log, by_log), Trial(1.0, 0.0))
     if told is None:
-        return untold('delay', 'does_not_follow', limit=LONGEST['reference'])
+        return untold('delay', 'does_not_follow', limit=LONGEST['speeds'])
     evidence.figures['reference.delay_s'] = round(told.value, 3)
     return told
 
@@ -235,21 +235,15 @@ def _even(evidence: Evidence, values: FloatArray, time: FloatArray) -> FloatArra
 
 
 def lag_of(
-    time: FloatArray,
-    first: FloatArray,
-    at: FloatArray,
-    second: FloatArray,
-    of: str,
-    by: str,
-    near: float = 0.0,
+    time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, by: str, log: float = 0
 ) -> Lag | None:
     """Return by how much the second series lags the first; None where they are not alike.
 
-    Lags are looked for around ``near`` [s], which log time tells where it is far from 0.
+    Lags are looked for around ``log`` [s], which log time tells where it is far from 0.
     The halves share the changes of the motion evenly, wherever in the drive they are.
     """
-    limit = min(LONGEST[of], float(time[-1] - time[0]) / IN_A_DRIVE)
-    at = at - near
+    limit = min(LONGEST[by], float(time[-1] - time[0]) / IN_A_DRIVE)
+    at = at - log
     whole = lag(time, first, at, second, limit)
     if whole is None or whole[1] < LEAST_FIT[by]:
         return None
@@ -263,10 +257,10 @@ def lag_of(
     for part, other in zip(parts, late[::-1], strict=True):
         left = [
             1.0 - _fits(np.interp(at[part] - off, time, first)[None], second[part])[0]
-            for off in (-near, other)
+            for off in (-log, other)
         ]
         trials.append(Trial(*left))
-    return Lag(near + whole[0], by, (near + late[0], near + late[1]), worst(trials))
+    return Lag(log + whole[0], by, (log + late[0], log + late[1]), worst(trials))
 
 
 def lag(

@@ -246,10 +246,8 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     evidence.figures['rover.rolling_radius_std_m'] = round(radius * ratio.std, 5)
     sides = _of_sides(evidence)
     lopsided = abs(sides.value) > max(LEAST_OF_SIDES, RADIUS_SIGMAS * sides.std)
-    sigmas, unlike = (
-        sides.sigmas_from(0.0) if lopsided else ratio.sigmas_from(1.0),
-        _unlike(evidence),
-    )
+    sigmas = sides.sigmas_from(0.0) if lopsided else ratio.sigmas_from(1.0)
+    unlike = _unlike(evidence)
     if not lopsided and unlike > max(LEAST_OF_SIDES, abs(ratio.value - 1.0)):
         return [untold('radius', 'one_wheel', unlike=100.0 * unlike)], evidence
     if not lopsided and (abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < UNCLEAR_SIGMAS):
@@ -276,9 +274,8 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         )
     elif not alone:
         words['rival'] = ': the radius of the wheels, or the scale of the reference'
-        words['rival'] += (
-            f', or {"soft ground makes" if soft else "torques off zero hide"} slip' * slips
-        )
+        hides = 'soft ground makes' if soft else 'torques off zero hide'
+        words['rival'] += f', or {hides} slip' if slips else ''
         words['separate'] = '; drive ten metres by a tape: the rims or the reference must say ten'
     mean, off = float(np.mean(rims)), radius * ratio.std
     of_rims = {'value': round(mean, 5), 'std': round(off, 5), 'radii': listed(rims)}
