@@ -53,7 +53,7 @@ WHEEL_ODOMETRY, INERTIAL, SINKAGE, LEAVING_ANGLE, REFERENCE = range(5)
 _TOO_DEEP = 'sinkage infinite or larger than the wheel radius'
 _VOID = 'variance says that nothing is known'
 REMEDIES = {
-    _TOO_DEEP: 'buried, or millimetres? multiply these by 0.001 in the driver (m)',
+    _TOO_DEEP: 'buried, or millimetres? multiply position by 0.001 in the driver (m)',
     _VOID: 'a placeholder? send the variance, or 0 and state sensors.reference_std',
 }
 """Reason for leaving something out -> what corrects it."""
