@@ -41,6 +41,23 @@ def test_stamps_that_stand_still_are_counted(make_bag, factory, config, printed)
     )
 
 
+@pytest.mark.parametrize(('period', 'said'), [(1, True), (0.5, False)])
+def test_wheel_odometry_that_counts_as_silent_most_of_the_time_is_told(
+    make_bag, factory, config, printed, period, said
+):
+    rows = []
+    for i in range(160):
+        header = factory.header(1_700_000_000_000_000_000 + i * 50_000_000)
+        rows.append(('/imu/data', factory.imu(header, (0.0, 0.0, 9.81), (0.0,) * 3, None), i))
+        if i % round(20 * period) == 0:
+            state = factory.joint_state(header, ('left', 'right'), velocity=(2.0, -2.0))
+            rows.append(('/joint_states', state, i))
+    words = (
+        'note: joint_states comes so seldom that wheels are mostly unknown: filter.silence (0.5 s)'
+    )
+    assert (words in printed(['replay', str(make_bag(messages=rows)), *config])) is said
+
+
 @pytest.mark.filter_fails
 def test_a_failing_filter_is_said_in_summary_and_diagnostics(
     make_bag, rover, monkeypatch, tmp_path

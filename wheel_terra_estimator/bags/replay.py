@@ -142,6 +142,7 @@ def replay(
             *([SMOOTHED] if smooth else []),
             *of_order,
             *_notes(bag, reader, pipeline, interrupted.is_set()),
+            *_of_rare_odometry(configuration, pipeline, history),
         ),
         interrupted=interrupted.is_set(),
         learned=core.learned(),
@@ -221,6 +222,19 @@ def _notes(
     if unknown:
         count = sum(topic.message_count for topic in unknown)
         yield f'{count} messages not used, on {", ".join(topic.name for topic in unknown)}'
+
+
+def _of_rare_odometry(
+    configuration: Configuration, pipeline: Pipeline, history: EstimateHistory
+) -> Iterator[str]:
+    """Say so where more sets lie in the silence between wheel odometry than upon it."""
+    topic = pipeline.converter.layout.wheel_odometry
+    if history.whole and history.whole.sets > 2 * pipeline.received[topic] > 0:
+        silence = configuration.filter.silence
+        yield (
+            f'{topic} comes so seldom that wheels are mostly unknown: filter.silence ({silence:g} '
+            's) to twice the period of its messages'
+        )
 
 
 def _times(count: int) -> str:
