@@ -565,6 +565,7 @@ class WheelSoilEstimator:
                 turning=motion.lateral_motion > _SHARP_TURN
                 or sides_oppose(rims, body.headings.by_yaw_rate),
                 depth_read=self._depth_read(time),
+                slip_told=self._reference.told_twice(time),
             ),
         )
         self._clock = self._clock._replace(assessment=assessment, speed=present)

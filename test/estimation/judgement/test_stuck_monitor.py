@@ -330,12 +330,13 @@ def test_a_median_above_0_9_is_warned_of_also_right_after_a_start():
     assert found[-1].reason == 'median slip 0.97: entrapment under way; stop, back out'
     # Less surely known, it is where a reference says that the rover stands.
     doubtful = [wheel(0.98, rim=0.05)._replace(slip_std=0.1)] * 6
-    sees, guesses = (
-        held(StuckMonitor(SETTINGS), doubtful, 3.0, speed_known=known) for known in (True, False)
+    sees = {'speed_known': True, 'slip_told': True}
+    assert first(held(StuckMonitor(SETTINGS), doubtful, 3.0, **sees)) == pytest.approx(
+        1.0, abs=0.11
     )
-    assert first(sees) == pytest.approx(1.0, abs=0.11)
-    assert not any(a.stuck for a in guesses)
-    spins = held(StuckMonitor(SETTINGS), doubtful, 3.0, speed_known=True, turning=True)
+    for one in sees:
+        assert not any(a.stuck for a in held(StuckMonitor(SETTINGS), doubtful, 3.0, **{one: True}))
+    spins = held(StuckMonitor(SETTINGS), doubtful, 3.0, turning=True, **sees)
     assert not any(a.stuck for a in spins), 'a rover that turns on the spot stands, too'
 
 

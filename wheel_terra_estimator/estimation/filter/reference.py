@@ -55,7 +55,8 @@ class ReferenceState(NamedTuple):
 
     time: float = -math.inf  # of the last one [s]
     told_time: float = -math.inf
-    """Of the last one that told of slip [s]: the rover moved, and it was not rejected."""
+    """Of the last one that told of slip [s]: wheels turned, and it was not rejected."""
+    told_before: float = -math.inf  # of the one before it [s]
     gap: float = 10.0  # between them, smoothed [s]
     sliding_until: float = -1.0  # a slide on standing wheels is believed until then [s]
     rejected: int = 0
@@ -106,6 +107,10 @@ class ReferenceUpdate(Component[ReferenceState]):
     def known(self, time: float) -> bool:
         """Say whether a reference that told of slip is young enough to tell it and soil apart."""
         return time - self.state.told_time < _KNOWN_TIME
+
+    def told_twice(self, time: float) -> bool:
+        """Say whether two such references are young: a mean over a start is the first one."""
+        return time - self.state.told_before < _KNOWN_TIME
 
     def fresh(self, time: float) -> bool:
         """Say whether the present speed rests on a reference."""
@@ -182,7 +187,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
         rests = still and time >= state.sliding_until
         if not rests and not state.rejected_in_a_row:
-            state = state._replace(told_time=time)
+            state = state._replace(told_time=time, told_before=state.told_time)
         self.state = state
         return opened
 

@@ -62,6 +62,7 @@ class RoverMotion(NamedTuple):
     turning: bool = False
     """Sharply: slip that comes from turning says nothing of what is ahead."""
     depth_read: bool = True  # sensors tell the sinkage of most wheels
+    slip_told: bool = False  # by two references of the last seconds, while wheels turned
 
 
 class Memory(NamedTuple):
