@@ -10,7 +10,7 @@ import pytest
 from estimate_sets import some_estimates
 
 from wheel_terra_estimator.checks.finding import FAULTS as FAULT_TABLE
-from wheel_terra_estimator.checks.finding import found
+from wheel_terra_estimator.checks.finding import Finding, found
 from wheel_terra_estimator.checks.input_judge import LONGEST_WAIT, InputJudge
 from wheel_terra_estimator.checks.online import CAP, OnlineChecks, Tally
 from wheel_terra_estimator.checks.series import Recording
@@ -223,6 +223,22 @@ def test_a_confirmed_warning_is_not_taken_back_by_what_is_found_later():
     fault = FAULTS['rpm'][0]
     sets = sets_of(drive, fault, REST + LONGEST + 2.0, stands=3.0, stuck_confirmed=True)
     assert any(told(s) for s in sets) and all(s.stuck for s in sets)
+
+
+def test_a_warning_that_was_confirmed_once_stays_and_wrong_torques_confirm_none(monkeypatch):
+    judge = InputJudge(Wheels().configuration)
+
+    def out(fault, confirmations):
+        words = {'kind': 'gain', 'topic': 'joint_states', 'words': 'wrong', 'cure': 'mend it'}
+        finding = Finding(**words, confidence=0.97, fault=fault)
+        monkeypatch.setattr(OnlineChecks, 'findings', (finding,))
+        return [
+            judge.judged(some_estimates(6, stuck=True, stuck_confirmed=confirmed), {}).stuck
+            for confirmed in confirmations
+        ]
+
+    assert out('torque_scale', [True, True]) == [False, False]
+    assert out('rate_unit', [False, True, False]) == [False, True, True]
 
 
 @pytest.mark.parametrize('rover', [SIX, FOUR])

@@ -495,6 +495,10 @@ def test_in_a_steady_turn_the_moments_of_pulls_and_lateral_forces_cancel(parts):
         pull, _ = published_pull(parts, 0.0, aside=aside)
         assert np.sum(x * force - y * pull) == pytest.approx(0.0, abs=1e-6)
         assert pull.sum() == pytest.approx(plain.sum(), abs=0.5)
+    # base_link elsewhere on the same rover.
+    moved = replace(parts.rover, longitudinal=tuple(x + 0.6), centre_of_gravity=(0.6, 0.0, 0.0))
+    parts.rover = moved
+    assert published_pull(parts, 0.0, aside=aside)[0] == pytest.approx(pull)
     doubted = replace(aside, force_std=(1e6,) * 6)
     assert published_pull(parts, 0.0, aside=doubted)[0] == pytest.approx(plain, abs=1e-6)
 

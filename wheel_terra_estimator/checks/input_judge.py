@@ -1,9 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The judge of the inputs: no slip class and no new stuck warning from what is wrong.
+"""The judge of the inputs: no slip class and no stuck warning from what is wrong.
 
-A finding about single wheels silences these alone, and none a warning that a reference at rest or a
-torque at its limit confirms.
+A finding about single wheels silences these alone, and none a warning that a reference at rest, or
+a torque at its limit that nothing speaks against, has confirmed.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ class InputJudge:
         self._checks = OnlineChecks(configuration)
         self._failed = False  # the checks of this run
         self._stuck_since: int | None = None  # [ns] of the warning; None = there is none
-        self._waits_for = ''  # what a warning waits for that is not out yet
+        self._confirmed = False  # the warning, since it began
+        self._waits_for = ''  # why a warning is not out; empty: it is, or there is none
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Look at the inputs of a step; stamps [ns] increase."""
@@ -91,18 +92,20 @@ class InputJudge:
         return dict.fromkeys(range(len(names)), f'not judged: {findings[0].words}')
 
     def _follow(self, estimates: EstimateSet, silenced: str) -> None:
-        """Follow the stuck warning: what it waits for, if anything; a doubt holds it up once.
+        """Follow the stuck warning: what it waits for, if anything.
 
         `silenced`: why no wheel is judged, if so.
         """
         if not estimates.stuck:
-            self._stuck_since, self._waits_for = None, ''
+            self._stuck_since, self._confirmed, self._waits_for = None, False, ''
             return
         rises = self._stuck_since is None
         begun = estimates.stamp if self._stuck_since is None else self._stuck_since
         held_up = (rises or bool(self._waits_for)) and estimates.stamp - begun < LONGEST_WAIT
         self._stuck_since, self._waits_for = begun, ''
-        if estimates.stuck_confirmed:
+        doubted = any(f.fault.startswith('torque') for f in self._checks.findings)
+        self._confirmed |= estimates.stuck_confirmed and not doubted
+        if self._confirmed:
             return
         if silenced:
             self._waits_for = silenced

@@ -34,6 +34,7 @@ class Rover:
     shear_radius: tuple[float, ...]  # to the lug tips
     lateral: tuple[float, ...]  # y in base_link [m]
     longitudinal: tuple[float, ...]  # x [m]
+    centre_of_gravity: tuple[float, ...]  # x, y, z [m]
     torque_limit: tuple[float, ...]  # [N m], 0 = not stated
     mass: float
     gravity: float
@@ -78,13 +79,14 @@ class Rover:
             shear_radius=_floats(wheels.radius + wheels.lug_height),
             lateral=_floats(wheels.y),
             longitudinal=_floats(x),
+            centre_of_gravity=_floats(rover.centre_of_gravity),
             torque_limit=_floats(wheels.torque_limit),
             mass=float(rover.mass),
             gravity=float(rover.gravity),
             load=load_distribution(
                 mass=float(rover.mass),
                 position=np.column_stack([wheels.x, wheels.y]).astype(float),
-                centre_of_gravity=[float(c) for c in rover.centre_of_gravity],
+                centre_of_gravity=_floats(rover.centre_of_gravity),
                 contact_height=float(np.mean(np.asarray(wheels.z) - np.asarray(wheels.radius))),
                 suspension=rover.suspension,
                 shares=shares if shares.any() else np.ones(wheels.count),

@@ -97,9 +97,9 @@ _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
 _TURN = 0.1
 """Lateral motion above which what turns the rover tells of the pulls [-]."""
-_ANGLE_KNOWN = 0.6  # deviation of slip angles up to which they tell the lateral forces [rad]
 _SHARP_TURN = 0.3
 """The same above which slip comes from turning and says nothing of an entrapment."""
+_ANGLE_KNOWN = 0.6  # deviation of slip angles up to which they tell the lateral forces [rad]
 
 
 class Instant(NamedTuple):

@@ -50,7 +50,7 @@ class PullEvidence(NamedTuple):
     cycle: Cycle
     readings: Floats  # last torque of each wheel [N m], nan = never known
     stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
-    aside: Sideways | None  # lateral forces in a sharp turn; None elsewhere
+    aside: Sideways | None  # lateral forces in a turn, where they are told; None elsewhere
 
 
 class KnownSum(NamedTuple):
@@ -143,14 +143,17 @@ class Pulls(Component[PullState]):
     ) -> list[KnownSum]:
         """Return what is known of the pulls together.
 
-        In a steady turn the moments of pulls and lateral forces about the body's z axis cancel.
+        In a steady turn the vertical moments of pulls and lateral forces cancel about the centre of
+        gravity.
         """
         along, across = np.array(cycle.headings.along), np.array(cycle.headings.across)
         known = []
         if total is not None:
             known.append(KnownSum(along, total.along - total.weight * tilt, total.variance))
         if aside is not None:
-            x, y = np.array(self._rover.longitudinal), np.array(self._rover.lateral)
+            rover = self._rover
+            x = np.array(rover.longitudinal) - rover.centre_of_gravity[0]
+            y = np.array(rover.lateral) - rover.centre_of_gravity[1]
             arms = x * along + y * across
             doubt = arms * aside.force_std
             moment = -float(arms @ aside.force)

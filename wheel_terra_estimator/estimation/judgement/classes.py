@@ -133,7 +133,8 @@ class PublishedClasses:
         outlook = np.vstack([np.where(stuck, 0.0, left), estimates.stuck_probability])
         if self._outlook is not None:
             told = classes if estimates.stuck else estimates.slip_class
-            outlook = np.where(told == UNKNOWN, self._outlook, outlook)
+            stalls = estimates.stuck_probability >= 1.0  # a wheel that stands, and tells
+            outlook = np.where((told == UNKNOWN) & ~stalls, self._outlook, outlook)
         self._outlook = outlook
         return replace(
             estimates,

@@ -17,8 +17,6 @@ from wheel_terra_estimator.estimation.scalars import NAN, TIME_ROUNDING
 # Deviations of the slip that no model of the filter has.
 _DRIFT = 0.05
 """Sideways over forward speed that no sensor of a steered rover reads: 3 degrees."""
-_REST_DEVIATIONS = 3.0
-"""Deviations of a rim speed within which it is noise of a wheel that stands."""
 _FORGETTING = 0.02  # growth of the deviation per stamp where no rate is known
 _LEAST_STD = 1e-3
 
@@ -70,8 +68,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
         if isnan(rim):
             std = min(before.std + _FORGETTING, 1.0)
             return before._replace(std=std, resting=False, judged=False)
-        rim_std = self._rim_std[i]
-        rest = max(self._rover.rest_speed, _REST_DEVIATIONS * rim_std)
+        rest = self._rover.rest_speed
         if body.stopped and abs(body.speed) < rest and abs(rim) < rest:
             # All wheels stand: what the gyro says beside them is noise.
             v, v_std = 0.0, 0.0
@@ -85,7 +82,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
             v_std = math.hypot(v_std, drift)
         if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
             return self._at_rest(before, time)
-        slip, std = slip_and_deviation(rim, v, v_std, rim_std, rest)
+        slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)
         return WheelSlip(slip, min(max(std, _LEAST_STD), 1.0), judged=True)
 
     def _at_rest(self, before: WheelSlip, time: float) -> WheelSlip:
@@ -103,11 +100,15 @@ def slip_and_deviation(
 
     Rim speed, ground speed `v` and their deviations [m/s]; below `rest_speed` a rim stands.
     """
+    both = math.hypot(v_std, rim_std)
     if abs(rim) <= rest_speed:
-        return -1.0, v_std / max(abs(v), rest_speed)
+        return -1.0, both / max(abs(v), rest_speed)
     if v * rim < 0.0:
-        return 1.0, math.hypot(v_std, rim_std) / abs(rim)
+        return 1.0, both / abs(rim)
     if abs(v) <= abs(rim):
         slip = 1.0 - v / rim
-        return slip, math.hypot(v_std / rim, (1.0 - slip) * rim_std / rim)
+        # On a rover that stands noise may be all that turns.
+        stands = abs(v) < max(rest_speed, 2.0 * v_std)
+        std = both if stands else math.hypot(v_std, (1.0 - slip) * rim_std)
+        return slip, std / abs(rim)
     return rim / v - 1.0, math.hypot(v_std * rim / (v * v), rim_std / v)
