@@ -289,12 +289,12 @@ def test_the_load_of_an_unloaded_wheel_goes_to_the_others(parts):
 # -- Wheels that stand ------------------------------------------------------------------------
 
 
-def standing_pull(parts, torque, speed, lateral_motion=0.0, speed_std=0.0):
+def standing_pull(parts, torque, speed, lateral_motion=0.0, speed_std=0.0, others=0.0):
     x = parts.filter().mean.copy()
     x[SPEED] = speed
     wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
     n = parts.rover.wheel_count
-    rims, turns = (0.0,) * n, (False,) * n
+    rims, turns = (0.0,) + (others,) * (n - 1), (False,) * n
     cycle = parts.cycle(
         rims, (60.0,) * n, turns=turns, torque=(torque,) * n, lateral_motion=lateral_motion
     )
@@ -317,8 +317,11 @@ def test_torque_tells_the_drag_of_a_locked_wheel(parts):
 def test_torque_over_radius_is_the_pull_of_a_wheel_that_holds_a_standing_rover(parts):
     assert standing_pull(parts, 3.0, 0.0) == pytest.approx(3.0 / parts.rover.shear_radius[0])
     assert standing_pull(parts, 1e3, 0.0) == 60.0  # no soil gives more than the load
-    # A speed within its own deviation is no slide.
-    assert standing_pull(parts, 3.0, -0.004, speed_std=0.003) == standing_pull(parts, 3.0, 0.0)
+    # A speed within its own deviation is no slide where no wheel turns.
+    slow = {'torque': 3.0, 'speed': -0.004, 'speed_std': 0.003}
+    assert standing_pull(parts, **slow) == standing_pull(parts, 3.0, 0.0)
+    drags = standing_pull(parts, 3.0, -0.004)
+    assert standing_pull(parts, **slow, others=0.05) == drags
     assert math.isnan(standing_pull(parts, NAN, 0.0))
 
 

@@ -25,12 +25,12 @@ from wheel_terra_estimator.estimation.filter.state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN
+from wheel_terra_estimator.estimation.scalars import NAN, known
 
 # Tuned on simulated drives with locked wheels, seeds 1000 to 1019, unless said otherwise.
 _SLIDING_RATIO = 3.0
 """v/(r w) taken for a locked wheel: its shear is saturated long before [-]."""
-_SLIDING_DEVIATIONS = 2.0  # of the speed, from which a wheel that stands is known to slide
+_SLIDING_DEVIATIONS = 2.0  # of the speed, from which a rover slides on wheels that stand
 _MOST_DRAG = 2.0  # of the load: friction and the soil pushed ahead
 _STRAIGHT = 0.1
 """Lateral motion above which a torque against the drag is no sign of a jammed drive [-]."""
@@ -108,7 +108,9 @@ class StationaryWheels:
         gain = np.where(tells, by_pull / np.where(tells, by_torque, 1.0), 0.0)
         pull = forces.pull + gain * (direction * torques - forces.torque)
         most = _MOST_DRAG * loads
-        stands = np.abs(speed) < max(rover.rest_speed, _SLIDING_DEVIATIONS * speed_std)
+        doubt = _SLIDING_DEVIATIONS * speed_std
+        standing = all(abs(rim) < doubt for rim in known(cycle.rims))
+        stands = np.abs(speed) < (max(rover.rest_speed, doubt) if standing else rover.rest_speed)
         return np.where(stands, held, direction * np.clip(pull, -most, most))
 
     def expectation(
