@@ -38,7 +38,7 @@ IN_A_DRIVE = 15.0  # length of a drive over the greatest lag that it tells [-]
 LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
 BY_LOG = 'log time'
-FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75, BY_LOG: 1.0}  # unlike part, at most
+FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part, at most
 LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
 """Deviation of a lag by chassis and filters; log time leaves the age of a velocity open [s]."""
 APART = 0.2  # lags of two halves or motions that differ by less agree [s]
@@ -196,7 +196,7 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
         started = lag_of(time, change, time, felt, 'starts')
     best = turned or started
     if best is None:
-        return untold('delay', 'no_turns')
+        return untold('delay', 'no_turns', limit=round(_longest('turns', time), 1))
     apart = 0.0 if turned is None or started is None else abs(turned.value - started.value)
     if started is not None and started.steady and apart > APART + 3.0 * best.std:
         return untold('delay', 'unlike', apart=apart)
@@ -234,6 +234,11 @@ def _even(evidence: Evidence, values: FloatArray, time: FloatArray) -> FloatArra
     return averaged(evidence.time, np.nan_to_num(values)[:, None], time, 2 * STEP)[:, 0]
 
 
+def _longest(by: str, time: FloatArray) -> float:
+    """Return the greatest lag that is looked for in a drive [s]."""
+    return min(LONGEST[by], float(time[-1] - time[0]) / IN_A_DRIVE)
+
+
 def lag_of(
     time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, by: str, log: float = 0
 ) -> Lag | None:
@@ -242,7 +247,7 @@ def lag_of(
     Lags are looked for around ``log`` [s], which log time tells where it is far from 0.
     The halves share the changes of the motion evenly, wherever in the drive they are.
     """
-    limit = min(LONGEST[by], float(time[-1] - time[0]) / IN_A_DRIVE)
+    limit = _longest(by, time)
     at = at - log
     whole = lag(time, first, at, second, limit)
     if whole is None or whole[1] < LEAST_FIT[by]:

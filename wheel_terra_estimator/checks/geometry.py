@@ -54,7 +54,7 @@ LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
 MOST_HIDDEN = 0.7  # speed over rim speed of slip that torques off zero may hide, at least [-]
-MOST_SOFT = 0.93  # the same on soft ground that no sinkage tells
+MOST_SOFT = 0.93  # the same on soft ground that no sinkage tells, at least [-]: slip is 7 % there
 UNSEEN_SLIP = 0.035  # slip that widens a track where no straight tells it, one deviation [-]
 STEERED_STD = 0.04  # slip of steered wheels in curves, as a share of the track, one deviation [-]
 MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steered, at most [-]
@@ -227,10 +227,11 @@ def _depth(evidence: Evidence) -> Estimate:
         return FIRM_DEPTH
     straight = evidence.rim_at(series.stamp, evidence.straight.astype(float)) > 0.99
     _, rows = without_stated_errors(facts, series)
-    if np.isfinite(rows[straight]).sum() < LEAST_DEPTHS:
+    known = rows[straight][np.isfinite(rows[straight])]
+    if known.size < LEAST_DEPTHS or not np.ptp(known):
         return FIRM_DEPTH
     radius = float(np.mean(facts.configuration.wheels.radius))
-    depth = float(np.nanmedian(rows[straight])) / radius
+    depth = float(np.median(known)) / radius
     std = max(float(facts.sensors.sinkage_zero_std), facts.sensors.sinkage_std / 2.0) / radius
     return Estimate(max(depth, 0.0), std) if depth < DEEPEST else FIRM_DEPTH
 
@@ -248,7 +249,9 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     lopsided = abs(sides.value) > max(LEAST_OF_SIDES, RADIUS_SIGMAS * sides.std)
     sigmas = sides.sigmas_from(0.0) if lopsided else ratio.sigmas_from(1.0)
     unlike = _unlike(evidence)
-    if not lopsided and unlike > max(LEAST_OF_SIDES, abs(ratio.value - 1.0)):
+    # One wheel of n that is off by u moves the mean by u/n: more than that is another's.
+    of_one = 0.5 * facts.side.size * abs(ratio.value - 1.0)
+    if not lopsided and unlike > max(LEAST_OF_SIDES, of_one):
         return [untold('radius', 'one_wheel', unlike=100.0 * unlike)], evidence
     if not lopsided and (abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < UNCLEAR_SIGMAS):
         return [], evidence
@@ -260,7 +263,7 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     scale, wheels = ratio.value * (1.0 + 0.5 * apart), facts.configuration.wheels
     rims = facts.radius * scale - (wheels.slip_radius - wheels.radius)  # lugs stay
     share = 1.0 if lopsided else _share_of_radius(evidence, ratio)
-    soft = MOST_SOFT < ratio.value < 1.0 and evidence.recording.sinkage is None
+    soft = MOST_SOFT < ratio.value < 1.0 and _depth(evidence) is FIRM_DEPTH
     unsure = evidence.force is None or both_ways(evidence) is None
     slips = soft or (unsure and MOST_HIDDEN < ratio.value < 1.0)
     sure = confidence(sigmas) * (SURE if lopsided else 0.5 if slips else 1.0)
@@ -314,15 +317,16 @@ def _of_sides(evidence: Evidence) -> Estimate:
 def _unlike(evidence: Evidence) -> float:
     """Return by how much the speeds of the wheels differ on the straight beside that of sides [-].
 
-    Half-way between the sides are the wheels on the centre line.
+    Half-way between the sides are the wheels on the centre line: else one of the three is odd.
     """
     shares = evidence.speed[evidence.straight] / evidence.rim[evidence.straight, None]
     usual, side = np.nanmedian(shares, axis=0), evidence.facts.side
     left, right, middle = (usual[(side == s) & np.isfinite(usual)] for s in (1.0, -1.0, 0.0))
     if not left.size or not right.size:
         return 0.0
-    off_middle = 2.0 * middle - left.mean() - right.mean()
-    return float(np.abs([np.ptp(left), np.ptp(right), *off_middle]).max())
+    threes = [sorted((left.mean(), right.mean(), one)) for one in middle]
+    odd = [low - 2.0 * between + high for low, between, high in threes]
+    return float(np.abs([np.ptp(left), np.ptp(right), *odd]).max())
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:

@@ -119,7 +119,7 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         return [evidence.found('reference_world', 0.95)], mended
     if in_body < STEADY:
         return [untold('mounting', 'reference_frame')] * _sideways(reference), evidence
-    told, off = float(np.ptp(psi)) > CLEAR_HEADING, _off_straights(evidence, reference)
+    off, told = _off_straights(evidence, reference)
     if off.sigmas_from(0.0) < TURNED_SIGMAS or not (told or reference.points_aside):
         return [], evidence  # a rover that keeps its heading may slide aside on a cross slope
     angle = off.value
@@ -132,21 +132,29 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
     return [evidence.found('reference_turned', sure, value=words['angle'], **words)], mended
 
 
-def _off_straights(evidence: Evidence, reference: VelocitySeries) -> Estimate:
-    """Return by which angle a velocity points off where the wheels roll on the straight [rad]."""
+def _off_straights(evidence: Evidence, reference: VelocitySeries) -> tuple[Estimate, bool]:
+    """Return by which angle a velocity points off where the wheels roll on the straight [rad].
+
+    And whether they roll several ways there: what slides aside on a cross slope does so down it.
+    """
     steered = np.tan(np.nan_to_num(evidence.steering))
     wheels = np.nan_to_num(evidence.speed * (1.0 + 1j * steered)).mean(axis=1)
     wheels, turn = (evidence.rim_at(reference.stamp, one) for one in (wheels, evidence.yaw))
     rows = evidence.rim_at(reference.stamp, evidence.straight.astype(float)) > 0.99
     if rows.sum() < LEAST_REFERENCES:
-        return Estimate(0.0, math.inf)
+        return Estimate(0.0, math.inf), False
     velocity = (reference.velocity[:, 0] + 1j * reference.velocity[:, 1]) * np.conj(wheels)
     velocity, turn = velocity[rows] / np.abs(wheels[rows]), turn[rows]
     angle = float(np.angle(velocity.sum()))
     velocity = velocity * np.exp(-1j * angle)
+    heading = integrated(evidence.time, evidence.yaw)
+    psi = np.interp(evidence.seconds(reference), evidence.time, heading)[rows]
+    way = np.exp(1j * (psi + np.angle(wheels[rows])))
+    several = bool(abs(way.mean()) < math.cos(0.5 * CLEAR_HEADING))
+    slides = [velocity.real * way.real, velocity.real * way.imag] if several else []
     # A velocity of another place has its distance times the turn aside.
-    rest = block_fit(np.column_stack([velocity.real, turn]), velocity.imag)[0]
-    return Estimate(angle + rest.value, math.hypot(rest.std, TURNED_STD))
+    rest = block_fit(np.column_stack([velocity.real, turn, *slides]), velocity.imag)[0]
+    return Estimate(angle + rest.value, math.hypot(rest.std, TURNED_STD)), several
 
 
 def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[FloatArray, Mask]:

@@ -145,16 +145,12 @@ def _sign_and_zero(
         how = f'reads {1000 * far:+.0f} mm off the other wheels all the time'
         odd = max(ODD_ZERO * small, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
         if (abs(far) > odd or own < -limit) and _lasting(table, index, far):
-            no_zero = abs(far) > NO_DEPTH * _radius(evidence)
-            zero = _zero(evidence, [name], far, spread, how)
-            outcomes.append(_no_depth(evidence, name, own) if no_zero else zero)
+            if abs(far) > NO_DEPTH * _radius(evidence):  # none of a sinkage
+                told = {'wheel': name, 'level': own, 'radius': _radius(evidence)}
+                outcomes.append(evidence.found('sinkage_none', 0.97, **told))
+            else:
+                outcomes.append(_zero(evidence, [name], far, spread, how))
     return outcomes
-
-
-def _no_depth(evidence: Evidence, wheel: str, level: float) -> Finding:
-    """Return the finding of a wheel whose readings are none of a sinkage."""
-    told = {'level': level, 'radius': _radius(evidence)}
-    return evidence.found('sinkage_none', 0.97, wheel=wheel, **told)
 
 
 def _dragged_where_deep(evidence: Evidence, table: FloatArray) -> float:

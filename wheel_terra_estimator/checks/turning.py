@@ -417,7 +417,7 @@ def _backwards(
 def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return what makes the wheels turn against the gyro, its sign or swapped sides, and it mended.
 
-    Curves are felt, rovers are steered and references turn as the gyro says where it is right.
+    Curves are felt and rovers are steered as the gyro says where it is right.
     """
     facts, (against, sense) = evidence.facts, _sense_of_gyro(evidence)
     if sense < 0 and evidence.gyro is not None:
@@ -453,11 +453,7 @@ def _sense_of_gyro(evidence: Evidence) -> tuple[str, int]:
     curves = max(curves, 0) if starts < 1 else curves  # else the IMU may be turned round
     if curves or _turns_as_oriented(evidence, imu):
         return 'curves', curves or 1
-    heading, gyro = _heading_of_reference(evidence), integrated(evidence.time, evidence.yaw)
-    if heading is not None:  # what agrees may have been made of the gyro
-        fit = correlation(_turns(evidence, heading), _turns(evidence, gyro))
-        if fit < -LEAST_CORRELATION:
-            return f'{OF_TWIST} of the reference', -1
+    # The yaw rate of a reference may be made of the wheels or of the gyro: it tells neither.
     fits = _steered_as_turned(evidence, evidence.steering)
     senses = set(np.sign(fits[np.abs(fits) > LEAST_CORRELATION]).astype(int).tolist())
     return ('steering', senses.pop()) if len(senses) == 1 else ('', 0)

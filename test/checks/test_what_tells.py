@@ -1,0 +1,133 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a check goes by must be in the recording: else a fault is left open, or told with others."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+from rolling_rover import checked
+from scipy.spatial.transform import Rotation
+
+WHOLE = rolling.recording()
+FLAT = replace(WHOLE.imu, force=WHOLE.imu.force * [1.0, 0.0, 1.0])  # curves tell nothing
+
+
+def faults(report):
+    return [finding.fault for finding in report.findings]
+
+
+def reasons(report, kind):
+    return ' '.join(entry.reason for entry in report.not_checked if entry.kind == kind)
+
+
+def one_way_and_a_turn():
+    time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [10, 11, 60, 61, 65, 66], [0, 0.3, 0.3, 0, 0, 0.3])
+    yaw = np.interp(time, [100, 101, 107, 108], [0, 0.22, 0.22, 0])
+    return rolling.Motion(time, speed, yaw, 0.0 * time)
+
+
+@pytest.mark.parametrize('degrees', [5.0, 8.0])
+@pytest.mark.parametrize('motion', [rolling.ten_minute_drive(), one_way_and_a_turn()])
+def test_a_rover_that_slides_down_a_cross_slope_has_no_turned_reference(motion, degrees):
+    """Down the slope on its way there and back: no turned frame does that."""
+    whole = rolling.recording(motion)
+    psi = np.cumsum(motion.yaw_rate)[::5] / rolling.RATE
+    forward = whole.reference.velocity[:, 0]
+    slide = -math.tan(math.radians(degrees)) * np.abs(forward) * np.cos(psi)
+    velocity = np.column_stack([forward, slide, 0.0 * slide])
+    report = checked(whole=whole, reference=replace(whole.reference, velocity=velocity))
+    assert faults(report) == []
+
+
+@pytest.mark.parametrize('swapped', [True, False])
+def test_a_reference_against_the_gyro_may_be_made_of_the_wheels(swapped):
+    joints, imu, reference = WHOLE.joints, FLAT, WHOLE.reference
+    if swapped:
+        order = [1, 0, 3, 2]
+        joints = replace(joints, rate=joints.rate[:, order], torque=joints.torque[:, order])
+        reference = replace(reference, yaw_rate=-reference.yaw_rate)
+    else:
+        imu = replace(imu, rate=imu.rate * [1.0, 1.0, -1.0])
+    told = checked(joints=joints, imu=imu, reference=reference).findings
+    assert {(f.fault, f.confidence) for f in told} == {
+        ('swapped_sides', 0.5), ('gyro_reversed', 0.5)
+    }  # fmt: skip
+
+
+def test_an_odd_wheel_hides_no_radius_that_all_wheels_have_wrong():
+    radii = 1.05 * rolling.RADIUS * np.array([1.06, 1.0, 1.0, 1.0])
+    assert faults(checked(rolling.rover(**{'wheels.radius': radii.tolist()}))) == ['radius']
+    radii = rolling.RADIUS * np.array([1.07, 1.0, 1.0, 1.0])
+    alone = checked(rolling.rover(**{'wheels.radius': radii.tolist()}))
+    assert faults(alone) == [] and 'one wheel turns up to 7 %' in reasons(alone, 'radius')
+
+
+@pytest.mark.parametrize(('percent', 'told'), [(4, False), (7, True)])
+def test_the_middle_wheel_of_a_tricycle_is_as_odd_as_it_is(percent, told):
+    rate, half = WHOLE.joints.rate.copy(), rolling.HALF_TRACK
+    rate[:, 2:] = rate[:, :2].mean(axis=1, keepdims=True)
+    radii = [rolling.RADIUS] * 2 + [(1.0 + 0.01 * percent) * rolling.RADIUS] * 2
+    places = {'wheels.x': [0.1, 0.1, -0.1, -0.2], 'wheels.y': [half, -half, 0.0, 0.0]}
+    rover = rolling.rover(**{'wheels.radius': radii}, **places)
+    report = checked(rover, joints=replace(WHOLE.joints, rate=rate))
+    assert (f'one wheel turns up to {percent} %' in reasons(report, 'radius')) == told
+
+
+def test_an_imu_too_late_to_be_seen_is_left_open_for_that():
+    late = {name: getattr(WHOLE.imu, name) + 2_500_000_000 for name in ('stamp', 'log_time')}
+    report = checked(imu=replace(WHOLE.imu, **late))
+    assert 'or stamps more than 2 s off' in reasons(report, 'delay')
+
+
+NONE, STUCK = np.nan * WHOLE.sinkage.sinkage, 0.0 * WHOLE.sinkage.sinkage
+
+
+@pytest.mark.parametrize(
+    'sinkage', [None, replace(WHOLE.sinkage, sinkage=NONE), replace(WHOLE.sinkage, sinkage=STUCK)]
+)
+def test_without_a_depth_soft_ground_may_be_a_radius(sinkage):
+    slower = replace(WHOLE.reference, velocity=0.95 * WHOLE.reference.velocity)
+    skids = rolling.rover(**{'wheels.x': [0.6, 0.6, -0.6, -0.6]})
+    told = checked(skids, reference=slower, sinkage=sinkage).findings
+    told = [f for f in told if f.fault in ('radius', 'reference_scale')]
+    assert told and all('soft ground makes slip' in f.words for f in told)
+    assert all(f.confidence <= 0.5 for f in told)
+    seen = checked(skids, reference=slower).findings
+    assert seen and not any('soft ground' in f.words for f in seen)
+
+
+def tilted(yaw, **rover):
+    motion = rolling.ten_minute_drive()
+    whole = rolling.recording(replace(motion, yaw_rate=yaw(motion.yaw_rate)))
+    tilt = Rotation.from_euler('y', 1.8, degrees=True).inv()
+    imu = replace(whole.imu, force=tilt.apply(whole.imu.force), rate=tilt.apply(whole.imu.rate))
+    return checked(rolling.rover(**rover), whole=whole, imu=imu)
+
+
+def test_a_lean_in_turns_one_way_alone_is_no_mounting():
+    assert faults(tilted(lambda yaw: yaw)) == ['imu_tilt']
+    assert faults(tilted(np.abs)) == []
+
+
+def test_a_tilt_below_the_zero_of_the_accelerometer_is_left_open():
+    report = tilted(lambda yaw: yaw, **{'sensors.specific_force_bias_std': 0.2})
+    assert faults(report) == [] and 'tilts below 4.' in reasons(report, 'mounting')
+
+
+def test_a_reference_from_the_future_is_off_whatever_its_speeds_are():
+    noise = np.random.default_rng(1).standard_normal(WHOLE.reference.velocity.shape)
+    ahead = replace(
+        WHOLE.reference, stamp=WHOLE.reference.stamp + 30_000_000_000,
+        velocity=WHOLE.reference.velocity + 0.1 * noise,
+    )  # fmt: skip
+    (told,) = [f for f in checked(reference=ahead).findings if f.fault == 'reference_offset']
+    assert told.value == pytest.approx(29.7, abs=0.1) and 'log time' in told.words
+
+
+def test_half_of_the_wheels_below_the_ground_reverse_no_sinkage():
+    half = replace(WHOLE.sinkage, sinkage=WHOLE.sinkage.sinkage - [0.0, 0.06, 0.0, 0.06])
+    assert 'sinkage_sign' not in faults(checked(sinkage=half))
