@@ -119,16 +119,17 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         return [evidence.found('reference_world', 0.95)], mended
     if in_body < STEADY:
         return [untold('mounting', 'reference_frame')] * _sideways(reference), evidence
-    off, told = _off_straights(evidence, reference)
-    if off.sigmas_from(0.0) < TURNED_SIGMAS or not (told or reference.points_aside):
+    turns, (off, several) = np.ptp(psi) > CLEAR_HEADING, _off_straights(evidence, reference)
+    told = reference.points_aside or (turns and several)
+    if off.sigmas_from(0.0) < TURNED_SIGMAS or not told:
         return [], evidence  # a rover that keeps its heading may slide aside on a cross slope
     angle = off.value
     turned = velocity * np.exp(-1j * angle)
     mended = evidence.with_channel(
         'reference', velocity=np.column_stack([turned.real, turned.imag, 0.0 * rim])
     )
-    rival = '' if told else ', or it is given in the world frame: drive a circle'
-    sure, words = 0.9 if told else 0.5, {'angle': math.degrees(angle), 'rival': rival}
+    rival = '' if turns else ', or it is given in the world frame: drive a circle'
+    sure, words = 0.9 if turns else 0.5, {'angle': math.degrees(angle), 'rival': rival}
     return [evidence.found('reference_turned', sure, value=words['angle'], **words)], mended
 
 
