@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
+from wheel_terra_estimator.configuration.column_map import are_units
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import check_size
 
@@ -49,6 +50,7 @@ def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
     mark of it; also while its rows are read.
     """
     check_size(path, largest)
+    wide = False
     try:
         with path.open('rb') as file:
             head = file.read(4)
@@ -67,8 +69,9 @@ def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
             line, header = next(rows, (1, []))
             yield CsvFile(path, header, line, delimiter, rows)
     except UnicodeDecodeError:
+        said, old = ('UTF-16', '-c -f utf-16') if wide else ('UTF-8', '-f cp1252')
         raise UserError(
-            f'{path}: not a UTF-8 text; save it as CSV (UTF-8), or: iconv -f cp1252 -t utf8'
+            f'{path}: not a {said} text; save it as CSV (UTF-8), or: iconv {old} -t utf8'
         ) from None
     except csv.Error as error:
         raise UserError(f'{path}: not a CSV text ({error}); export it again') from None
@@ -77,18 +80,20 @@ def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
 def _titles(text: TextIO) -> tuple[int, str, str]:
     """Return how many lines stand above that of the titles, this, and a delimiter that one states.
 
-    Above it may stand comments (#); one that numbers follow is the line of the titles itself.
+    Above it may stand comments (#); one that numbers or units follow is the line of titles itself.
     """
     comment, stated = (0, ''), ''
     for above, line in enumerate(iter(text.readline, '')):
         delimiter = _STATED_DELIMITER.fullmatch(line)
+        cells = [cell.strip('" \r\n') for cell in re.split('[,;\t]', line)]
+        below = bool(comment[1]) and are_units(cells)
         if delimiter:
             stated = delimiter[1]
         elif line.startswith('#'):
-            comment = above, line
+            comment = comment if below else (above, line)
         elif line.strip():
-            numbers = any(is_number(cell.strip('" \r\n')) for cell in re.split('[,;\t]', line))
-            return (*(comment if comment[1] and numbers else (above, line)), stated)
+            below |= bool(comment[1]) and any(map(is_number, cells))
+            return (*(comment if below else (above, line)), stated)
     return (*comment, stated)
 
 

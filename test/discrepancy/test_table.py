@@ -89,6 +89,8 @@ def test_an_export_of_a_laboratory_is_read(tmp_path, encoding):
     for above, line, factor in (
         (f'# wheel of 8" width, bed 3\n\n{HEADER}\n-,N,[mm],N,Nm', 5, 1e-3),
         (f'# from numpy, savetxt\n# {HEADER}', 3, 1.0),
+        (f'# {HEADER}\n-,N,mm,N,Nm', 3, 1e-3),
+        (f'# {HEADER}\n# -,N,mm,N,Nm', 3, 1e-3),
     ):
         path = tmp_path / 'export.csv'
         path.write_bytes(f'\ufeff{above}\n{body}\n'.encode(encoding))
@@ -98,6 +100,19 @@ def test_an_export_of_a_laboratory_is_read(tmp_path, encoding):
     with pytest.raises(UserError, match="line 2: 'm' below 'sinkage_mm'; correct one"):
         titles = HEADER.replace('sinkage', 'sinkage_mm')
         read_table(write(tmp_path, '\n'.join([titles, '-,N,m,N,Nm', *lines()])))
+    path.write_bytes(b'\xff\xfe\x00\xd8a\x00')
+    with pytest.raises(UserError, match=r'not a UTF-16 text; .*: iconv -c -f utf-16'):
+        read_table(path)
+
+
+def test_a_row_of_units_has_nothing_else(tmp_path):
+    """Symbols that spell a unit, or a remark of one letter, are none."""
+    text = '\n'.join([HEADER, 's,Fz,z,Fx,T', '-,N,m,N,Nm', *lines()])
+    with pytest.raises(UserError, match='line 2: no numbers below the column names; delete'):
+        read_table(write(tmp_path, text))
+    text = '\n'.join([f'{HEADER},note', ',,,,,g', *(f'{line},a' for line in lines())])
+    with pytest.raises(UserError, match='line 2, column slip: the number is missing'):
+        read_table(write(tmp_path, text))
 
 
 def test_capitals_units_and_semicolons_are_read_with_a_note(tmp_path):

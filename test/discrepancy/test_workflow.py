@@ -380,6 +380,9 @@ def test_reference_cancels_a_common_structural_error():
     assert again.effects == found.effects
     assert any('16 rows are exact copies' in note for note in again.notes)
     assert run(plain[1], values, **options).verdict == 'agrees'
+    one_more = {key: np.r_[plain[1][key], column[:1]] for key, column in plain[0].items()}
+    with pytest.raises(UserError, match='1 of 17 rows are not copies of rows of a'):
+        run(one_more, values, **options)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,6 +67,18 @@ def factor(si: str, unit: str) -> float | None:
 def is_unit(text: str) -> bool:
     """Return whether a text spells a unit of any kind."""
     return any(_plain(text) in units for units in _FACTORS.values())
+
+
+def are_units(cells: Iterable[str]) -> bool:
+    """Return whether cells are a row of units: each one or empty, two of them beside '-'."""
+    units = [unit for cell in cells if (unit := bare(cell))]
+    named = [unit for unit in units if unit != '-']
+    return len(named) > 1 and all(map(is_unit, units)) and '1' not in units
+
+
+def bare(unit: str) -> str:
+    """Return a unit without the brackets and the mark of a comment around it."""
+    return unit.strip('#[]() ')
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
 )
 from wheel_terra_estimator.errors import UserError
 
+MINIMUM_ROWS = 6
 MOST_ROWS = 240  # more are averaged over neighbouring inputs: the time grows with their cube
 
 
@@ -95,7 +96,8 @@ def together(tables: Sequence[SteadyTable]) -> SteadyTable:
 def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, SteadyTable, BoolArray]:
     """Return the table less the rows of the reference, both as one, and which are not reference.
 
-    Raises UserError if the two share no measured quantity, or only one of them states a column.
+    Raises UserError if the two share no measured quantity, only one of them states a column, or a
+    few rows of the table are left.
     """
     if not set(table.quantities) & set(reference.quantities):
         raise UserError(
@@ -109,6 +111,11 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, Stead
                 f'{lacks.name}: no column {column!r}, which {has.name} has; state it in both'
             )
     own = new_rows(table, [reference])
+    if 0 < len(own) < MINIMUM_ROWS:
+        raise UserError(
+            f'{table.name}: {len(own)} of {len(table)} rows are not copies of rows of '
+            f'{reference.name}; at least {MINIMUM_ROWS} are needed'
+        )
     table = own if len(own) else replace(table, notes=own.notes)
     notes = (*table.notes, f'{len(reference)} rows of {reference.name} as reference')
     joined = concatenated(table.name, (table, reference), notes)

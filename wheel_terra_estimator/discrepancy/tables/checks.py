@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
-from wheel_terra_estimator.discrepancy.tables.averaging import MOST_ROWS, averaged
+from wheel_terra_estimator.discrepancy.tables.averaging import MINIMUM_ROWS, MOST_ROWS, averaged
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
     ONE_OF,
@@ -24,7 +24,6 @@ from wheel_terra_estimator.errors import UserError
 
 Mask = BoolArray
 
-MINIMUM_ROWS = 6
 MINIMUM_SLIP_SPAN = 0.1
 MINIMUM_LOAD_RATIO = 1.5
 SAME_SLIP = 1e-3

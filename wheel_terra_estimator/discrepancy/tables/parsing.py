@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
-from wheel_terra_estimator.configuration.column_map import factor, is_unit
+from wheel_terra_estimator.configuration.column_map import are_units, bare, factor
 from wheel_terra_estimator.csv_file import (
     CsvFile,
     check_width,
@@ -147,11 +147,9 @@ def _with_row_of_units(
 ) -> list[str]:
     """Return the titles with the units that a row below them has; take that out of ``rows``."""
     line, cells = rows[0] if rows else (0, [])
-    units = [cell.strip('[]()') for cell in cells]
-    if any(is_number(cell, decimal_comma=True) for cell in cells) or not any(
-        is_unit(unit) and unit != '-' for unit in units
-    ):
+    if not are_units(cells):
         return file.header
+    units = [bare(cell) for cell in cells]
     del rows[0]
     titles = []
     for title, unit in zip_longest(file.header, units[: len(file.header)], fillvalue=''):
