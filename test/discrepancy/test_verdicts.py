@@ -217,3 +217,13 @@ def test_a_wrong_unit_is_said_before_any_effect(column, factor, units):
     assert not found.proposal
     assert list(found.misread) == [column]
     assert f'The unit of {column.replace("_", " ")} looks wrong ({units})' in found.sentence
+
+
+@pytest.mark.parametrize(('design', 'factor'), [('sweep40', 2.0), ('basic16', 1.0 / 4.4482216)])
+def test_a_wrong_load_is_found_where_neither_noise_nor_soil_is_known(design, factor):
+    table, values, *_ = make(design, stds=False)
+    values['soil.frictional_modulus'] *= 3.0
+    assert 'normal_load' not in run(table, values).misread
+    found = run({**table, 'normal_load': factor * table['normal_load']}, values)
+    assert found.misread == {'normal_load': pytest.approx(1.0 / factor)}
+    assert not found.effects

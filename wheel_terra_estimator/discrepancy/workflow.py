@@ -15,6 +15,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration, Readings
 from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
+    Coordinate,
     base_coordinates,
     soil_coordinates,
 )
@@ -23,7 +24,7 @@ from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
 from wheel_terra_estimator.discrepancy.selection.search import Findings, search
 from wheel_terra_estimator.discrepancy.selection.verdict import choose
-from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors, weigh
+from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
 from wheel_terra_estimator.discrepancy.tables.averaging import join
 from wheel_terra_estimator.discrepancy.tables.checks import (
     check_against_wheel,
@@ -41,6 +42,7 @@ from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 _CLEARLY_MISREAD = 10.0  # nats by which another unit must explain the rows better
+_LIKELIER_LOAD = 5.0  # nats by which soil alone under other loads must beat any explanation
 # Factors by which loads may be off: of a pair of wheels, or one of it; units of force read as N.
 _LOADS = (0.5, 2.0, *(f**s for f in (9.80665, 4.4482216) for s in (-1, 1)))
 _UNLIKELY = 0.05  # odds of beds that differ, below which nothing is said of them
@@ -116,7 +118,7 @@ def diagnose(
             misread[quantity] = times
     verdict = choose(findings.selection, findings.setting.problem)
     if chosen.effects is None and (misread or verdict.status != 'agrees'):
-        misread = _load_misread(findings) or misread
+        misread = _load_misread(both, findings, nuisance, forward) or misread
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
     if sweeps is not None and decision.verdict.status != 'agrees':
@@ -151,17 +153,21 @@ def diagnose(
     return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
 
 
-def _load_misread(findings: Findings) -> dict[str, float]:
-    """Return by what the loads are off, where soil alone then agrees and beats any explanation."""
-    setting, best, found = findings.setting, findings.selection.best + _CLEARLY_MISREAD, {}
-    start = [np.zeros(len(setting.nuisance))]
+def _load_misread(
+    table: SteadyTable, findings: Findings, nuisance: tuple[Coordinate, ...], forward: Forward
+) -> dict[str, float]:
+    """Return by what the loads are off, where soil alone then fits and beats any explanation.
+
+    Noise that is not stated is estimated anew: that under a wrong load is another one. Soil may go
+    far: where its numbers are wrong as well, the load is to be put right first.
+    """
+    best, found = findings.selection.best + _LIKELIER_LOAD, {}
     for times in _LOADS:
-        points = setting.forward.points
-        points = replace(points, normal_load=times * points.normal_load)
-        other = replace(setting, forward=setting.forward.at(points))
-        alone = weigh([other.explain(fit) for fit in other.fit([()], start)], setting.floors, ())
-        if alone.best > best and choose(alone, setting.problem).status == 'agrees':
-            best, found = alone.best, {'normal_load': times}
+        points = replace(forward.points, normal_load=times * forward.points.normal_load)
+        alone = search(table, forward.at(points), nuisance, {}, findings.setting.floors)
+        left = choose(alone.selection, alone.setting.problem).left
+        if alone.selection.best > best and (left.only_far or not left.significant):
+            best, found = alone.selection.best, {'normal_load': times}
     return found
 
 
