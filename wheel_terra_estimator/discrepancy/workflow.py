@@ -23,7 +23,7 @@ from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
 from wheel_terra_estimator.discrepancy.selection.search import Findings, search
-from wheel_terra_estimator.discrepancy.selection.verdict import choose
+from wheel_terra_estimator.discrepancy.selection.verdict import choose, remainder
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
 from wheel_terra_estimator.discrepancy.tables.averaging import join
 from wheel_terra_estimator.discrepancy.tables.checks import (
@@ -159,14 +159,18 @@ def _load_misread(
     """Return by what the loads are off, where soil alone then fits and beats any explanation.
 
     Noise that is not stated is estimated anew: that under a wrong load is another one. Soil may go
-    far: where its numbers are wrong as well, the load is to be put right first.
+    far, where its numbers are wrong as well, unless it then fits under the loads as they are.
     """
-    best, found = findings.selection.best + _LIKELIER_LOAD, {}
+    as_they_are = remainder(
+        findings.selection, findings.selection.nothing, findings.setting.problem
+    )
+    far = as_they_are.significant and not as_they_are.only_far
+    best, found = findings.selection.best + (_LIKELIER_LOAD if far else _CLEARLY_MISREAD), {}
     for times in _LOADS:
         points = replace(forward.points, normal_load=times * forward.points.normal_load)
         alone = search(table, forward.at(points), nuisance, {}, findings.setting.floors)
         left = choose(alone.selection, alone.setting.problem).left
-        if alone.selection.best > best and (left.only_far or not left.significant):
+        if alone.selection.best > best and (not left.significant or (far and left.only_far)):
             best, found = alone.selection.best, {'normal_load': times}
     return found
 
