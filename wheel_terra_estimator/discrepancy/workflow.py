@@ -43,6 +43,7 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 _CLEARLY_MISREAD = 10.0  # nats by which another unit must explain the rows better
 _LIKELIER_LOAD = 5.0  # nats by which soil alone under other loads must beat any explanation
+_FLOOR_NEEDED = 0.8  # probability of a structural error from which soil alone does not fit
 # Factors by which loads may be off: of a pair of wheels, or one of it; units of force read as N.
 _LOADS = (0.5, 2.0, *(f**s for f in (9.80665, 4.4482216) for s in (-1, 1)))
 _UNLIKELY = 0.05  # odds of beds that differ, below which nothing is said of them
@@ -159,12 +160,14 @@ def _load_misread(
     """Return by what the loads are off, where soil alone then fits and beats any explanation.
 
     Noise that is not stated is estimated anew: that under a wrong load is another one. Soil may go
-    far, where its numbers are wrong as well, unless it then fits under the loads as they are.
+    far, where its numbers are wrong as well, unless it fits, without a floor, the loads as they are.
     """
     as_they_are = remainder(
         findings.selection, findings.selection.nothing, findings.setting.problem
     )
-    far = as_they_are.significant and not as_they_are.only_far
+    far = as_they_are.probability_of_any > _FLOOR_NEEDED or not (
+        as_they_are.only_far or as_they_are.accounted_for
+    )
     best, found = findings.selection.best + (_LIKELIER_LOAD if far else _CLEARLY_MISREAD), {}
     for times in _LOADS:
         points = replace(forward.points, normal_load=times * forward.points.normal_load)
