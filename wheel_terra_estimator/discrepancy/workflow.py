@@ -160,7 +160,7 @@ def _load_misread(
     """Return by what the loads are off, where soil alone then fits and beats any explanation.
 
     Noise that is not stated is estimated anew: that under a wrong load is another one. Soil may go
-    far, where its numbers are wrong as well, unless it fits, without a floor, the loads as they are.
+    far, where its numbers are wrong as well, unless it fits the loads as they are without a floor.
     """
     as_they_are = remainder(
         findings.selection, findings.selection.nothing, findings.setting.problem
