@@ -108,6 +108,7 @@ class StationaryWheels:
         gain = np.where(tells, by_pull / np.where(tells, by_torque, 1.0), 0.0)
         pull = forces.pull + gain * (direction * torques - forces.torque)
         most = _MOST_DRAG * loads
+        # Where nothing turns faster than the speed is in doubt, the rover comes to rest.
         doubt = _SLIDING_DEVIATIONS * speed_std
         standing = all(abs(rim) < doubt for rim in known(cycle.rims))
         stands = np.abs(speed) < (max(rover.rest_speed, doubt) if standing else rover.rest_speed)
