@@ -141,8 +141,7 @@ def replay(
         notes=(
             *([SMOOTHED] if smooth else []),
             *of_order,
-            *_notes(bag, reader, pipeline, interrupted.is_set()),
-            *_of_rare_odometry(configuration, pipeline, history),
+            *_notes(bag, reader, pipeline, history, interrupted.is_set()),
         ),
         interrupted=interrupted.is_set(),
         learned=core.learned(),
@@ -196,7 +195,11 @@ def smoothed(
 
 
 def _notes(
-    bag: Bag, reader: MeasurementReader, pipeline: Pipeline, interrupted: bool
+    bag: Bag,
+    reader: MeasurementReader,
+    pipeline: Pipeline,
+    history: EstimateHistory,
+    interrupted: bool,
 ) -> Iterator[str]:
     if interrupted:
         yield 'interrupted: this is the drive up to there'
@@ -222,18 +225,11 @@ def _notes(
     if unknown:
         count = sum(topic.message_count for topic in unknown)
         yield f'{count} messages not used, on {", ".join(topic.name for topic in unknown)}'
-
-
-def _of_rare_odometry(
-    configuration: Configuration, pipeline: Pipeline, history: EstimateHistory
-) -> Iterator[str]:
-    """Say so where more sets lie in the silence between wheel odometry than upon it."""
-    topic = pipeline.converter.layout.wheel_odometry
-    if history.whole and history.whole.sets > 2 * pipeline.received[topic] > 0:
-        silence = configuration.filter.silence
+    wheels = pipeline.converter.layout.wheel_odometry
+    if history.whole and history.whole.sets > 2 * pipeline.received[wheels] > 0:
         yield (
-            f'{topic} comes so seldom that wheels are mostly unknown: filter.silence ({silence:g} '
-            's) to twice the period of its messages'
+            f'{wheels} comes so seldom that wheels are mostly unknown: filter.silence '
+            f'({pipeline.configuration.filter.silence:g} s) to twice the period of its messages'
         )
 
 

@@ -118,7 +118,7 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         mended = evidence.with_channel('reference', velocity=along)
         return [evidence.found('reference_world', 0.95)], mended
     if in_body < STEADY:
-        return [untold('mounting', 'reference_frame')] * _sideways(reference), evidence
+        return [untold('mounting', 'reference_frame')] if _sideways(reference) else [], evidence
     turns, (off, several) = np.ptp(psi) > CLEAR_HEADING, _off_straights(evidence, reference)
     told = reference.points_aside or (turns and several)
     if off.sigmas_from(0.0) < TURNED_SIGMAS or not told:

@@ -67,7 +67,6 @@ IN_DEGREES = (30.0, 110.0)  # gyro over orientation if in degrees per second [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # the same over wheels, which slip and skid in turns [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
 LEAST_TURNED = 0.1  # turn in that time, which no rolling of a pitched body is [rad]
-OF_TWIST = 'twist.angular'
 LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
 TIE = 1e-3  # residuals [-] that differ by less are the same
 NOISE_FLOOR = 0.02  # residual [-] by which hypotheses must differ at least
@@ -504,8 +503,11 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if imu is None or evidence.gyro is None:
         return [], evidence
     gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
-    headings = ('orientation', _heading(evidence, imu)), (OF_TWIST, _heading_of_reference(evidence))
-    for name, other in headings:
+    headings = {
+        'orientation': _heading(evidence, imu),
+        'twist.angular': _heading_of_reference(evidence),
+    }
+    for name, other in headings.items():
         if other is None:
             continue
         seen = _turns(evidence, other)
