@@ -508,6 +508,24 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
     assert unmeasured == without
 
 
+def test_noise_of_the_accelerometer_averages_out_over_the_same_ground(parts, ekf):
+    """Cycles over one piece of ground share its tilt and the zero, not the vibration."""
+    found, loads = forces(parts, ekf)
+    noisy = window(0.0, 9.8)._replace(noise_density=0.04, duration=0.1)
+    cycle = parts.cycle(FORWARD, loads, window=noisy)
+    total = force_balance(parts).sum_of_pulls(cycle, 0.0)
+    assert total.noise == pytest.approx(parts.rover.mass**2 * 0.4)
+    once, often = (
+        force_balance(parts)
+        .update(
+            ekf, found, total, cycle, stationary=[None] * 6, model_variance=0.0, repeats=repeats
+        )
+        .variance
+        for repeats in (1.0, 30.0)
+    )
+    assert often - once == pytest.approx(29.0 * total.lasting)
+
+
 def test_turning_weakens_a_torque(parts, ekf):
     rows, found = torque_rows(parts, ekf, 0.0)
     doubted, _ = torque_rows(parts, ekf, 0.0, doubt=2.0)

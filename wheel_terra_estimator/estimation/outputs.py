@@ -33,7 +33,6 @@ from wheel_terra_estimator.estimation.taught import with_model_errors
 from wheel_terra_estimator.estimation.words import reasons_in_words
 
 _UNKNOWN_STD = 1.0  # of a slip velocity [m/s]
-_UNLOADED_STD = 1.0  # of the pull of a wheel in the air [N]
 _BELIEVED_LOAD = 0.1
 """Sum of the loads over the rover's weight below which the specific force is none of a rover on
 its wheels."""
@@ -184,8 +183,7 @@ class Outputs:
         mean_load_std = math.hypot(rover.load_std, rover.open_load_std) * sum(load) / len(load)
         loads = [mean_load_std if given.loads.force_known else w for w in load]
         pulls = [
-            min(std, w if w > 0.0 else _UNLOADED_STD)
-            for std, w in zip(given.pulls.std, load, strict=True)
+            min(std, w + w_std) for std, w, w_std in zip(given.pulls.std, load, loads, strict=True)
         ]
         least = _LEAST_FORCE_STD * share
         return [max(std, least) for std in loads], [max(std, least) for std in pulls]

@@ -11,11 +11,12 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover
-from wheel_terra_estimator.estimation.scalars import TINY
+from wheel_terra_estimator.estimation.scalars import TINY, gain_of
 
 LEAST_LOAD = 1e-3
 """Of a wheel on the ground [N]: with less it is in the air."""
 _LEAST_FORCE = 0.1  # specific force on z [m/s^2] below which a slope is not defined
+_NOISE_SHARE = 0.03  # of gravity: noise of the specific force that loads may have
 
 
 class LoadState(NamedTuple):
@@ -53,8 +54,7 @@ class WheelLoads(Component[LoadState]):
         along the headings. The load of wheels that carry nothing goes to the others.
         """
         if window.tells_force:
-            force = window.mean_force()
-            rover = self._rover
+            force, rover = self._smoothed(window), self._rover
             moment = [t - f * r for t, f, r in zip(torques, pulls, rover.rim_radius, strict=True)]
             if headings.steered:
                 moment = [m * c for m, c in zip(moment, headings.along, strict=True)]
@@ -66,3 +66,13 @@ class WheelLoads(Component[LoadState]):
                 loads = [w * total / max(sum(loads), TINY) for w in loads]
             self.state = LoadState(tuple(loads), force, force_known=True)
         return self.state
+
+    def _smoothed(self, window: InertialWindow) -> tuple[float, float, float]:
+        """Return the mean specific force, smoothed as far as vibration asks."""
+        force, before = window.mean_force(), self.state
+        if not (before.force_known and window.duration > 0.0):
+            return force
+        lag = window.noise_density / (2.0 * (_NOISE_SHARE * self._rover.gravity) ** 2)
+        gain = gain_of(window.duration, max(lag, TINY))
+        x, y, z = (old + gain * (new - old) for old, new in zip(before.force, force, strict=True))
+        return x, y, z

@@ -81,6 +81,7 @@ class Pulls(Component[PullState]):
         zero = (0.0,) * rover.wheel_count
         super().__init__(PullState(zero, loads, zero, zero, zero))
         self._rover, self._sensors = rover, sensors
+        self._load_std = rover.load_std * sum(loads) / rover.wheel_count  # [N]
 
     def update(
         self, mean: FloatArray, covariance: FloatArray, evidence: PullEvidence, *, tilt: float
@@ -112,7 +113,7 @@ class Pulls(Component[PullState]):
                 pull[i] = load * share if isnan(standing) else standing
                 torque[i] = pull[i] * self._rover.rim_radius[i]
                 known = _GUESS_STD if loads.force_known else 1.0
-                std[i] = known * load + _FLOOR_STD
+                std[i] = known * load + self._load_std * abs(share) + _FLOOR_STD
                 own[i] = std[i] ** 2
             else:
                 if not isnan(readings[i]):  # what its torque says beyond its model, smoothed
@@ -164,10 +165,9 @@ class Pulls(Component[PullState]):
         self, i: int, pull: float, torque: float, load: float, *, level: bool
     ) -> float:
         """Return the variance of a turning wheel's pull that no other wheel shares [N^2]."""
-        rover, sensors = self._rover, self._sensors
-        radius = rover.shear_radius[i]
+        sensors, radius = self._sensors, self._rover.shear_radius[i]
         return (
-            (rover.load_std * pull) ** 2
+            (self._load_std * pull / max(load, TINY)) ** 2
             + (sensors.torque_zero_std / radius) ** 2
             + (_GAIN_SHARE * sensors.torque_gain_std * torque / radius) ** 2
             + (_MODEL_STD * load) ** 2

@@ -21,7 +21,7 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 # Tuned on simulated drives, seeds 1000 to 1019.
-_WEIGHT_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
+_WEIGHT_STD = 0.02  # of the weight: what curvature, ruts and mass leave open
 _SIDE_SHARE = 0.5
 """Of the load: the side force that a steered wheel may give, which acts along the body by the
 sine of its angle (friction angle of sand)."""
@@ -33,7 +33,13 @@ class SumOfPulls(NamedTuple):
 
     along: float  # [N] if the body lay along the ground
     weight: float  # [N] that a tilt of the body by its ruts turns into it
-    variance: float  # [N^2]
+    noise: float  # variance of what is new in each cycle [N^2]
+    lasting: float  # variance of what stays the same over the same ground [N^2]
+
+    @property
+    def variance(self) -> float:
+        """Variance of the sum in one cycle [N^2]."""
+        return self.noise + self.lasting
 
 
 class ForceBalance(Component['float | None']):
@@ -68,9 +74,8 @@ class ForceBalance(Component['float | None']):
         noise = std**2 / window.readings
         if window.duration > 0.0:
             noise = max(noise, window.noise_density / window.duration)
-        noise += sensors.specific_force_bias_std**2
-        variance = rover.mass**2 * noise + (_WEIGHT_STD * weight) ** 2
-        return SumOfPulls(rover.mass * force[0] + uphill, weight, variance)
+        lasting = (rover.mass * sensors.specific_force_bias_std) ** 2 + (_WEIGHT_STD * weight) ** 2
+        return SumOfPulls(rover.mass * force[0] + uphill, weight, rover.mass**2 * noise, lasting)
 
     def update(
         self,
@@ -109,7 +114,7 @@ class ForceBalance(Component['float | None']):
             # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
             jacobian[self._layout.sinkage.start + i] += total.weight * gain
         residual = total.along - (pull_sum + total.weight * tilt)
-        variance = repeats * total.variance + open_variance
+        variance = total.noise + repeats * total.lasting + open_variance
         expected = float(jacobian @ ekf.covariance @ jacobian) + variance
         self.state = smoothed_nis(self.state, residual * residual / expected)
         gate = chi_square_gate(residual, expected, self._gate)
