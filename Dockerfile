@@ -23,5 +23,7 @@ FROM dev AS run
 COPY . src/wheel_terra_estimator
 RUN source /opt/ros/jazzy/setup.bash \
     && colcon build --packages-select wheel_terra_estimator
+# Host and container share the network, but not the shared memory that Fast DDS would take.
+ENV FASTDDS_BUILTIN_TRANSPORTS=UDPv4
 ENTRYPOINT ["/bin/bash", "-c", "source /ws/install/setup.bash && exec \"$@\"", "--"]
 CMD ["ros2", "run", "wheel_terra_estimator", "wheel-terra", "demo"]
