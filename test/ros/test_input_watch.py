@@ -30,13 +30,27 @@ def test_the_rate_of_the_first_messages_is_that_of_their_mean_gap():
 
 def test_loss_by_the_publishers_own_count_is_told_whatever_comes_next():
     watch = InputWatch()
-    for number in (1, 2, 5, 6, 1, 2):  # three to four are missing, then the publisher restarts
+    for number in (1, 2, 5, 6):  # three to four are missing
         watch.heard('joint_states', 0.01 * number, 0.0, number)
+    watch.believe_gaps({'joint_states'})
+    for number in (1, 2):  # the publisher restarts
+        watch.heard('joint_states', 0.06 + 0.01 * number, 0.0, number)
+    watch.believe_gaps({'joint_states'})
     assert watch.values(0.1)['joint_states_lost'] == 2
     for i in range(1000):
         watch.heard('joint_states', 0.1 + 0.01 * i, 0.0, None)
     assert watch.faults(10.1) == [('joint_states', '2 messages lost on the way so far')]
     assert watch.faults(10.1) == [], 'told: whoever asked keeps it'
+
+
+def test_two_publishers_between_two_looks_are_no_loss():
+    watch = InputWatch()
+    for number in (500, 1, 501, 2, 502, 503):
+        watch.heard('joint_states', 0.01 * number, 0.0, number)
+    watch.believe_gaps({'joint_states'})  # the first of them has ended
+    watch.heard('joint_states', 6.0, 0.0, 600)
+    watch.believe_gaps(())
+    assert watch.values(6.0)['joint_states_lost'] == 0
 
 
 def test_a_process_that_is_late_calls_no_topic_silent_and_says_by_how_much():

@@ -8,7 +8,7 @@ Times are of a steady clock, so that silence is seen when nothing comes any more
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +33,8 @@ class _Topic:
     ahead: float = 0.0  # least of what the stamps were before the clock
     latest: float = -math.inf  # greatest delay since this was last asked
     number: int | None = None  # of the publisher's last message
+    gaps: int = 0  # in these numbers since the last look at the publishers
+    mixed: bool = False  # a number from before: another publisher's, and so are the gaps
     lost: int = 0
     told: int = 0  # of these
 
@@ -70,9 +72,17 @@ class InputWatch:
         state.latest = max(state.latest, delay)
         state.heard = now
         state.received += 1
-        if number is not None and state.number is not None and number > state.number + 1:
-            self.lost(topic, number - state.number - 1)
+        if number is not None and state.number is not None:
+            state.gaps += max(number - state.number - 1, 0)
+            state.mixed |= number <= state.number
         state.number = number
+
+    def believe_gaps(self, topics: Collection[str]) -> None:
+        """Count the gaps in the numbers of these topics as lost, and forget all others."""
+        for topic, state in self._topics.items():
+            if topic in topics and not state.mixed:
+                state.lost += state.gaps
+            state.gaps, state.mixed = 0, False
 
     def lost(self, topic: str, count: int) -> None:
         """Note messages that were sent and not heard."""

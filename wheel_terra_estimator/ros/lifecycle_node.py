@@ -518,7 +518,10 @@ class EstimatorNode(LifecycleNode):
         assert self._pipeline is not None
         topics: Iterable[str] = self._pipeline.converter.layout.topics
         # With several publishers the counts of their messages cannot be told apart.
-        self._numbered = {topic for topic in topics if self.count_publishers(topic) == 1}
+        resolved = {topic: self.resolve_topic_name(topic) for topic in topics}
+        single = {topic for topic, name in resolved.items() if self.count_publishers(name) == 1}
+        self._watch_inputs.believe_gaps(self._numbered & single)
+        self._numbered = single
 
     def _transport_values(self) -> dict[str, Any]:
         return dict(self._watch_inputs.values(self._seconds()))

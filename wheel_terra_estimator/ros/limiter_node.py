@@ -181,7 +181,7 @@ class TractionLimiter(Node):
         if state.interlock is not Interlock.FREE:
             level = ERROR
             words = words if state.reason in words else f'{state.reason}; {words}'
-        if (publishers := self.count_publishers(f'{NODE}/stuck')) > 1:
+        if (publishers := self.count_publishers(self.resolve_topic_name(f'{NODE}/stuck'))) > 1:
             level = max(level, WARN)
             words = f'{words}; {publishers} publishers of ~/stuck: end all but one'
         if self._unkept:
