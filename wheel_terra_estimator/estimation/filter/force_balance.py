@@ -21,7 +21,8 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 # Tuned on simulated drives, seeds 1000 to 1019.
-_WEIGHT_STD = 0.02  # of the weight: what curvature, ruts and mass leave open
+_WEIGHT_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
+_GROUND_STD = 0.04  # of the weight in a cycle: noise beyond it is that of no ground
 _SIDE_SHARE = 0.5
 """Of the load: the side force that a steered wheel may give, which acts along the body by the
 sine of its angle (friction angle of sand)."""
@@ -33,13 +34,8 @@ class SumOfPulls(NamedTuple):
 
     along: float  # [N] if the body lay along the ground
     weight: float  # [N] that a tilt of the body by its ruts turns into it
-    noise: float  # variance of what is new in each cycle [N^2]
-    lasting: float  # variance of what stays the same over the same ground [N^2]
-
-    @property
-    def variance(self) -> float:
-        """Variance of the sum in one cycle [N^2]."""
-        return self.noise + self.lasting
+    variance: float  # [N^2]
+    vibration: float  # part of it that is new in each cycle, also over the same ground
 
 
 class ForceBalance(Component['float | None']):
@@ -74,8 +70,10 @@ class ForceBalance(Component['float | None']):
         noise = std**2 / window.readings
         if window.duration > 0.0:
             noise = max(noise, window.noise_density / window.duration)
+        noise *= rover.mass**2
         lasting = (rover.mass * sensors.specific_force_bias_std) ** 2 + (_WEIGHT_STD * weight) ** 2
-        return SumOfPulls(rover.mass * force[0] + uphill, weight, rover.mass**2 * noise, lasting)
+        vibration = max(noise - (_GROUND_STD * weight) ** 2, 0.0)
+        return SumOfPulls(rover.mass * force[0] + uphill, weight, noise + lasting, vibration)
 
     def update(
         self,
@@ -114,7 +112,7 @@ class ForceBalance(Component['float | None']):
             # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
             jacobian[self._layout.sinkage.start + i] += total.weight * gain
         residual = total.along - (pull_sum + total.weight * tilt)
-        variance = total.noise + repeats * total.lasting + open_variance
+        variance = repeats * (total.variance - total.vibration) + total.vibration + open_variance
         expected = float(jacobian @ ekf.covariance @ jacobian) + variance
         self.state = smoothed_nis(self.state, residual * residual / expected)
         gate = chi_square_gate(residual, expected, self._gate)
