@@ -351,10 +351,13 @@ def test_a_warning_waits_for_the_verdict_on_a_suspicion_and_never_comes_if_it_is
     assert not raised(Wheels(), at(7.0), flip_from=0.0)
 
 
-@pytest.mark.parametrize(('nis', 'told'), [(7.0, False), (13.0, True)])
-def test_torques_that_do_not_fit_are_told_and_slip_is_still_judged(nis, told):
+@pytest.mark.parametrize(
+    ('nis', 'stuck', 'told'), [(7.0, False, False), (13.0, False, True), (13.0, True, False)]
+)
+def test_torques_that_do_not_fit_are_told_and_slip_is_still_judged(nis, stuck, told):
+    """Of a rover that has dug itself in no model fits, and none of its sensors is to blame."""
     judge = InputJudge(Wheels().configuration)
-    estimates = judge.judged(some_estimates(6), {'nis_torque': nis})
+    estimates = judge.judged(some_estimates(6, stuck=stuck), {'nis_torque': nis})
     assert ('fit of torque' in estimates.faults) is told
     if told:
         assert 'NIS 13' in estimates.faults['fit of torque']

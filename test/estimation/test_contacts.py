@@ -477,7 +477,7 @@ def test_the_pull_of_a_wheel_that_seems_in_the_air_is_as_open_as_its_load(parts)
     climb = cycle.loads._replace(force=(3.4, 0.0, 9.2))
     ekf = parts.filter()
     evidence = PullEvidence(
-        forces_at(parts), None, cycle._replace(loads=climb), (np.nan,) * 6, (np.nan,) * 6, None
+        forces_at(parts), None, cycle._replace(loads=climb), (np.nan,) * 6, (np.nan,) * 6, None, 0.0
     )
     pulls.update(ekf.mean, 1e-9 * np.eye(len(ekf.mean)), evidence, tilt=0.0)
     assert pulls.state.pull[0] == 0.0
@@ -502,6 +502,7 @@ def published_pull(parts, excess, lateral_motion=0.0, aside=None):
                 readings=tuple((forces.torque + excess).tolist()),
                 stationary=(np.nan,) * 6,
                 aside=aside,
+                tilt_std=0.0,
             ),
             tilt=0.0,
         )

@@ -295,6 +295,22 @@ def relaxed(parts, ekf, seconds, speed=0.05, start=None):
     return x[parts.layout.sinkage], travel, prediction
 
 
+def test_digging_leaves_the_sinkage_open_until_it_is_read_or_the_wheel_rolls_on(parts, ekf):
+    """Sand that a standing wheel spins out is gone: 0 to 0.1 of the way that the rim slips."""
+    process = SinkageProcess(parts.rover, parts.layout, parts.models, 0.0)
+
+    def goes_on(seconds, speed, read=()):
+        ekf.mean[SPEED] = speed
+        unread = [i for i in range(6) if i not in read]
+        for _ in range(round(10 * seconds)):
+            process.predict(Prediction.unchanged(ekf.mean), ekf.mean, parts.cycle(FORWARD))
+            process.end_cycle(ekf, ekf.mean[parts.layout.sinkage].copy(), unread, 0.1)
+        return process.state.dug
+
+    assert goes_on(20.0, 0.0, read=[2])[[1, 2]] == pytest.approx([0.1 * 0.05 * 20.0, 0.0])
+    assert (goes_on(10.0, 0.05) < 2e-3).all()
+
+
 def test_the_sinkage_relaxes_over_travel_to_where_the_bearing_law_carries_the_load(parts, ekf):
     at_rest = ekf.mean[parts.layout.sinkage]  # the same law without slip
     found, travel, _ = relaxed(parts, ekf, 30.0, start=0.05)

@@ -61,7 +61,8 @@ class InputJudge:
 
         ``health``: what the estimator says of itself.
         """
-        faults = _told({**estimates.faults, **_misfits(health)}, self._checks.remarks)
+        misfits = {} if estimates.stuck else _misfits(health)  # dug in, no model fits
+        faults = _told({**estimates.faults, **misfits}, self._checks.remarks)
         if self._failed:
             faults |= _NOT_CHECKED
         silenced = self._silenced(self._checks.findings)

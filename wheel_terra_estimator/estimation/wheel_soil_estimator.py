@@ -303,10 +303,11 @@ class WheelSoilEstimator:
             forces, total, stationary, force_rows = self._force_rows(cycle)
             if self._contact_age.settled or cycle.reference_known:
                 rows += force_rows
+        unread = self._sinkage.unread(time)
         considered = layout.considered(
             settled=self._contact_age.settled,
             opposes_rims=cycle.yaw_compensated.oppose(float(ekf.mean[SPEED])),
-            unread=self._sinkage.unread(time),
+            unread=unread,
         )
         ekf.fuse(rows, considered)
 
@@ -319,7 +320,7 @@ class WheelSoilEstimator:
             settled=self._contact_age.settled,
             turning=cycle.lateral_motion > _SHARP_TURN,
         )
-        self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
+        self._sinkage_process.end_cycle(ekf, sinkage_before, unread, cycle.dt)
         self._speed.keep_least_variance(ekf, cycle.rims)
         evidence = PullEvidence(
             forces=forces,
@@ -335,6 +336,7 @@ class WheelSoilEstimator:
             ),
             stationary=stationary,
             aside=self._lateral_forces(cycle),
+            tilt_std=math.hypot(*(self._sinkage_process.state.dug * self._rover.rut_tilt)),
         )
         tilt = rut_tilt(self._rover, layout, ekf.mean)
         self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)

@@ -51,6 +51,7 @@ class PullEvidence(NamedTuple):
     readings: Floats  # last torque of each wheel [N m], nan = never known
     stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
     aside: Sideways | None  # lateral forces in a turn, where they are told; None elsewhere
+    tilt_std: float  # of the body against the ground, by digging alone [rad]
 
 
 class KnownSum(NamedTuple):
@@ -90,7 +91,7 @@ class Pulls(Component[PullState]):
 
         `tilt` is that of the body against the ground by its ruts [rad].
         """
-        forces, total, cycle, readings, stationary, aside = evidence
+        forces, total, cycle, readings, stationary, aside, tilt_std = evidence
         loads, lateral_motion = cycle.loads, cycle.lateral_motion
         state, share = self.state, loads.slope_share
         n = self._rover.wheel_count
@@ -130,7 +131,8 @@ class Pulls(Component[PullState]):
                     i, pull[i], torque[i], load, level=not loads.force_known
                 )
                 own[i] += noises[i] ** 2
-                std[i] = math.sqrt(max(shared[i], 0.0) + own[i] + scrub[i])
+                all_variances = max(shared[i], 0.0) + own[i] + scrub[i] + (tilt_std * load) ** 2
+                std[i] = math.sqrt(all_variances)
         model_pull = tuple(pull)
         if forces is not None:
             sums = self._known(cycle, total, aside, tilt)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,8 @@ _RELAXATION_SLOPE = 0.9  # of the relaxation that acts on the covariance
 _LEAST_MEMORY = 0.05  # of the sinkage in the covariance
 _LAW_ERROR = 0.05  # of the sinkage per contact length
 _DIGGING = 0.05  # of the slip velocity times slip
+_OPEN_DIGGING = 0.1
+"""Of it, lasting: 0 to 0.1 in simulators of four hands, where nothing measures the sinkage."""
 _SLOPE_KEEP = 0.9  # smoothing of the derivatives over about a second of cycles
 _RATE_TIME = 0.5  # time constant of the published rate [s]
 _FIRST_RATE_STD = 1.0  # [m/s], before anything is known
@@ -56,6 +59,8 @@ class SinkageState(NamedTuple):
     """(2, n) smoothed derivatives of ln(load carried) by v / rim speed and by n1; nan = none."""
     rate: Floats  # of each wheel [m/s]
     rate_std: Floats
+    dug: FloatArray
+    """(n,) what digging, of which the law knows nothing, leaves open of each sinkage [m]."""
 
 
 class _Motion(NamedTuple):
@@ -79,7 +84,7 @@ class SinkageProcess(Component[SinkageState]):
     ) -> None:
         n = rover.wheel_count
         none = np.full((2, n), np.nan)
-        super().__init__(SinkageState(none, (0.0,) * n, (_FIRST_RATE_STD,) * n))
+        super().__init__(SinkageState(none, (0.0,) * n, (_FIRST_RATE_STD,) * n, np.zeros(n)))
         self._rover, self._layout, self._models = rover, layout, models
         self._leaving_angle_std = leaving_angle_std
 
@@ -144,10 +149,14 @@ class SinkageProcess(Component[SinkageState]):
             [np.log(carried[0] / carried[1]) / _RATIO_STEP, np.abs(slip) * log_depths[0]]
         )
         slopes = smoothed_slopes(self.state.slopes, raw, _SLOPE_KEEP)
-        self.state = self.state._replace(slopes=np.where(relaxes, slopes, self.state.slopes))
         # What the law does not know: a share of the sinkage per contact length, and digging.
-        digging = _DIGGING * np.maximum(slip, 0.0) ** 2 * rim * dt
-        noise = (_LAW_ERROR * floored) ** 2 * 2.0 * alpha + digging**2 + _WALK * dt
+        spun = np.maximum(slip, 0.0) ** 2 * rim * dt
+        dug = (self.state.dug + _OPEN_DIGGING * spun) * np.exp(-np.abs(speed) * dt / length)
+        self.state = self.state._replace(
+            slopes=np.where(relaxes, slopes, self.state.slopes),
+            dug=np.where(relaxes, dug, self.state.dug),
+        )
+        noise = (_LAW_ERROR * floored) ** 2 * 2.0 * alpha + (_DIGGING * spun) ** 2 + _WALK * dt
         if states.leaving_angle is not None:
             angle = states.leaving_angle - self._leaving_angle_std
             there = self._models.bearing(states._replace(leaving_angle=angle)).load
@@ -163,8 +172,16 @@ class SinkageProcess(Component[SinkageState]):
         prediction.F[zi, SPEED] = (-sensitivity * slopes[0] / rim * by_speed)[wheels]
         prediction.Q[zi, zi] = noise[wheels]
 
-    def end_cycle(self, ekf: GatedFilter, before: FloatArray, dt: float) -> None:
-        """Keep the rate of change since `before`, the (n,) sinkages at the start of the cycle."""
+    def end_cycle(
+        self, ekf: GatedFilter, before: FloatArray, unread: Sequence[int], dt: float
+    ) -> None:
+        """Keep the rate of change since `before`, the (n,) sinkages at the start of the cycle.
+
+        What digging leaves open is so of the wheels whose sinkage is `unread`.
+        """
+        dug = np.zeros(len(before))
+        dug[unread] = self.state.dug[unread]
+        self.state = self.state._replace(dug=dug)
         if dt <= 0.0:
             return
         part = self._layout.sinkage
