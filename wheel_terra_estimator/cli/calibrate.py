@@ -29,7 +29,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     configuration_reader.add_arguments(parser)
     add_output(parser, 'rover file to be written', 'F', required=True)
     add_remaps(parser)
-    parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -25,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_output(parser, 'rosbag2 folder (MCAP)')
     parser.add_argument('--example', action='store_true', help='print a map of columns and stop')
-    parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
 
 
 def run(arguments: argparse.Namespace) -> int:

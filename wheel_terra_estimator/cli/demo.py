@@ -80,9 +80,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--no-node', action='store_true', help='replay the drives even where rclpy is at hand'
     )
-    parser.add_argument(
-        '--overwrite', action='store_true', help='replace the output of an earlier demo'
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:

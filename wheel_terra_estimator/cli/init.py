@@ -41,7 +41,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(f'--{name}', type=_positive, metavar=unit, help=meaning)
     add_remaps(parser)
     parser.add_argument('--name', default='', metavar='TEXT', help='name of the rover, for reports')
-    parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 
 
 _MEASURES = (

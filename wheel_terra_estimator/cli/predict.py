@@ -117,7 +117,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--seed', type=int, default=1, metavar='N', help='draws the noise (default 1)'
     )
     add_output(parser, 'write a picture (.png, .svg, .pdf) or a table (.csv) instead', 'FILE')
-    parser.add_argument('--overwrite', action='store_true', help='replace an existing FILE')
     configuration_reader.add_arguments(parser)
 
 

@@ -83,9 +83,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='take the messages in the order that a live node logged (its parameter '
         'record_arrival), not in that of the bag',
     )
-    parser.add_argument(
-        '--overwrite', action='store_true', help='replace an earlier output of the same name'
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -46,9 +46,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_output(parser, 'rosbag2 folder (MCAP)', required=True)
     configuration_reader.add_arguments(parser)
-    parser.add_argument(
-        '--overwrite', action='store_true', help='replace an earlier bag of the same name'
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:
