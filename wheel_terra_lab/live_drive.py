@@ -348,7 +348,7 @@ def _run(arguments: argparse.Namespace) -> None:
     print(told.as_text)
     print(f'estimates: {arguments.output}')
     if arguments.report:
-        told.write_report(arguments.report, arguments.overwrite)
+        told.write({'report': arguments.report}, arguments.overwrite)
         print(f'report: {arguments.report}')
 
 

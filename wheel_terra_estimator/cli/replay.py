@@ -145,8 +145,8 @@ _ENDINGS = {
 """Option that names a file -> how it may end, and what is said of another."""
 
 
-def _check_kinds(arguments: argparse.Namespace) -> list[Path]:
-    """Refuse files whose names promise another format; return all that are to be written."""
+def _files(arguments: argparse.Namespace) -> dict[str, Path]:
+    """Return the files to be written by option; refuse names that promise another format."""
     from wheel_terra_estimator.reporting.estimates_table import PARQUET, pandas_for
 
     paths: dict[str, Path] = {o: p for o in _ENDINGS if (p := getattr(arguments, o))}
@@ -156,14 +156,14 @@ def _check_kinds(arguments: argparse.Namespace) -> list[Path]:
             raise UserError(f'{path}: {words}')
         if path.suffix.lower() == PARQUET:
             pandas_for(path)
-    return list(paths.values())
+    return paths
 
 
 def _check_outputs(arguments: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written, before hours of work."""
     from wheel_terra_estimator.output_folder import check_file, check_folder
 
-    for path in _check_kinds(arguments):
+    for path in _files(arguments).values():
         check_file(path, arguments.overwrite)
     if arguments.save_soil:
         check_file(arguments.save_soil, arguments.overwrite, foreign=soil_file.why_foreign)
@@ -173,18 +173,13 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
 
 def _write_outputs(drive: Drive, arguments: argparse.Namespace) -> dict[str, Path]:
     """Write what was asked for beside the bag of estimates; return what there is now."""
-    if arguments.table:
-        drive.write_table(arguments.table, arguments.overwrite)
-    if arguments.track:
-        drive.write_track(arguments.track, arguments.overwrite)
+    drive.write(_files(arguments), arguments.overwrite)
     if arguments.save_soil:
         if not drive.result.learned:
             raise UserError(
                 f'{arguments.bags[0]}: no estimates, so nothing for {arguments.save_soil}'
             )
         soil_file.write_values(arguments.save_soil, drive.result.learned, arguments.overwrite)
-    if arguments.report:
-        drive.write_report(arguments.report, arguments.overwrite)
     outputs = {
         'table': arguments.table,
         'track': arguments.track,
@@ -204,15 +199,12 @@ def _run_several(arguments: argparse.Namespace) -> int:
     for option, given in (('--arrival', arguments.arrival), ('--save-soil', arguments.save_soil)):
         if given:
             raise UserError(f'{option}: belongs to one recording; replay that one by itself')
-    _check_kinds(arguments)
     settings = Settings(
         configuration_reader.from_arguments(arguments),
         parse_remaps(arguments.remap),
         arguments.output,
-        _plain_name('--report', arguments.report),
-        _plain_name('--table', arguments.table),
+        {option: _plain_name(option, path) for option, path in _files(arguments).items()},
         _options(arguments),
-        track=_plain_name('--track', arguments.track),
     )
     rows = replay_bags(
         arguments.bags,
@@ -238,13 +230,11 @@ def _run_several(arguments: argparse.Namespace) -> int:
     return SOME_FAILED if failed else 0
 
 
-def _plain_name(option: str, path: Path | None) -> str:
+def _plain_name(option: str, path: Path) -> str:
     """Return the name of a file that stands in the folder of each recording."""
-    if path is None:
-        return ''
     if path != Path(path.name):
         raise UserError(
-            f'{option} {path}: with several recordings it stands in the folder of each; '
+            f'--{option} {path}: with several recordings it stands in the folder of each; '
             f'give a plain name such as {path.name}'
         )
     return path.name

@@ -45,31 +45,28 @@ class Drive:
             lines += truth_scores.as_lines(self.errors)
         return '\n'.join(lines)
 
-    def write_table(self, path: Path, overwrite: bool) -> None:
-        """Write the estimates as a table."""
-        with new_file(path, overwrite) as fresh:
-            estimates_table.write_table(self.result.history, fresh)
-
-    def write_track(self, path: Path, overwrite: bool) -> None:
-        """Write the track as a table."""
-        assert self.result.track is not None
-        with new_file(path, overwrite) as fresh:
-            estimates_table.write_track(self.result.track, fresh)
-
-    def write_report(self, path: Path, overwrite: bool) -> None:
-        """Write the page with pictures."""
-        write_replay_report(
-            path,
-            self.summary,
-            self.result.history,
-            self.truth,
-            self.configuration,
-            overwrite=overwrite,
-            findings=self.checked.findings,
-            errors=self.errors,
-            smoothed=self.result.smoothed,
-            track=self.result.track,
-        )
+    def write(self, files: Mapping[str, Path], overwrite: bool) -> None:
+        """Write those that have a path: ``table`` of the estimates, ``track``, ``report``."""
+        history, track = self.result.history, self.result.track
+        if 'table' in files:
+            with new_file(files['table'], overwrite) as fresh:
+                estimates_table.write_table(history, fresh)
+        if 'track' in files and track is not None:
+            with new_file(files['track'], overwrite) as fresh:
+                estimates_table.write_track(track, fresh)
+        if 'report' in files:
+            write_replay_report(
+                files['report'],
+                self.summary,
+                history,
+                self.truth,
+                self.configuration,
+                overwrite=overwrite,
+                findings=self.checked.findings,
+                errors=self.errors,
+                smoothed=self.result.smoothed,
+                track=track,
+            )
 
 
 def replay_drive(

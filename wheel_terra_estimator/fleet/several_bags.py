@@ -44,19 +44,13 @@ READ_AT_ONCE = 2**20  # bytes of a recording that are read at a time for its dig
 
 @dataclass(frozen=True)
 class Settings:
-    """What is the same for all recordings.
-
-    ``report``, ``table`` and ``track`` are names of files in the folder of each recording, empty
-    for none.
-    """
+    """What is the same for all recordings."""
 
     configuration: Configuration
     remaps: Mapping[str, str]
     output: Path
-    report: str = ''
-    table: str = ''
+    files: Mapping[str, str]  # as for `Drive.write` -> name in the folder of each recording
     options: Options = DEFAULT
-    track: str = ''
 
 
 @dataclass(frozen=True)
@@ -107,7 +101,7 @@ def _replay_into(
     told = [replace(rows[i], bag=str(bag)) for i, bag in enumerate(bags)]
     with new_file(output / SUMMARY_TABLE, overwrite=True) as path:
         write_table(told, path)
-    write_summary_page(told, output / SUMMARY_PAGE, settings.report)
+    write_summary_page(told, output / SUMMARY_PAGE, settings.files.get('report', ''))
     return told
 
 
@@ -158,7 +152,7 @@ def _digest(settings: Settings, path: Path) -> str:
         'values': values,
         'stated': sorted(configuration.stated),
         'remaps': dict(settings.remaps),
-        'files': [settings.report, settings.table, settings.track],
+        'files': dict(settings.files),
         'smooth': settings.options.smooth,
     }
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
@@ -189,12 +183,7 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
     output = settings.output / task.folder
     options = replace(settings.options, overwrite=True, progress=False)
     drive = replay_drive(task.path, configuration, settings.remaps, output, options)
-    if settings.table:
-        drive.write_table(output / settings.table, overwrite=True)
-    if settings.track:
-        drive.write_track(output / settings.track, overwrite=True)
-    if settings.report:
-        drive.write_report(output / settings.report, overwrite=True)
+    drive.write({kind: output / name for kind, name in settings.files.items()}, overwrite=True)
     row = DriveRow.from_drive(str(task.path), drive.summary, drive.checked)
     row = replace(row, folder=task.folder)
     mark(output, [], {'digest': task.digest, 'row': asdict(row)})
