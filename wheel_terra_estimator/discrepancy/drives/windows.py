@@ -67,18 +67,6 @@ _CREEP = (0.10, 0.5e-3, 0.02)  # share of the sinkage, least [m], most in wheel 
 
 SMOOTHED = 'slip: from the fixed-interval smoother, which heard neither torque nor sinkage'
 GOOD = 'steady'
-QUALITIES = (
-    GOOD,
-    'standing',
-    'settling',
-    'turning',
-    'digging in',
-    'wheel rate changes',
-    'slip changes',
-    'slope changes',
-    'no reference',
-    'no data',
-)
 
 
 @dataclass(frozen=True)
@@ -517,11 +505,8 @@ def _notes(finder: _WindowFinder, windows: list[Window], left_out: int) -> tuple
     if max(passages):
         kind = f'{min(passages)} to {max(passages)} lug passages each'
     slips = [float(np.mean(w.slip)) for w in windows]
-    rest = [
-        f'{key} {finder.seconds[key]:.0f} s'
-        for key in QUALITIES
-        if key != GOOD and finder.seconds.get(key, 0.0) >= 0.5
-    ]
+    longest_first = sorted(finder.seconds.items(), key=lambda item: -item[1])
+    rest = [f'{key} {s:.0f} s' for key, s in longest_first if key != GOOD and s >= 0.5]
     notes = (
         f'{len(windows)} steady windows ({kind}), {used:.0f} of {total:.0f} s used, mean slip '
         f'{min(slips):.2f} to {max(slips):.2f} with a standard deviation of '
