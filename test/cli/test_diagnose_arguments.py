@@ -57,30 +57,3 @@ def test_json_is_the_report_and_nothing_else(tmp_path, capsys, printed):
     arguments = ['diagnose', rows, *config, '-o', str(out), '--no-pictures', '--json']
     said = printed([*arguments, '--only', 'lug_digging'])
     assert json.loads(said) == json.loads((out / 'report.json').read_text())
-
-
-def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(tmp_path, capsys, printed):
-    """The same friction of the drive in two soils: each table gets its soil."""
-    rig = ['--config', 'hit_wh3_lug10']
-    for name, soil in (('sand', 'hit_lss1'), ('simulant', 'fjs1_ishigami')):
-        friction = 'effects.drivetrain_friction'
-        hidden = ['-p', f'{friction}.enabled:=true', '-p', f'{friction}.torque:=0.8']
-        rows = ['predict', *rig, '--config', soil, *hidden, '--slip', '0.05:0.7:8']
-        rows += ['--load', '40,80', '--noise', '0.0003,0.6,0.06', '--seed', str(len(name))]
-        assert main([*rows, '-o', str(tmp_path / f'{name}.csv')]) == 0
-    tables = [str(tmp_path / f'{name}.csv') for name in ('sand', 'simulant')]
-    capsys.readouterr()
-    arguments = ['diagnose', *tables, *rig, '--config', 'hit_lss1', '--no-pictures']
-    arguments += ['--soil', 'own', '--jobs', '1', '--only', 'drivetrain_friction']
-    arguments += ['-o', str(tmp_path / 'out')]
-    said = printed(arguments)
-    assert 'over all 2 tables, each with its own soil' in said
-    assert 'for it 2 of 2 tables' in said.splitlines()[-1]
-    stiffness = {}
-    for name in ('sand', 'simulant'):
-        report = json.loads((tmp_path / 'out' / name / 'report.json').read_text())
-        stiffness[name] = next(s for s in report['soil'] if s['name'] == 'stiffness')['after']
-        assert (tmp_path / 'out' / name / 'model.yaml').exists()
-    assert abs(stiffness['sand'] / stiffness['simulant'] - 1.0) > 0.05
-    summary = (tmp_path / 'out' / 'summary.csv').read_text().splitlines()
-    assert len(summary) == 3 and summary[0].startswith('table,verdict,effects,confidence,')

@@ -112,7 +112,7 @@ def test_the_shipped_completion_is_that_of_the_parsers(capsys):
         ('repl', ['replay']),
         ('replay --rem', ['--remap']),
         ('replay bag --config fros', ['frostyboy']),
-        ('diagnose rows.csv --soil ', ['shared', 'own']),
+        ('predict --method q', ['quadrature']),
         ('config sh', ['show']),
         ('replay no_such_file', []),
     ],

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +12,6 @@ from typing import TYPE_CHECKING
 from wheel_terra_estimator.cli.outputs import Output, add_remaps, file_or_entry
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
-from wheel_terra_estimator.scheduler import add_jobs_argument, finished
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.configuration import Configuration
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 EXAMPLES = (
     'wheel-terra diagnose rows.csv --config hit_wh3 --config hit_fit -o diagnosis',
     'wheel-terra diagnose my_bag --config my_rover.yaml --remap reference_odom:=/vo -o diagnosis',
-    'wheel-terra diagnose sand.csv gravel.csv --soil own --jobs 2 --config rig.yaml -o diagnosis',
+    'wheel-terra diagnose smooth.csv lugged.csv --config rig.yaml -o diagnosis',
 )
 
 
@@ -36,19 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs='+',
         metavar='DATA',
-        help='CSV table of steady rows, or a rosbag2; several: see --soil',
+        help='CSV table of steady rows, or a rosbag2; several are one table with one soil',
     )
     parser.add_argument(
         '-o', '--output', action=Output, required=True, metavar='DIR', help='folder to be written'
     )
-    parser.add_argument(
-        '--soil',
-        choices=('shared', 'own'),
-        default='shared',
-        help='several tables: as one with one soil (default), or each with its own in a folder of '
-        'its name, with a summary of which effect they favour together',
-    )
-    add_jobs_argument(parser, words='tables with their own soil side by side (default 1)')
     parser.add_argument(
         '--reference',
         type=Path,
@@ -150,8 +140,6 @@ def run(arguments: argparse.Namespace) -> int:
             )
         if arguments.smooth:
             raise UserError(f'--smooth: goes with a bag, but {given[0]} is a table; leave it out')
-    if arguments.soil == 'own' and len(arguments.data) > 1:
-        return _each_with_its_soil(arguments)
     diagnosis = _diagnosed(arguments)
     with new_folder(output, arguments.overwrite) as folder:
         write_files(diagnosis, folder, pictures=not arguments.no_pictures)
@@ -190,48 +178,6 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
         note = 'no soil was stated (--config): the default sand was taken for the model believed in'
         diagnosis = replace(diagnosis, notes=(*diagnosis.notes, note))
     return diagnosis
-
-
-def _each_with_its_soil(arguments: argparse.Namespace) -> int:
-    """Diagnose each table with a soil of its own, side by side, and sum up what they favour."""
-    from wheel_terra_estimator.discrepancy.report.model_file import (
-        over_all,
-        write_files,
-        write_summary,
-    )
-
-    names = _folder_names(arguments.data)
-    plain = {key: value for key, value in vars(arguments).items() if key != 'run'}
-    tasks = [argparse.Namespace(**{**plain, 'data': [data]}) for data in arguments.data]
-    found: dict[str, Diagnosis] = {}
-    for index, outcome in finished(_diagnosed, tasks, arguments.jobs):
-        if isinstance(outcome, Exception):
-            raise outcome
-        found[names[index]] = outcome
-    found = {name: found[name] for name in names}
-    output: Path = arguments.output
-    with new_folder(output, arguments.overwrite) as folder:
-        for name, diagnosis in found.items():
-            (folder / name).mkdir()
-            write_files(diagnosis, folder / name, pictures=not arguments.no_pictures)
-        write_summary(found, folder / 'summary.csv')
-    if arguments.json:
-        print(json.dumps({name: diagnosis.to_dict() for name, diagnosis in found.items()}))
-        return 0
-    for name, diagnosis in found.items():
-        print(f'{name}:')
-        _tell(diagnosis, output / name)
-    print(over_all(found))
-    return 0
-
-
-def _folder_names(data: list[str]) -> list[str]:
-    """Return a name for each table: that of its file, with a number where two are alike."""
-    names: list[str] = []
-    for path in map(Path, data):
-        stem = path.stem or 'table'
-        names.append(stem if stem not in names else f'{stem}_{len(names) + 1}')
-    return names
 
 
 def _tell(diagnosis: Diagnosis, output: Path) -> None:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""All files of a diagnosis, or of several; the corrected model with its provenance.
+"""All files of a diagnosis; the corrected model with its provenance.
 
 A sensor reads ``gain * true + zero``: zeros and gains of readings that were found as effects are
 written as keys ``sensors.*``, from which estimator, drive rows, diagnosis and ``predict`` start,
@@ -11,14 +11,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.discrepancy.numbers import percent
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, Proposal
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
@@ -174,56 +172,3 @@ def write_model(diagnosis: Diagnosis, path: str | Path, proposal: Proposal | Non
     if 'effect_file' in keys:
         comment = f'Runs Python code (effect_file): needs --allow-effect-files\n{comment}'
     configuration.write(path, keys, comment=comment)
-
-
-_CLEAR = 3.0  # nats over the soil alone from which a table favours an effect
-
-
-def evidence_over_all(found: Mapping[str, Diagnosis]) -> dict[str, tuple[float, int]]:
-    """Return effect -> (sum of its log evidence over the tables [nats], tables that favour it).
-
-    Each table has its own soil and its own size of the effect, so that the evidences multiply. An
-    effect that a table does not list counts as its least listed one.
-    """
-    total: dict[str, tuple[float, int]] = {}
-    by_table = []
-    for diagnosis in found.values():
-        best: dict[str, float] = {}
-        for candidate in diagnosis.candidates:
-            if len(candidate.names) == 1:
-                name = effect_of(candidate.names[0])
-                best[name] = max(candidate.log_evidence, best.get(name, -float('inf')))
-        by_table.append(best)
-    for name in dict.fromkeys(name for best in by_table for name in best):
-        values = [best.get(name, min([*best.values(), 0.0])) for best in by_table]
-        total[name] = sum(values), sum(value > _CLEAR for value in values)
-    return dict(sorted(total.items(), key=lambda item: -item[1][0]))
-
-
-def over_all(found: Mapping[str, Diagnosis]) -> str:
-    """Return the effects that the tables favour together, in words."""
-    total = evidence_over_all(found)
-    names = [name for name, (value, _) in total.items() if value > _CLEAR][:3]
-    begin = f'over all {len(found)} tables, each with its own soil: '
-    if not names:
-        return f'{begin}no effect is favoured'
-    return begin + '; '.join(
-        f'{name} ({total[name][0]:+.1f} nats over the soils alone, for it {total[name][1]} of '
-        f'{len(found)} tables)'
-        for name in names
-    )
-
-
-def write_summary(found: Mapping[str, Diagnosis], path: Path) -> None:
-    """Write one row per table: verdict, names, confidence, and the gap of each quantity [SI]."""
-    quantities = dict.fromkeys(q for diagnosis in found.values() for q in diagnosis.gap)
-    parts = ('before', 'refit', 'after', 'noise')
-    rows = []
-    for name, diagnosis in found.items():
-        effects = ' + '.join(effect.name for effect in diagnosis.effects)
-        sure = f'{diagnosis.effects[0].confidence:.3g}' if diagnosis.effects else ''
-        values = (getattr(diagnosis.gap.get(q), p, None) for q in quantities for p in parts)
-        gaps = ['' if value is None else f'{value:.6g}' for value in values]
-        rows.append([name, diagnosis.verdict, effects, sure, *gaps])
-    header = ['table', 'verdict', 'effects', 'confidence']
-    write_csv(path, [*header, *(f'{q}_{p}' for q in quantities for p in parts)], rows)
