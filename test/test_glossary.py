@@ -1,13 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""One glossary for terminal, reports and site."""
+"""One glossary for reports and site."""
 
 from pathlib import Path
 
-import pytest
-
 from wheel_terra_estimator import glossary
-from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.discrepancy.numbers import percent
 from wheel_terra_estimator.reporting.html import render
 
@@ -20,19 +17,6 @@ def test_the_page_of_the_site_has_the_glossary():
     )
     assert words in PAGE.read_text(encoding='utf-8'), words
     assert all(term.meaning.endswith('.') for term in glossary.terms())
-
-
-def test_a_word_on_the_terminal(capsys):
-    for words, status, said in (
-        (['--glossary', 'margin'], 0, 'pull margin: Greatest pull'),
-        (['--glossary'], 0, 'not known (unknown): '),
-        (['--glossary', 'sinkag'], 0, 'sinkage: Depth'),
-        (['--glossary', 'findng'], 2, "did you mean 'finding'?"),
-    ):
-        with pytest.raises(SystemExit) as end:
-            main(words)
-        assert end.value.code == status
-        assert said in ''.join(capsys.readouterr())
 
 
 def test_a_report_explains_its_words_and_no_others(tmp_path):

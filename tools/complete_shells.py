@@ -10,11 +10,14 @@ from __future__ import annotations
 import argparse
 import re
 import shlex
+from pathlib import Path
 
-from wheel_terra_estimator.cli.completion import path
 from wheel_terra_estimator.cli.main import COMMANDS, sub_parsers
 from wheel_terra_estimator.configuration import shipped
 
+FOLDER = Path(__file__).resolve().parents[1] / 'wheel_terra_estimator' / 'cli' / 'completion'
+FILES = {'bash': FOLDER / 'wheel-terra', 'zsh': FOLDER / '_wheel-terra'}
+"""Shell -> its shipped file, under the name that the shell looks for."""
 _HEAD = '# Written by python tools/complete_shells.py; do not edit.'
 _BASH = """\
 {head}
@@ -119,4 +122,4 @@ def _zsh(options: dict[str, dict[str, str]], values: dict[tuple[str, str], list[
 
 if __name__ == '__main__':
     for shell, text in scripts().items():
-        path(shell).write_text(text, encoding='utf-8')
+        FILES[shell].write_text(text, encoding='utf-8')

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The words that terminal, reports and site use, explained once (``glossary.csv``)."""
+"""The words that reports and site use, explained once (``glossary.csv``)."""
 
 from __future__ import annotations
 
@@ -37,10 +37,3 @@ def used_in(text: str) -> list[Term]:
         for term in terms()
         if any(re.search(rf'\b{re.escape(w)}\b', plain) for w in (term.term, term.also) if w)
     ]
-
-
-def as_text(word: str = '') -> str:
-    """Return the words whose name holds a text, for a terminal; all for an empty one."""
-    wanted = word.lower()
-    found = [t for t in terms() if wanted in t.term or wanted in t.also]
-    return '\n'.join(f'{t.term}{f" ({t.also})" if t.also else ""}: {t.meaning}' for t in found)

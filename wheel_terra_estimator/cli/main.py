@@ -25,7 +25,6 @@ from wheel_terra_estimator.cli.terminal import (
     UNUSABLE_INPUT,
     Harmless,
     Parser,
-    Printing,
     complain,
     discard_output,
     open_closed_streams,
@@ -83,22 +82,6 @@ def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, Parser]]:
     )
     parser.add_argument('--version', action='version', version=__version__)
     parser.add_argument('--debug', action='store_true', help=DEBUG_HELP)
-    parser.add_argument(
-        '--print-completion',
-        action=Printing,
-        text=_completion,
-        metavar='SHELL',
-        help='print what completes commands and options in bash or zsh',
-    )
-    parser.add_argument(
-        '--glossary',
-        action=Printing,
-        text=_glossary,
-        nargs='?',
-        const='',
-        metavar='WORD',
-        help='what the words of terminal and reports mean',
-    )
     commands = parser.add_subparsers(
         dest='command', required=True, metavar='COMMAND', parser_class=Parser
     )
@@ -156,26 +139,6 @@ def _commands_here() -> Container[str]:
         except UserError:
             here.discard(name)
     return here
-
-
-def _glossary(parser: argparse.ArgumentParser, word: str) -> str:
-    """What a word means, or all of them."""
-    from wheel_terra_estimator import glossary
-
-    found = glossary.as_text(word or '')
-    if not found:
-        names = [term.term for term in glossary.terms()]
-        parser.error(f"--glossary: no word '{word}'; {suggestion(word, names)}")
-    return f'{found}\n'
-
-
-def _completion(parser: argparse.ArgumentParser, shell: str) -> str:
-    """The shipped file that completes commands and options in a shell."""
-    from wheel_terra_estimator.cli import completion
-
-    if shell not in completion.FILES:
-        parser.error(f'--print-completion: {suggestion(shell, list(completion.FILES))}')
-    return completion.path(shell).read_text(encoding='utf-8')
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -11,7 +11,7 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import IO, Any, NoReturn
@@ -105,27 +105,6 @@ class Parser(argparse.ArgumentParser):
                 what = 'no command' if action.dest == 'command' else f'{named}: no choice'
                 return f"{what} '{wrong}'; {suggestion(wrong, known)}"
         return message
-
-
-class Printing(argparse.Action):
-    """An option that prints what ``text(parser, value)`` gives, and ends the program."""
-
-    def __init__(
-        self, *names: Any, text: Callable[[argparse.ArgumentParser, Any], str], **settings: Any
-    ) -> None:
-        super().__init__(*names, **settings)
-        self._text = text
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
-        """Print, and end."""
-        print(self._text(parser, values), end='')
-        parser.exit()
 
 
 def suggestion(wrong: str, known: Sequence[str]) -> str:
