@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wheel_terra_estimator.cli.outputs import Output, add_remaps, file_or_entry
+from wheel_terra_estimator.cli.outputs import add_output, add_remaps, file_or_entry
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 
@@ -36,9 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DATA',
         help='CSV table of steady rows, or a rosbag2; several are one table with one soil',
     )
-    parser.add_argument(
-        '-o', '--output', action=Output, required=True, metavar='DIR', help='folder to be written'
-    )
+    add_output(parser, 'folder to be written', required=True)
     parser.add_argument(
         '--reference',
         type=Path,
@@ -111,7 +109,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--no-pictures', action='store_true', help='write report.json and model.yaml only'
     )
     parser.add_argument('--json', action='store_true', help='print report.json and nothing else')
-    parser.add_argument('--overwrite', action='store_true', help='replace DIR if it exists')
     reader.add_arguments(parser)
 
 

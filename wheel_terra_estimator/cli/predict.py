@@ -30,8 +30,6 @@ from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.output_folder import check_file, new_file
 from wheel_terra_estimator.terramechanics.contact_law import (
     BEKKER_WONG_JANOSI,
-    LAWS,
-    RESISTIVE_FORCE,
     ContactLaw,
     contact_law,
 )
@@ -46,7 +44,7 @@ if TYPE_CHECKING:
 EXAMPLES = (
     'wheel-terra predict --config hit_wh3 --config hit_fit --slip 0:0.6:13 --load 80',
     'wheel-terra predict --config hit_wh3 --config dlr_mss -o curves.png',
-    'wheel-terra predict --config hit_wh3 --config hit_fit --law wong_reece',
+    'wheel-terra predict --config hit_wh3 --config hit_fit -p rover.contact_law:=wong_reece',
 )
 DEFAULT_SLIP = '0:0.9:19'
 MOST_POINTS = 100_000
@@ -101,11 +99,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--method', choices=METHODS, default='quadrature', help='how the contact is integrated'
-    )
-    parser.add_argument(
-        '--law',
-        choices=LAWS,
-        help='law of the contact (see models/laws) in place of rover.contact_law',
     )
     parser.add_argument(
         '--noise',
@@ -168,19 +161,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _model(arguments: argparse.Namespace, configuration: Configuration, width: float) -> ContactLaw:
     soil, effects, rover = configuration.soil, configuration.effects, configuration.rover
-    law = arguments.law
-    if law is None and rover.contact_law != BEKKER_WONG_JANOSI:
-        law = rover.contact_law
-    if law is None:
+    law = rover.contact_law
+    if law == BEKKER_WONG_JANOSI:
         return WheelSoilModel(soil, effects, arguments.method, strict=False)
     if arguments.method != METHODS[0]:
         raise UserError(f'the law {law} says how the contact is integrated; leave --method')
-    if arguments.law == RESISTIVE_FORCE != rover.contact_law and effects:
-        print(
-            f'wheel-terra predict: the law {RESISTIVE_FORCE} has no effects; left out: '
-            f'{", ".join(effects)}',
-            file=sys.stderr,
-        )
     if 'wheels.width' in configuration.stated:
         width = float(configuration.wheels.width[_wheel_index(arguments, configuration)])
     gravity = float(rover.gravity)
@@ -202,7 +187,8 @@ def _write(
         else:
             name = str(configuration.flat().get('soil.name') or 'soil as configured')
             effects = ', '.join(configuration.effects) or 'none'
-            method = arguments.law or arguments.method
+            law = configuration.rover.contact_law
+            method = arguments.method if law == BEKKER_WONG_JANOSI else law
             _draw(result, fresh, f'{name}; effects: {effects}; {method}')
 
 
