@@ -12,7 +12,7 @@ from parts import SAND, Parts
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.contact_age import DECAY, START_VARIANCE, ContactAge
 from wheel_terra_estimator.estimation.contacts.demand import Demand
-from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
+from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation, turning_wheels
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import (
     KnownSum,
@@ -25,6 +25,7 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import Stationa
 from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     RUT_SHARE,
@@ -336,6 +337,24 @@ def test_torque_over_radius_is_the_pull_of_a_wheel_that_holds_a_standing_rover(p
     drags = standing_pull(parts, 3.0, -0.004)
     assert standing_pull(parts, **slow, others=0.05) == drags
     assert math.isnan(standing_pull(parts, NAN, 0.0))
+
+
+@pytest.mark.parametrize('way', [1.0, -1.0])
+def test_a_wheel_that_stalls_beside_spinning_ones_has_the_pull_of_its_torque(parts, way):
+    """At slip 1 torque and pull follow from one another, whatever the strength of the soil."""
+    rims, loads = tuple(way * r for r in (*(0.07,) * 5, 0.0036)), (60.0,) * 6
+    turns = turning_wheels(parts.rover, rims, loads)
+    assert turns == (True,) * 5 + (False,)
+    assert turning_wheels(parts.rover, (0.0036,) * 6, loads) == (True,) * 6
+    x = parts.filter().mean.copy()
+    spun = WheelStates(0.0, x[parts.layout.sinkage], np.array(loads), 0.2, 0.0)
+    torque, pull = parts.models.torque_and_pull(spun)
+    wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
+    x[SPEED] = -0.003 * way  # within what is known of a rover that is stuck
+    cycle = parts.cycle(rims, loads, turns=turns, torque=tuple((way * torque).tolist()))
+    pulls, expected = wheels.update(x, 0.003, cycle)
+    assert pulls[5] == pytest.approx(way * float(pull[5]), rel=0.02)
+    assert expected[:5] == [None] * 5
 
 
 # -- Linearisation ----------------------------------------------------------------------------

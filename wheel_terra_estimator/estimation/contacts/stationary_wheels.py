@@ -84,17 +84,19 @@ class StationaryWheels:
     def _pulls(self, x: FloatArray, speed_std: float, cycle: Cycle) -> FloatArray:
         """Return the pulls of wheels that stand, from their torques, (n,) [N]; nan without one.
 
-        A locked wheel slides: its shear is saturated, and torque gives the pull whatever the
-        strength of the soil. Where its hub stands too, torque and pull balance about the hub. A
-        torque that drives a wheel which is dragged is not the soil's: its drive is jammed.
+        A locked wheel slides, one that creeps beside faster ones spins: its shear is saturated, and
+        torque gives the pull whatever the strength of the soil. Where its hub stands too, torque
+        and pull balance about the hub. A torque that drives a wheel which is dragged is not the
+        soil's: its drive is jammed.
         """
         rover, torques, loads = self._rover, np.array(cycle.torque), np.array(cycle.loads.load)
         speed = cycle.headings.speeds(float(x[SPEED]), cycle.yaw_rate)
         held = np.clip(torques / np.array(rover.shear_radius), -loads, loads)
-        direction = np.where(speed > 0.0, 1.0, -1.0)
+        creeps = np.abs(cycle.rims) > rover.rest_speed
+        direction = np.where(np.where(creeps, cycle.rims, speed) > 0.0, 1.0, -1.0)
         forces = self._models.forces(
             WheelStates(
-                _SLIDING_RATIO,
+                np.where(creeps, 0.0, _SLIDING_RATIO),
                 x[self._layout.sinkage],
                 loads,
                 float(x[SHEAR_STRENGTH]),
@@ -103,7 +105,7 @@ class StationaryWheels:
             )
         )
         by_torque, by_pull = forces.d_torque[STRENGTH], forces.d_pull[STRENGTH]
-        jammed = (direction * torques > 0.0) & (cycle.lateral_motion < _STRAIGHT)
+        jammed = (direction * torques > 0.0) & ~creeps & (cycle.lateral_motion < _STRAIGHT)
         tells = (by_torque != 0.0) & ~jammed
         gain = np.where(tells, by_pull / np.where(tells, by_torque, 1.0), 0.0)
         pull = forces.pull + gain * (direction * torques - forces.torque)
@@ -112,7 +114,7 @@ class StationaryWheels:
         doubt = _SLIDING_DEVIATIONS * speed_std
         standing = all(abs(rim) < doubt for rim in known(cycle.rims))
         stands = np.abs(speed) < (max(rover.rest_speed, doubt) if standing else rover.rest_speed)
-        return np.where(stands, held, direction * np.clip(pull, -most, most))
+        return np.where(stands & ~creeps, held, direction * np.clip(pull, -most, most))
 
     def expectation(
         self, pull: float, load: float, slope_share: float, lateral_motion: float
