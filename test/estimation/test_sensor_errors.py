@@ -73,18 +73,6 @@ def test_a_drive_with_stated_errors_gives_the_estimates_of_the_clean_one(rover):
         assert np.abs(left[name] - expected[name]).max() > 1e-3, name
 
 
-def test_each_kind_of_reading(rover):
-    errors = SensorErrors(rover.replace(STATED))
-    truth = WheelOdometry(START, np.full(4, 3.0), np.array([10.0, -5.0, np.nan, 0.0]))
-    back = errors.corrected(misread(truth))
-    np.testing.assert_allclose(back.torque, truth.torque, atol=1e-12)
-    assert back.rate is truth.rate
-    for reading in (misread(truth), misread(SinkageReading(START, np.full(4, 0.02)))):
-        again = errors.as_read(errors.corrected(reading))
-        field = 'torque' if isinstance(reading, WheelOdometry) else 'sinkage'
-        np.testing.assert_allclose(getattr(again, field), getattr(reading, field), atol=1e-12)
-
-
 def test_an_imu_off_the_middle_feels_what_the_middle_does(rover):
     """A rover turns on the spot at 0.5 rad/s: half a metre ahead 0.125 m/s^2 pull towards it."""
     placed = SensorErrors(rover.replace({**STATED, 'sensors.imu_position': [0.5, 0.0, 0.3]}))

@@ -133,12 +133,8 @@ def test_the_smoother_is_nearer_to_the_truth_and_says_how_near(drive, pairs):
     assert narrower < 1.0
 
 
-def test_warnings_and_times_are_those_that_were_given_live(pairs):
+def test_what_was_not_judged_live_is_not_judged_later(pairs):
     for smoothed, live in pairs:
-        assert smoothed.stamp == live.stamp and smoothed.stuck == live.stuck
-        assert smoothed.reasons == live.reasons and smoothed.faults == live.faults
-        for name in ('stuck_probability', 'time_to_stuck', 'rim_travel_left', 'pull_margin'):
-            np.testing.assert_array_equal(getattr(smoothed, name), getattr(live, name))
         unjudged = (live.slip_class == SlipClass.UNKNOWN) & (live.slip_std <= 0.25)
         assert (smoothed.slip_class[unjudged] == SlipClass.UNKNOWN).all()
 

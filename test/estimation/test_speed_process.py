@@ -124,18 +124,6 @@ def test_disagreement_of_the_wheels(changes, expected):
     assert found == pytest.approx(max(expected - least, 0.0))
 
 
-def test_slow_rover_does_not_integrate_a_bias():
-    window = InertialWindow(speed_change=0.02 * 0.1, duration=0.1)
-    assert step(0.04, window=window)[0] == pytest.approx(0.04, abs=2e-4)
-
-
-def test_combination_is_better_than_either():
-    window = InertialWindow(speed_change=0.0, duration=0.1)
-    both = step(0.5, before=0.6, now=0.6, window=window)[1]
-    assert both < step(0.5, before=0.6, now=0.6)[1]
-    assert both < noise() ** 2 * 0.1
-
-
 def test_a_rover_that_must_pull_more_slips_more_at_once():
     """At a slip per demand of 2, a demand that grows by 0.05 takes a tenth of the rim speed."""
     parts = Parts(reader.load(SAND))

@@ -36,7 +36,6 @@ from wheel_terra_estimator.estimation.timing.input_checks import (
     REFERENCE,
     WHEEL_ODOMETRY,
 )
-from wheel_terra_estimator.estimation.timing.lag import LONGEST_HOLD, LagLearner
 from wheel_terra_estimator.estimation.timing.merging import same
 
 
@@ -80,11 +79,6 @@ def test_a_stamp_that_comes_again_with_other_numbers_is_said():
     assert core.repeated == {'joint_states': 2}
     said = {reason: n for (_, reason), n in core.rejected.items()}
     assert said == {'stamp repeated with other numbers (the newer ones count)': 1}
-
-
-def test_no_lag_is_no_wait_of_any_length():
-    assert LagLearner(0).longest == 0
-    assert LagLearner(-1).longest == LONGEST_HOLD
 
 
 def test_odometry_a_little_later_than_the_imu_still_gets_its_set():

@@ -111,23 +111,6 @@ def test_torque_tells_nothing_on_the_plateau_or_where_there_is_none():
     assert math.isnan(slip_of_torque(math.nan).slip)
 
 
-@pytest.mark.parametrize('correlation', [-0.9, 0.0, 0.9, 1.0])
-def test_pooled_variance_covers_any_correlation(correlation):
-    """By Monte Carlo: the stated variance is never below that of the error."""
-    rng = np.random.default_rng(5)
-    first, second = rng.standard_normal((2, 20_000))
-    one = 0.1 * first
-    other = 0.3 * (correlation * first + math.sqrt(1.0 - correlation**2) * second)
-    # The mean is linear in both: its weights from two calls.
-    weight = pooled(SpeedAndVariance(1.0, 0.01), SpeedAndVariance(0.0, 0.09)).speed
-    error = weight * one + (1.0 - weight) * other
-    stated = pooled(SpeedAndVariance(0.0, 0.01), SpeedAndVariance(0.0, 0.09)).variance
-    assert np.mean(error**2) <= 1.02 * stated
-    # The mean is that of inverse variances, as if the errors were apart.
-    both = pooled(SpeedAndVariance(0.2, 0.01), SpeedAndVariance(0.6, 0.09))
-    assert both.speed == pytest.approx((0.2 / 0.01 + 0.6 / 0.09) / (1 / 0.01 + 1 / 0.09))
-
-
 def test_pooled_estimates_have_the_moments_of_their_mixture():
     """By Monte Carlo: each of the two is right as often as its inverse variance says."""
     rng = np.random.default_rng(6)

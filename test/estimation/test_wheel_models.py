@@ -149,13 +149,6 @@ def test_the_onset_of_the_mound_is_that_of_the_configuration(enabled):
         assert forces(late, ratio=0.0).pull == pytest.approx(forces(early, ratio=0.0).pull)
 
 
-def test_mound_pushes_only_above_its_onset(models):
-    low = forces(models, ratio=0.7, mound=0.0), forces(models, ratio=0.7, mound=0.5)
-    high = forces(models, ratio=0.1, mound=0.0), forces(models, ratio=0.1, mound=0.5)
-    assert low[0].pull == low[1].pull
-    assert high[1].pull > high[0].pull
-
-
 def test_never_nan_outside_the_valid_range(models):
     for ratio, z in itertools.product([-1.0, 0.0, 1.0, 10.0], [-0.01, 0.0, 1e-6, 0.5]):
         state = WheelStates(ratio, z, 100.0, rim_speed=0.05)

@@ -217,16 +217,6 @@ def test_wheel_without_load_is_found_by_its_torque_and_taken_back():
         assert slip == pytest.approx(truth.slip[part].mean(axis=0), abs=0.06)
 
 
-def test_locked_wheel_is_dragged_along():
-    run = drive(10.0, **fault('locked', 'rear_right', 6.0, 10.0))
-    sets, truth = estimate(run), run.truth
-    # Once the body stands as well the wheel is dragged no more, and its pull is hardly seen.
-    pull, true_pull = sets[-15].drawbar_pull, truth.drawbar_pull[-15]
-    load = truth.normal_load[-15]
-    assert true_pull[5] < -0.3 * load[5]
-    assert pull == pytest.approx(true_pull, abs=0.12 * load.mean())
-
-
 SLIDE = 9.81 * np.sin(np.radians(20.0))  # weight along 20 degrees, of a kilogram [N]
 
 

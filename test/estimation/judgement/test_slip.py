@@ -114,13 +114,6 @@ def test_change_comes_after_the_dwell_and_not_before():
     assert 1 not in through  # it never stayed there
 
 
-@pytest.mark.parametrize('std', [0.001, 0.1, 0.25])
-def test_the_deviation_changes_nothing_up_to_its_limit(std):
-    assert run([0.1] * 5 + [0.34] * 10, std)[-1] == 1
-    assert run([0.1] * 5 + [1.0] * 10, std)[-1] == 3
-    assert run([0.1] * 5 + [-0.95] * 10, std)[-1] == 3
-
-
 def test_beyond_its_limit_the_class_is_unknown_and_what_it_was_is_forgotten():
     classes = run([0.1, 0.1, 0.1, 0.85, 0.85], [0.1, 0.26, 1.0, 0.25, 0.25])
     assert classes == [0, 255, 255, 2, 2]
