@@ -107,19 +107,6 @@ def test_a_zero_of_the_accelerometer_is_no_tilt_the_gyro_does_not_see_it():
     assert (x, y, z) == pytest.approx((0.6, 0.0, 0.0), abs=0.05)
 
 
-def test_radius_within_one_percent():
-    configuration = rolling.rover(**{'wheels.radius': [1.06 * rolling.RADIUS] * 4})
-    finding = only(checked(configuration), 'radius')
-    assert finding.value == pytest.approx(rolling.RADIUS, rel=0.01)
-    assert finding.value == pytest.approx(rolling.RADIUS, abs=3.0 * finding.std)
-
-
-def test_track_of_wheels_that_do_not_skid():
-    configuration = rolling.rover(**{'wheels.y': [0.36, -0.36, 0.36, -0.36]})
-    finding = only(checked(configuration), 'track')
-    assert finding.value == pytest.approx(2.0 * rolling.HALF_TRACK, rel=0.02)
-
-
 def test_noise_of_a_gyro_is_no_unit_where_turns_agree():
     noise = np.random.default_rng(3).normal(0.0, 0.1, WHOLE.imu.rate.shape)
     report = checked(imu=replace(WHOLE.imu, rate=WHOLE.imu.rate + noise))

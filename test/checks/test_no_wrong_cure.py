@@ -294,14 +294,6 @@ def test_wheels_wound_up_otherwise_at_each_stop_have_no_zero():
     assert 'torque_zero' not in faults(with_torque(25.0 * (-1.0) ** stop))
 
 
-def test_turns_on_the_spot_are_a_drive():
-    """The mean of the rims is nothing."""
-    time = np.arange(0.0, 80.0, 1.0 / rolling.RATE)
-    spot = rolling.Motion(time, 0.0 * time, 0.3 * (time % 20.0 > 6.0), 0.0 * time)
-    whole = rolling.recording(spot)
-    assert faults(checked(whole=whole)) == []
-
-
 @pytest.mark.parametrize('degrees', [True, False])
 def test_exchanged_wheels_are_no_gyro_in_degrees(degrees):
     """The sides turn next to alike where two wheels across are exchanged; rear ones are larger."""

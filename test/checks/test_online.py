@@ -197,16 +197,6 @@ def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(name):
     assert found[-1] is sets[-1], 'it stands'
 
 
-@pytest.mark.parametrize('confirmed', [False, True])
-def test_a_warning_that_is_confirmed_does_not_wait(confirmed):
-    drive = drive_of(SIX)
-    judge = InputJudge(drive.configuration)
-    for second in range(3):
-        stamp = 10**12 + second * 10**9
-        said = some_estimates(6, stamp=stamp, stuck=True, stuck_confirmed=confirmed)
-        assert judge.judged(said, {}).stuck == confirmed
-
-
 def test_a_rover_that_may_slide_back_on_a_slope_has_no_reversed_reference():
     def slides_back(m):
         if isinstance(m, InertialReading):
@@ -216,13 +206,6 @@ def test_a_rover_that_may_slide_back_on_a_slope_has_no_reversed_reference():
     sets = sets_of(drive_of(SIX), slides_back, STRAIGHT)
     assert not any('linear.x' in words for s in sets for words in told(s).values())
     assert any(s.stuck for s in sets)
-
-
-def test_a_confirmed_warning_is_not_taken_back_by_what_is_found_later():
-    drive = drive_of(SIX)
-    fault = FAULTS['rpm'][0]
-    sets = sets_of(drive, fault, REST + LONGEST + 2.0, stands=3.0, stuck_confirmed=True)
-    assert any(told(s) for s in sets) and all(s.stuck for s in sets)
 
 
 def test_a_warning_that_was_confirmed_once_stays_and_wrong_torques_confirm_none(monkeypatch):
@@ -380,15 +363,6 @@ def test_the_table_of_faults_names_kinds_parameters_and_channels_that_there_are(
         assert fault.driving in ('', 'slip', 'beside')
         assert fault.parameter is None or fault.parameter in keys
         assert fault.channel in {field.name for field in fields(Recording)}
-
-
-def test_kinds_are_those_of_the_checks_of_a_recording():
-    for name, (fault, kind, topic, _, begins) in FAULTS.items():
-        if name not in ('g', 'no_gravity', 'upside_down'):
-            continue
-        checks = checks_over(drive_of(SIX), fault, begins + LONGEST)
-        assert [(f.kind, f.topic) for f in checks.findings] == [(kind, topic)]
-        assert 0.8 < checks.findings[0].confidence < 1.0
 
 
 def checks_over(drive, fault, seconds):

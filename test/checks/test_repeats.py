@@ -155,14 +155,6 @@ def test_steps_are_named_with_the_noise_that_they_make(jitter):
     assert f'{COUNTS} counts per turn' in finding.words
 
 
-def test_counting_makes_that_noise():
-    """A rate from two counts, each cut off at a whole one, against the rate itself."""
-    turning = np.abs(WHOLE.joints.rate).mean(axis=1) > 1.0
-    error = (counted().rate - WHOLE.joints.rate)[turning]
-    step = 2.0 * math.pi / COUNTS / 0.1
-    assert np.std(error) == pytest.approx(step / math.sqrt(6.0), rel=0.05)
-
-
 def test_fine_steps_and_real_noise_are_no_steps():
     fine = rolling.checked(joints=counted(20_000))
     assert not fine.findings, [str(f) for f in fine.findings]
