@@ -71,32 +71,6 @@ def test_a_gain_acts_before_a_zero_error_and_after_the_soil():
     assert read == pytest.approx(1.2 * (z + 0.5 * WHEEL.lug_height) + 0.002)
 
 
-def test_lug_terms():
-    z = state(0.5, LOAD).sinkage[0]
-    for height, saved in ((0.005, 0.0), (0.010, 0.0015), (0.015, 0.003)):
-        wheel = Wheel(WHEEL.radius, WHEEL.width, height, 30)
-        plain = state(0.5, LOAD, wheel=wheel).sinkage[0]
-        carried = model(0.5, 'lug_support:by_height', wheel=wheel)[0]
-        assert plain - carried == pytest.approx(saved, abs=1e-9)  # Ding et al. 2010, 3.2.2
-    dug = model(0.5, 'lug_digging:saturating', values={'kd': 1.0, 'range': 0.25})[0]
-    assert dug - z == pytest.approx(WHEEL.lug_height * (1.0 - math.exp(-2.0)))
-
-
-def test_bulldozing_after_terzaghi():
-    """Printed bearing factors of Terzaghi at 30 degrees: Nc 37.2, Nq 22.5, Ng 19.7."""
-    phi = math.radians(30.0)
-    soil = Soil(**{**SAND.__dict__, 'friction_angle': phi})
-    z, pull, _ = state(0.2, LOAD, soil=soil).outputs()[0]
-    pushed = model(0.2, 'bulldozing:terzaghi', values={'kb': 1.0}, soil=soil)[1]
-    a = math.acos(1.0 - z / WHEEL.radius)  # Bekker's angle of approach: cos a = 1 - 2 z/D
-    k_c = (37.2 - math.tan(phi)) * math.cos(phi) ** 2
-    k_g = (2.0 * 19.7 / math.tan(phi) + 1.0) * math.cos(phi) ** 2
-    front = math.sin(a + phi) / (2.0 * math.sin(a) * math.cos(phi))
-    weight = soil.density * G
-    expected = WHEEL.width * front * (2.0 * z * soil.cohesion * k_c + weight * z * z * k_g)
-    assert pull - pushed == pytest.approx(expected, rel=0.03)
-
-
 @pytest.mark.parametrize(('inside', 'felt'), [(-0.001, 0.0), (5e-4, 1.25e-4), (0.003, 0.0025)])
 def test_a_hard_layer_begins_within_a_millimetre(inside, felt):
     """As printed: <x> = x^2 / (2 mm) up to x = 1 mm, x - 0.5 mm beyond."""
@@ -109,18 +83,6 @@ def test_a_hard_layer_begins_within_a_millimetre(inside, felt):
         contact, SimpleNamespace(stiffness=stiffness, depth=depth)
     )
     assert contact.normal_stress == pytest.approx([100.0 + stiffness * felt])
-
-
-def test_soil_carried_round_balances_volume_and_energy():
-    slip, fill = 0.5, 0.8
-    z, pull, torque = state(slip, LOAD).outputs()[0]
-    ours = model(slip, 'soil_transport', values={'fill': fill})
-    rate = 3.0  # [rad/s]; the balances hold at any
-    volume = fill * WHEEL.lug_height * slip * WHEEL.width * rate * WHEEL.radius  # m^3/s
-    power = volume * SAND.density * G * 2.0 * WHEEL.radius
-    assert (ours[2] - torque) * rate == pytest.approx(power)
-    assert (ours[0] - z) * WHEEL.width * rate * WHEEL.radius == pytest.approx(volume)
-    assert ours[1] == pytest.approx(pull)
 
 
 @pytest.mark.parametrize('name', ['soil_mound', 'soil_mound:conveyed'])

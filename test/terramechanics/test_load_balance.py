@@ -8,13 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from terra_tools import SAND, WHEEL, points, state
+from terra_tools import SAND, state
 
-from wheel_terra_estimator.terramechanics import load_balance
-from wheel_terra_estimator.terramechanics import model as model_module
 from wheel_terra_estimator.terramechanics.load_balance import balance, solve_entrance_angle
-from wheel_terra_estimator.terramechanics.model import WheelSoilModel
-from wheel_terra_estimator.terramechanics.soil import PRESSURE_LAWS
 
 
 @pytest.mark.parametrize('load', [1e-6, 1.0, 1e6])
@@ -48,26 +44,6 @@ def test_what_three_angles_do_not_settle_goes_to_the_bracketed_solver():
     np.testing.assert_allclose(angle, expected, rtol=1e-8)
     np.testing.assert_allclose(pull, 2.0 * expected, rtol=1e-8)
     np.testing.assert_allclose(torque, 3.0 * expected, rtol=1e-8)
-
-
-@pytest.mark.parametrize('law', PRESSURE_LAWS)
-def test_the_first_guess_is_near_in_either_pressure_law(law, monkeypatch):
-    guesses: list[Any] = []
-
-    def watched(contact: Any) -> Any:
-        guesses.append(load_balance.explicit_entrance_angle(contact))
-        return guesses[-1]
-
-    monkeypatch.setattr(model_module, 'explicit_entrance_angle', watched)
-    soil = replace(SAND, cohesive_modulus=0.0)
-    if law == 'reece':
-        # The same pressure: gamma b k' (z/b)^n is k z^n.
-        weight = SAND.density * 9.80665
-        share = WHEEL.width ** (SAND.sinkage_exponent - 1.0) / weight
-        modulus = SAND.frictional_modulus * share
-        soil = replace(soil, pressure_law=law, frictional_modulus=modulus)
-    found = WheelSoilModel(soil).steady_state(points(np.array([0.05, 0.1]), 80.0))
-    np.testing.assert_allclose(guesses[0], found.entrance_angle, rtol=0.4)
 
 
 def test_soil_without_weight_does_not_bulldoze():

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A skidding wheel digs in; an effect has several forms, of which settings choose one."""
 
-import numpy as np
 import pytest
 from terra_tools import SAND, points, state
 
@@ -43,16 +42,6 @@ def test_skid_has_a_coefficient_of_its_own():
     assert state(0.4, effects=settings).outputs() == pytest.approx(
         state(0.4, effects={SKID: {'n1': 0.4}}).outputs()
     )
-
-
-def test_lyasko_multiplies_the_sinkage_at_rest():
-    """Small angles, no shear: z(s)/z(0) = (1 + s)/(1 - s/2), the printed law."""
-    stiff = Soil(0.0, 4e8, 0.9, 0.0, 0.0, 0.01, 0.3, 0.0)
-    model = WheelSoilModel(stiff, {SKID: {'form': 'lyasko', 'gain': 1.0}})
-    slip = np.array([0.0, 0.3, 0.6, -0.3])
-    z = model.steady_state(points(slip)).sinkage
-    s = np.abs(slip)
-    assert z / z[0] == pytest.approx((1.0 + s) / (1.0 - 0.5 * s), rel=2e-3)
 
 
 # The mechanism ---------------------------------------------------------------------------------
