@@ -102,18 +102,6 @@ def test_side_slip_acts_against_the_motion_and_costs_pull(twenty):
     assert (shear < 1.2 * (np.tan(np.radians(31.9)) * load + cohesion)).all()
 
 
-def test_without_friction_and_cohesion_pull_is_the_compaction_resistance():
-    # F = -b k z^(n+1)/(n+1) when the stress starts at the bottom of the wheel (Bekker).
-    slick = Soil(0.0, 1e6, 1.0, 0.0, 1e-9, 0.01, 1e-6, 0.0)
-    wheel = Wheel(np.array([0.2]), np.array([0.1]))
-    steady = WheelSoilModel(slick, {}).steady_state(OperatingPoints([0.3], [40.0], wheel))
-    depth = steady.sinkage
-    model = ContactModel(wheel, slick, wheel.radius, {}, 9.80665)
-    forces = answer(model, depth, np.array([0.3]), np.array([40.0]))
-    assert forces.pull == pytest.approx(-0.1 * 1e6 * depth**2 / 2.0, rel=2e-3)
-    assert forces.torque == pytest.approx(0.0, abs=1e-6)
-
-
 def test_bad_geometry_and_effects_are_refused():
     wheel = Wheel(np.array([0.2]), np.array([0.1]))
     with pytest.raises(ValueError, match='not in the catalogue'):
