@@ -55,13 +55,6 @@ def test_tools_are_told_the_range_of_each_bounded_parameter():
             assert ranges[key] == []
 
 
-def test_an_integer_will_do_where_a_number_is_wanted_in_any_state():
-    from wheel_terra_estimator.configuration.parameters import declared
-    from wheel_terra_estimator.ros.parameters import _descriptor
-
-    assert all(_descriptor(p).dynamic_typing is (p.kind == 'number') for p in declared().values())
-
-
 @pytest.mark.parametrize(
     ('policy', 'good', 'bad'), [('reliability', 'reliable', 'reliabel'), ('depth', 7, '7')]
 )

@@ -230,17 +230,6 @@ def test_signals_end_it_while_it_starts_also_twice(start_interpreter, parameters
         assert_two_signals_end(process, number)
 
 
-def test_signals_end_it_while_it_serves_also_twice(start, parameters, listener):
-    node, until = listener
-    processes = {
-        signal.SIGINT: start('estimator_node', *ROVER, parameters),
-        signal.SIGTERM: start('traction_limiter_node'),
-    }
-    until(lambda: node.count_publishers(f'{NODE}/slip') and node.count_publishers('cmd_vel_out'))
-    for number, process in processes.items():
-        assert_two_signals_end(process, number)
-
-
 def test_a_closing_that_hangs_is_cut_short(monkeypatch):
     from wheel_terra_estimator.ros import process
 

@@ -103,22 +103,3 @@ def test_the_live_tutorials_in_one_drive(start, listener, tmp_path):
     for axis, fused in enumerate(flags[6:12]):
         assert (last.covariance[7 * axis] < 1e6) == fused, 'what is not estimated is not fused'
     assert last.twist.linear.x == pytest.approx(speed, rel=0.2)
-
-
-def test_launch_line_of_the_tutorial_names_files_and_arguments_that_are_there():
-    (line,) = [words for words in commands('node') if words[:2] == ['ros2', 'launch']]
-    launch = Path(__file__).resolve().parents[2] / 'launch' / line[3]
-    declared = launch.read_text(encoding='utf-8')
-    for argument in line[4:]:
-        name, _, value = argument.partition(':=')
-        assert f"'{name}': (" in declared
-        assert reader.load(value.split(',')).wheels.names
-
-
-def test_nav2_page_names_topics_of_the_limiter():
-    text = (TUTORIALS / 'nav2.md').read_text(encoding='utf-8')
-    words = text.partition('traction_limiter_node` behind')[2]
-    remaps = dict(re.findall(r'`(\w+):=(/\w+)`', words))
-    assert remaps == {'cmd_vel_in': '/cmd_vel_smoothed', 'cmd_vel_out': '/cmd_vel'}
-    (line,) = [w for w in commands('node') if 'traction_limiter_node' in w]
-    assert {w.partition(':=')[0] for w in line if ':=' in w} == set(remaps)
