@@ -19,9 +19,7 @@ from wheel_terra_estimator.configuration.soil_file import read_values
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.messages.convert import JOINT_STATE
 
-REAL = ('--remap', 'odom:=/wheel/odometry', '--remap', 'reference_odom:=/truth/odometry')
 SLIP_ON_SLOPE = '/wheel_terra_estimator/slip_on_slope'
-THINNED = ('-p', 'reference_odom_max_rate:=1.0')
 
 
 def assert_slip_follows_the_reference(history: EstimateHistory) -> None:
@@ -107,26 +105,3 @@ def test_interrupted_replay_leaves_a_readable_bag(
         assert not opened.notes
         history = read_estimates(opened)
     assert 40 < history.stamp.size < 150
-
-
-@pytest.mark.shared
-@pytest.mark.parametrize(
-    ('name', 'rover_name'),
-    [
-        pytest.param('frostyboy_event_1_4_mcap', 'frostyboy', marks=pytest.mark.slow),
-        pytest.param('frostyboy_event_1_6_db3', 'frostyboy', marks=pytest.mark.slow),
-        pytest.param('wvu_pathfinder_test17_mcap', 'pathfinder', marks=pytest.mark.slow),
-    ],
-)
-def test_measured_recordings_with_a_rover_file_and_remaps(shared, tmp_path, name, rover_name):
-    out = tmp_path / 'out'
-    bag = str(shared / 'bags' / name)
-    command = ['replay', bag, '--config', rover_name, *REAL, *THINNED, '-o', str(out)]
-    assert main(command) == 0
-    with open_bag(out) as opened, open_bag(bag) as source:
-        history = read_estimates(opened)
-        assert history.stamp.size == source.topics['/joint_states'].message_count
-    assert (np.diff(history.stamp) > 0).all()
-    assert all(np.isfinite(values).all() for values in history.values.values())
-    # Each FrostyBoy event ends immobilised; the Pathfinder drive is on firm ground.
-    assert bool(history.warnings) == (rover_name == 'frostyboy')
