@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What only the transport knows: names taken twice, a clock that is missing, messages lost."""
 
-import signal
 from types import SimpleNamespace
 
 import pytest
@@ -52,15 +51,17 @@ def joint_states(node, stamp, *, topic='joint_states'):
     return publisher, send
 
 
-def test_two_nodes_of_one_name_are_told(start, start_interpreter, heard, rover, soon):
-    _, until, statuses = heard
+def test_two_nodes_of_one_name_are_told(start, heard, rover, soon):
+    from rclpy.node import Node
+
+    node, until, statuses = heard
     start('estimator_node', *rover, **soon)
     until(lambda: statuses)
     assert not any('another node' in s.message for s in statuses)
-    second = start_interpreter('estimator_node', *rover)  # what is forked leaves no word behind
+    second = Node(NODE.strip('/'), context=node.context)
     words = f'another node is called {NODE}: both publish estimates'
     until(lambda: any(words in s.message for s in statuses))
-    second.stop(signal.SIGINT)
+    second.destroy_node()
     until(lambda: 'another node' not in statuses[-1].message)
 
 
