@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -42,7 +43,8 @@ class Moment(NamedTuple):
     pull: FloatArray  # (n,) [N]
 
 
-class _Place(NamedTuple, Generic[Companion]):
+@dataclass(frozen=True)
+class _Place(Generic[Companion]):  # no NamedTuple: Python 3.10 has no generic ones
     companion: Companion
     moment: Moment
     begin: float  # of the stretch that may be averaged [s]
