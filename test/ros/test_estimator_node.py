@@ -178,7 +178,7 @@ def test_publisher_of_another_type_or_quality_is_named(start, parameters, listen
         return any(words in message.status[0].message for message in diagnostics)
 
     until(lambda: said('geometry_msgs/msg/Twist comes there, needed is sensor_msgs/msg/JointState'))
-    until(lambda: said('/reference_odom: a publisher offers another RELIABILITY'))
+    until(lambda: said('/reference_odom: nothing comes from /listener: best effort publisher'))
 
 
 def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, parameters, listener):

@@ -15,6 +15,8 @@ from test_estimator_node import ROVER, wheel_message
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.errors import UserError
 
+STUCK = 'wheel_terra_estimator/stuck'
+
 
 class Operator:
     """Commands, and wheel odometry of the present time, as long as a condition does not hold."""
@@ -148,12 +150,9 @@ def test_a_stop_by_its_topics_outlives_the_limiter(start, listener, tmp_path):
     assert status == 0 and 'Traceback' not in words, words
 
 
-def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
-    listener, tmp_path, monkeypatch
-):
-    """The state is kept with a sync of the disk; a bag played back sends ``~/stuck``, too."""
+def test_a_stop_waits_for_no_disk(listener, tmp_path, monkeypatch):
+    """The state is kept with a sync of the disk."""
     from rclpy.parameter import Parameter
-    from rclpy.serialization import deserialize_message
 
     from wheel_terra_estimator.configuration import soil_file
     from wheel_terra_estimator.estimation.traction_limiter import Event, after_event
@@ -174,17 +173,48 @@ def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
     assert sent[-1] > 0.0
     node._follow(after_event(node._state, Event.STOP, 1, 'stop'))
     assert kept == [(True, 0.0)]
-    said = []
-    monkeypatch.setattr(node._diagnostics, 'publish', said.append)
-    rival = listener[0].create_publisher(ros.Bool, 'wheel_terra_estimator/stuck', 1)
-    node._say()
-    other = listener[0].create_publisher(ros.Bool, 'wheel_terra_estimator/stuck', 1)
-    node._say()
-    words = [deserialize_message(data, ros.DiagnosticArray).status[0].message for data in said]
-    assert ['2 publishers' in word for word in words] == [False, True], words
-    for publisher in (rival, other):
-        listener[0].destroy_publisher(publisher)
     node.destroy_node()
+
+
+def test_publishers_that_bypass_it_or_are_not_heard_are_told_in_diagnostics_and_log(
+    start, listener
+):
+    node, until = listener
+    said = []
+    node.create_subscription(
+        ros.DiagnosticArray, '/diagnostics', lambda m: said.append(m.status[0]), 10
+    )
+    wiring = ['cmd_vel_in:=/cmd_vel_checked', 'cmd_vel_out:=/cmd_vel', f'{STUCK}:=/est/stuck']
+    process = start('traction_limiter_node', '--ros-args', *(w for r in wiring for w in ('-r', r)))
+    until(lambda: said)
+    assert said[-1].level == b'\x00', said[-1].message
+    best_effort = ros.QoSProfile(depth=1, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
+    checked, stamped = '/cmd_vel_checked', ros.TwistStamped
+
+    def told(*faults):
+        words = said[-1].message
+        return said[-1].level == b'\x01' and all(fault in words for fault in faults)
+
+    other_type = f'{checked}: geometry_msgs/msg/Twist comes there'
+    other = node.create_publisher(ros.Twist, checked, 1)
+    until(lambda: told(other_type))
+    node.destroy_publisher(other)  # a participant has one type on a topic
+    until(lambda: said[-1].level == b'\x00')
+    for kind, topic, quality in (
+        (stamped, checked, best_effort),
+        (stamped, '/cmd_vel', 1),
+        (ros.Bool, '/est/stuck', 1),
+        (ros.Bool, '/est/stuck', 1),
+    ):
+        node.create_publisher(kind, topic, quality)
+    faults = (
+        f'{checked}: nothing comes from /listener: best effort publisher',
+        '/cmd_vel: /listener publishes too',
+        '2 publishers of ~/stuck',
+    )
+    until(lambda: told(*faults))
+    _, log = process.stop(signal.SIGTERM)
+    assert [log.count(fault) for fault in (other_type, *faults)] == [1, 1, 1, 1], log
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,6 @@ from rclpy.clock_type import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from rclpy.qos import qos_policy_name_from_kind
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import SetBool, Trigger
@@ -46,6 +45,7 @@ from wheel_terra_estimator.ros import parameters
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.outputs import EstimatePublisher
+from wheel_terra_estimator.ros.publishers import other_quality, other_type
 from wheel_terra_estimator.ros.qos import FREQUENT, OVERRIDABLE, check_overrides, input_profile
 
 if TYPE_CHECKING:
@@ -267,7 +267,6 @@ class EstimatorNode(LifecycleNode):
                 WithInfo(partial(self._hear, topic)),
                 input_profile(topic),
                 event_callbacks=SubscriptionEventCallbacks(
-                    incompatible_qos=partial(self._on_incompatible_qos, topic),
                     message_lost=partial(self._on_message_lost, topic),
                     use_default_callbacks=False,
                 ),
@@ -303,7 +302,6 @@ class EstimatorNode(LifecycleNode):
         self._watch_inputs.heard(
             topic, now, (clock - message.stamp) / _SECOND if clock else 0.0, number
         )
-        self._incompatible.pop(topic, None)
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)
         if topic not in FREQUENT:  # often late: run through now, the next set is there sooner
@@ -325,16 +323,6 @@ class EstimatorNode(LifecycleNode):
             self._views.publish(estimates)
         if statuses := self._pipeline.diagnostics.due(estimates):
             self._say(estimates.stamp, statuses, now)
-
-    def _on_incompatible_qos(self, topic: str, event: Any) -> None:
-        policy = qos_policy_name_from_kind(event.last_policy_kind)
-        name = self.resolve_topic_name(topic)
-        words = (
-            f'a publisher offers another {policy} than asked for, so nothing comes from it; '
-            f'set qos_overrides.{name}.subscription.* to what it offers'
-        )
-        self._incompatible[topic] = words
-        self.get_logger().warning(f'{name}: {words}')
 
     def _on_message_lost(self, topic: str, event: Any) -> None:
         if topic in self._numbered:
@@ -494,7 +482,10 @@ class EstimatorNode(LifecycleNode):
             (self.resolve_topic_name(name) if name in MESSAGE_TYPES else name, words)
             for name, words in self._watch_inputs.faults(now)
         ]
-        faults += [(self.resolve_topic_name(t), words) for t, words in self._incompatible.items()]
+        for topic, words in self._incompatible.items():
+            name = self.resolve_topic_name(topic)
+            cure = f'; set qos_overrides.{name}.subscription.* to what it offers'
+            faults += [(name, words + cure)] if words else []
         wheels = self._pipeline.converter.layout.wheel_odometry if self._pipeline else ''
         if wheels and self._watch_inputs.age(wheels, now) is None and self._latest is not None:
             words = f'never received ({self._publishers_in_words(wheels)})'
@@ -517,9 +508,13 @@ class EstimatorNode(LifecycleNode):
         self._same_name = names.count(f'/{self._full_name}') > 1
         assert self._pipeline is not None
         topics: Iterable[str] = self._pipeline.converter.layout.topics
+        found = {topic: self.get_publishers_info_by_topic(topic) for topic in topics}
+        self._incompatible = {
+            topic: other_quality(publishers, self._subscriptions_made[topic].qos_profile)
+            for topic, publishers in found.items()
+        }
         # With several publishers the counts of their messages cannot be told apart.
-        resolved = {topic: self.resolve_topic_name(topic) for topic in topics}
-        single = {topic for topic, name in resolved.items() if self.count_publishers(name) == 1}
+        single = {topic for topic, publishers in found.items() if len(publishers) == 1}
         self._watch_inputs.believe_gaps(self._numbered & single)
         self._numbered = single
 
@@ -546,11 +541,9 @@ class EstimatorNode(LifecycleNode):
         return '; '.join([f'no estimates for {seconds:.0f} s', *words])
 
     def _publishers_in_words(self, topic: str) -> str:
-        types = [p.topic_type for p in self.get_publishers_info_by_topic(topic)]
-        others = sorted(set(types) - {INPUT_TYPES[topic]})
-        if others:
-            return f'{", ".join(others)} comes there, needed is {INPUT_TYPES[topic]}'
-        return '1 publisher' if len(types) == 1 else f'{len(types) or "no"} publishers'
+        found = self.get_publishers_info_by_topic(topic)
+        count = '1 publisher' if len(found) == 1 else f'{len(found) or "no"} publishers'
+        return other_type(found, INPUT_TYPES[topic]) or count
 
     # -- Parameters -----------------------------------------------------------------------------
 

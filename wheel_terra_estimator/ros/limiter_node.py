@@ -11,6 +11,7 @@ by `traction_limiter`; this is its transport. It says what it does on ``~/scale`
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN, Status
 from wheel_terra_estimator.messages.pack import diagnostic_array
 from wheel_terra_estimator.output_folder import cannot_write, check_file
+from wheel_terra_estimator.ros.publishers import name_of, other_quality, other_type
 from wheel_terra_estimator.ros.qos import input_profile, output_profile
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
@@ -57,6 +59,7 @@ class TractionLimiter(Node):
         self._refuse_unknown()
         self._file = Path(name).expanduser() if name else None
         self._unkept = ''  # why the state is not in its file
+        self._told: list[str] = []  # faults of the wiring that stand in the log
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._state = self._start()
         self._decision: limiter.Decision | None = None
@@ -69,7 +72,9 @@ class TractionLimiter(Node):
         self._output = self.create_publisher(kind, 'cmd_vel_out', QoSProfile(depth=1))
         self._scale = self.create_publisher(Float64, '~/scale', output_profile())
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', output_profile())
-        self.create_subscription(kind, 'cmd_vel_in', self._on_command, QoSProfile(depth=1))
+        self._input = self.create_subscription(
+            kind, 'cmd_vel_in', self._on_command, QoSProfile(depth=1)
+        )
         latched = output_profile(latched=True)
         # The direction before the warning: in this order they are taken where both are there.
         topics: tuple[tuple[type, str, Any, QoSProfile], ...] = (
@@ -181,12 +186,13 @@ class TractionLimiter(Node):
         if state.interlock is not Interlock.FREE:
             level = ERROR
             words = words if state.reason in words else f'{state.reason}; {words}'
-        if (publishers := self.count_publishers(self.resolve_topic_name(f'{NODE}/stuck'))) > 1:
-            level = max(level, WARN)
-            words = f'{words}; {publishers} publishers of ~/stuck: end all but one'
-        if self._unkept:
-            level = max(level, WARN)
-            words = f'{words}; state_file: {self._unkept}'
+        faults = self._faults_of_wiring()
+        for fault in set(faults) - set(self._told):
+            self.get_logger().warning(fault)
+        self._told = faults
+        faults = [*faults, f'state_file: {self._unkept}'] if self._unkept else faults
+        if faults:
+            level, words = max(level, WARN), '; '.join([words, *faults])
         age = limiter.estimate_age(state, now)
         values = {
             'scale': f'{decision.scale:.3f}' if decision is not None else '',
@@ -198,6 +204,25 @@ class TractionLimiter(Node):
         }
         status = Status(level, f'{name}: limiter', words, name, list(values.items()))
         self._diagnostics.publish(diagnostic_array(self.get_clock().now().nanoseconds, [status]))
+
+    def _faults_of_wiring(self) -> list[str]:
+        """Return what is wrong with the publishers of commands and of the warning."""
+        faults = []
+        if (count := len(self.get_publishers_info_by_topic(f'{NODE}/stuck'))) > 1:
+            faults.append(f'{count} publishers of ~/stuck: end all but one')
+        drivers = self.get_publishers_info_by_topic('cmd_vel_in')
+        kind = 'TwistStamped' if self._stamped else 'Twist'
+        if words := other_type(drivers, f'geometry_msgs/msg/{kind}'):
+            faults.append(f'{self._input.topic_name}: {words} (parameter stamped)')
+        elif words := other_quality(drivers, self._input.qos_profile):
+            faults.append(f'{self._input.topic_name}: {words}')
+        others = sorted(map(name_of, self.get_publishers_info_by_topic('cmd_vel_out')))
+        with suppress(ValueError):
+            others.remove(self.get_fully_qualified_name())
+        if others:
+            past = 'its commands go past this node'
+            faults.append(f'{self._output.topic_name}: {", ".join(others)} publishes too: {past}')
+        return faults
 
     # -- What is kept over a restart ------------------------------------------------------------
 
