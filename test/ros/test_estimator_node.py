@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node as other nodes see it."""
 
+import re
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 import ros_types as ros
 
-from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS
 
@@ -229,3 +230,21 @@ def test_a_proposed_law_is_a_further_file_and_an_integer_may_stand_for_a_number(
     assert list(targets.string_array_value) == ['torque', 'exponent']
     assert list(coefficients.double_array_value) == [0.05, 0.4]
     assert contact_law.string_value == 'wong_reece'
+
+
+@pytest.mark.parametrize('others', [(), ('--params-file', str(shipped.find('pathfinder')))])
+def test_a_file_whose_section_is_for_another_name_is_told(executor, tmp_path, others, capfd):
+    """ROS drops the section without a word: the node is in a namespace, or renamed."""
+    from wheel_terra_estimator.errors import UserError
+    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
+
+    path = tmp_path / 'named.yaml'
+    path.write_text('wheel_terra_estimator:\n  ros__parameters:\n    output_rate: 5.0\n')
+    arguments = [*ROVER, str(path), '-r', '__ns:=/rover1', *others]
+    words = f"{path}: sections there: 'wheel_terra_estimator:'; none is for the node /rover1{NODE}"
+    if others:
+        EstimatorNode(context=executor.context, cli_args=arguments).destroy_node()
+        assert words in capfd.readouterr().err
+    else:
+        with pytest.raises(UserError, match=re.escape(words)):
+            EstimatorNode(context=executor.context, cli_args=arguments)

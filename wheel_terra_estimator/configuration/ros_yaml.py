@@ -173,10 +173,10 @@ def read(path: Path) -> dict[str, Value]:
         )
     if _is_plain(document):
         return flatten(document, str(path))
-    sections = list(_sections(document, '', path))
-    ours = [section for section in sections if _OUR_SECTION.fullmatch(section[0])]
+    found = list(_sections(document, '', path))
+    ours = [section for section in found if _OUR_SECTION.fullmatch(section[0])]
     if not ours:
-        there = ', '.join(f"'{name}'" for name, _ in sections) or 'none'
+        there = ', '.join(f"'{name}'" for name, _ in found) or 'none'
         raise UserError(
             f"{path}: no section for this node: sections there: {there}; use '/**:' with "
             "'ros__parameters:' below it"
@@ -185,6 +185,11 @@ def read(path: Path) -> dict[str, Value]:
     for _, parameters in sorted(ours, key=lambda section: section[0] != '/**'):
         values.update(flatten(parameters, str(path)))
     return values
+
+
+def sections(path: Path) -> list[str]:
+    """Return the names of the sections of a parameter file, as their nodes are called."""
+    return [name for name, _ in _sections(_loaded(read_text(path), path), '', path)]
 
 
 def flatten(parameters: Mapping[str, Any], source: str, prefix: str = '') -> dict[str, Value]:

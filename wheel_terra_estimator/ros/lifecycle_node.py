@@ -192,6 +192,10 @@ class EstimatorNode(LifecycleNode):
         Raises UserError if a parameter is unknown or its value cannot be used.
         """
         check_overrides(self)
+        if unread := parameters.unread(self._files, self):
+            if 'wheels.names' not in self._given:
+                raise UserError(unread)
+            self.get_logger().warning(unread)
         configuration = parameters.configuration(self._given, self.get_logger().warning)
         self._kept = self._kept_over_restart(configuration)
         kept = self._kept.values(configuration) if self._kept is not None else {}

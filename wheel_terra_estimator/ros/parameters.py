@@ -5,14 +5,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration import reader, ros_yaml
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import Parameter, declared
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
@@ -44,6 +45,20 @@ def files(arguments: Sequence[str]) -> list[Path]:
     return [
         Path(arguments[i + 1]) for i, word in enumerate(arguments[:-1]) if word == '--params-file'
     ]
+
+
+def unread(files: Iterable[Path], node: Node) -> str:
+    """Say which of the parameter files has a section for the estimator, but not for this node."""
+    for path in files:
+        with suppress(UserError):  # has sections of other nodes only
+            keys = ros_yaml.read(path).keys() - set(reader.STANDARD_PARAMETERS)
+            if keys and not any(map(node.has_parameter, keys)):
+                there = ', '.join(f"'{section}:'" for section in ros_yaml.sections(path))
+                return (
+                    f'{path}: sections there: {there}; none is for the node '
+                    f"{node.get_fully_qualified_name()}, so nothing of it counts; use '/**:'"
+                )
+    return ''
 
 
 def configuration(given: Mapping[str, Any], warn: Callable[[str], Any]) -> Configuration:
