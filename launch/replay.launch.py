@@ -22,6 +22,7 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 
 from launch import LaunchDescription
+from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
 ARGUMENTS = {
     'bag': (None, 'recording to play'),
@@ -34,11 +35,20 @@ ARGUMENTS = {
 DELAY = '4.0'  # [s] until the node listens
 
 
+def played(remaps):
+    """Return the bag's topics that are inputs: outputs and commands of the drive stay silent."""
+    heard_as = {topic: topic for topic in INPUT_TYPES}
+    for remap in remaps:
+        source, _, topic = remap.partition(':=')
+        heard_as[source.lstrip('/')] = topic.lstrip('/')
+    return [f'/{source}' for source, topic in heard_as.items() if topic in INPUT_TYPES]
+
+
 def start(context):
     """Make the processes, once the arguments are known."""
     values = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     play = ['ros2', 'bag', 'play', values['bag'], '--clock', '100', '--rate', values['rate']]
-    play += ['--delay', DELAY]
+    play += ['--delay', DELAY, '--topics', *played(values['remap'].split())]
     if values['remap']:
         play += ['--remap', *values['remap'].split()]
     player = ExecuteProcess(cmd=play, output='screen')

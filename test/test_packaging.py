@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The package as ROS and pip see it."""
 
+import ast
 import importlib
 import json
 import re
@@ -13,6 +14,7 @@ import yaml
 
 import wheel_terra_estimator
 from wheel_terra_estimator.configuration import reader, shipped
+from wheel_terra_estimator.messages.convert import INPUT_TYPES
 from wheel_terra_estimator.simulation import scenario
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -121,6 +123,18 @@ def test_every_shipped_folder_is_installed():
     }
     assert on_disk <= installed
     assert 'package.xml' in installed
+
+
+def test_the_launch_file_of_a_replay_plays_inputs_only():
+    """Outputs of an old run beside those of the node would be taken for them."""
+    tree = ast.parse((ROOT / 'launch/replay.launch.py').read_text())
+    tree.body = [node for node in tree.body if getattr(node, 'name', '') == 'played']
+    namespace = {'INPUT_TYPES': INPUT_TYPES}
+    exec(compile(tree, 'replay.launch.py', 'exec'), namespace)
+    inputs = {f'/{topic}' for topic in INPUT_TYPES}
+    assert set(namespace['played']([])) == inputs
+    remaps = ['/truth/odometry:=reference_odom', 'odom:=/wheels', '/cmd_vel:=/replayed/cmd_vel']
+    assert set(namespace['played'](remaps)) == inputs - {'/odom'} | {'/truth/odometry'}
 
 
 def test_no_path_of_a_machine_is_committed():
