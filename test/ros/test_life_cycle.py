@@ -265,3 +265,15 @@ def test_wrong_parameters_end_it_with_one_line(start, parameters, tmp_path):
         assert status == 2 and name in words
         assert 'Traceback' not in words
         assert len(words.strip().splitlines()) <= 2, words
+
+
+@pytest.mark.parametrize('home', [None, '/proc'])
+def test_where_no_log_can_be_written_the_first_line_names_the_cure(
+    start_interpreter, monkeypatch, home
+):
+    for name in ('HOME', 'ROS_HOME', 'ROS_LOG_DIR'):
+        monkeypatch.delenv(name, raising=False)
+    if home:
+        monkeypatch.setenv('HOME', home)
+    said, _ = start_interpreter('traction_limiter_node').communicate(timeout=60.0)
+    assert 'set ROS_LOG_DIR' in said.splitlines()[0]

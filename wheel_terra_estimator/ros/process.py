@@ -20,6 +20,9 @@ from typing import Any
 LONGEST_END = 0.8  # [s] for saving and closing, then the process ends anyway
 LOOK_UP = 0.1  # [s] between two looks at the signals
 
+HOMES = ('HOME', 'ROS_HOME', 'ROS_LOG_DIR')
+LOG_CURE = 'set ROS_LOG_DIR (or ROS_HOME) to a folder that can be written'
+
 
 class _Signals:
     """First ends the process at once; while serving, asks it to end."""
@@ -55,13 +58,16 @@ def run_node(module: str, name: str, args: list[str] | None = None) -> int:
 
     node: Any = None
     status = 0
+    if not any(map(os.environ.get, HOMES)):
+        print(f'there is no folder for logs: {LOG_CURE}', file=sys.stderr)  # before rcutils says so
     try:
         try:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         except Exception as error:  # rcl's: a parameter file or argument that cannot be read
             # What rcl complains of, without the places in its source.
             words = str(error).splitlines()[0].partition(', at ')[0]
-            print(f'unknown: {words}' if words.startswith('[') else words, file=sys.stderr)
+            words = f'unknown: {words}' if words.startswith('[') else words
+            print(f'{words}; {LOG_CURE}' if 'logging' in words else words, file=sys.stderr)
             return 2
         if signals is not None:
             signals.serving = True
