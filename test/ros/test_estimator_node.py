@@ -41,9 +41,9 @@ def hear(node, kind, topic, profile=10):
 
 def test_tools_are_told_the_range_of_each_bounded_parameter():
     from wheel_terra_estimator.configuration.parameters import declared
-    from wheel_terra_estimator.ros.parameters import _descriptor
+    from wheel_terra_estimator.ros.parameters import descriptor
 
-    told = {key: _descriptor(parameter) for key, parameter in declared().items()}
+    told = {key: descriptor(parameter) for key, parameter in declared().items()}
     ranges = {
         key: [(r.from_value, r.to_value) for r in (*d.floating_point_range, *d.integer_range)]
         for key, d in told.items()

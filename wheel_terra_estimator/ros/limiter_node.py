@@ -18,7 +18,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
@@ -28,6 +27,14 @@ from std_msgs.msg import Bool, Float64, Int8, UInt8MultiArray
 from std_srvs.srv import Trigger
 
 from wheel_terra_estimator.configuration import soil_file
+from wheel_terra_estimator.configuration.parameters import (
+    Parameter,
+    by_spelling,
+    declared,
+    nearest,
+    parameter,
+)
+from wheel_terra_estimator.configuration.reader import STANDARD_PREFIXES, checked_value
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation import traction_limiter as limiter
 from wheel_terra_estimator.estimation.traction_law import LimiterTuning
@@ -36,6 +43,7 @@ from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN, Status
 from wheel_terra_estimator.messages.pack import diagnostic_array
 from wheel_terra_estimator.output_folder import cannot_write, check_file
+from wheel_terra_estimator.ros.parameters import descriptor
 from wheel_terra_estimator.ros.publishers import name_of, other_quality, other_type
 from wheel_terra_estimator.ros.qos import input_profile, output_profile
 
@@ -53,9 +61,9 @@ class TractionLimiter(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__('traction_limiter', **options)
         self._tuning = LimiterTuning(**{f.name: self._number(f) for f in fields(LimiterTuning)})
-        self._stamped = bool(self._declare('stamped', True, 'TwistStamped rather than Twist'))
+        self._stamped = self._take(parameter('stamped', 'flag', True, 'TwistStamped, not Twist'))
         words = 'file that keeps a stop over a restart of this node; empty: none does'
-        name = str(self._declare('state_file', '', words))
+        name = self._take(parameter('state_file', 'text', '', words))
         self._refuse_unknown()
         self._file = Path(name).expanduser() if name else None
         self._unkept = ''  # why the state is not in its file
@@ -266,20 +274,22 @@ class TractionLimiter(Node):
 
     # -- Parameters and time --------------------------------------------------------------------
 
-    def _declare(self, name: str, default: Any, meaning: str, **bounds: Any) -> Any:
-        """Return a parameter that is read at start."""
-        descriptor = ParameterDescriptor(description=meaning, read_only=True, **bounds)
-        return self.declare_parameter(name, default, descriptor).value
+    def _take(self, declared: Parameter) -> Any:
+        """Return a parameter, checked as those of the estimator are; it is read at the start."""
+        given = self._parameter_overrides.get(declared.key)  # private in rclpy
+        stated = {} if given is None else {declared.key: (given.value, 'parameters')}
+        value = checked_value(declared, stated, 0)
+        described = descriptor(declared)
+        described.read_only = True
+        self.declare_parameter(declared.key, value, described, ignore_override=True)
+        return value
 
     def _refuse_unknown(self) -> None:
         """Refuse what neither this node nor the estimator has: a file may hold both under /**."""
-        # Private in rclpy, but what nobody declares is kept nowhere else.
+        # What nobody declares is kept nowhere else.
         unknown = set(self._parameter_overrides) - set(self.get_parameters_by_prefix(''))
         if not unknown:
             return
-        from wheel_terra_estimator.configuration.parameters import by_spelling, declared, nearest
-        from wheel_terra_estimator.configuration.reader import STANDARD_PREFIXES
-
         for key in sorted(unknown - set(by_spelling(declared()))):
             if key.startswith(STANDARD_PREFIXES):
                 continue
@@ -288,12 +298,15 @@ class TractionLimiter(Node):
                 f"'{nearest(key, self.get_parameters_by_prefix(''))}'"
             )
 
-    def _number(self, parameter: Field[float]) -> float:
-        """Return a number of the tuning; an integer will do."""
-        given = parameter.metadata
-        bounds = FloatingPointRange(from_value=given['lower'], to_value=given['upper'], step=0.0)
-        more = {'dynamic_typing': True, 'floating_point_range': [bounds]}
-        return float(self._declare(parameter.name, parameter.default, given['meaning'], **more))
+    def _number(self, field: Field[float]) -> float:
+        """Return a number of the tuning."""
+        given, default = field.metadata, float(field.default)  # type: ignore[arg-type]
+        bounds = {'at_least': given['lower'], 'at_most': given['upper']}
+        return float(
+            self._take(
+                parameter(field.name, 'number', default, given['meaning'], unit='', **bounds)
+            )
+        )
 
     def _now(self) -> float:
         return float(self._steady.now().nanoseconds) * _SECOND

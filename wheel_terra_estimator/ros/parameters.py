@@ -97,14 +97,15 @@ def declare(node: Node, configuration: Configuration) -> None:
         node.undeclare_parameter(name)
     values = configuration.flat()
     for key, parameter in declared().items():
-        node.declare_parameter(key, values[key], _descriptor(parameter), ignore_override=True)
+        node.declare_parameter(key, values[key], descriptor(parameter), ignore_override=True)
 
 
-def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+def descriptor(parameter: Parameter) -> ParameterDescriptor:
+    """Return what tools are told of a parameter: meaning, unit, range, when it may change."""
     unit = f' [{parameter.unit}]' if parameter.unit else ''
     tuning = is_tuning(parameter.key)
     when = '' if tuning else '; read-only while the node is configured'
-    descriptor = ParameterDescriptor(
+    found = ParameterDescriptor(
         description=f'{parameter.meaning}{unit}',
         additional_constraints=f'{parameter.allowed}{when}',
         # An integer will do where a number is wanted; the validator knows.
@@ -112,13 +113,13 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     )
     finite = parameter.lower > float('-inf') and parameter.upper < float('inf')
     if finite and parameter.kind == 'number' and not tuning:
-        descriptor.floating_point_range = [
+        found.floating_point_range = [
             FloatingPointRange(
                 from_value=float(parameter.lower), to_value=float(parameter.upper), step=0.0
             )
         ]
     elif finite and parameter.kind == 'integer':
-        descriptor.integer_range = [
+        found.integer_range = [
             IntegerRange(from_value=int(parameter.lower), to_value=int(parameter.upper), step=1)
         ]
-    return descriptor
+    return found
