@@ -219,6 +219,7 @@ def test_a_configuration_is_read_only_and_can_be_copied():
         ({'soil.friction_angle': 0.5}, "'soil.friction_angle_deg'"),
         ({'effects.lug_diging.enabled': True}, "'effects.lug_digging.enabled'"),
         ({'maxlag': 1.0}, "'max_lag'"),
+        ({'max_lag': -0.5}, '-0.5 is neither -1 (learned) nor a time to wait'),
         ({'rover.wieght': 20.0}, "'rover.mass'"),
         ({'qwertz': 1}, 'the nearest known one is'),
         ({'wheels.radius': [0.1]}, 'has 1 entries instead of 2 (as many as wheels.names)'),

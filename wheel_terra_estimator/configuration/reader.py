@@ -315,6 +315,8 @@ def _cross_check(values: Mapping[str, Any], stated: _Sourced, sources: str) -> N
         room = 2.0 * math.pi * (values['wheels.radius'][i] + values['wheels.lug_height'][i])
         if values['wheels.lug_count'][i] * values['wheels.lug_thickness'][i] > room:
             raise refuse('wheels.lug_thickness', f'the lugs of {name} do not fit its circumference')
+    if -1.0 < values['max_lag'] < 0.0:
+        raise refuse('max_lag', f'{values["max_lag"]} is neither -1 (learned) nor a time to wait')
     thresholds = values['filter.class_thresholds']
     if not thresholds[0] < thresholds[1] < thresholds[2]:
         raise refuse('filter.class_thresholds', f'must increase: {thresholds}')
