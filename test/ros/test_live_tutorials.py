@@ -103,3 +103,26 @@ def test_the_live_tutorials_in_one_drive(start, listener, tmp_path):
     for axis, fused in enumerate(flags[6:12]):
         assert (last.covariance[7 * axis] < 1e6) == fused, 'what is not estimated is not fused'
     assert last.twist.linear.x == pytest.approx(speed, rel=0.2)
+
+
+def test_launch_line_of_the_tutorial_names_files_and_arguments_that_are_there():
+    (line,) = [words for words in commands('node') if words[:2] == ['ros2', 'launch']]
+    launch = Path(__file__).resolve().parents[2] / 'launch' / line[3]
+    declared = launch.read_text(encoding='utf-8')
+    for argument in line[4:]:
+        name, _, value = argument.partition(':=')
+        assert f"'{name}': (" in declared
+        assert reader.load(value.split(',')).wheels.names
+
+
+def test_nav2_page_puts_the_limiter_between_the_collision_monitor_and_the_base():
+    """Else nav2 of Jazzy sends its commands past it."""
+    text = (TUTORIALS / 'nav2.md').read_text(encoding='utf-8')
+    _, nav2 = re.findall(r'^```yaml\n(.*?)^```', text, re.M | re.S)
+    monitor = yaml.safe_load(nav2)['collision_monitor']['ros__parameters']
+    assert '`stamped:=false`' in text
+    remaps = dict(re.findall(r'`(\w+):=(/\w+)`', text))
+    before = f'/{monitor["cmd_vel_out_topic"]}'
+    assert remaps == {'cmd_vel_in': before, 'cmd_vel_out': '/cmd_vel'}
+    (line,) = [w for w in commands('node') if 'traction_limiter_node' in w]
+    assert {w.partition(':=')[0] for w in line if ':=' in w} == set(remaps)
