@@ -338,9 +338,11 @@ def test_torque_over_radius_is_the_pull_of_a_wheel_that_holds_a_standing_rover(p
 def test_a_wheel_that_stalls_beside_spinning_ones_has_the_pull_of_its_torque(parts, way):
     """At slip 1 torque and pull follow from one another, whatever the strength of the soil."""
     rims, loads = tuple(way * r for r in (*(0.07,) * 5, 0.006)), (60.0,) * 6
-    turns = turning_wheels(parts.rover, rims, loads)
+    turns = turning_wheels(parts.rover, rims, loads, reference_known=True)
     assert turns == (True,) * 5 + (False,)
-    assert turning_wheels(parts.rover, (0.006,) * 6, loads) == (True,) * 6
+    all_slow = turning_wheels(parts.rover, (0.006,) * 6, loads, reference_known=True)
+    assert all_slow == turning_wheels(parts.rover, rims, loads, reference_known=False)
+    assert all_slow == (True,) * 6
     x = parts.filter().mean.copy()
     spun = WheelStates(0.0, x[parts.layout.sinkage], np.array(loads), 0.2, 0.0)
     torque, pull = parts.models.torque_and_pull(spun)

@@ -394,7 +394,7 @@ class WheelSoilEstimator:
             torque=self._wheels.take_torque(),
             leaving_angles=self._leaving_angles.angles(time),
             loads=loads,
-            turns=turning_wheels(rover, rims, loads.load),
+            turns=turning_wheels(rover, rims, loads.load, reference_known=reference_known),
             reference_known=reference_known,
             demand_change=demand_change if reference_known else 0.0,
         )

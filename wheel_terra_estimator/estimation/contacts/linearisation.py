@@ -172,12 +172,15 @@ def _met(x: FloatArray, layout: StateLayout, ruts: FloatArray | Floats) -> Float
     return np.minimum(ruts, np.maximum(x[layout.sinkage], 0.0))
 
 
-def turning_wheels(rover: Rover, rims: Floats, loads: Floats) -> tuple[bool, ...]:
+def turning_wheels(
+    rover: Rover, rims: Floats, loads: Floats, *, reference_known: bool
+) -> tuple[bool, ...]:
     """Say for which wheels the contact models hold: they turn under a load.
 
-    The slip of one that hardly turns beside others hangs on the last bit of the speed.
+    The slip of one that hardly turns beside others hangs on the last bit of the speed; without a
+    reference velocity it may be the one that rolls.
     """
-    fastest = max((abs(rim) for rim in known(rims)), default=0.0)
+    fastest = max((abs(rim) for rim in known(rims)), default=0.0) if reference_known else 0.0
     least = max(_LEAST_RIM_OVER_REST * rover.rest_speed, _LEAST_RIM_SHARE * fastest)
     return tuple(
         abs(rim) >= least and load >= LEAST_LOAD for rim, load in zip(rims, loads, strict=True)
