@@ -113,6 +113,24 @@ def test_beds_that_differ_from_sweep_to_sweep_are_no_effect():
     assert again.what.startswith('the sweeps of least and greatest normal load again')
 
 
+def test_the_bed_of_a_reference_is_another_unless_trial_says_that_it_is_one():
+    table, values, soil, rows = make('sweep40')
+    softer = replace(
+        soil,
+        frictional_modulus=0.87 * soil.frictional_modulus,
+        friction_angle=np.arctan(0.96 * np.tan(soil.friction_angle)),
+    )
+    again = noisy(rows, solve(rows, soil), solve(rows, softer), np.random.default_rng(3))
+    found = run(again, values, reference=check_table('a.csv', table))
+    assert (found.verdict, found.effects) == ('agrees', ())
+    assert any('0.87' in note and 'of that of the reference' in note for note in found.notes)
+    assert 'reference again on a fresh bed' in found.next_measurement[0].what
+    bed = {'trial': np.ones(40)}
+    same = run({**again, **bed}, values, reference=check_table('a.csv', {**table, **bed}))
+    assert same.verdict != 'agrees'
+    assert not any('of that of the reference' in note for note in same.notes)
+
+
 def test_pulls_of_the_other_sign_are_refused_with_the_cure():
     table, values, *_ = make('lugs48')
     table['drawbar_pull'] = -table['drawbar_pull']

@@ -16,6 +16,7 @@ from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch, changes_along_rows
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import Decision, known_alike
+from wheel_terra_estimator.discrepancy.fitting.coordinates import BED
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import (
@@ -68,7 +69,11 @@ def render(
         not_visible=dict(findings.not_visible),
         smallest_visible=_smallest_visible(findings, known),
         where=locate(both, setting.problem, decision.findings.nothing, len(table)),
-        next_measurement=(*words.fresh_bed(decision.beds_differ, table), *_next(decision)),
+        next_measurement=(
+            *words.fresh_bed(decision.beds_differ, table),
+            *words.reference_again(after),
+            *_next(decision),
+        ),
         curves=decision.curves,
         noise=replace(findings.noise, std=findings.noise.std[: len(table)]),
         soil=soil,
@@ -84,6 +89,7 @@ def render(
             *words.notes(both, findings, after, moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
             *words.own_beds(decision.beds_differ, table),
+            *filter(None, [words.another_bed(after)]),
             *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
         ),
         base_effects=tuple(configuration.effects),
@@ -136,7 +142,7 @@ def _parameters(
     of_u = fitted.covariance() if covariance is None else covariance
     found = {}
     for index, c in enumerate(fitted.coordinates):
-        if c.owner != 'soil' and (c.owner in fitted.names) != base:
+        if c.owner not in ('soil', BED) and (c.owner in fitted.names) != base:
             u, std = float(fitted.u[index]), float(np.sqrt(of_u[index, index]))
             found[c.key] = FittedParameter(
                 float(c.value(u)),

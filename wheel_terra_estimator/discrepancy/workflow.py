@@ -17,6 +17,7 @@ from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     Coordinate,
     base_coordinates,
+    bed_coordinates,
     soil_coordinates,
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
@@ -84,6 +85,7 @@ def diagnose(
     both, active = table, None
     if reference is not None:
         table, both, active = join(table, reference)
+    own_bed = reference is not None and not _on_one_bed(table, reference)
     points = operating_points(both.columns, configuration, both.name)
     wheels, stated = configuration.wheels, configuration.stated
     check_wheel_of_model(
@@ -104,6 +106,7 @@ def diagnose(
     stated_std, source = configuration.soil_std_stated, configuration.soil_source
     nuisance = (
         *soil_coordinates(configuration.soil, stated_std, source, chosen.soil_known_to),
+        *(bed_coordinates() if own_bed else ()),
         *base_coordinates(configuration.effects, configuration.effects_std, known),
     )
     floors = default_floors(chosen.floor) if reference is None else shared_floors()
@@ -152,6 +155,12 @@ def diagnose(
     seconds = time.perf_counter() - started
     notes = (*notes, *diagnosis.notes)
     return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
+
+
+def _on_one_bed(table: SteadyTable, reference: SteadyTable) -> bool:
+    """Return whether the columns `trial` say that all rows lie on beds of the reference."""
+    beds = (t.columns.get('trial', np.full(len(t), np.nan)) for t in (table, reference))
+    return bool(np.isin(*beds).all())
 
 
 def _load_misread(

@@ -81,13 +81,18 @@ EFFECT_SCALES = (0.3, 2.0, 10.0)
 EFFECT_SHARES = (0.45, 0.45, 0.10)
 # During fits the strength is held loosely, so that a strong effect is not pulled back.
 LOOSE = 6.0
+# By which prepared beds differ, shares of the soil numbers: forces of repeated plates and wheels on
+# CMU's bed (measured/cmu_single_wheel) scatter by 2 to 17 %, 8 % pooled; of the friction assumed.
+BED_SCATTER = {'stiffness': 0.10, 'tan_friction': 0.03}
+BED = 'bed'  # owner of what the bed of the rows under diagnosis has in excess of a reference's
+_FARTHEST_BED = 8.0  # deviations by which it may differ
 
 
 @dataclass(frozen=True)
 class Coordinate:
     """One free parameter: transform(centre + scale u) with u ~ N(0, 1) in [lower, upper]."""
 
-    owner: str  # ``soil``, or the name of an effect
+    owner: str  # ``soil``, ``bed``, or the name of an effect
     # Field of ``Soil`` (``stiffness`` = both bearing moduli), or parameter of the effect
     name: str
     centre: float  # as ``scale``, in the space of the transform
@@ -112,7 +117,7 @@ class Coordinate:
         An effect that is on is held by 0.4 of its deviation: wider it takes what is missing (CMU's
         smooth wheel with its own fit, HIT's lugs against the smooth twin).
         """
-        return WIDENING if self.owner == 'soil' else 1.0
+        return WIDENING if self.owner in ('soil', BED) else 1.0
 
     @property
     def key(self) -> str:
@@ -181,6 +186,15 @@ def soil_coordinates(
             )
         )
     return tuple(found)
+
+
+def bed_coordinates() -> tuple[Coordinate, ...]:
+    """Return the factors by which the bed under diagnosis differs from that of a reference."""
+    farthest = _FARTHEST_BED / WIDENING
+    return tuple(
+        Coordinate(BED, name, 0.0, WIDENING * std, -farthest, farthest, logarithmic=True)
+        for name, std in BED_SCATTER.items()
+    )
 
 
 def narrowed(coordinates: Sequence[Coordinate], factor: float) -> tuple[Coordinate, ...]:

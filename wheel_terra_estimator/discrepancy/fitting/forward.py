@@ -17,7 +17,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.configuration.configuration import Readings
-from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
+from wheel_terra_estimator.discrepancy.fitting.coordinates import BED, Coordinate
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.contact import Contact
@@ -94,19 +94,24 @@ class Forward:
         stacked = dict(zip(keys, table[:, :, None], strict=True))
         one = np.ones((len(columns), 1))
         soil = {name: getattr(self.soil, name) * one for name in SOIL_NUMBERS}
-        for key, values in stacked.items():
+        for key, values in stacked.items():  # those of a bed after those of the soil
             owner, name = key.split('.')
-            if owner != 'soil':
+            if owner == BED and self.active is not None:
+                values = np.where(self.active, values, 1.0)
+            if owner not in ('soil', BED):
                 continue
             if name == 'stiffness':
-                soil['cohesive_modulus'] = self.soil.cohesive_modulus * values
-                soil['frictional_modulus'] = self.soil.frictional_modulus * values
+                soil['cohesive_modulus'] = soil['cohesive_modulus'] * values
+                soil['frictional_modulus'] = soil['frictional_modulus'] * values
+            elif owner == BED:
+                soil['friction_angle'] = np.arctan(np.tan(soil['friction_angle']) * values)
             elif name == 'tan_friction':
                 soil['friction_angle'] = np.arctan(values)
             else:
                 soil[name] = values
         names = dict.fromkeys(self.base_effects)
-        names.update(dict.fromkeys(c.owner for c in keys.values() if c.owner != 'soil'))
+        of_effects = (c.owner for c in keys.values() if c.owner not in ('soil', BED))
+        names.update(dict.fromkeys(of_effects))
         settings: dict[str, dict[str, Any]] = {}
         for name in names:
             setting = {**self.catalogue[name].defaults(), **self.base_effects.get(name, {})}
@@ -150,7 +155,7 @@ class Forward:
 
     def _resting_value(self, coordinate: Coordinate) -> float:
         """Value of a coordinate in hypotheses that do not have it."""
-        if coordinate.owner == 'soil':
+        if coordinate.owner in ('soil', BED):
             return float(coordinate.value(0.0))
         if coordinate.owner in self.base_effects:
             return self.base_effects[coordinate.owner][coordinate.name]

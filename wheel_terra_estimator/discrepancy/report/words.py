@@ -16,6 +16,7 @@ from wheel_terra_estimator.configuration.column_map import UNITS
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
+from wheel_terra_estimator.discrepancy.fitting.coordinates import BED
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.numbers import (
     SHOWN,
@@ -61,6 +62,8 @@ FACTORS = {
 _WORTH_VARYING = ('normal_load', 'lug_height')
 _CHANCE = 1e-3  # of a scatter of repeated rows, beside the stated noise
 _SAME_FACTOR = 0.03  # between two units: a factor of ten, or that of a kilopond
+_OF_BEDS = {'stiffness': 'stiffness', 'tan_friction': 'tan phi'}
+_SURE_OF_BED = 2.0  # deviations, after the fit
 _COARSE = 0.05  # model-error floor above which agreement says little
 
 
@@ -277,6 +280,28 @@ def fresh_bed(probability: float, table: SteadyTable) -> tuple[NextMeasurement, 
     if 'trial' in table.columns:
         what = f'the sweeps of least and greatest {_swept(table)} again, each on two fresh beds'
     return (NextMeasurement(what, competitors, 0.0, math.inf),)
+
+
+def another_bed(fitted: Fit) -> str:
+    """Return how the bed differs from that of the reference; empty where the rows are not sure."""
+    std = np.sqrt(np.diag(fitted.covariance()))
+    factors = ' and '.join(
+        f'{number(float(c.value(u)), 3)} times the {_OF_BEDS[c.name]}'
+        for c, u, s in zip(fitted.coordinates, fitted.u, std, strict=True)
+        if c.owner == BED and abs(u) > _SURE_OF_BED * s
+    )
+    return factors and (
+        f'the bed has {factors} of that of the reference: beds differ so (10 % and 3 % are usual); '
+        'the same `trial` in both tables says that it is one'
+    )
+
+
+def reference_again(fitted: Fit) -> tuple[NextMeasurement, ...]:
+    """Return the measurement that tells another bed than the reference's from an effect."""
+    if not another_bed(fitted):
+        return ()
+    what = 'the rows of the reference again on a fresh bed'
+    return (NextMeasurement(what, ('another bed', 'an effect'), 0.0, math.inf),)
 
 
 def _swept(table: SteadyTable) -> str:

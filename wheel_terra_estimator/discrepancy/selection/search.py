@@ -12,7 +12,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.fitting import noise as noises
-from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
+from wheel_terra_estimator.discrepancy.fitting.coordinates import BED_SCATTER, Coordinate
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
@@ -58,9 +58,6 @@ _BEHIND = 3.0  # nats behind the best of all, up to which that is done
 _ROUNDS = 2  # of adding and swapping
 _NEAR = 2.0  # nats behind the best one, up to which that is done
 _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
-# By which prepared beds differ, shares of the soil numbers: forces of repeated plates and wheels on
-# CMU's bed (measured/cmu_single_wheel) scatter by 2 to 17 %, 8 % pooled; of the friction assumed.
-BED_SCATTER = {'stiffness': 0.10, 'tan_friction': 0.03}
 
 
 @dataclass(frozen=True)
