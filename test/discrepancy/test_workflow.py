@@ -363,9 +363,16 @@ def test_reference_cancels_a_common_structural_error():
     options = {'reference': check_table('a.csv', reference), 'options': few}
     quiet = run(table, values, **options)
     assert quiet.verdict == 'agrees'
+    # What both have is no scatter, nothing left, and nowhere to look first.
+    assert quiet.sentence.startswith('Rows and reference agree')
+    assert quiet.where.sentence == 'no region stands out from the noise'
     table['torque'] = table['torque'] + 0.08 * np.ptp(table['torque'])
     diagnosis = run(table, values, **options)
     assert [effect.name for effect in diagnosis.effects] == ['drivetrain_friction']
+    assert not diagnosis.effects[0].remainder
+    open_one = run(table, values, **{**options, 'options': Options(effects=('cohesion',))})
+    assert not open_one.effects and open_one.where.quantity == 'torque'
+    assert open_one.gap['sinkage'].refit < 1.5 * open_one.gap['sinkage'].noise
     assert len(diagnosis.curves.after) == len(table['slip'])
     assert diagnosis.gap['torque'].after < diagnosis.gap['torque'].refit
     # Rows of the table do not repeat those of the reference: what the friction adds is no noise.
@@ -383,6 +390,13 @@ def test_reference_cancels_a_common_structural_error():
     one_more = {key: np.r_[plain[1][key], column[:1]] for key, column in plain[0].items()}
     with pytest.raises(UserError, match='1 of 17 rows are not copies of rows of a'):
         run(one_more, values, **options)
+
+
+def test_however_large_an_error_that_a_reference_shares_is_no_gap():
+    table, values, _, rows = make('basic16', structure=0.5, seed=11)
+    again = noisy(rows, table, table, np.random.default_rng(1))
+    found = run(again, values, reference=check_table('a.csv', table))
+    assert (found.verdict, found.effects) == ('agrees', ())
 
 
 @pytest.mark.slow

@@ -178,6 +178,8 @@ class Decider:
         if decision.verdict.status not in OPEN:
             return decision
         law = self._law(decision, decision.verdict.left.only_far)
+        if self.findings.setting.forward.active is not None:
+            return replace(decision, proposal=law)  # its floor stands for what a reference shares
         setting, nothing = self.findings.setting, decision.findings.nothing
         # Estimated noise may be next to nothing beside a few smooth rows.
         exact = 'estimated' not in self.findings.noise.origin.values()
@@ -205,7 +207,7 @@ class Decider:
         rows = len(self.table)
         groups = np.where(np.arange(len(self.both)) < rows, slip_groups(self.both), -1)
         outs = hold_out(setting, fits, beside, groups)
-        curves = _curves(rows, findings, fits[-1], outs[0], outs[-1], floor)
+        curves = _curves(rows, findings, fits[-1], outs, floor)
         return {
             'findings': findings,
             'after': fits[-1],
@@ -293,50 +295,19 @@ def _strength(fitted: Fit, name: str) -> float:
 
 
 def _curves(
-    rows: int,
-    findings: Findings,
-    after: Fit,
-    held_refit: FloatArray,
-    held_after: FloatArray,
-    floor: float,
+    rows: int, findings: Findings, after: Fit, held_out: list[FloatArray], floor: float
 ) -> Curves:
     setting = findings.setting
-    nuisance = setting.nuisance
-    refit_error, after_error = (
-        _shared_error(findings, fitted, floor) for fitted in (findings.nothing, after)
-    )
+    nuisance, problem = setting.nuisance, setting.problem
     configured = setting.forward.solve([nuisance], [np.zeros(len(nuisance))], jacobian=False)
+    fits = [findings.nothing.outputs, after.outputs]
+    refit, fitted = setting.predicted(fits, problem.variance(floor))
     # Where slips are latent the model stands at the most probable slip; a curve is compared with
     # what was read, so that it goes back along the tangent (cells that were not measured stay).
-    problem = setting.problem
-    moved = problem.moved
-    refit_error, after_error = refit_error - moved, after_error - moved
-    band = np.sqrt(findings.noise.std**2 + (floor * problem.scale) ** 2)
-    return Curves(
-        (configured.outputs[0] - moved)[:rows],
-        (findings.nothing.outputs + refit_error)[:rows],
-        (after.outputs + after_error)[:rows],
-        (held_refit + refit_error)[:rows],
-        (held_after + after_error)[:rows],
-        band[:rows],
+    before, refit, fitted, held_refit, held_after = (
+        (model - problem.moved)[:rows]
+        for model in (configured.outputs[0], refit, fitted, held_out[0], held_out[-1])
     )
-
-
-def _shared_error(findings: Findings, fitted: Fit, floor: float) -> FloatArray:
-    """(N, 4) structural error of the rows under diagnosis as a reference shows it, elsewhere zero.
-
-    Conditional mean of the smooth error given the residuals of the reference rows alone.
-    """
-    setting, error = findings.setting, np.zeros_like(fitted.outputs)
-    active, problem = setting.forward.active, setting.problem
-    if active is None or floor == 0.0:
-        return error
-    unrotate = np.linalg.inv(problem.rotation)
-    noise = problem.variance(0.0)
-    smooth = (unrotate * (problem.variance(floor) - noise)) @ unrotate.T
-    total = smooth + (unrotate * noise) @ unrotate.T
-    ours = active[problem.row]
-    residual = problem.wanted - problem.flat(fitted.outputs)
-    weights = np.linalg.solve(total[np.ix_(~ours, ~ours)], residual[~ours])
-    error[problem.row[ours], problem.quantity[ours]] = smooth[np.ix_(ours, ~ours)] @ weights
-    return error
+    left = floor if setting.forward.active is None else 0.0  # what a reference shows is in them
+    band = np.sqrt(findings.noise.std**2 + (left * problem.scale) ** 2)
+    return Curves(before, refit, fitted, held_refit, held_after, band[:rows])

@@ -68,7 +68,7 @@ def render(
         gap=decision.gap,
         not_visible=dict(findings.not_visible),
         smallest_visible=_smallest_visible(findings, known),
-        where=locate(both, setting.problem, decision.findings.nothing, len(table)),
+        where=locate(both, setting.problem, findings.nothing, variance, setting.forward.active),
         next_measurement=(
             *words.fresh_bed(decision.beds_differ, table),
             *words.reference_again(after),

@@ -159,8 +159,8 @@ def diagnose(
 
 def _on_one_bed(table: SteadyTable, reference: SteadyTable) -> bool:
     """Return whether the columns `trial` say that all rows lie on beds of the reference."""
-    beds = (t.columns.get('trial', np.full(len(t), np.nan)) for t in (table, reference))
-    return bool(np.isin(*beds).all())
+    beds, known = (t.columns.get('trial', np.full(1, np.nan)) for t in (table, reference))
+    return bool(np.isin(beds, known).all())
 
 
 def _load_misread(

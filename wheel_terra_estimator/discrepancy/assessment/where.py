@@ -27,23 +27,36 @@ _SURE = 0.05
 _ONE_SIGN = 0.3  # below this share of the size a mean misfit says nothing
 
 
-def locate(table: SteadyTable, problem: Problem, nothing: Fit, rows: int) -> Where:
+def locate(
+    table: SteadyTable,
+    problem: Problem,
+    nothing: Fit,
+    variance: FloatArray,  # of the rotated axes, with the floor
+    ours: BoolArray | None,  # (N,) rows to look at, where the others are a reference
+) -> Where:
     """Return the region of the inputs in which the soil-refitted model is worst.
 
     The residuals after a refit are neither independent nor equal in size; the p-value therefore
-    comes from noise drawn and refitted on the same rows (linear), under the same scan. Only the
-    first `rows` are looked at; the others are a reference.
+    comes from noise drawn and refitted on the same rows (linear), under the same scan.
     """
-    cells = (problem.wanted - problem.flat(nothing.outputs)) / problem.std
-    cells = np.where(problem.outlier | (problem.row >= rows), 0.0, cells)
+
+    def own(residual: FloatArray) -> FloatArray:
+        """Return (m, K) residuals without what a reference shows, in noise deviations."""
+        shared = problem.shared_error(residual, ours, variance)
+        return np.asarray((residual - shared) / problem.std[:, None])
+
+    looked_at = np.ones(len(table), dtype=bool) if ours is None else ours
+    cells = own((problem.wanted - problem.flat(nothing.outputs))[:, None])[:, 0]
+    cells = np.where(problem.outlier | ~looked_at[problem.row], 0.0, cells)
     residual = np.full((len(table), len(QUANTITIES)), np.nan)
     residual[problem.row, problem.quantity] = cells
     present = [q for q in range(len(QUANTITIES)) if (problem.quantity == q).any()]
-    excess = {q: max(float((cells[problem.quantity == q] ** 2 - 1.0).sum()), 1e-9) for q in present}
+    of = {q: cells[(problem.quantity == q) & looked_at[problem.row]] for q in present}
+    excess = {q: max(float((of[q] ** 2 - 1.0).sum()), 1e-9) for q in present}
     total = sum(excess.values())
     shares = {QUANTITIES[q]: excess[q] / total for q in present}
     worst = max(present, key=lambda q: excess[q])
-    mine = np.isfinite(residual[:, worst]) & (np.arange(len(table)) < rows)
+    mine = np.isfinite(residual[:, worst]) & looked_at
     names = [name for name in table.varying() if np.isfinite(table.columns[name]).all()]
     boxes, sides = _boxes(table, names)
     values = np.where(mine, residual[:, worst], 0.0)
@@ -54,8 +67,11 @@ def locate(table: SteadyTable, problem: Problem, nothing: Fit, rows: int) -> Whe
         counts = np.maximum(boxes @ mine, 1.0)
         score = _score(boxes @ values**2, counts)
         best = int(np.argmax(score))
-        null = np.where(mine, _simulated(problem, nothing, worst, len(table)), 0.0)
-        strongest = _score(boxes @ (null.T**2), counts[:, None]).max(axis=0)
+        draws = own(_simulated(problem, nothing, None if ours is None else variance))
+        null = np.zeros((len(table), _DRAWS))
+        null[problem.row[problem.quantity == worst]] = draws[problem.quantity == worst]
+        null[~mine] = 0.0
+        strongest = _score(boxes @ null**2, counts[:, None]).max(axis=0)
         p_value = float((1 + (strongest >= score[best]).sum()) / (1 + len(strongest)))
         chosen = (boxes[best] > 0) & mine
         square = float((values**2).sum())
@@ -72,7 +88,9 @@ def locate(table: SteadyTable, problem: Problem, nothing: Fit, rows: int) -> Whe
     mean, size = float(np.mean(physical)), float(np.sqrt(np.mean(physical**2)))
     noise = float(np.sqrt(np.mean(std**2)))
     quantity, sentence = QUANTITIES[worst], 'no region stands out from the noise'
-    if p_value < _SURE or excess[worst] > 3.0 * np.sqrt(2.0 * mine.sum()):
+    # What a reference does not show exactly is in the draws only.
+    beyond_noise = ours is None and excess[worst] > 3.0 * np.sqrt(2.0 * mine.sum())
+    if p_value < _SURE or beyond_noise:
         sentence = _sentence(quantity, box, mean, size, noise)
     return Where(sentence, quantity, shares, box, np.flatnonzero(inside), share_inside, p_value)
 
@@ -117,17 +135,19 @@ def _score(square: FloatArray, count: FloatArray) -> FloatArray:
     return 0.5 * count * (ratio - 1.0 - np.log(ratio))
 
 
-def _simulated(problem: Problem, nothing: Fit, quantity: int, rows: int) -> FloatArray:
-    """(draws, N) whitened residuals of a refit where nothing is missing."""
+def _simulated(problem: Problem, nothing: Fit, variance: FloatArray | None) -> FloatArray:
+    """(m, draws) residuals of a refit where nothing is missing but what a reference shares."""
     rng = np.random.default_rng(_SEED)
     jacobian = nothing.sensitivity / problem.std[:, None]
     noise = rng.standard_normal((problem.size, _DRAWS))
+    if variance is not None:
+        error = np.sqrt(variance - problem.variance(0.0))[:, None] * rng.standard_normal(
+            noise.shape
+        )
+        noise += np.linalg.inv(problem.rotation) @ error / problem.std[:, None]
     precision = jacobian.T @ jacobian + np.diag(nothing.prior)
-    draws = noise - jacobian @ np.linalg.solve(precision, jacobian.T @ noise)
-    mine = problem.quantity == quantity
-    full = np.zeros((_DRAWS, rows))
-    full[:, problem.row[mine]] = draws[mine].T
-    return full
+    left = noise - jacobian @ np.linalg.solve(precision, jacobian.T @ noise)
+    return np.asarray(left * problem.std[:, None])
 
 
 def _sentence(

@@ -67,6 +67,25 @@ class Problem:
         shift[self.row, self.quantity] = self.wanted - self.observed
         return shift
 
+    def shared_error(
+        self, residual: FloatArray, ours: BoolArray | None, variance: FloatArray
+    ) -> FloatArray:
+        """Return the structural error (m, ...) of our rows as a reference shows it, elsewhere zero.
+
+        Conditional mean of the smooth error given the residuals (m, ...) of the other rows alone;
+        ``ours`` is (N,), None without a reference. ``variance``: of the rotated axes, with a floor.
+        """
+        error = np.zeros_like(residual)
+        if ours is None:
+            return error
+        here = ours[self.row]
+        unrotate = np.linalg.inv(self.rotation)
+        smooth = (unrotate * (variance - self.variance(0.0))) @ unrotate.T
+        total = (unrotate * variance) @ unrotate.T
+        weights = np.linalg.solve(total[np.ix_(~here, ~here)], residual[~here])
+        error[here] = smooth[np.ix_(here, ~here)] @ weights
+        return error
+
     def variance(self, amplitude: ArrayLike) -> FloatArray:
         """Return (m,) variances of the rotated axes.
 

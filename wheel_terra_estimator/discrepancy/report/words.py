@@ -340,6 +340,24 @@ def wrong_units(misread: Mapping[str, float]) -> str:
     )
 
 
+def _agreement(decision: Decision, gap_p_value: float) -> str:
+    """Return beside what the rows agree with the model, the soil refitted."""
+    floor = decision.floor
+    if decision.verdict.left.shared:
+        both = f', but for an error of {number(100 * floor, 2)} % of the range that both have'
+        return f'Rows and reference agree once the soil is refitted{both if floor else ""}.'
+    if floor > _COARSE:
+        return (
+            'These rows are too scattered to judge the model: it agrees with them, but only within '
+            f'{100 * floor:.0f} % of the range (p = {number(gap_p_value, 2)}).'
+        )
+    within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'
+    if not floor:
+        within = ' (model-error floor needed: none)'
+    beds = ' and the bed of each sweep may be another' if decision.beds_differ else ''
+    return f'Model and measurement agree once the soil is refitted{beds}{within}.'
+
+
 def sentence(
     decision: Decision,
     effects: tuple[NamedEffect, ...],
@@ -348,24 +366,13 @@ def sentence(
     nearest: tuple[str, ...],
 ) -> str:
     """Return the verdict in words."""
-    verdict, left, floor = decision.verdict, decision.verdict.left, decision.floor
+    verdict, left = decision.verdict, decision.verdict.left
     if decision.misread:
         return wrong_units(decision.misread)
     if verdict.status == 'undecided':
         return _undecided(decision.gap, nearest)
-    within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'
-    if not floor:
-        within = ' (model-error floor needed: none)'
-    if verdict.status == 'agrees' and floor > _COARSE:
-        return (
-            'These rows are too scattered to judge the model: it agrees with them, but only within '
-            f'{100 * floor:.0f} % of the range (p = {number(gap_p_value, 2)}).'
-        )
     if verdict.status == 'agrees':
-        agreed = 'Model and measurement agree once the soil is refitted'
-        if decision.beds_differ:
-            agreed += ' and the bed of each sweep may be another'
-        return f'{agreed}{within}.'
+        return _agreement(decision, gap_p_value)
     if verdict.status == 'unexplained' and stretch:
         return (
             'Model and measurement disagree; none of the known effects alone explains it, but '

@@ -37,6 +37,7 @@ class Remainder:
     amplitude: float  # most probable amplitude of the structural error, share of the range
     p_value: float  # of the whole misfit under the best floor (chi-square)
     z_score: float  # farthest of a configured number, in its stated deviations
+    shared: bool = False  # a reference has the structural error as well: it is nothing left
 
     @property
     def accounted_for(self) -> bool:
@@ -56,7 +57,7 @@ class Remainder:
     @property
     def noticeable(self) -> bool:
         """True where noise alone is not enough: also a misfit within the model-error floor."""
-        return self.significant or self.probability_of_any > 0.8
+        return self.significant or (self.probability_of_any > 0.8 and not self.shared)
 
 
 def remainder(selection: Selection, index: int, problem: Problem) -> Remainder:
@@ -68,14 +69,15 @@ def remainder(selection: Selection, index: int, problem: Problem) -> Remainder:
     real = np.array([floor.largest >= 0.01 for floor in selection.floors])
     any_share = float(np.exp(log_sum(joint[real]) - log_sum(joint)))
     variance = problem.variance(selection.floors[selection.quiet_floor(index)].amplitude)
-    # A reference has no misfit that asks for a name: its structural error moves the soil as well.
-    z_score = largest_z_score(explanation.fitted) if selection.unexplained.any() else 0.0
+    # Beside a reference no misfit asks for a name: its structural error moves the soil as well.
+    shared = not selection.unexplained.any()
     return Remainder(
         share,
         any_share,
-        selection.floors[top].largest,
+        0.0 if shared else selection.floors[top].largest,
         chi_square_p_value(explanation.fitted, variance),
-        z_score,
+        0.0 if shared else largest_z_score(explanation.fitted),
+        shared,
     )
 
 

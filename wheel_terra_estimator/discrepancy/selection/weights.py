@@ -97,6 +97,16 @@ class Setting:
             iterations,
         )
 
+    def predicted(self, outputs: Sequence[FloatArray], variance: FloatArray) -> FloatArray:
+        """(K, N, 4) outputs with the structural error that a reference shows beside each."""
+        problem, values = self.problem, np.array(outputs)
+        cells = values[:, problem.row, problem.quantity]
+        residual = (problem.wanted - cells).T
+        values[:, problem.row, problem.quantity] += problem.shared_error(
+            residual, self.forward.active, variance
+        ).T
+        return values
+
     def explain(self, fitted: Fit) -> Explanation:
         """Weigh a fit."""
         posterior = evidence(self.problem, fitted, self.floors, self.believed_widths)
@@ -224,7 +234,7 @@ def shared_floors() -> tuple[Floor, ...]:
 
     However large, it is no gap: it is there without the effect in question as well.
     """
-    amplitudes = (0.0, 0.015, 0.03, 0.06, 0.12, 0.25)
+    amplitudes = (0.0, 0.015, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
     each = -math.log(len(amplitudes))
     return tuple(Floor((a,) * len(QUANTITIES), each, False) for a in amplitudes)
 
