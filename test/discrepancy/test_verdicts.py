@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -129,6 +130,16 @@ def test_the_bed_of_a_reference_is_another_unless_trial_says_that_it_is_one():
     same = run({**again, **bed}, values, reference=check_table('a.csv', {**table, **bed}))
     assert same.verdict != 'agrees'
     assert not any('of that of the reference' in note for note in same.notes)
+
+
+def test_rows_of_two_soils_in_turn_are_called_scattered_where_no_noise_is_stated():
+    table, values, soil, rows = make('sweep40', stds=False)
+    stiff = solve(rows, replace(soil, frictional_modulus=5.0 * soil.frictional_modulus))
+    every_second = np.arange(40) % 2 == 1
+    mixed = {k: np.where(every_second, stiff[k], v) if k in stiff else v for k, v in table.items()}
+    found = run(mixed, values)
+    assert found.verdict == 'agrees'
+    assert re.search('too scattered.* [23]. % of the range of the sinkage', found.sentence)
 
 
 def test_pulls_of_the_other_sign_are_refused_with_the_cure():

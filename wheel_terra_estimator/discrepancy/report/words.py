@@ -64,6 +64,7 @@ _CHANCE = 1e-3  # of a scatter of repeated rows, beside the stated noise
 _SAME_FACTOR = 0.03  # between two units: a factor of ten, or that of a kilopond
 _OF_BEDS = {'stiffness': 'stiffness', 'tan_friction': 'tan phi'}
 _SURE_OF_BED = 2.0  # deviations, after the fit
+_SCATTERED = 0.2  # of the range: estimated noise beyond which agreement says little
 _COARSE = 0.05  # model-error floor above which agreement says little
 
 
@@ -340,9 +341,30 @@ def wrong_units(misread: Mapping[str, float]) -> str:
     )
 
 
+def _scattered(findings: Findings) -> str:
+    """Return estimated noise so large that anything agrees; empty if there is none."""
+    problem, noise = findings.setting.problem, findings.noise
+    shares = {
+        name: float(np.nanmedian(noise.std[:, q])) / problem.scale[q]
+        for q, name in enumerate(QUANTITIES)
+        if noise.origin.get(name) == 'estimated'
+    }
+    return ' and '.join(
+        f'{percent(share)} of the range of the {plain(name)}'
+        for name, share in shares.items()
+        if share > _SCATTERED
+    )
+
+
 def _agreement(decision: Decision, gap_p_value: float) -> str:
     """Return beside what the rows agree with the model, the soil refitted."""
-    floor = decision.floor
+    floor, scattered = decision.floor, _scattered(decision.findings)
+    if scattered:
+        return (
+            'These rows are too scattered to judge the model: it agrees with them beside a noise '
+            f'estimated at {scattered}; state it in *_std columns, or look for what changes from '
+            'row to row.'
+        )
     if decision.verdict.left.shared:
         both = f', but for an error of {number(100 * floor, 2)} % of the range that both have'
         return f'Rows and reference agree once the soil is refitted{both if floor else ""}.'
