@@ -42,7 +42,7 @@ from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import confidence
 from wheel_terra_estimator.discrepancy.selection import verdict as gap_test
 from wheel_terra_estimator.discrepancy.selection.verdict import _competitors
-from wheel_terra_estimator.discrepancy.selection.weights import default_floors
+from wheel_terra_estimator.discrepancy.selection.weights import Setting, default_floors
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.terramechanics.effects import catalogue
@@ -247,7 +247,7 @@ def test_held_out_rows_are_predicted_by_a_fit_without_them():
     start = [np.zeros(len(coordinates))]
     whole = fit(forward, problem, [((), coordinates)], start, variance)[0]
     groups = np.tile(np.arange(8), 3)
-    work = SimpleNamespace(problem=problem, forward=forward)
+    work = Setting(forward, problem, coordinates, {}, (), 0.0)
     found = held_out.hold_out(work, [whole], variance, groups)[0]
 
     def predicted(u):

@@ -41,6 +41,7 @@ def propose(
     probable first. ``std``: (4,) noise of a new row.
     """
     found: list[NextMeasurement] = []
+    where = '' if setting.forward.active is None else ' (for the table, not its reference)'
     competitors = competitors[:2]
     menu = _menu(setting) if competitors else []
     predicted = _predicted(setting, [chosen, *competitors], menu)
@@ -62,7 +63,7 @@ def propose(
             worth = np.isfinite(then) and then > max(_WORTH, _MORE * now)
             if worth and depth < _DEEPEST * rows['wheel_radius'][0]:
                 stated = {key: column for key, column in rows.items() if np.isfinite(column).all()}
-                blocks.append(NextMeasurement(what, names, now, then, stated))
+                blocks.append(NextMeasurement(what + where, names, now, then, stated))
         blocks.sort(key=lambda block: -block.distance_then)
         found.extend(blocks[:_KEPT])
     return tuple(found)
