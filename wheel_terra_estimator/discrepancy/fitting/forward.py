@@ -94,21 +94,21 @@ class Forward:
         stacked = dict(zip(keys, table[:, :, None], strict=True))
         one = np.ones((len(columns), 1))
         soil = {name: getattr(self.soil, name) * one for name in SOIL_NUMBERS}
-        for key, values in stacked.items():  # those of a bed after those of the soil
+        for key, value in stacked.items():  # those of a bed after those of the soil
             owner, name = key.split('.')
             if owner == BED and self.active is not None:
-                values = np.where(self.active, values, 1.0)
+                value = np.where(self.active, value, 1.0)
             if owner not in ('soil', BED):
                 continue
             if name == 'stiffness':
-                soil['cohesive_modulus'] = soil['cohesive_modulus'] * values
-                soil['frictional_modulus'] = soil['frictional_modulus'] * values
+                soil['cohesive_modulus'] = soil['cohesive_modulus'] * value
+                soil['frictional_modulus'] = soil['frictional_modulus'] * value
             elif owner == BED:
-                soil['friction_angle'] = np.arctan(np.tan(soil['friction_angle']) * values)
+                soil['friction_angle'] = np.arctan(np.tan(soil['friction_angle']) * value)
             elif name == 'tan_friction':
-                soil['friction_angle'] = np.arctan(values)
+                soil['friction_angle'] = np.arctan(value)
             else:
-                soil[name] = values
+                soil[name] = value
         names = dict.fromkeys(self.base_effects)
         of_effects = (c.owner for c in keys.values() if c.owner not in ('soil', BED))
         names.update(dict.fromkeys(of_effects))
