@@ -57,6 +57,7 @@ def render(
     gap_p_value = chi_square_p_value(decision.findings.nothing, decision.variance)
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
     soil = _shifts(findings, after, variance, 'soil')
+    bed = words.another_bed(after)
     moved = (*soil, *_shifts(findings, after, variance, *setting.forward.base_effects))
     return Diagnosis(
         verdict=decision.verdict.status,
@@ -71,7 +72,7 @@ def render(
         where=locate(both, setting.problem, findings.nothing, variance, setting.forward.active),
         next_measurement=(
             *words.fresh_bed(decision.beds_differ, table),
-            *words.reference_again(after),
+            *([words.REFERENCE_AGAIN] if bed else []),
             *_next(decision),
         ),
         curves=decision.curves,
@@ -89,7 +90,7 @@ def render(
             *words.notes(both, findings, after, moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
             *words.own_beds(decision.beds_differ, table),
-            *filter(None, [words.another_bed(after)]),
+            *([bed] if bed else []),
             *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
         ),
         base_effects=tuple(configuration.effects),

@@ -64,6 +64,9 @@ _CHANCE = 1e-3  # of a scatter of repeated rows, beside the stated noise
 _SAME_FACTOR = 0.03  # between two units: a factor of ten, or that of a kilopond
 _OF_BEDS = {'stiffness': 'stiffness', 'tan_friction': 'tan phi'}
 _SURE_OF_BED = 2.0  # deviations, after the fit
+REFERENCE_AGAIN = NextMeasurement(
+    'the rows of the reference again on a fresh bed', ('another bed', 'an effect'), 0.0, math.inf
+)
 _SCATTERED = 0.2  # of the range: estimated noise beyond which agreement says little
 _COARSE = 0.05  # model-error floor above which agreement says little
 
@@ -295,14 +298,6 @@ def another_bed(fitted: Fit) -> str:
         f'the bed has {factors} of that of the reference: beds differ so (10 % and 3 % are usual); '
         'the same `trial` in both tables says that it is one'
     )
-
-
-def reference_again(fitted: Fit) -> tuple[NextMeasurement, ...]:
-    """Return the measurement that tells another bed than the reference's from an effect."""
-    if not another_bed(fitted):
-        return ()
-    what = 'the rows of the reference again on a fresh bed'
-    return (NextMeasurement(what, ('another bed', 'an effect'), 0.0, math.inf),)
 
 
 def _swept(table: SteadyTable) -> str:
