@@ -88,10 +88,11 @@ def test_a_small_tilt_is_told_by_full_turns(degrees, gravity):
     """On the Moon a zero of the accelerometer may be one of four degrees."""
     cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     about_y = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
-    imu, share = WHOLE.imu, gravity / rolling.GRAVITY
-    tilted = replace(
-        imu, force=share * imu.force @ about_y, rate=imu.rate @ about_y
-    )  # inverse turn
+    imu, share, motion = WHOLE.imu, gravity / rolling.GRAVITY, rolling.ten_minute_drive()
+    slope = np.interp(imu.seconds, motion.time, motion.slope)
+    up = np.column_stack([np.sin(slope), 0.0 * slope, np.cos(slope)])
+    force = imu.force - (rolling.GRAVITY - gravity) * up
+    tilted = replace(imu, force=force @ about_y, rate=imu.rate @ about_y)  # inverse turn
     joints, rover = WHOLE.joints, rolling.rover(**{'rover.gravity': gravity})
     lighter = replace(joints, torque=share * joints.torque)
     finding = only(checked(rover, imu=tilted, joints=lighter), 'mounting')

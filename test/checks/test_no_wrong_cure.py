@@ -162,6 +162,22 @@ def test_a_circle_with_a_gap_of_the_imu_tells_no_tilt():
     assert 'imu_tilt' not in faults(checked(imu=imu))
 
 
+def test_turns_over_hills_tell_no_tilt():
+    """Slopes of up to 0.1 change along the way: in these turns they lean the rover by 5 degrees."""
+    random = np.random.default_rng(37)
+    time = np.arange(0.0, 80.0, 0.1)
+    yaw = np.interp(time, np.arange(0.0, 90.0, 8.0), random.uniform(-0.25, 0.25, 12)) * (time > 4.0)
+    speed = np.interp(time, [4.0, 5.0], [0.0, 0.3])
+    hills = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    heading = np.exp(1j * np.cumsum(yaw) / rolling.RATE)
+    place = np.cumsum(speed * heading) / rolling.RATE
+    uphill = np.sin(place.real / 1.4) + 1j * np.sin(place.imag / 1.4 + random.uniform(0.0, 6.0))
+    felt = np.interp(hills.imu.seconds, time, 0.1 * rolling.GRAVITY * uphill / heading)
+    lean = np.column_stack([felt.real, felt.imag, 0.0 * felt.real])
+    report = checked(whole=hills, imu=replace(hills.imu, force=hills.imu.force + lean))
+    assert not {'imu_tilt', 'force_bias'} & {*faults(report)}
+
+
 @pytest.mark.parametrize(('axis', 'name'), [(0, 'x'), (1, 'y')])
 def test_a_reversed_axis_of_the_accelerometer_is_no_turned_imu(axis, name):
     """No rotation reverses one horizontal axis: starts are felt along x, curves along y."""
