@@ -236,6 +236,20 @@ def test_stamps_of_the_sinkage_ahead_of_their_arrival():
     assert abs(told.value - 0.8) < 2.0 * told.std < 0.2
 
 
+def test_messages_read_from_a_buffer_are_named_and_not_lost():
+    """Eight at a time, 0.1 ms apart, stamped when they are read."""
+    joints = WHOLE.joints
+    row = np.arange(joints.stamp.size)
+    stamp = joints.stamp[np.minimum(row // 8 * 8 + 7, row[-1])] + 100_000 * (row % 8)
+    read = replace(joints, stamp=stamp, log_time=stamp + 2_000_000)
+    report = checked(joints=read)
+    assert 'bursts of 8 every 0.8 s' in only(report, 'order').words
+    assert report.figures['joints.rate_hz'] == pytest.approx(10.0, rel=0.01)
+    assert report.figures['imu.delay_s'] == pytest.approx(0.0, abs=0.05)
+    kept = row % 100 < 60  # of a recorder that pauses
+    assert 'order' not in {f.kind for f in checked(joints=rows_of(joints, kept)).findings}
+
+
 def test_transport():
     joints = WHOLE.joints
     keep = (np.arange(joints.stamp.size) // 40) % 4 > 0

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome, found, of_offset, untold
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
@@ -310,6 +310,9 @@ LONGEST_SILENCE = 5.0  # of an input at an end of a recording in which others co
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
 GAP_SHARE = 0.05  # share of missing messages of a stuttering channel
+PAUSE = 5.0  # between bursts, over the median step, at least [-]
+IN_PAUSES = 0.8  # share of the time that passes between bursts, at least [-]
+LEAST_BURSTS, LEAST_IN_A_BURST = 10, 3
 SEVERAL = 10  # messages over which a period is taken where stamps jitter
 OFF_PERIOD, REGULAR = 0.2, 0.6
 """Distance of a step from a multiple of the period, as a share of it, and the share of steps nearer
@@ -328,6 +331,8 @@ def check_transport(
 ) -> tuple[list[Outcome], Recording]:
     """Return what is wrong with the stamps, and the recording with that mended by log time."""
     outcomes = _silent(recording)
+    read, recording = _from_buffer(recording, facts)
+    outcomes += read
     late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
     mended: dict[str, Any] = {}
     for name in CHECKED:
@@ -382,6 +387,45 @@ def check_transport(
         outcomes.append(found(f'{name}_offset', channel.topic, 0.999, **words))
         mended[key] = shifted(channel, round(-value * 1e9))
     return outcomes, replace(recording, **mended)
+
+
+def _from_buffer(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome], Recording]:
+    """Return inputs read in bursts, and the recording with these spread evenly up to their ends."""
+    outcomes, mended = list[Outcome](), dict[str, Any]()
+    for name in CHECKED:
+        if (channel := getattr(recording, name)) is None:
+            continue
+        one = of_one_wheel(channel, facts.names)
+        stamp = np.unique(one.stamp[one.stamp > 0])
+        ends = _bursts(stamp)
+        if ends is None:
+            continue
+        count, wait = np.median(np.diff(ends)), np.median(np.diff(stamp[ends]))
+        row = np.arange(stamp.size)
+        outside = np.minimum(row - ends[0], 0) + np.maximum(row - ends[-1], 0)
+        even = np.interp(row, ends, stamp[ends]) + wait / count * outside
+        off = np.where(channel.stamp > 0, np.interp(channel.stamp, stamp, stamp - even), 0.0)
+        shift = np.round(off).astype(np.int64)
+        mended[name] = replace(shifted(channel, shift), log_time=channel.log_time - shift)
+        if wait * 1e-9 > LEAST_OFFSET:
+            how = f'they come in bursts of {count:.0f} every {wait * 1e-9:.2g} s, stamped when read'
+            outcomes.append(found('order', channel.topic, 0.99, how=how))
+    return outcomes, replace(recording, **mended)
+
+
+def _bursts(stamp: IntArray) -> IntArray | None:
+    """Return the last message of each burst of ascending stamps (k,) [ns]; None: no bursts.
+
+    As many messages come as time has passed: a pause of the recorder takes none with it.
+    """
+    step = np.diff(stamp)
+    ends = np.flatnonzero(step > PAUSE * np.median(step)) if step.size else step
+    if ends.size < LEAST_BURSTS or step[ends].sum() < IN_PAUSES * step.sum():
+        return None
+    count = np.diff(ends)
+    period = np.diff(stamp[ends]) / count
+    regular = robust_std(period) < OFF_PERIOD * np.median(period)
+    return ends if regular and np.median(count) >= LEAST_IN_A_BURST else None
 
 
 def _steps(channel: Channel) -> FloatArray:
