@@ -178,6 +178,17 @@ def test_turns_over_hills_tell_no_tilt():
     assert not {'imu_tilt', 'force_bias'} & {*faults(report)}
 
 
+def test_a_second_between_turns_tells_no_sign_of_a_torque():
+    """At 50 Hz that is 50 rows; the left side, inside or outside, is dragged by the right one."""
+    time = np.arange(0.0, 60.0, 0.02)
+    speed = np.interp(time, [4.0, 5.0], [0.0, 0.3]) + 0.03 * np.sin(4.0 * time) * (time > 5.0)
+    yaw = np.interp(time, [4, 5, 18, 20, 32, 34, 46, 48], [0, 1, 1, -1, -1, 1, 1, -1]) * 0.4
+    weaves = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    torque = weaves.joints.torque * [-1.0, 1.0, -1.0, 1.0]
+    report = checked(whole=weaves, joints=replace(weaves.joints, torque=torque))
+    assert 'torque_sign' not in faults(report)
+
+
 @pytest.mark.parametrize(('axis', 'name'), [(0, 'x'), (1, 'y')])
 def test_a_reversed_axis_of_the_accelerometer_is_no_turned_imu(axis, name):
     """No rotation reverses one horizontal axis: starts are felt along x, curves along y."""

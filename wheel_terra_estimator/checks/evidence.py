@@ -43,6 +43,7 @@ LEAST_REST = 0.4  # rest that tells the bias of a gyro [s]
 SETTLING = 0.5  # A speed counts as steady this long after it changed [s]
 STRAIGHT_SHARE = 0.25  # speed of the sides against the middle of a straight, at most [-]
 LEAST_MOVING_ROWS = 30  # fewer rows of driving than these tell nothing
+LEAST_DRIVING = 3.0  # less driving than this tells nothing, however many rows it has [s]
 EVEN_GROUND_STD = math.radians(0.8)  # deviation of a tilt by circles on a plane, at most [rad]
 NO_NOISE = 5e-4  # noise of rates that have none, over the working rate, at most [-]
 BEND_OF_NOISE = math.sqrt(70.0)  # deviation of fourth differences, in which no motion is left [-]
@@ -97,6 +98,11 @@ class Evidence:
     def rows_in(self, duration: float) -> int:
         """Return the number of rows in a time [s], one at least."""
         return max(round(duration / max(self.period, 1e-3)), 1)
+
+    def enough(self, rows: Mask, times: float = 1.0) -> bool:
+        """Return whether rows tell something, or so many times that."""
+        least = max(LEAST_MOVING_ROWS, self.rows_in(LEAST_DRIVING))
+        return bool(rows.sum() >= times * least)
 
     @cached_property
     def common_rate(self) -> FloatArray:

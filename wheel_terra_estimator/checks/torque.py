@@ -127,7 +127,7 @@ def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     Starts and stops of the wheels tell which way the IMU feels forward, else the mean torque does.
     """
     rows, sense = evidence.unturned, np.sign(evidence.common_rate)
-    if evidence.force is None or rows.sum() < LEAST_MOVING_ROWS:
+    if evidence.force is None or not evidence.enough(rows):
         return None
     yaw = felt_yaw(evidence)
     width = evidence.rows_in(SETTLING)
@@ -138,7 +138,7 @@ def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     table = np.column_stack([moving_mean(np.nan_to_num(t), width) for t in evidence.torque.T])
     told = [block_fit(design, column)[0] for column in table[rows].T]
     rows = rows & (along * sense > UPHILL_ENOUGH * evidence.facts.gravity)
-    if rows.sum() < LEAST_MOVING_ROWS:
+    if not evidence.enough(rows):
         return None
     way = np.column_stack([sense, np.ones(sense.size)])[rows]
     levels = [block_fit(way, column)[0] for column in table[rows].T]
@@ -161,7 +161,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Judge the level of the torques: units and currents."""
     facts, rows = evidence.facts, evidence.straight
     assert evidence.force is not None
-    if rows.sum() < LEAST_MOVING_ROWS:
+    if not evidence.enough(rows):
         return [untold('gain', 'no_straight')], evidence
     level = (thrust(evidence) - facts.mass * evidence.force[:, 0]) * np.sign(evidence.rim)
     traction = _middle_mean(level[rows]) / (facts.mass * facts.gravity)
@@ -200,7 +200,7 @@ class Slopes(NamedTuple):
 def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
     """Return the scale of the torques by slopes, and its trial on halves, or why not."""
     rows = evidence.straight
-    if evidence.force is None or rows.sum() < 3 * LEAST_MOVING_ROWS:
+    if evidence.force is None or not evidence.enough(rows, 3.0):
         return untold('gain', 'few_straights')
     # Noise of a regressor makes a slope look flat: both sides are means over the same time.
     along = moving_mean(evidence.force[:, 0], SMOOTH_ROWS)[rows]
