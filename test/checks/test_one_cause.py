@@ -47,6 +47,14 @@ def test_an_orientation_of_a_world_with_z_down():
     assert finding.fault == 'orientation_frame'
 
 
+def test_a_pitch_that_counts_nose_up_is_no_reversed_gyro():
+    """Gyro and specific force tell the same hill."""
+    angles = Rotation.from_quat(attitude(WHOLE.imu.seconds)).as_euler('ZYX') * [1.0, -1.0, 1.0]
+    wrong = Rotation.from_euler('ZYX', angles).as_quat()
+    (finding,) = found(imu=replace(WHOLE.imu, orientation=wrong))
+    assert finding.fault == 'orientation_frame'
+
+
 def test_a_pitch_of_the_imu_that_no_circle_shows_is_named_beside_zeros_of_all_torques():
     motion = rolling.ten_minute_drive(turns=False)
     whole = rolling.recording(motion)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.evidence import (
     EVEN_GROUND_STD,
     LEAST_YAW,
@@ -64,6 +64,8 @@ UPSIDE_TILT = math.radians(35.0)  # mean tilt that no rover drives at [rad]
 STEEPEST_MEAN = math.radians(20.0)  # mean slope of a drive, at most [rad]
 LEAST_SHOWN = 0.01  # change of an angle [deg] below which a cure leaves it out
 LEAST_MOUNTING = math.radians(1.5)  # mounting errors below this [rad] are left to calibration
+SLOPE_TIME = 2.0  # forces are averaged over this to tell a slope [s]
+CLEAR_SLOPE = 0.5  # correlation with a slope that is one [-]
 LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
 LEAST_TURN = 4.5  # heading that a drive has to cover for the mounting to be told from a slope [rad]
 FLAT_TURN_STD = math.radians(0.1)  # unevenness of the ground leaves open [rad]
@@ -268,7 +270,10 @@ def _gravity(state: ImuState) -> Judged:
 
 
 def _against_orientation(state: ImuState) -> Judged:
-    """Compare the gyro with the turning of the orientation, axis by axis."""
+    """Compare the gyro with the turning of the orientation, axis by axis.
+
+    Where they differ about x or y, the specific force shows which of them tells the slope.
+    """
     from scipy.spatial.transform import Rotation  # heavy
 
     imu = state.imu
@@ -294,6 +299,9 @@ def _against_orientation(state: ImuState) -> Judged:
         if abs(fit) < 0.6 or float(np.std(x)) < 0.01:
             continue
         if fit < 0.0:
+            if axis < 2 and _slopes_alike(state, known, 1 - axis) < -CLEAR_SLOPE:
+                told_of = state.found('orientation_frame', 0.97)
+                return [told_of], state.with_values(orientation=np.full_like(q, np.nan))
             factor[axis] = -1.0
             words = {'value': -1.0, 'axis': name, 'against': 'the orientation'}
             outcomes.append(state.found('gyro_reversed', confidence(6.0 * abs(fit)), **words))
@@ -305,6 +313,17 @@ def _against_orientation(state: ImuState) -> Judged:
         words = {'times': degrees[0], 'how': 'turning of the orientation'}
         outcomes.append(state.found('gyro_degrees', 0.99, value=math.radians(1.0), **words))
     return outcomes, state.with_values(rate=imu.rate * factor) if outcomes else state
+
+
+def _slopes_alike(state: ImuState, known: BoolArray, axis: int) -> float:
+    """Return the correlation of up by orientation and by specific force along an axis [-]."""
+    from scipy.spatial.transform import Rotation  # heavy
+
+    imu = state.imu
+    up = Rotation.from_quat(imu.orientation[known]).inv().apply([0.0, 0.0, 1.0])[:, axis]
+    width = round(SLOPE_TIME / imu.period)
+    force = np.nan_to_num(imu.force[known, axis])
+    return correlation(up - up.mean(), moving_mean(force - force.mean(), width))
 
 
 # With the wheels ---------------------------------------------------------------------------------
