@@ -198,6 +198,15 @@ def test_a_reversed_axis_of_the_accelerometer_is_no_turned_imu(axis, name):
     assert finding.fault == 'force_mirrored' and f'linear_acceleration.{name} ' in finding.words
 
 
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+def test_exchanged_axes_of_the_accelerometer_are_no_turned_imu(sign):
+    """Starts are felt along y as those of an IMU turned by 90 degrees, curves along x are not."""
+    whole = rolling.recording(rolling.starts_and_curves())
+    force = whole.imu.force[:, [1, 0, 2]] * [sign, sign, 1.0]
+    (finding,) = checked(whole=whole, imu=replace(whole.imu, force=force)).findings
+    assert finding.fault == 'force_exchanged' and ('negate' in finding.cure) == (sign < 0.0)
+
+
 def test_without_curves_a_reversed_axis_is_told_beside_a_turned_imu():
     straight = rolling.recording(rolling.ten_minute_drive(turns=False))
     back = replace(straight.imu, force=straight.imu.force * [-1.0, 1.0, 1.0])

@@ -465,7 +465,7 @@ def _is_mounting(tilt: FloatArray, floor: float, turns: FloatArray, gyro: FloatA
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return an IMU whose x axis does not point forward, and the evidence with that mended."""
     starts, curves = felt_senses(evidence)
-    axis, clear = 'x' if starts < 0 else 'y', curves != 0
+    axis = 'x' if starts < 0 else 'y'
     mirrored = starts * curves < 0 and _turns_upright(evidence) > CLEAR_AGREEMENT
     if mirrored and evidence.force is not None:
         signs = np.array([-1.0 if name == axis else 1.0 for name in 'xyz'])
@@ -481,12 +481,19 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
         return [], evidence
-    words: dict[str, Any] = {'angle': math.degrees(seen.value), 'off': math.degrees(seen.std)}
-    sure = 0.97
-    if not clear and math.cos(seen.value) < -ALONG_AXIS:
-        words['rival'] = ', or linear_acceleration.x has the wrong sign: drive circles'
-        sure = TURNED_ROUND
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)
+    words: dict[str, Any] = {'angle': math.degrees(seen.value), 'off': math.degrees(seen.std)}
+    sure, aside = 0.97, math.sin(seen.value)
+    curves = felt_senses(mended)[1]  # turned round or exchanged, starts feel the same
+    if abs(aside) > ALONG_AXIS and curves < 0 and evidence.force is not None:
+        told = '' if aside > 0.0 else ', and negate both'
+        told_of = evidence.found('force_exchanged', 0.95, signs=told)
+        signs = np.array([math.copysign(1.0, aside)] * 2 + [1.0])
+        return [told_of], replace(evidence, force=signs * evidence.force[:, [1, 0, 2]])
+    if curves == 0 and max(abs(aside), -math.cos(seen.value)) > ALONG_AXIS:
+        rival = ' and y are exchanged' if abs(aside) > ALONG_AXIS else ' has the wrong sign'
+        words['rival'] = f', or linear_acceleration.x{rival}: drive circles'
+        sure = TURNED_ROUND
     return [mounting_finding('imu_yaw', evidence, mended, words['off'], sure, **words)], mended
 
 
