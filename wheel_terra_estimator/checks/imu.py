@@ -482,7 +482,7 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
         return [], evidence
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)
-    words: dict[str, Any] = {'angle': math.degrees(seen.value), 'off': math.degrees(seen.std)}
+    words: dict[str, Any] = {'angle': -math.degrees(seen.value), 'off': math.degrees(seen.std)}
     sure, aside = 0.97, math.sin(seen.value)
     curves = felt_senses(mended)[1]  # turned round or exchanged, starts feel the same
     if abs(aside) > ALONG_AXIS and curves < 0 and evidence.force is not None:
