@@ -375,6 +375,9 @@ def test_a_reference_that_points_aside_is_no_reversed_one(angle):
     either = checked(whole=straight, reference=replace(straight.reference, velocity=aside))
     rivals = ['world frame' in f.words for f in either.findings if f.kind == 'mounting']
     assert rivals == [True] * (angle > 30.0 or angle < 0.0)
+    scale = replace(straight.reference, velocity=aside * 1.1)  # or the radius, or cos 15 degrees
+    left = checked(whole=straight, reference=scale).findings
+    assert angle != 15.0 or left == []
 
 
 def test_an_orientation_that_hardly_turns_tells_degrees_per_second():

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,6 +38,7 @@ AHEAD = 0.3  # mean of the rims over the usual size of one, above which the rove
 CLEAR_HEADING = 1.0  # turn in which a frame of the world is told from one of the rover [rad]
 STEADY = 0.9  # length of the mean direction of a velocity that keeps to a frame [-]
 TURNED_SIGMAS, TURNED_STD = 4.0, math.radians(1.0)  # of the direction on straights, at least [rad]
+FAR_ASIDE = math.radians(12.0)  # direction in which 2 % of a speed along x are lost [rad]
 MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
 """Speed over that without slip of a rover that slips much, and error of the ratio without slip."""
 LEAST_UNIT_RATIO = 1.3  # speed over rim speed below which it may be the radius, not the unit [-]
@@ -121,9 +123,12 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         return [untold('mounting', 'reference_frame')] if _sideways(reference) else [], evidence
     turns, (off, several) = np.ptp(psi) > CLEAR_HEADING, _off_straights(evidence, reference)
     told = reference.points_aside or (turns and several)
-    if off.sigmas_from(0.0) < TURNED_SIGMAS or not told:
-        return [], evidence  # a rover that keeps its heading may slide aside on a cross slope
-    angle = off.value
+    angle, usual = off.value, float(np.angle(direction.mean()))  # whatever jumps there are
+    if off.sigmas_from(0.0) < TURNED_SIGMAS or not (told or abs(usual) > FAR_ASIDE):
+        return [], evidence
+    if not told:  # a rover that keeps its heading may slide aside on a cross slope
+        without = replace(evidence, recording=replace(evidence.recording, reference=None))
+        return [untold('mounting', 'reference_aside', angle=math.degrees(angle))], without
     turned = velocity * np.exp(-1j * angle)
     mended = evidence.with_channel(
         'reference', velocity=np.column_stack([turned.real, turned.imag, 0.0 * rim])
@@ -174,8 +179,7 @@ def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[Flo
 
 def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     reference = evidence.recording.reference
-    assert reference is not None
-    if not evidence.facts.known:
+    if reference is None or not evidence.facts.known:
         return [], evidence
     rim, rows = ahead(evidence, reference, 0.4)
     if rows.sum() < LEAST_ROWS:
