@@ -331,29 +331,25 @@ def _slopes_alike(state: ImuState, known: BoolArray, axis: int) -> float:
 
 @dataclass(frozen=True)
 class Mounting:
-    """What is left of the mounting: small tilt about x and y [rad], each with its deviation."""
+    """What is left of the mounting: small tilt about x and y [rad], and the deviation of both."""
 
-    roll: Estimate
-    pitch: Estimate
-    ground: float  # deviation that uneven ground leaves in both [rad]
+    roll: float
+    pitch: float
+    std: float
+    ground: float  # part of it that uneven ground leaves [rad]
     turn: float  # heading covered [rad]
     sure: float  # probability that it is no zero of the accelerometer
 
     @property
-    def std(self) -> float:
-        """The larger deviation [rad]."""
-        return max(self.roll.std, self.pitch.std)
-
-    @property
     def sigmas(self) -> float:
         """Deviations that the tilt is off nothing."""
-        return max(self.roll.sigmas_from(0.0), self.pitch.sigmas_from(0.0))
+        return max(abs(self.roll), abs(self.pitch)) / self.std
 
     def taken_off(self, rotation: FloatArray) -> FloatArray:
         """Return a rotation into ``base_link`` without the tilt: about x, then y."""
         from scipy.spatial.transform import Rotation  # heavy
 
-        tilt = Rotation.from_euler('xy', [self.roll.value, self.pitch.value])
+        tilt = Rotation.from_euler('xy', [self.roll, self.pitch])
         return np.asarray(tilt.as_matrix() @ rotation)
 
 
@@ -429,21 +425,22 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     design = np.stack([[one, zero, cos, sin], [zero, one, -sin, cos]]).transpose(2, 0, 1)
     target = force / float(np.median(evidence.force[turning, 2]))
     fit = block_fit(design.reshape(-1, 4), target.ravel())
-    along, across = fit[:2]
-    left = target - design @ [one.value for one in fit]
-    smooth = [moving_mean(column, evidence.rows_in(SMOOTHING)) for column in left.T]
-    ground = max(along.std, across.std, BENT * float(np.sqrt(np.mean(np.square(smooth)))))
+    value, std = np.array(fit).T
+    left = (target - design @ value).T
+    smooth = [moving_mean(column, evidence.rows_in(SMOOTHING)) for column in left]
+    ground = float(np.max([*std[:2], BENT * np.sqrt(np.mean(np.square(smooth)))]))
     facts = evidence.facts
     open_bias = facts.sensors.specific_force_bias_std if facts.known else 0.0
     one_way = abs(float(np.sign(yaw * evidence.rim)[turning].mean()))
     floor = math.hypot(FLAT_TURN_STD, LEAN_STD * one_way, open_bias / facts.gravity)
     turns = np.column_stack([yaw, np.ones(yaw.size)])[turning, : 2 if seen is None else 1]
-    tilt = np.array([along.value, across.value])
+    along, across = tilt = value[:2]
     # A sensor whose x axis points up by p reads +g sin p on x; one rolled by q reads -g sin q on y.
     return Mounting(
         sure=_is_mounting(tilt, floor, turns, evidence.gyro[turning, :2]),
-        roll=Estimate(across.value, math.hypot(ground, floor)),
-        pitch=Estimate(-along.value, math.hypot(ground, floor)),
+        roll=float(across),
+        pitch=-float(along),
+        std=math.hypot(ground, floor),
         ground=ground,
         turn=covered,
     )
@@ -544,18 +541,18 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if tilt is None:
         return [untold('mounting', 'no_circle')], evidence
     std = math.degrees(tilt.std)
-    evidence.figures['imu.tilt_roll_deg'] = round(math.degrees(tilt.roll.value), 3)
-    evidence.figures['imu.tilt_pitch_deg'] = round(math.degrees(tilt.pitch.value), 3)
+    evidence.figures['imu.tilt_roll_deg'] = round(math.degrees(tilt.roll), 3)
+    evidence.figures['imu.tilt_pitch_deg'] = round(math.degrees(tilt.pitch), 3)
     evidence.figures['imu.tilt_std_deg'] = round(std, 3)
     if not tilt.ground <= EVEN_GROUND_STD:  # nan: an axis without a number
         return [untold('mounting', 'uneven')], evidence
-    size = math.hypot(tilt.roll.value, tilt.pitch.value)
+    size = math.hypot(tilt.roll, tilt.pitch)
     if size < LEAST_MOUNTING or tilt.sigmas < 4.0:
         if tilt.std > EVEN_GROUND_STD:
             return [untold('mounting', 'zero_open', least=4.0 * std)], evidence
         return [], evidence
     gravity, biases = evidence.facts.gravity, evidence.facts.sensors.specific_force_bias
-    off = gravity * np.array([-tilt.pitch.value, tilt.roll.value, 0.0])
+    off = gravity * np.array([-tilt.pitch, tilt.roll, 0.0])
     zero = f'sensors.specific_force_bias: [{listed(biases + off, ".2f")}]'
     words = {'size': math.degrees(size), 'zero': math.sin(size) * gravity, 'biases': zero}
     sure = confidence(tilt.sigmas) * max(tilt.sure, 1.0 - tilt.sure)
