@@ -102,7 +102,8 @@ def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES, **other):
 def test_steered_wheels_roll_where_they_point(change, faults):
     report = steered(change)
     assert [finding.fault for finding in report.findings] == faults
-    assert all('or wheels.x' in f.words for f in report.findings if f.kind == 'sign')  # mirrored
+    told = [f for f in report.findings if f.kind == 'sign']
+    assert all('or wheels.x' in f.words and 'by hand first' in f.cure for f in told)  # mirrored
     assert report.figures['rover.effective_over_stated_track'] == pytest.approx(1.0, abs=0.02)
 
 

@@ -272,7 +272,8 @@ def check_steering_sign(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     elif not right.any():
         sure, rival = 0.75, ', or wheels.x has the wrong sign (positive ahead)'
     told = {'wheel': facts.named(wrong), 'value': -1.0, 'rival': rival}
-    finding = evidence.found('steering_sign', sure, **told)
+    separate = '; turn one joint to the left by hand first and look at what is published'
+    finding = evidence.found('steering_sign', sure, **told, separate=separate if rival else '')
     return [finding], replace(evidence, steering=steering * np.where(wrong, -1.0, 1.0))
 
 
