@@ -29,6 +29,16 @@ def test_torques_are_judged_by_the_gravity_that_is_there():
     assert faults(report) == ['planet'] and report.findings[0].value == 9.81
 
 
+def test_turns_are_not_taken_across_a_gap():
+    """Nothing tells how a rover turned while its IMU was dead: that is no scale of the gyro."""
+    alive = (WHOLE.imu.seconds < 200.0) | (WHOLE.imu.seconds > 240.0)
+    recording = replace(WHOLE, imu=rows_of(WHOLE.imu, alive))
+    evidence = gather(recording, from_configuration(rolling.rover()), np.eye(3), {})
+    turns = turning._turns(evidence, evidence.time)
+    assert turns == pytest.approx(turning.HEADING_TIME, rel=0.1)
+    assert turns.size < evidence.time.size - evidence.rows_in(turning.HEADING_TIME)
+
+
 def test_the_moon_is_not_gravity_that_was_taken_off():
     moon = WHOLE.imu.force * 1.62 / rolling.GRAVITY
     (finding,) = checked(imu=replace(WHOLE.imu, force=moon)).findings

@@ -469,9 +469,10 @@ def _heading_of_reference(evidence: Evidence) -> FloatArray | None:
 
 
 def _turns(evidence: Evidence, heading: FloatArray) -> FloatArray:
-    """Return by how much a heading (k,) changes over `HEADING_TIME` [rad]."""
+    """Return by how much a heading (k,) changes over `HEADING_TIME` [rad], gaps left out."""
     rows = evidence.rows_in(HEADING_TIME)
-    return heading[rows:] - heading[:-rows]
+    whole = evidence.time[rows:] - evidence.time[:-rows] < 2.0 * HEADING_TIME
+    return np.asarray((heading[rows:] - heading[:-rows])[whole])
 
 
 def _most(turns: FloatArray) -> float:
