@@ -24,7 +24,7 @@ Written by `python tools/document_commands.py` from the help of the commands; do
 `ros2 run wheel_terra_estimator wheel-terra COMMAND`. Every command takes
 `--debug` (traceback of an error), every one that writes `--overwrite` (replace an earlier output).
 Completion in bash and zsh comes with the package; in a virtual environment
-`. $VIRTUAL_ENV/share/bash-completion/completions/wheel-terra` turns it on.
+`. wheel_terra_estimator/cli/completion/wheel-terra` turns it on.
 [Exit status](exit_status.md).
 """
 _LABORATORY = """## Of the laboratory

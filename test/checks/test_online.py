@@ -340,7 +340,8 @@ def test_a_warning_waits_for_the_verdict_on_a_suspicion_and_never_comes_if_it_is
 def test_torques_that_do_not_fit_are_told_and_slip_is_still_judged(nis, stuck, told):
     """Of a rover that has dug itself in no model fits, and none of its sensors is to blame."""
     judge = InputJudge(Wheels().configuration)
-    estimates = judge.judged(some_estimates(6, stuck=stuck), {'nis_torque': nis})
+    dug_in = some_estimates(6, stuck=stuck, stuck_confirmed=stuck)
+    estimates = judge.judged(dug_in, {'nis_torque': nis})
     assert ('fit of torque' in estimates.faults) is told
     if told:
         assert 'NIS 13' in estimates.faults['fit of torque']

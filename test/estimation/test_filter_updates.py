@@ -221,10 +221,10 @@ def test_a_fast_rover_is_not_stopped_at_once(parts):
 # -- Sinkage ----------------------------------------------------------------------------------
 
 
-def read_sinkage(parts, update, ekf, time, depth, count=1):
+def read_sinkage(parts, update, ekf, time, depth, count=1, dug=0.0):
     """Fuse the sum of some readings of the first wheel; return its mean, None where it stays."""
     sums = SinkageSums((depth,) + (0.0,) * 5, (count,) + (0,) * 5)
-    rows = update.update(ekf, time, sums, parts.sensors.sinkage_std**2)
+    rows = update.update(ekf, time, sums, parts.sensors.sinkage_std**2, np.full(6, dug))
     ekf.fuse(rows)
     return float(ekf.mean[parts.layout.sinkage.start]) if rows else None
 
@@ -274,6 +274,14 @@ def test_two_readings_of_the_sinkage_are_the_textbook_update(parts, ekf, sinkage
     mean = (0.03 / 0.002**2 + 0.031 / noise) / information
     assert read_sinkage(parts, sinkage_update, ekf, 0.0, 0.062, 2) == pytest.approx(mean)
     assert float(ekf.covariance[zi, zi]) == pytest.approx(1.0 / information)
+
+
+def test_the_first_reading_of_a_wheel_that_dug_in_is_believed(parts, ekf, sinkage_update):
+    ekf.set(parts.layout.sinkage.start, 0.03, 0.002**2)
+    assert read_sinkage(parts, sinkage_update, ekf, 0.0, 0.11) is None, 'a spike'
+    assert read_sinkage(parts, sinkage_update, ekf, 0.1, 0.11, dug=0.08) == pytest.approx(
+        0.11, abs=0.001
+    )
 
 
 def sinkage_predicted(parts, x, loads=None, angle=NAN, angle_std=0.0, rims=FORWARD):

@@ -61,7 +61,7 @@ class InputJudge:
 
         ``health``: what the estimator says of itself.
         """
-        misfits = {} if estimates.stuck else _misfits(health)  # dug in, no model fits
+        misfits = _misfits(health, dug_in=estimates.stuck and estimates.stuck_confirmed)
         faults = _told({**estimates.faults, **misfits}, self._checks.remarks)
         if self._failed:
             faults |= _NOT_CHECKED
@@ -134,13 +134,16 @@ class InputJudge:
         self._checks.restore(state)
 
 
-def _misfits(health: Mapping[str, Any]) -> dict[str, str]:
-    """Say where torque, balance or noise are far from what the filter expects of them."""
+def _misfits(health: Mapping[str, Any], *, dug_in: bool) -> dict[str, str]:
+    """Say where torque, balance or noise are far from what the filter expects of them.
+
+    No model fits a rover that is `dug_in`.
+    """
     told = {
         subject: f'{words} (NIS {health[key]:.0f}, usual below 1): sign or scale of the '
         'torques, rover.mass or soil -> wheel-terra check'
         for key, (subject, words) in _MISFITS.items()
-        if health.get(key, 0.0) > FAR_NIS
+        if health.get(key, 0.0) > FAR_NIS and not dug_in
     }
     if _NOISE in health:
         told['noise'] = f'{health[_NOISE]} -> state it so'

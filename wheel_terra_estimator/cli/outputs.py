@@ -40,7 +40,7 @@ def add_output(
     parser: argparse.ArgumentParser, words: str, metavar: str = 'DIR', **settings: Any
 ) -> None:
     """Declare ``-o``, the file or folder that the command is run for, and ``--overwrite``."""
-    parser.add_argument('-o', dest='output', action=Output, metavar=metavar, help=words, **settings)
+    parser.add_argument('-o', '--output', action=Output, metavar=metavar, help=words, **settings)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
 
 

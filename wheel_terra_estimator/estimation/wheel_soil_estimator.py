@@ -289,9 +289,8 @@ class WheelSoilEstimator:
             self._fuse_reference(cycle, reference)
         self._zero_velocity.update(ekf, cycle, sliding=time < self._reference.state.sliding_until)
 
-        rows = self._sinkage.update(
-            ekf, time, self._sinkages.take(), self._noise.variance('sinkage')
-        )
+        variance, dug = self._noise.variance('sinkage'), self._sinkage_process.state.dug
+        rows = self._sinkage.update(ekf, time, self._sinkages.take(), variance, dug)
         self._unloaded.update(cycle)
         forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
         if cycle.still:
@@ -394,7 +393,7 @@ class WheelSoilEstimator:
             torque=self._wheels.take_torque(),
             leaving_angles=self._leaving_angles.angles(time),
             loads=loads,
-            turns=turning_wheels(rover, rims, loads.load, reference_known=reference_known),
+            turns=turning_wheels(rover, rims, loads.load),
             reference_known=reference_known,
             demand_change=demand_change if reference_known else 0.0,
         )

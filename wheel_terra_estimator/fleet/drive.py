@@ -51,7 +51,8 @@ class Drive:
         if 'table' in files:
             with new_file(files['table'], overwrite) as fresh:
                 estimates_table.write_table(history, fresh)
-        if 'track' in files and track is not None:
+        if 'track' in files:
+            assert track is not None  # kept where it is asked for
             with new_file(files['track'], overwrite) as fresh:
                 estimates_table.write_track(track, fresh)
         if 'report' in files:

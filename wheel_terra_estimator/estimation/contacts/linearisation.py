@@ -30,7 +30,6 @@ from wheel_terra_estimator.estimation.filter.state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.rover import Rover
-from wheel_terra_estimator.estimation.scalars import known
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _SLOPE_KEEP = 0.9
@@ -39,7 +38,6 @@ _NEW_CONTACT = 0.15
 """Change of a torque by strength, of load times radius, that is no noise of the state."""
 _LEAST_RIM_OVER_REST = 2.0
 """Rim speed over ``rest_speed`` above which a wheel turns."""
-_LEAST_RIM_SHARE = 0.1  # of that of the fastest wheel
 
 
 class ContactForces(NamedTuple):
@@ -172,16 +170,9 @@ def _met(x: FloatArray, layout: StateLayout, ruts: FloatArray | Floats) -> Float
     return np.minimum(ruts, np.maximum(x[layout.sinkage], 0.0))
 
 
-def turning_wheels(
-    rover: Rover, rims: Floats, loads: Floats, *, reference_known: bool
-) -> tuple[bool, ...]:
-    """Say for which wheels the contact models hold: they turn under a load.
-
-    The slip of one that hardly turns beside others hangs on the last bit of the speed; without a
-    reference velocity it may be the one that rolls.
-    """
-    fastest = max((abs(rim) for rim in known(rims)), default=0.0) if reference_known else 0.0
-    least = max(_LEAST_RIM_OVER_REST * rover.rest_speed, _LEAST_RIM_SHARE * fastest)
+def turning_wheels(rover: Rover, rims: Floats, loads: Floats) -> tuple[bool, ...]:
+    """Say for which wheels the contact models hold: they turn under a load."""
+    least = _LEAST_RIM_OVER_REST * rover.rest_speed
     return tuple(
         abs(rim) >= least and load >= LEAST_LOAD for rim, load in zip(rims, loads, strict=True)
     )

@@ -92,8 +92,12 @@ class StationaryWheels:
         rover, torques, loads = self._rover, np.array(cycle.torque), np.array(cycle.loads.load)
         speed = cycle.headings.speeds(float(x[SPEED]), cycle.yaw_rate)
         held = np.clip(torques / np.array(rover.shear_radius), -loads, loads)
-        creeps = np.abs(cycle.rims) > rover.rest_speed
-        direction = np.where(np.where(creeps, cycle.rims, speed) > 0.0, 1.0, -1.0)
+        rims, doubt = np.array(cycle.rims), _SLIDING_DEVIATIONS * speed_std
+        # It turns on beside faster ones, and its hub is no faster than its rim.
+        creeps = np.abs(rims) > rover.rest_speed
+        creeps &= rims * cycle.yaw_compensated.typical > 0.0
+        creeps &= np.abs(speed) < np.maximum(np.abs(rims), doubt)
+        direction = np.sign(np.where(creeps, rims, np.where(speed > 0.0, 1.0, -1.0)))
         forces = self._models.forces(
             WheelStates(
                 np.where(creeps, 0.0, _SLIDING_RATIO),
@@ -111,7 +115,6 @@ class StationaryWheels:
         pull = forces.pull + gain * (direction * torques - forces.torque)
         most = _MOST_DRAG * loads
         # Where nothing turns faster than the speed is in doubt, the rover comes to rest.
-        doubt = _SLIDING_DEVIATIONS * speed_std
         standing = all(abs(rim) < doubt for rim in known(cycle.rims))
         stands = np.abs(speed) < (max(rover.rest_speed, doubt) if standing else rover.rest_speed)
         return np.where(stands & ~creeps, held, direction * np.clip(pull, -most, most))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.filter.consistency import smoothed_nis
@@ -50,11 +51,17 @@ class SinkageUpdate(Component[SinkageUpdateState]):
         return [i for i, when in enumerate(self.state.time) if time - when >= _AGE]
 
     def update(
-        self, ekf: GatedFilter, time: float, sums: SinkageSums, reading_variance: float
+        self,
+        ekf: GatedFilter,
+        time: float,
+        sums: SinkageSums,
+        reading_variance: float,
+        open_std: FloatArray,
     ) -> list[Row]:
         """Return the rows of the readings of a cycle; opens the state where spikes are none.
 
-        `reading_variance` is that of one reading [m^2].
+        `reading_variance` is that of one reading [m^2], `open_std` (n,) what digging leaves open
+        of the sinkages, beyond the state [m].
         """
         if not any(sums.readings):
             return []
@@ -65,6 +72,8 @@ class SinkageUpdate(Component[SinkageUpdateState]):
             if not count:
                 continue
             index = self._layout.sinkage.start + i
+            if open_std[i] > 0.0:
+                ekf.inflate(index, float(open_std[i]) ** 2)
             variance = reading_variance / count + FLOOR_VARIANCE
             residual = total / count - float(ekf.mean[index])
             nis = residual * residual / (float(ekf.covariance[index, index]) + variance)
