@@ -246,8 +246,11 @@ def test_messages_read_from_a_buffer_are_named_and_not_lost():
     assert 'bursts of 8 every 0.8 s' in only(report, 'order').words
     assert report.figures['joints.rate_hz'] == pytest.approx(10.0, rel=0.01)
     assert report.figures['imu.delay_s'] == pytest.approx(0.0, abs=0.05)
-    kept = row % 100 < 60  # of a recorder that pauses
-    assert 'order' not in {f.kind for f in checked(joints=rows_of(joints, kept)).findings}
+    for many, of in ((60, 100), (4, 24)):  # of a recorder that pauses
+        assert only(checked(joints=rows_of(joints, row % of < many)), 'drop_outs')
+    off = 10**11 * (row > row.size // 2)  # a clock that is set makes no row in between
+    stepped = replace(read, stamp=stamp + off, log_time=stamp + off + 2_000_000)
+    assert 'jumps' not in {f.kind for f in checked(joints=stepped).findings}
 
 
 def test_transport():

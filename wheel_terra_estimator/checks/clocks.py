@@ -313,6 +313,8 @@ GAP_SHARE = 0.05  # share of missing messages of a stuttering channel
 PAUSE = 5.0  # between bursts, over the median step, at least [-]
 IN_PAUSES = 0.8  # share of the time that passes between bursts, at least [-]
 LEAST_BURSTS, LEAST_IN_A_BURST = 10, 3
+READ_AT_ONCE, READ_SHARE = 2e6, 0.1  # step within a burst [ns], over the period: less than this
+LONGEST_WAIT = 2.0  # for a burst, over the median; beyond it is a pause, or a step of the clock
 SEVERAL = 10  # messages over which a period is taken where stamps jitter
 OFF_PERIOD, REGULAR = 0.2, 0.6
 """Distance of a step from a multiple of the period, as a share of it, and the share of steps nearer
@@ -401,9 +403,12 @@ def _from_buffer(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome]
         if ends is None:
             continue
         count, wait = np.median(np.diff(ends)), np.median(np.diff(stamp[ends]))
+        # Up to the end of each burst, and over no pause or step that is longer than others.
+        waits = np.diff(stamp[ends], prepend=stamp[ends[0]] - wait)
+        period = np.minimum(waits, LONGEST_WAIT * wait) / np.diff(ends, prepend=ends[0] - count)
         row = np.arange(stamp.size)
-        outside = np.minimum(row - ends[0], 0) + np.maximum(row - ends[-1], 0)
-        even = np.interp(row, ends, stamp[ends]) + wait / count * outside
+        end = np.minimum(np.searchsorted(ends, row), ends.size - 1)
+        even = stamp[ends[end]] - period[end] * (ends[end] - row)
         off = np.where(channel.stamp > 0, np.interp(channel.stamp, stamp, stamp - even), 0.0)
         shift = np.round(off).astype(np.int64)
         mended[name] = replace(shifted(channel, shift), log_time=channel.log_time - shift)
@@ -416,7 +421,7 @@ def _from_buffer(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome]
 def _bursts(stamp: IntArray) -> IntArray | None:
     """Return the last message of each burst of ascending stamps (k,) [ns]; None: no bursts.
 
-    As many messages come as time has passed: a pause of the recorder takes none with it.
+    A buffer is read in no time, and as many messages come as time has passed.
     """
     step = np.diff(stamp)
     ends = np.flatnonzero(step > PAUSE * np.median(step)) if step.size else step
@@ -425,6 +430,7 @@ def _bursts(stamp: IntArray) -> IntArray | None:
     count = np.diff(ends)
     period = np.diff(stamp[ends]) / count
     regular = robust_std(period) < OFF_PERIOD * np.median(period)
+    regular &= np.median(step) < min(READ_AT_ONCE, READ_SHARE * float(np.median(period)))
     return ends if regular and np.median(count) >= LEAST_IN_A_BURST else None
 
 

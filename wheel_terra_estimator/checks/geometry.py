@@ -20,6 +20,7 @@ from wheel_terra_estimator.checks.finding import (
     listed,
     untold,
 )
+from wheel_terra_estimator.checks.reference import ASIDE
 from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
     UNIFORM_STD,
@@ -238,6 +239,8 @@ def _depth(evidence: Evidence) -> Estimate:
 
 def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return a radius or a reference of another scale, and the evidence with that mended."""
+    if ASIDE in evidence.figures:
+        return [], evidence
     told = radius_ratio(evidence)
     if isinstance(told, NotChecked):
         return [told], evidence

@@ -482,12 +482,14 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words: dict[str, Any] = {'angle': -math.degrees(seen.value), 'off': math.degrees(seen.std)}
     sure, aside = 0.97, math.sin(seen.value)
     curves = felt_senses(mended)[1]  # turned round or exchanged, starts feel the same
-    if abs(aside) > ALONG_AXIS and curves < 0 and evidence.force is not None:
+    exchanged = abs(aside) > ALONG_AXIS and curves < 0 and evidence.force is not None
+    if exchanged and _turns_upright(evidence) > CLEAR_AGREEMENT:
+        assert evidence.force is not None
         told = '' if aside > 0.0 else ', and negate both'
         told_of = evidence.found('force_exchanged', 0.95, signs=told)
         signs = np.array([math.copysign(1.0, aside)] * 2 + [1.0])
         return [told_of], replace(evidence, force=signs * evidence.force[:, [1, 0, 2]])
-    if curves == 0 and max(abs(aside), -math.cos(seen.value)) > ALONG_AXIS:
+    if (curves == 0 or exchanged) and max(abs(aside), -math.cos(seen.value)) > ALONG_AXIS:
         rival = ' and y are exchanged' if abs(aside) > ALONG_AXIS else ' has the wrong sign'
         words['rival'] = f', or linear_acceleration.x{rival}: drive circles'
         sure = TURNED_ROUND

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -38,6 +37,7 @@ AHEAD = 0.3  # mean of the rims over the usual size of one, above which the rove
 CLEAR_HEADING = 1.0  # turn in which a frame of the world is told from one of the rover [rad]
 STEADY = 0.9  # length of the mean direction of a velocity that keeps to a frame [-]
 TURNED_SIGMAS, TURNED_STD = 4.0, math.radians(1.0)  # of the direction on straights, at least [rad]
+ASIDE = 'reference.aside_deg'
 FAR_ASIDE = math.radians(12.0)  # direction in which 2 % of a speed along x are lost [rad]
 MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
 """Speed over that without slip of a rover that slips much, and error of the ratio without slip."""
@@ -127,8 +127,8 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
     if off.sigmas_from(0.0) < TURNED_SIGMAS or not (told or abs(usual) > FAR_ASIDE):
         return [], evidence
     if not told:  # a rover that keeps its heading may slide aside on a cross slope
-        without = replace(evidence, recording=replace(evidence.recording, reference=None))
-        return [untold('mounting', 'reference_aside', angle=math.degrees(angle))], without
+        evidence.figures[ASIDE] = round(math.degrees(usual), 1)  # and tells no unit, no radius
+        return [untold('mounting', 'reference_aside', angle=math.degrees(usual))], evidence
     turned = velocity * np.exp(-1j * angle)
     mended = evidence.with_channel(
         'reference', velocity=np.column_stack([turned.real, turned.imag, 0.0 * rim])
@@ -179,7 +179,8 @@ def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[Flo
 
 def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     reference = evidence.recording.reference
-    if reference is None or not evidence.facts.known:
+    assert reference is not None
+    if not evidence.facts.known or ASIDE in evidence.figures:
         return [], evidence
     rim, rows = ahead(evidence, reference, 0.4)
     if rows.sum() < LEAST_ROWS:

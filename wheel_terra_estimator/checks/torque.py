@@ -161,7 +161,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Judge the level of the torques: units and currents."""
     facts, rows = evidence.facts, evidence.straight
     assert evidence.force is not None
-    if not evidence.enough(rows):
+    if rows.sum() < LEAST_MOVING_ROWS:
         return [untold('gain', 'no_straight')], evidence
     level = (thrust(evidence) - facts.mass * evidence.force[:, 0]) * np.sign(evidence.rim)
     traction = _middle_mean(level[rows]) / (facts.mass * facts.gravity)
@@ -169,6 +169,8 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if traction > UNIT_TRACTION:
         finding = evidence.found('torque_unit', 0.97, value=1e-3, traction=traction)
         return [finding], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
+    if not evidence.enough(rows):
+        return [untold('gain', 'no_straight')], evidence
     size = _middle_mean(np.abs(thrust(evidence)[rows])) / (facts.mass * facts.gravity)
     if traction < LEAST_TRACTION < size:
         return _not_told('unlike_slopes'), evidence
