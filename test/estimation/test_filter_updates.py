@@ -538,7 +538,7 @@ def test_noise_of_the_accelerometer_averages_out_over_the_same_ground(parts, ekf
     noisy = window(0.0, 9.8)._replace(noise_density=0.04, duration=0.1)
     cycle = parts.cycle(FORWARD, loads, window=noisy)
     total = force_balance(parts).sum_of_pulls(cycle, 0.0)
-    weight = 9.8 * parts.rover.mass
+    weight = parts.rover.gravity * parts.rover.mass
     assert total.vibration == pytest.approx(parts.rover.mass**2 * 0.4 - (0.04 * weight) ** 2)
     once, often = (
         force_balance(parts)

@@ -72,7 +72,7 @@ class ForceBalance(Component['float | None']):
             noise = max(noise, window.noise_density / window.duration)
         noise *= rover.mass**2
         lasting = (rover.mass * sensors.specific_force_bias_std) ** 2 + (_WEIGHT_STD * weight) ** 2
-        vibration = max(noise - (_GROUND_STD * weight) ** 2, 0.0)
+        vibration = max(noise - (_GROUND_STD * rover.mass * rover.gravity) ** 2, 0.0)
         return SumOfPulls(rover.mass * force[0] + uphill, weight, noise + lasting, vibration)
 
     def update(

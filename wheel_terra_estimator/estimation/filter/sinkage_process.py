@@ -46,7 +46,7 @@ _LEAST_MEMORY = 0.05  # of the sinkage in the covariance
 _LAW_ERROR = 0.05  # of the sinkage per contact length
 _DIGGING = 0.05  # of the slip velocity times slip
 _OPEN_DIGGING = 0.1
-"""Of it, lasting: 0 to 0.1 in simulators of four hands, where nothing measures the sinkage."""
+"""The same, lasting, where nothing measures the sinkage: 0 to 0.1 in simulators of four hands."""
 _SLOPE_KEEP = 0.9  # smoothing of the derivatives over about a second of cycles
 _RATE_TIME = 0.5  # time constant of the published rate [s]
 _FIRST_RATE_STD = 1.0  # [m/s], before anything is known
