@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs='+',
         metavar='DATA',
-        help='CSV table of steady rows, or a rosbag2; several are one table with one soil',
+        help='CSV table of steady rows, or a rosbag2; several count as one',
     )
     add_output(parser, 'folder to be written', required=True)
     parser.add_argument(
