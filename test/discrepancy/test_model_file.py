@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The written model is the fitted one, whatever the verdict; a second pass goes on from it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_workflow import make, noisy
@@ -10,6 +12,7 @@ from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import workflow
 from wheel_terra_estimator.discrepancy.report.model_file import corrected, write_model
+from wheel_terra_estimator.discrepancy.result import Proposal
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 from wheel_terra_lab.trials.forms import FORMS
@@ -99,6 +102,37 @@ def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
     write_model(found, tmp_path / 'model.yaml')
     assert_errors(predicted(table, configuration, tmp_path), table, found.gap, 'before')
     assert_errors(predicted(table, configuration, tmp_path, 'model.yaml'), table, found.gap)
+
+
+def test_the_written_soil_is_that_of_the_table_where_a_reference_has_another_bed(tmp_path):
+    table, values, soil, rows = make('sweep40')
+    softer = replace(
+        soil,
+        frictional_modulus=0.87 * soil.frictional_modulus,
+        cohesive_modulus=0.87 * soil.cohesive_modulus,
+        friction_angle=np.arctan(0.96 * np.tan(soil.friction_angle)),
+    )
+    again = noisy(rows, solve(rows, soil), solve(rows, softer), np.random.default_rng(3))
+    configuration = reader.from_parameters(values, complete=False)
+    few = Options(effects=('bulldozing', 'cohesion'))
+    reference = check_table('a.csv', table)
+    found = diagnose(check_table('t.csv', again), configuration, reference, few)
+    write_model(found, tmp_path / 'model.yaml')
+    assert_errors(predicted(again, configuration, tmp_path, 'model.yaml'), again, found.gap)
+    stiffness, friction = found.bed
+    assert stiffness.after / stiffness.before == pytest.approx(0.87, abs=0.02)
+    assert friction.after / friction.before == pytest.approx(0.96, abs=0.01)
+    # The table alone tells its bed about as well as both tables do.
+    alone = diagnose(check_table('t.csv', again), configuration, options=few).soil[0]
+    assert stiffness.after_std == pytest.approx(alone.after_std, rel=0.5)
+    assert 'the soil is that of the bed of these rows' in corrected(found)[0].provenance
+    assert 'not in this file' not in corrected(found)[0].provenance
+    shared = replace(found, shared_error=0.06)
+    assert 'not in this file: an error of 6 % of the range' in corrected(shared)[0].provenance
+    law = {'words': 'a law', 'targets': ('friction',), 'features': ('slip',)}
+    law |= {'coefficients': (0.1,), 'coefficients_std': (0.1,), 'resembles': (), 'not_trusted': ()}
+    proposal = Proposal(**law, gap={}, left_out={}, soil=found.soil, bed=found.bed)
+    assert corrected(found, proposal)[0].soil == corrected(found)[0].soil
 
 
 OF_SENSORS = 'torque_gain', 'sinkage_gain', 'sinkage_offset', 'drivetrain_friction'

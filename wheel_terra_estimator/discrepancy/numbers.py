@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 
 # How quantities are shown: factor and unit.
+OF_BEDS = {'stiffness': 'stiffness', 'tan_friction': 'tan phi'}  # that differ between beds
 SHOWN = {
     'sinkage': (1e3, 'mm'),
     'drawbar_pull': (1.0, 'N'),

@@ -93,6 +93,8 @@ def render(
             *([bed] if bed else []),
             *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
         ),
+        bed=_beds(findings, after, variance),
+        shared_error=0.0 if setting.forward.active is None else decision.floor,
         base_effects=tuple(configuration.effects),
         refitted=_parameters(after, base=True),
         along_rows=tuple(along),
@@ -165,6 +167,7 @@ def _proposal(decision: Decision) -> Proposal | None:
     return replace(
         found,
         soil=_shifts(findings, found.fit, decision.variance, 'soil'),
+        bed=_beds(findings, found.fit, decision.variance),
         refitted={key: value for key, value in base.items() if not key.startswith(f'{NAME}.')},
     )
 
@@ -247,8 +250,7 @@ def _shifts(
     findings: Findings, after: Fit, variance: FloatArray, *owners: str
 ) -> tuple[SoilShift, ...]:
     """Return the configured numbers of the soil, or of effects that were on, before and after."""
-    weighted = after.jacobian / variance[:, None]
-    covariance = np.linalg.inv(weighted.T @ after.jacobian + np.diag(after.prior))
+    covariance = _covariance(after, variance)
     found = []
     for index, c in enumerate(after.coordinates):
         if c.owner not in owners or c.role != 'believed':
@@ -268,3 +270,34 @@ def _shifts(
             )
         )
     return tuple(found)
+
+
+def _beds(findings: Findings, after: Fit, variance: FloatArray) -> tuple[SoilShift, ...]:
+    """Return soil numbers of the bed under diagnosis, ``before`` on that of the reference."""
+    covariance = _covariance(after, variance)
+    place = {c.key: k for k, c in enumerate(after.coordinates)}
+    found = []
+    for index, c in enumerate(after.coordinates):
+        if c.owner != BED:
+            continue
+        of_soil = place[f'soil.{c.name}']
+        soil, u = after.coordinates[of_soil], float(after.u[index])
+        usual, times = float(soil.value(float(after.u[of_soil]))), float(c.value(u))
+        refit = soil.value(findings.nothing.u[of_soil]) * c.value(findings.nothing.u[index])
+        both = [of_soil, index]  # the product is better known than either
+        slope = np.array([times * soil.deviation(float(after.u[of_soil]), 1.0),
+                          usual * c.deviation(u, 1.0)])  # fmt: skip
+        std = float(np.sqrt(slope @ covariance[np.ix_(both, both)] @ slope))
+        prior_std = usual * c.deviation(0.0, 1.0 / c.stated)
+        found.append(
+            SoilShift(
+                c.name, usual, prior_std, float(refit), usual * times, std, c.stated * u, soil.unit,
+                'beds differ so',
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _covariance(after: Fit, variance: FloatArray) -> FloatArray:
+    weighted = after.jacobian / variance[:, None]
+    return np.asarray(np.linalg.inv(weighted.T @ after.jacobian + np.diag(after.prior)))

@@ -130,6 +130,7 @@ class Proposal:
     left_out: Mapping[str, Mapping[str, LeftOut]]
     # As in ``Diagnosis``, refitted with the law
     soil: tuple[SoilShift, ...] = field(default=(), metadata=_ASIDE)
+    bed: tuple[SoilShift, ...] = field(default=(), metadata=_ASIDE)
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict, metadata=_ASIDE)
     fit: Fit | None = field(default=None, metadata=_ASIDE)  # the fitted model, law included
     # Refit and law hold the soil where it can be believed: another soil alone would leave no gap,
@@ -244,7 +245,7 @@ class Diagnosis:
     next_measurement: tuple[NextMeasurement, ...]
     curves: Curves = field(metadata=_ASIDE)
     noise: Noise = field(metadata=_ASIDE)
-    soil: tuple[SoilShift, ...]
+    soil: tuple[SoilShift, ...]  # of the bed of the reference, where there are two
     # The same with the parameters of effects that were on
     moved: tuple[SoilShift, ...] = field(metadata=_ASIDE)
     # Row index, quantity, deviation in standard deviations of the cells that were rejected
@@ -256,6 +257,10 @@ class Diagnosis:
     floor: float  # model-error floor in use, as a share of each quantity's range
     # Warnings for people (units, duplicates, constant columns, shifted soil numbers)
     notes: tuple[str, ...] = ()
+    # Soil numbers of the bed under diagnosis, where it is another one; ``before`` = the reference's
+    bed: tuple[SoilShift, ...] = ()
+    # Structural error that a reference shows and ``fitted`` has, as a share of the range
+    shared_error: float = field(default=0.0, metadata=_ASIDE)
     base_effects: tuple[str, ...] = ()  # effects that the configuration had switched on already
     # ``effect.parameter`` -> fitted value, of parameters that were on already
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.discrepancy.numbers import percent
+from wheel_terra_estimator.discrepancy.numbers import OF_BEDS, number, percent
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, Proposal
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
@@ -48,7 +48,7 @@ def corrected(
     """Return the configuration with diagnosis, or a proposed law, put in, and the keys it sets."""
     fitted, believed = proposal or diagnosis, diagnosis.configuration
     changes: dict[str, Any] = {}
-    for shift in fitted.soil:
+    for shift in (*fitted.soil, *fitted.bed):  # of the table's bed, not of the reference's
         after = round(shift.after, _DECIMALS)
         changes |= _soil_keys(shift.name, after, shift.after_std, believed.soil)
     for key, parameter in fitted.refitted.items():  # of effects that were on already
@@ -159,6 +159,18 @@ def provenance(diagnosis: Diagnosis, proposal: Proposal | None = None) -> str:
         done = f'soil refitted (verdict: {diagnosis.verdict})'
     line = f'{done} by wheel-terra diagnose on {Path(diagnosis.table.name).name}'
     line += f', {len(diagnosis.table)} rows'
+    beds = (proposal or diagnosis).bed
+    if beds:
+        factors = ' and '.join(
+            f'{number(shift.after / shift.before, 3)} times the {OF_BEDS[shift.name]}'
+            for shift in beds
+        )
+        line += f'; the soil is that of the bed of these rows, {factors} of the reference'
+    if diagnosis.shared_error:
+        line += (
+            f'; not in this file: an error of {number(100 * diagnosis.shared_error, 2)} % of the '
+            'range that the reference shares, which the reported errors leave out'
+        )
     return f'{before}; {line}' if before else line
 
 

@@ -19,6 +19,7 @@ from wheel_terra_estimator.discrepancy.decision import Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import BED
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.numbers import (
+    OF_BEDS,
     SHOWN,
     amount,
     joined,
@@ -62,7 +63,6 @@ FACTORS = {
 _WORTH_VARYING = ('normal_load', 'lug_height')
 _CHANCE = 1e-3  # of a scatter of repeated rows, beside the stated noise
 _SAME_FACTOR = 0.03  # between two units: a factor of ten, or that of a kilopond
-_OF_BEDS = {'stiffness': 'stiffness', 'tan_friction': 'tan phi'}
 _SURE_OF_BED = 2.0  # deviations, after the fit
 REFERENCE_AGAIN = NextMeasurement(
     'the rows of the reference again on a fresh bed', ('another bed', 'an effect'), 0.0, math.inf
@@ -290,7 +290,7 @@ def another_bed(fitted: Fit) -> str:
     """Return how the bed differs from that of the reference; empty where the rows are not sure."""
     std = np.sqrt(np.diag(fitted.covariance()))
     factors = ' and '.join(
-        f'{number(float(c.value(u)), 3)} times the {_OF_BEDS[c.name]}'
+        f'{number(float(c.value(u)), 3)} times the {OF_BEDS[c.name]}'
         for c, u, s in zip(fitted.coordinates, fitted.u, std, strict=True)
         if c.owner == BED and abs(u) > _SURE_OF_BED * s
     )
