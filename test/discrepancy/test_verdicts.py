@@ -130,6 +130,8 @@ def test_the_bed_of_a_reference_is_another_unless_trial_says_that_it_is_one():
     same = run({**again, **bed}, values, reference=check_table('a.csv', {**table, **bed}))
     assert same.verdict != 'agrees'
     assert not any('of that of the reference' in note for note in same.notes)
+    assert any(note.startswith('trial 1 in both tables: taken as one') for note in same.notes)
+    assert not any('taken as one bed' in note for note in found.notes)
 
 
 def test_rows_of_two_soils_in_turn_are_called_scattered_where_no_noise_is_stated():

@@ -22,6 +22,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.render import render
+from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
 from wheel_terra_estimator.discrepancy.selection.search import Findings, search
 from wheel_terra_estimator.discrepancy.selection.verdict import choose, remainder
@@ -82,10 +83,10 @@ def diagnose(
     """
     started = time.perf_counter()
     chosen = options or Options()
-    both, active = table, None
+    both, active, own_bed = table, None, False
     if reference is not None:
         table, both, active = join(table, reference)
-    own_bed = reference is not None and not _on_one_bed(table, reference)
+        own_bed = not _on_one_bed(table, reference)
     points = operating_points(both.columns, configuration, both.name)
     wheels, stated = configuration.wheels, configuration.stated
     check_wheel_of_model(
@@ -154,6 +155,8 @@ def diagnose(
     diagnosis = render(table, both, configuration, decision)
     seconds = time.perf_counter() - started
     notes = (*notes, *diagnosis.notes)
+    if reference is not None and not own_bed:
+        notes = (*notes, words.one_bed(table))
     return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
 
 

@@ -286,6 +286,16 @@ def fresh_bed(probability: float, table: SteadyTable) -> tuple[NextMeasurement, 
     return (NextMeasurement(what, competitors, 0.0, math.inf),)
 
 
+def one_bed(table: SteadyTable) -> str:
+    """Return on what it rests that a table and its reference lie on one bed."""
+    first, last = np.min(table.columns['trial']), np.max(table.columns['trial'])
+    numbers = f'{first:g}..{last:g}' if last > first else f'{first:g}'
+    return (
+        f'trial {numbers} in both tables: taken as one bed; where each file counts anew, leave the '
+        'column out'
+    )
+
+
 def another_bed(fitted: Fit) -> str:
     """Return how the bed differs from that of the reference; empty where the rows are not sure."""
     std = np.sqrt(np.diag(fitted.covariance()))
