@@ -22,7 +22,7 @@ from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.report.page import write_report
-from wheel_terra_estimator.discrepancy.report.words import FACTORS, _leaves, in_words
+from wheel_terra_estimator.discrepancy.report.words import FACTORS, _leaves, in_words, sentence
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.selection.verdict import Remainder
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
@@ -297,3 +297,18 @@ def test_noise_of_a_cell_is_its_own_part_of_the_covariance():
 )
 def test_a_candidate_that_was_not_named_leaves_what_it_leaves(probability, p_value, said):
     assert said in _leaves(Remainder(probability, probability, 0.1, p_value, 1.0))
+
+
+@pytest.mark.parametrize(
+    ('shared', 'nearest', 'said'),
+    [
+        (False, (), '(nothing smooth, but more scatter than the noise allows, is left)'),
+        (True, ('cohesion',), 'to be named (nearest: cohesion).'),
+        (True, (), 'well enough to be named.'),
+    ],
+)
+def test_scatter_is_left_only_where_no_reference_shares_an_error(shared, nearest, said):
+    left = Remainder(0.1, 0.1, 0.0, 1e-6, 1.0, shared)
+    verdict = SimpleNamespace(status='unexplained', left=left)
+    chosen = SimpleNamespace(verdict=verdict, misread={})
+    assert said in sentence(chosen, (), 1e-6, None, nearest)

@@ -413,13 +413,15 @@ def sentence(
             'like them and is none of the known effects.'
         )
     if verdict.status == 'unexplained':
-        size = f'a misfit of about {100 * left.amplitude:.0f} % of the range'
-        if left.amplitude < 0.005:
-            size = 'nothing smooth, but more scatter than the noise allows,'
-        near = f'; nearest: {", ".join(nearest)}' if nearest else ''
+        size = f'a misfit of about {100 * left.amplitude:.0f} % of the range is left'
+        if left.amplitude < 0.005:  # with a reference what is shared is not in it
+            scatter = 'nothing smooth, but more scatter than the noise allows, is left'
+            size = '' if left.shared else scatter
+        near = f'nearest: {", ".join(nearest)}' if nearest else ''
+        aside = '; '.join(filter(None, (size, near)))
         return (
             'Model and measurement disagree, and none of the known effects explains it well enough '
-            f'to be named ({size} is left{near}).'
+            f'to be named{f" ({aside})" if aside else ""}.'
         )
     parts = []
     for effect in effects:
