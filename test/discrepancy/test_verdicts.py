@@ -126,6 +126,14 @@ def test_the_bed_of_a_reference_is_another_unless_trial_says_that_it_is_one():
     assert (found.verdict, found.effects) == ('agrees', ())
     assert any('0.87' in note and 'of that of the reference' in note for note in found.notes)
     assert 'reference again on a fresh bed' in found.next_measurement[0].what
+    assert any('beds differ so' in note for note in found.notes)
+    half = replace(soil, frictional_modulus=0.4 * soil.frictional_modulus)
+    far = noisy(rows, solve(rows, soil), solve(rows, half), np.random.default_rng(3))
+    few = Options(effects=('bulldozing', 'cohesion'))
+    loose = run(far, values, reference=check_table('a.csv', table), options=few)
+    assert any('more than beds usually differ' in note for note in loose.notes)
+    assert any(note.startswith('stiffness of the bed stands at') for note in loose.notes)
+    assert not any('bed.' in note for note in loose.notes)
     bed = {'trial': np.ones(40)}
     same = run({**again, **bed}, values, reference=check_table('a.csv', {**table, **bed}))
     assert same.verdict != 'agrees'

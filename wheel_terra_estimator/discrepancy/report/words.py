@@ -64,6 +64,7 @@ _WORTH_VARYING = ('normal_load', 'lug_height')
 _CHANCE = 1e-3  # of a scatter of repeated rows, beside the stated noise
 _SAME_FACTOR = 0.03  # between two units: a factor of ten, or that of a kilopond
 _SURE_OF_BED = 2.0  # deviations, after the fit
+_USUAL_OF_BEDS = 3.0  # deviations of ``BED_SCATTER``
 REFERENCE_AGAIN = NextMeasurement(
     'the rows of the reference again on a fresh bed', ('another bed', 'an effect'), 0.0, math.inf
 )
@@ -246,7 +247,8 @@ def notes(
     ]
     for c, u in zip(after.coordinates, after.u, strict=True):
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
-            found.append(f'{c.key} stands at the end of its range ({number(float(c.value(u)))})')
+            key = f'{OF_BEDS[c.name]} of the bed' if c.owner == BED else c.key
+            found.append(f'{key} stands at the end of its range ({number(float(c.value(u)))})')
     return tuple(found)
 
 
@@ -299,13 +301,18 @@ def one_bed(table: SteadyTable) -> str:
 def another_bed(fitted: Fit) -> str:
     """Return how the bed differs from that of the reference; empty where the rows are not sure."""
     std = np.sqrt(np.diag(fitted.covariance()))
-    factors = ' and '.join(
-        f'{number(float(c.value(u)), 3)} times the {OF_BEDS[c.name]}'
+    sure = [
+        (c, float(u))
         for c, u, s in zip(fitted.coordinates, fitted.u, std, strict=True)
         if c.owner == BED and abs(u) > _SURE_OF_BED * s
+    ]
+    factors = ' and '.join(
+        f'{number(float(c.value(u)), 3)} times the {OF_BEDS[c.name]}' for c, u in sure
     )
+    farthest = max((c.stated * abs(u) for c, u in sure), default=0.0)
+    so = 'more than beds usually differ' if farthest > _USUAL_OF_BEDS else 'beds differ so'
     return factors and (
-        f'the bed has {factors} of that of the reference: beds differ so (10 % and 3 % are usual); '
+        f'the bed has {factors} of that of the reference: {so} (10 % and 3 % are usual); '
         'the same `trial` in both tables says that it is one'
     )
 
