@@ -127,8 +127,10 @@ def test_the_written_soil_is_that_of_the_table_where_a_reference_has_another_bed
     assert stiffness.after_std == pytest.approx(alone.after_std, rel=0.5)
     assert 'the soil is that of the bed of these rows' in corrected(found)[0].provenance
     assert 'not in this file' not in corrected(found)[0].provenance
-    shared = replace(found, shared_error=0.06)
-    assert 'not in this file: an error of 6 % of the range' in corrected(shared)[0].provenance
+    shared = replace(found, shared_error=True)
+    assert (
+        'not in this file: the error that the reference shares' in corrected(shared)[0].provenance
+    )
     law = {'words': 'a law', 'targets': ('friction',), 'features': ('slip',)}
     law |= {'coefficients': (0.1,), 'coefficients_std': (0.1,), 'resembles': (), 'not_trusted': ()}
     proposal = Proposal(**law, gap={}, left_out={}, soil=found.soil, bed=found.bed)

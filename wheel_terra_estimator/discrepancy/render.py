@@ -94,7 +94,7 @@ def render(
             *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
         ),
         bed=_beds(findings, after, variance),
-        shared_error=0.0 if setting.forward.active is None else decision.floor,
+        shared_error=setting.forward.active is not None and decision.floor > 0.0,
         base_effects=tuple(configuration.effects),
         refitted=_parameters(after, base=True),
         along_rows=tuple(along),

@@ -259,8 +259,8 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     # Soil numbers of the bed under diagnosis, where it is another one; ``before`` = the reference's
     bed: tuple[SoilShift, ...] = ()
-    # Structural error that a reference shows and ``fitted`` has, as a share of the range
-    shared_error: float = field(default=0.0, metadata=_ASIDE)
+    # Whether ``fitted`` leaves out a structural error that a reference shows: no model has it
+    shared_error: bool = field(default=False, metadata=_ASIDE)
     base_effects: tuple[str, ...] = ()  # effects that the configuration had switched on already
     # ``effect.parameter`` -> fitted value, of parameters that were on already
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict)

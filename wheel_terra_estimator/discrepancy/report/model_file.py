@@ -168,8 +168,8 @@ def provenance(diagnosis: Diagnosis, proposal: Proposal | None = None) -> str:
         line += f'; the soil is that of the bed of these rows, {factors} of the reference'
     if diagnosis.shared_error:
         line += (
-            f'; not in this file: an error of {number(100 * diagnosis.shared_error, 2)} % of the '
-            'range that the reference shares, which the reported errors leave out'
+            '; not in this file: the error that the reference shares, which the reported errors '
+            'leave out'
         )
     return f'{before}; {line}' if before else line
 
