@@ -16,7 +16,7 @@ from wheel_terra_estimator.configuration.column_map import UNITS
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
-from wheel_terra_estimator.discrepancy.fitting.coordinates import BED
+from wheel_terra_estimator.discrepancy.fitting.coordinates import BED, BED_SCATTER
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.numbers import (
     OF_BEDS,
@@ -311,8 +311,9 @@ def another_bed(fitted: Fit) -> str:
     )
     farthest = max((c.stated * abs(u) for c, u in sure), default=0.0)
     so = 'more than beds usually differ' if farthest > _USUAL_OF_BEDS else 'beds differ so'
+    usual = ' and '.join(map(percent, BED_SCATTER.values()))
     return factors and (
-        f'the bed has {factors} of that of the reference: {so} (10 % and 3 % are usual); '
+        f'the bed has {factors} of that of the reference: {so} ({usual} are usual); '
         'the same `trial` in both tables says that it is one'
     )
 

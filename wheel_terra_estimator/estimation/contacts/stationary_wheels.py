@@ -97,7 +97,7 @@ class StationaryWheels:
         creeps = np.abs(rims) > rover.rest_speed
         creeps &= rims * cycle.yaw_compensated.typical > 0.0
         creeps &= np.abs(speed) < np.maximum(np.abs(rims), doubt)
-        direction = np.sign(np.where(creeps, rims, np.where(speed > 0.0, 1.0, -1.0)))
+        direction = np.where(np.where(creeps, rims, speed) > 0.0, 1.0, -1.0)
         forces = self._models.forces(
             WheelStates(
                 np.where(creeps, 0.0, _SLIDING_RATIO),
