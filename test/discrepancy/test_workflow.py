@@ -272,6 +272,19 @@ def test_next_measurement_would_part_the_rivals(same_lugs, monkeypatch):
     assert set(Counter(p.separates for p in proposals if p.rows).values()) == {3}
 
 
+def test_what_turns_in_the_air_tells_no_friction_that_grows_with_the_torque(unproposed):
+    """A quarter too much torque everywhere: the sensor's scale, or a share that the gears take."""
+    table, values, *_ = make()
+    proposals = run(
+        {**table, 'torque': 1.25 * table['torque']},
+        values,
+        options=Options(effects=('torque_gain', 'drivetrain_friction')),
+    ).next_measurement
+    checks = [p.what for p in proposals if np.isinf(p.distance_then)]
+    assert len(checks) == 1
+    assert 'lifts, then lowers, a known weight' in checks[0]
+
+
 @pytest.mark.slow
 def test_where_the_verdict_is_open_the_soil_goes_where_the_rows_pull_it():
     """Side drag pulls the soil far: however the fit gets there, it ends at the same errors."""

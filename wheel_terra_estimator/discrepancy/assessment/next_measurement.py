@@ -27,6 +27,10 @@ _DEEPEST = 0.6  # of the radius: blocks in which a competitor sinks deeper are n
 ZERO_CHECKS = {
     'sinkage_offset': 'read the sinkage sensor with the wheel on a hard, level floor (should be 0)',
     'drivetrain_friction': 'read the torque with the wheel turning in the air',
+    'drivetrain_friction:viscous': 'read the torque with the wheel turning in the air',
+    # A lost share of no torque is nothing, and lifting reads more than lowering only by friction.
+    'drivetrain_friction:proportional': 'read the torque while the wheel lifts, then lowers, '
+    'a known weight on a cord round it',
     'wheel_radius_bias': 'roll the wheel out on a hard floor: distance over 10 turns',
     'pitch_bias': 'read attitude and pull of the standing rig, then turned by 180 degrees',
 }
@@ -50,10 +54,10 @@ def propose(
         if names[0] == names[1]:  # two forms of the same
             names = (' + '.join(chosen.names), ' + '.join(competitor.names))
         now = _distance(setting, chosen, competitor)
-        ours, theirs = ([effect_of(key) for key in f.names] for f in (chosen, competitor))
-        for name in dict.fromkeys((*ours, *theirs)):
-            if name in ZERO_CHECKS and (name in ours) != (name in theirs):
-                found.append(NextMeasurement(ZERO_CHECKS[name], names, now, np.inf))
+        ours, theirs = ({effect_of(key) for key in f.names} for f in (chosen, competitor))
+        for key in dict.fromkeys((*chosen.names, *competitor.names)):
+            if key in ZERO_CHECKS and effect_of(key) in ours ^ theirs:
+                found.append(NextMeasurement(ZERO_CHECKS[key], names, now, np.inf))
         blocks = []
         for (what, rows), (values, sensitivity) in zip(menu, predicted, strict=True):
             outputs = values[[0, place]]
