@@ -16,7 +16,7 @@ from wheel_terra_estimator.discrepancy.result import Proposal
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 from wheel_terra_lab.trials.forms import FORMS
-from wheel_terra_lab.trials.hidden import LISTED
+from wheel_terra_lab.trials.hidden import LISTED, SmoothError
 from wheel_terra_lab.trials.truth import solve
 
 QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
@@ -126,15 +126,28 @@ def test_the_written_soil_is_that_of_the_table_where_a_reference_has_another_bed
     alone = diagnose(check_table('t.csv', again), configuration, options=few).soil[0]
     assert stiffness.after_std == pytest.approx(alone.after_std, rel=0.5)
     assert 'the soil is that of the bed of these rows' in corrected(found)[0].provenance
-    assert 'not in this file' not in corrected(found)[0].provenance
-    shared = replace(found, shared_error=True)
-    assert (
-        'not in this file: the error that the reference shares' in corrected(shared)[0].provenance
-    )
+    assert not any('is in no file' in note for note in found.notes)
     law = {'words': 'a law', 'targets': ('friction',), 'features': ('slip',)}
     law |= {'coefficients': (0.1,), 'coefficients_std': (0.1,), 'resembles': (), 'not_trusted': ()}
     proposal = Proposal(**law, gap={}, left_out={}, soil=found.soil, bed=found.bed)
     assert corrected(found, proposal)[0].soil == corrected(found)[0].soil
+
+
+def test_the_error_that_a_reference_shares_is_not_in_the_errors_of_the_written_model(tmp_path):
+    _, values, soil, rows = make('sweep40')
+    rng = np.random.default_rng(8)
+    clean = solve(rows, soil)
+    both = solve(rows, soil, (SmoothError(0.08, rows, clean, rng),))
+    reference, table = (noisy(rows, clean, both, rng) for _ in range(2))
+    configuration = reader.from_parameters(values, complete=False)
+    few = Options(effects=('bulldozing', 'cohesion'))
+    found = diagnose(
+        check_table('t.csv', table), configuration, check_table('a.csv', reference), few
+    )
+    write_model(found, tmp_path / 'model.yaml')
+    assert_errors(predicted(table, configuration, tmp_path, 'model.yaml'), table, found.gap)
+    assert max(gap.fitted / gap.after for gap in found.gap.values()) > 2.0
+    assert sum('is in no file: model.yaml alone errs' in note for note in found.notes) == 1
 
 
 OF_SENSORS = 'torque_gain', 'sinkage_gain', 'sinkage_offset', 'drivetrain_friction'

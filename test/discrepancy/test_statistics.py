@@ -351,8 +351,10 @@ def test_repeats_give_the_noise():
     assert found.origin == {'torque': 'repeats'} and found.repeatability == {'torque': (std, 32)}
     for stated, notes in ((0.02, 1), (0.05, 0), (0.2, 1)):
         given = replace(table, stated_std=np.full_like(table.stated_std, stated))
-        said = _repeatability(noise.stated_noise(given, np.ones(len(QUANTITIES)), one))
+        found = noise.stated_noise(given, np.ones(len(QUANTITIES)), one)
+        said = _repeatability(given, found)
         assert len(said) == notes and all('scatter by' in text for text in said)
+        assert found.std[0, 2] == pytest.approx(max(stated, std) if notes else stated)
 
 
 def test_confidence_follows_what_speaks_for_a_name():

@@ -135,7 +135,7 @@ class Decider:
                 return self._left_open(replace(decision, doubtful=doubtful))
             tried.append(verdict.index)
             names, likely = self._against_law(decision, _names(self.table, decision))
-            if likely:
+            if likely and any(item.after < item.refit for item in decision.gap.values()):
                 return replace(decision, names=names)
             doubtful = doubtful or names
 
@@ -304,10 +304,8 @@ def _curves(
     refit, fitted = setting.predicted(fits, problem.variance(floor))
     # Where slips are latent the model stands at the most probable slip; a curve is compared with
     # what was read, so that it goes back along the tangent (cells that were not measured stay).
-    before, refit, fitted, held_refit, held_after = (
-        (model - problem.moved)[:rows]
-        for model in (configured.outputs[0], refit, fitted, held_out[0], held_out[-1])
-    )
+    models = configured.outputs[0], refit, fitted, held_out[0], held_out[-1], after.outputs
+    curves = [(model - problem.moved)[:rows] for model in models]
     left = floor if setting.forward.active is None else 0.0  # what a reference shows is in them
     band = np.sqrt(findings.noise.std**2 + (left * problem.scale) ** 2)
-    return Curves(before, refit, fitted, held_refit, held_after, band[:rows])
+    return Curves(*curves, band=band[:rows])

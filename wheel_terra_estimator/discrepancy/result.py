@@ -201,8 +201,9 @@ class Curves:
     """(N, 4) model values of the table's rows: sinkage, drawbar pull, torque.
 
     ``before`` = as configured, ``refit`` = soil refitted, ``after`` = effects added; the
-    ``held_out`` pair was computed row by row from fits that did not see the row. ``band`` is one
-    standard deviation of noise plus floor.
+    ``held_out`` pair was computed row by row from fits that did not see the row. ``alone`` is
+    ``after`` without the structural error that a reference shows: no model file has it. ``band`` is
+    one standard deviation of noise plus floor.
     """
 
     before: FloatArray
@@ -210,6 +211,7 @@ class Curves:
     after: FloatArray
     held_out_refit: FloatArray
     held_out_after: FloatArray
+    alone: FloatArray
     band: FloatArray
 
 
@@ -259,8 +261,6 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     # Soil numbers of the bed under diagnosis, where it is another one; ``before`` = the reference's
     bed: tuple[SoilShift, ...] = ()
-    # Whether ``fitted`` leaves out a structural error that a reference shows: no model has it
-    shared_error: bool = field(default=False, metadata=_ASIDE)
     base_effects: tuple[str, ...] = ()  # effects that the configuration had switched on already
     # ``effect.parameter`` -> fitted value, of parameters that were on already
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict)

@@ -22,7 +22,6 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.render import render
-from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
 from wheel_terra_estimator.discrepancy.selection.search import Findings, search
 from wheel_terra_estimator.discrepancy.selection.verdict import choose, remainder
@@ -83,10 +82,9 @@ def diagnose(
     """
     started = time.perf_counter()
     chosen = options or Options()
-    both, active, own_bed = table, None, False
+    both, active = table, None
     if reference is not None:
         table, both, active = join(table, reference)
-        own_bed = not _on_one_bed(table, reference)
     points = operating_points(both.columns, configuration, both.name)
     wheels, stated = configuration.wheels, configuration.stated
     check_wheel_of_model(
@@ -107,7 +105,7 @@ def diagnose(
     stated_std, source = configuration.soil_std_stated, configuration.soil_source
     nuisance = (
         *soil_coordinates(configuration.soil, stated_std, source, chosen.soil_known_to),
-        *(bed_coordinates() if own_bed else ()),
+        *(bed_coordinates() if reference is not None else ()),
         *base_coordinates(configuration.effects, configuration.effects_std, known),
     )
     floors = default_floors(chosen.floor) if reference is None else shared_floors()
@@ -155,15 +153,7 @@ def diagnose(
     diagnosis = render(table, both, configuration, decision)
     seconds = time.perf_counter() - started
     notes = (*notes, *diagnosis.notes)
-    if reference is not None and not own_bed:
-        notes = (*notes, words.one_bed(table))
     return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
-
-
-def _on_one_bed(table: SteadyTable, reference: SteadyTable) -> bool:
-    """Return whether the columns `trial` say that all rows lie on beds of the reference."""
-    beds, known = (t.columns.get('trial', np.full(1, np.nan)) for t in (table, reference))
-    return bool(np.isin(beds, known).all())
 
 
 def _load_misread(

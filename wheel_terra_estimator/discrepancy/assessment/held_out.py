@@ -130,7 +130,7 @@ def gaps(
             refit=error(curves.held_out_refit),
             after=error(curves.held_out_after),
             noise=noise,
-            fitted=error(curves.after),
+            fitted=error(curves.alone),
             limit=TOO_FAR * float(np.hypot(noise, allowed)),
         )
     return found

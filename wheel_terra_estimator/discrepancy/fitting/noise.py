@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import bdtrc
+from scipy.special import bdtrc, chdtrc
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
@@ -26,6 +26,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
 )
 
 ENOUGH_REPEATS = 6  # degrees of freedom from which repeats alone set the noise
+SCATTER_CHANCE = 1e-3  # below which repeated rows do not have the stated noise
 # Amplitudes of the smooth misfit that compete while the noise is estimated: whatever is smooth,
 # effects included, must not be counted as noise.
 _SMOOTH = (0.01, 0.03, 0.1, 0.3, 1.0)
@@ -39,7 +40,7 @@ _CLEARLY = 3.0  # nats by which noise of another shape must be more likely
 
 
 def stated_noise(table: SteadyTable, scale: FloatArray, apart: FloatArray) -> Noise:
-    """Return the stated deviations, those from repeats, and a first guess for the rest.
+    """Return the stated deviations, those of repeats that scatter by more, a guess for the rest.
 
     ``apart``: (N,) rows of other numbers do not repeat one another (another bed, a reference).
     """
@@ -56,8 +57,14 @@ def stated_noise(table: SteadyTable, scale: FloatArray, apart: FloatArray) -> No
         stated = here & np.isfinite(std[:, q])
         if stated.any():
             # Cells without a stated deviation take the median of the stated ones.
-            std[here & ~stated, q] = np.median(std[stated, q])
+            usual = np.median(std[stated, q])
+            std[here & ~stated, q] = usual
             origin[quantity] = 'given'
+            # An instrument's noise is not all that repeated runs scatter by: beds do as well.
+            chance = float(chdtrc(count, count * (pooled / usual) ** 2)) if count else 1.0
+            if count >= ENOUGH_REPEATS and chance < SCATTER_CHANCE:
+                std[here, q] *= pooled / usual
+                origin[quantity] = 'repeats'
             continue
         if count >= ENOUGH_REPEATS:
             std[here, q] = max(pooled, _LEAST * scale[q])

@@ -319,7 +319,7 @@ def _proposal(
             gap.reported[quantity],
             refit=by_slip[quantity].refit,
             after=by_slip[quantity].law,
-            fitted=gap.error(setting.predicted([law.outputs], gap.variance)[0], q),
+            fitted=gap.error(law.outputs, q),
         )
         for q, quantity in enumerate(QUANTITIES)
         if quantity in by_slip

@@ -166,11 +166,6 @@ def provenance(diagnosis: Diagnosis, proposal: Proposal | None = None) -> str:
             for shift in beds
         )
         line += f'; the soil is that of the bed of these rows, {factors} of the reference'
-    if diagnosis.shared_error:
-        line += (
-            '; not in this file: the error that the reference shares, which the reported errors '
-            'leave out'
-        )
     return f'{before}; {line}' if before else line
 
 

@@ -18,6 +18,7 @@ from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import BED, BED_SCATTER
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.noise import SCATTER_CHANCE
 from wheel_terra_estimator.discrepancy.numbers import (
     OF_BEDS,
     SHOWN,
@@ -61,9 +62,9 @@ FACTORS = {
 }
 # Inputs that tell effects apart, in the order of how easily a rig varies them.
 _WORTH_VARYING = ('normal_load', 'lug_height')
-_CHANCE = 1e-3  # of a scatter of repeated rows, beside the stated noise
 _SAME_FACTOR = 0.03  # between two units: a factor of ten, or that of a kilopond
 _SURE_OF_BED = 2.0  # deviations, after the fit
+_SHARED = 1.5  # times the error on unseen rows: more on seen ones is not in the model
 _USUAL_OF_BEDS = 3.0  # deviations of ``BED_SCATTER``
 REFERENCE_AGAIN = NextMeasurement(
     'the rows of the reference again on a fresh bed', ('another bed', 'an effect'), 0.0, math.inf
@@ -235,7 +236,7 @@ def notes(
             'errors that neighbouring rows share (digitised figures) are not in it; state them in '
             '*_std columns'
         )
-    found += _repeatability(findings.noise)
+    found += _repeatability(table, findings.noise)
     if findings.outliers:
         count = len(findings.outliers)
         several = f'{count} cells were rejected as outliers'
@@ -252,17 +253,23 @@ def notes(
     return tuple(found)
 
 
-def _repeatability(noise: Noise) -> list[str]:
+def _repeatability(table: SteadyTable, noise: Noise) -> list[str]:
     """Return where rows that repeat one another scatter by another amount than was stated."""
     found = []
     for name, (pooled, count) in noise.repeatability.items():
-        stated = float(np.nanmedian(noise.std[:, QUANTITIES.index(name)]))
+        column = table.stated_std[:, QUANTITIES.index(name)]
+        if np.isnan(column).all():
+            continue
+        stated = float(np.nanmedian(column))
         chance = float(chdtrc(count, count * (pooled / stated) ** 2))
-        if noise.origin[name] == 'given' and not _CHANCE < chance < 1.0 - _CHANCE:
+        if not SCATTER_CHANCE < chance < 1.0 - SCATTER_CHANCE:
+            so = (
+                'the scatter is used' if noise.origin[name] == 'repeats' else 'one of them is wrong'
+            )
             found.append(
                 f'{plain(name)}: rows that repeat one another scatter by '
                 f'{amount(name, pooled, 2)} {SHOWN[name][1]}, its stated noise is '
-                f'{amount(name, stated, 2)}; one of them is wrong'
+                f'{amount(name, stated, 2)}; {so}'
             )
     return found
 
@@ -288,16 +295,6 @@ def fresh_bed(probability: float, table: SteadyTable) -> tuple[NextMeasurement, 
     return (NextMeasurement(what, competitors, 0.0, math.inf),)
 
 
-def one_bed(table: SteadyTable) -> str:
-    """Return on what it rests that a table and its reference lie on one bed."""
-    first, last = np.min(table.columns['trial']), np.max(table.columns['trial'])
-    numbers = f'{first:g}..{last:g}' if last > first else f'{first:g}'
-    return (
-        f'trial {numbers} in both tables: taken as one bed; where each file counts anew, leave the '
-        'column out'
-    )
-
-
 def another_bed(fitted: Fit) -> str:
     """Return how the bed differs from that of the reference; empty where the rows are not sure."""
     std = np.sqrt(np.diag(fitted.covariance()))
@@ -312,9 +309,24 @@ def another_bed(fitted: Fit) -> str:
     farthest = max((c.stated * abs(u) for c, u in sure), default=0.0)
     so = 'more than beds usually differ' if farthest > _USUAL_OF_BEDS else 'beds differ so'
     usual = ' and '.join(map(percent, BED_SCATTER.values()))
-    return factors and (
-        f'the bed has {factors} of that of the reference: {so} ({usual} are usual); '
-        'the same `trial` in both tables says that it is one'
+    return factors and (f'the bed has {factors} of that of the reference: {so} ({usual} are usual)')
+
+
+def alone(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
+    """Return how far the model is off where most of the fit is an error shared with a reference."""
+    errors = [
+        f'{plain(name)} {amount(name, item.fitted, 2)} {SHOWN[name][1]} '
+        f'(as configured {amount(name, item.before, 2)})'
+        for name, item in gap.items()
+        if item.fitted > _SHARED * item.after
+    ]
+    return (
+        (
+            f'the error that table and reference share is in no file: model.yaml alone errs by '
+            f'{", ".join(errors)}',
+        )
+        if errors
+        else ()
     )
 
 
