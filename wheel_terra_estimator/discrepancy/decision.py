@@ -304,8 +304,12 @@ def _curves(
     refit, fitted = setting.predicted(fits, problem.variance(floor))
     # Where slips are latent the model stands at the most probable slip; a curve is compared with
     # what was read, so that it goes back along the tangent (cells that were not measured stay).
-    models = configured.outputs[0], refit, fitted, held_out[0], held_out[-1], after.outputs
-    curves = [(model - problem.moved)[:rows] for model in models]
+    before, refit, fitted, held_refit, held_after, alone = (
+        (model - problem.moved)[:rows]
+        for model in (
+            configured.outputs[0], refit, fitted, held_out[0], held_out[-1], after.outputs
+        )
+    )  # fmt: skip
     left = floor if setting.forward.active is None else 0.0  # what a reference shows is in them
     band = np.sqrt(findings.noise.std**2 + (left * problem.scale) ** 2)
-    return Curves(*curves, band=band[:rows])
+    return Curves(before, refit, fitted, held_refit, held_after, alone, band[:rows])
