@@ -243,6 +243,24 @@ def test_without_a_reference_the_rover_does_not_move_against_its_wheels():
         assert ekf.mean[SPEED] == kept
 
 
+@pytest.mark.parametrize('way', [1.0, -1.0])
+def test_without_a_reference_the_rover_is_no_faster_than_a_wheel_that_drives_it(way):
+    parts = Parts(reader.load(SAND))
+    rims = way * np.array([0.05] * 5 + [0.004])
+    drives = 0.5 * np.array(parts.cycle().loads.load) * np.array(parts.rover.slip_radius)
+    for torque, std, kept in (
+        (drives, 1e-3, 0.004),
+        (np.where(np.arange(6) < 5, drives, -drives), 1e-3, 0.04),  # the soil drags it
+        (drives, 0.02, 0.04),  # it may stand
+        (np.where(np.arange(6) < 5, drives, NAN), 1e-3, 0.04),
+    ):
+        made, ekf = process(rims), parts.filter()
+        ekf.set(SPEED, way * 0.04, std**2)
+        made.keep_behind_driving_wheels(ekf, parts.cycle(tuple(rims), torque=tuple(way * torque)))
+        assert ekf.mean[SPEED] == pytest.approx(way * kept)
+        assert ekf.covariance[SPEED, SPEED] == pytest.approx(std**2 if kept == 0.04 else 0.015**2)
+
+
 def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
     """As a first-order process in travel: a share of exp(-1) is left after its length."""
     made, rim = process([0.05] * 6), 0.05

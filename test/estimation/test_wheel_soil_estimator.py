@@ -3,11 +3,12 @@
 """The whole estimator on short simulated drives: signs, situations, missing inputs."""
 
 import functools
+import math
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from parts import SAND, step_inputs
+from parts import SAND, Parts, step_inputs
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -256,6 +257,26 @@ def test_torques_alone_carry_no_rover_backwards():
     assert all(map(finite, sets))
     assert min(s.forward_velocity for s in sets) > -0.002  # the least rim speed that turns
     assert np.all(sets[-1].slip_std > 0.15)  # of the slip nothing is known
+
+
+def test_a_rover_that_is_stuck_stays_so_without_a_reference_until_the_ground_asks_for_less():
+    """On 8 degrees it digs itself in; its references end, and 20 s later the slope does."""
+    parts = Parts(reader.load(SAND))
+    estimator, rover = WheelSoilEstimator(parts.configuration), parts.rover
+    torque = 0.35 * np.array(parts.cycle().loads.load) * np.array(rover.slip_radius)
+    told = {}
+    for time in np.arange(0.0, 46.0, 0.1):
+        slope = math.radians(8.0 if time < 40.0 else 0.0)
+        force = rover.gravity * np.array([math.sin(slope), 0.0, math.cos(slope)])
+        speed = None if time > 20.0 else 0.002 if time > 10.0 else 0.095
+        rate = 0.1 / np.array(rover.slip_radius)
+        estimator.step(*step_inputs(time, rate, torque, tuple(force), speed))
+        told[round(time)] = estimator.estimates()
+    assert not told[9].stuck and told[9].slip.max() < 0.1
+    assert all(told[time].stuck and told[time].slip.min() > 0.9 for time in range(15, 39))
+    stds = [np.median(told[time].slip_std) for time in (20, 30, 38)]
+    assert stds == sorted(stds), 'less and less is known'
+    assert not told[45].stuck and told[45].slip.max() < 0.5
 
 
 def test_nothing_drifts_along_the_ridge_of_slip_and_strength():

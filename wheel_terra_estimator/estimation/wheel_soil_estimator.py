@@ -312,6 +312,7 @@ class WheelSoilEstimator:
 
         if not cycle.reference_known:
             self._speed.keep_with_rims(ekf, cycle.yaw_compensated)
+            self._speed.keep_behind_driving_wheels(ekf, cycle)
         self._speed.end_cycle(
             time,
             ekf,
@@ -429,7 +430,9 @@ class WheelSoilEstimator:
         speed, direction = self._speed, self._contact_age.state.direction
         inflation = speed.state.inflation if cycle.reference_known else 0.0
         by_wheels = expected = speed.by_wheels(cycle.dt, cycle.yaw_compensated, inflation)
-        unseen = not cycle.still and not cycle.reference_known
+        # No slip is usual where the ground holds the rover.
+        held = self._clock.assessment.holds
+        unseen = not (cycle.still or cycle.reference_known or held)
         if unseen:
             expected = speed.towards_equilibrium_slip(by_wheels, cycle, direction)
         lacking = speed.learn_bias(self._ekf, cycle, expected)
@@ -567,6 +570,7 @@ class WheelSoilEstimator:
                 or sides_oppose(rims, body.headings.by_yaw_rate),
                 depth_read=self._depth_read(time),
                 slip_told=self._reference.told_twice(time),
+                demand=self._demand.state,
             ),
         )
         self._clock = self._clock._replace(assessment=assessment, speed=present)
@@ -666,11 +670,13 @@ class WheelSoilEstimator:
     def _usual_speed(self, rims: RimSpeeds) -> SpeedAndVariance | None:
         """Return speed [m/s] and variance by the slip that is usual at such torques.
 
-        None with a reference velocity, without torques, and where wheels do not roll on straight.
+        None with a reference velocity, without torques, where wheels do not roll on straight or
+        the ground holds the rover.
         """
         time, turns = self._clock.time, self._turning.state.lateral_motion > _SHARP_TURN
         straight = self._contact_age.settled and not turns
-        if self._reference.known(time) or not (straight and self._wheels.torque_known(time)):
+        told = straight and self._wheels.torque_known(time)
+        if self._reference.known(time) or not told or self._clock.assessment.holds:
             return None
         usual = slip_of_torque(self._torque_coefficient.state)
         if isnan(usual.slip) or not abs(rims.typical) >= self._rover.low_rim:

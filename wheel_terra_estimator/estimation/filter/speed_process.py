@@ -102,6 +102,9 @@ _EQUILIBRIUM_SLIP_STD = 0.2  # about that of the configured soil on such a slope
 USUAL_LENGTH = 1.5  # rim travel over which slip returns to it [m]
 _LEAST_EQUILIBRIUM_SLIP = -0.2
 _MOST_EQUILIBRIUM_SLIP = 0.8
+_DRIVING = 0.3
+"""Torque over load times radius of a wheel that drives [-]: on loose soil it slips by a tenth."""
+_SURELY = 2.0  # deviations by which a rover is faster than such a wheel
 _START_SHARE = 0.5
 """Of the usual speed: what is farther from it at a start without reference is a transient of
 the accelerometer."""
@@ -452,6 +455,26 @@ class SpeedProcess(Component[SpeedState]):
         if abs(rims.typical) > self._rover.low_rim and rims.oppose(float(ekf.mean[SPEED])):
             least = (_FIRST_RATIO_STD * rims.typical) ** 2
             ekf.set(SPEED, 0.0, max(float(ekf.covariance[SPEED, SPEED]), least))
+
+    def keep_behind_driving_wheels(self, ekf: GatedFilter, cycle: Cycle) -> None:
+        """Let a rover without a reference velocity be no faster than a wheel that drives it.
+
+        The soil turns a wheel that it drags; one that stalls drives, however slowly it turns.
+        """
+        rims, loads = cycle.yaw_compensated, cycle.loads.load
+        way = math.copysign(1.0, rims.typical)
+        driving = [
+            max(way * rim, 0.0)
+            for rim, torque, load, radius in zip(
+                rims.each, cycle.torque, loads, self._rover.slip_radius, strict=True
+            )
+            if way * torque > _DRIVING * load * radius
+        ]
+        slowest = min(known(driving), default=math.inf)
+        variance = float(ekf.covariance[SPEED, SPEED])
+        if way * float(ekf.mean[SPEED]) - slowest > _SURELY * math.sqrt(variance):
+            least = (_FIRST_RATIO_STD * rims.typical) ** 2
+            ekf.set(SPEED, way * slowest, max(variance, least))
 
     def keep_least_variance(self, ekf: GatedFilter, rims: Floats) -> None:
         """Keep a least slip deviation."""

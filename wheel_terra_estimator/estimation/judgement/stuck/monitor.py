@@ -38,6 +38,8 @@ that sink, standing (two readings of wheel odometry). Where the rover stops, a r
 to 0.9 s before the wheels do, and none of them sinks."""
 _SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
 _DIGGING_SLIP = 0.8  # median slip above which a rover that drives on digs itself in
+_EASED = 0.05
+"""By how much less the ground asks where it may let a rover go [-]: three degrees of slope."""
 
 
 class StuckAssessment(NamedTuple):
@@ -52,6 +54,8 @@ class StuckAssessment(NamedTuple):
     """Sinkage gained over rim travel by more than half of the wheels [m/m]."""
     confirmed: bool = False
     """Whether something says so that no wrong sign or unit of the wheels' readings makes up."""
+    holds: bool = False
+    """Whether the ground holds the rover still: it drives on, and is asked for no less."""
 
 
 class StuckState(NamedTuple):
@@ -62,6 +66,7 @@ class StuckState(NamedTuple):
     stuck: bool = False
     reason: str = ''
     direction: int = 0
+    demand: float = NAN  # when the warning was raised [-]
     clear_since: float = NAN  # [s]
 
 
@@ -93,7 +98,9 @@ class StuckMonitor(Component[StuckState]):
             memory = situation.memory
             direction = memory.way if time - memory.way_since > SINKING_HOLD else 0
             reason = _in_words(situation, ahead, settings, held)
-            state = state._replace(stuck=True, reason=reason, direction=direction)
+            state = state._replace(
+                stuck=True, reason=reason, direction=direction, demand=motion.demand
+            )
         elif (
             old.stuck
             and not (any(there) or situation.sunk)
@@ -111,6 +118,9 @@ class StuckMonitor(Component[StuckState]):
             state.direction,
             situation.digging,
             state.stuck and _confirmed(situation),
+            state.stuck
+            and state.direction * situation.memory.way >= 0
+            and not motion.demand < state.demand - _EASED,
         )
 
 

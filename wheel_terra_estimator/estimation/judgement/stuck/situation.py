@@ -63,6 +63,7 @@ class RoverMotion(NamedTuple):
     """Sharply: slip that comes from turning says nothing of what is ahead."""
     depth_read: bool = True  # sensors tell the sinkage of most wheels
     slip_told: bool = False  # by two references of the last seconds, while wheels turned
+    demand: float = NAN  # what the ground asks in the direction of the drive, over the load [-]
 
 
 class Memory(NamedTuple):
