@@ -21,7 +21,7 @@ from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Readings
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
-    INPUT_UNITS,
+    INPUT_COLUMNS,
     WHEEL,
     operating_points,
 )
@@ -50,7 +50,7 @@ DEFAULT_SLIP = '0:0.9:19'
 MOST_POINTS = 100_000
 
 # Columns of the result, in the layout of the tables of steady measurements.
-INPUTS = (*INPUT_UNITS, 'leaving_angle')
+INPUTS = (*INPUT_COLUMNS, 'leaving_angle')
 SIDEWAYS = 'lateral_force'  # beside them where a wheel slides sideways
 CURVES = {
     'normal_load': '{:g} N',

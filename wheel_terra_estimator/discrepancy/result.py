@@ -13,7 +13,8 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.numbers import joined
-from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK, effect_of
 
 if TYPE_CHECKING:
@@ -277,7 +278,7 @@ class Diagnosis:
     def __repr__(self) -> str:
         """Return the verdict in words, and the error of each quantity on unseen rows."""
         errors = (
-            f'{name} [{UNITS[name]}]: unseen rows off by {gap.before:.3g} as configured, '
+            f'{name} [{unit_of(name)}]: unseen rows off by {gap.before:.3g} as configured, '
             f'{gap.refit:.3g} soil refitted, {gap.after:.3g} in the end'
             for name, gap in self.gap.items()
         )

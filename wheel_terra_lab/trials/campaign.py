@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray
-from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
+from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_COLUMNS
 from wheel_terra_lab.trials.designs import random_rows, random_soil
 from wheel_terra_lab.trials.detectability import Ruler, listed_kinds, size_for
 from wheel_terra_lab.trials.forms import FORMS
@@ -30,7 +30,7 @@ from wheel_terra_lab.trials.truth import (
     solve,
 )
 
-INPUTS = tuple(name for name in INPUT_UNITS if name != 'slip_angle')  # wheels that run straight
+INPUTS = tuple(name for name in INPUT_COLUMNS if name != 'slip_angle')  # wheels that run straight
 SLIP_STD = 0.02  # of a window of a drive
 
 

@@ -19,7 +19,7 @@ from wheel_terra_estimator.discrepancy.fitting.noise import inverse_covariance
 from wheel_terra_estimator.discrepancy.numbers import number, plain
 from wheel_terra_estimator.discrepancy.selection.weights import Setting
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
-    INPUT_UNITS,
+    INPUT_COLUMNS,
     ORDER_COLUMNS,
     QUANTITIES,
     SteadyTable,
@@ -165,7 +165,7 @@ def changes_along_rows(table: SteadyTable, predicted: FloatArray, band: FloatArr
 def _apart_from_inputs(table: SteadyTable, column: str) -> bool:
     """Return whether the order is not that of an input, whose misfit it would show as well."""
     rank = _ranks(table.columns[column])
-    inputs = (_ranks(table.columns[name]) for name in table.varying() if name in INPUT_UNITS)
+    inputs = (_ranks(table.columns[name]) for name in table.varying() if name in INPUT_COLUMNS)
     with np.errstate(invalid='ignore', divide='ignore'):
         return all(not abs(np.corrcoef(rank, other)[0, 1]) > _SAME_AS_INPUT for other in inputs)
 

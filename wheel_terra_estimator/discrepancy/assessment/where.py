@@ -14,10 +14,10 @@ from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, with_unit
 from wheel_terra_estimator.discrepancy.result import InputRange, Where
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
-    INPUT_UNITS,
     QUANTITIES,
     SteadyTable,
 )
+from wheel_terra_estimator.frames import unit_of
 
 _LEVELS = 7  # steps into which an input is cut
 _LARGEST_SHARE = 0.7  # of the rows in a box; more is "everywhere"
@@ -110,7 +110,7 @@ def _boxes(table: SteadyTable, names: list[str]) -> tuple[FloatArray, list[tuple
         for low, high in edges:
             member = (values >= low - 1e-12) & (values <= high + 1e-12)
             if 2 <= member.sum() <= _LARGEST_SHARE * len(values):
-                found.append((member, InputRange(name, float(low), float(high), INPUT_UNITS[name])))
+                found.append((member, InputRange(name, float(low), float(high), unit_of(name))))
         intervals[name] = found
     boxes: list[BoolArray] = []
     sides: list[tuple[InputRange, ...]] = []

@@ -20,7 +20,7 @@ from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import OUTLIER_FACTOR, Problem
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
-    INPUT_UNITS,
+    INPUT_COLUMNS,
     QUANTITIES,
     SteadyTable,
 )
@@ -77,7 +77,7 @@ def stated_noise(table: SteadyTable, scale: FloatArray, apart: FloatArray) -> No
 
 def repeats(table: SteadyTable, quantity: int, apart: FloatArray) -> tuple[float, int]:
     """Return the pooled deviation of rows with equal inputs, and its degrees of freedom."""
-    inputs = [values for name, values in table.columns.items() if name in INPUT_UNITS]
+    inputs = [values for name, values in table.columns.items() if name in INPUT_COLUMNS]
     keys = np.round(np.nan_to_num(np.column_stack([*inputs, apart])), 9)
     _, group = np.unique(keys, axis=0, return_inverse=True)
     group = np.ravel(group)

@@ -11,10 +11,11 @@ import numpy as np
 
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, with_unit
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
-    INPUT_UNITS,
+    INPUT_COLUMNS,
     QUANTITIES,
     SteadyTable,
 )
+from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES, TARGETS, pair_of
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
@@ -96,13 +97,13 @@ def limits_of_trust(table: SteadyTable) -> tuple[str, ...]:
     """Return where the law must not be used: outside the ranges of the rows that it came from."""
     varying = set(table.varying())
     found = []
-    for name in INPUT_UNITS:
+    for name in INPUT_COLUMNS:
         if name not in varying:
             continue
         values = table.columns[name][np.isfinite(table.columns[name])]
         ends = f'{number(values.min())} to {number(values.max())}'
-        found.append(with_unit(f'{name} outside {ends}', INPUT_UNITS[name]))
-    still = [name for name in INPUT_UNITS if name in table.columns and name not in varying]
+        found.append(with_unit(f'{name} outside {ends}', unit_of(name)))
+    still = [name for name in INPUT_COLUMNS if name in table.columns and name not in varying]
     if still:
         found.append(f'other values of what did not vary: {", ".join(still)}')
     return (*found, 'another soil')

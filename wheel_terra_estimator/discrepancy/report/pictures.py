@@ -12,7 +12,8 @@ import numpy as np
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label, plain, with_unit
 from wheel_terra_estimator.discrepancy.result import Diagnosis
-from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, QUANTITIES
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
+from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.reporting.style import INK, LINE_COLOURS, NOISE_COLOUR, picture_style
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ _LEGEND_LINE, _LEGEND_MARK, _LEGEND_LETTER = 0.28, 0.45, 0.072  # room they take
 
 def shown_input(name: str) -> tuple[float, str]:
     """Return factor and unit in which an input is shown."""
-    return SHOWN_INPUT.get(name, (1.0, INPUT_UNITS.get(name, '-')))
+    return SHOWN_INPUT.get(name, (1.0, unit_of(name)))
 
 
 def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:

@@ -46,12 +46,12 @@ from wheel_terra_estimator.discrepancy.selection.verdict import (
     Verdict,
     remainder,
 )
-from wheel_terra_estimator.discrepancy.tables.header import unit_of
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     ON_ONE_BED,
     QUANTITIES,
     SteadyTable,
 )
+from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES

@@ -16,7 +16,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
-    INPUT_UNITS,
+    INPUT_COLUMNS,
     SteadyTable,
     concatenated,
     new_rows,
@@ -42,7 +42,7 @@ def averaged(table: SteadyTable, most: int) -> SteadyTable:
     inputs = np.column_stack([table.columns[name] for name in names])
     width = np.nanmax(inputs, axis=0) - np.nanmin(inputs, axis=0)
     scaled = np.nan_to_num(inputs / np.where(width > 0.0, width, 1.0))
-    scaled[:, [i for i, name in enumerate(names) if name not in INPUT_UNITS]] = 0.0
+    scaled[:, [i for i, name in enumerate(names) if name not in INPUT_COLUMNS]] = 0.0
     known = np.isfinite(np.column_stack([inputs, table.measured, table.stated_std]))
     _, pattern = np.unique(known, axis=0, return_inverse=True)
     whole = [np.flatnonzero(np.ravel(pattern) == p) for p in np.unique(pattern)]
@@ -105,7 +105,7 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, Stead
             f'{", ".join(table.quantities)}; a reference needs a quantity of the table'
         )
     for column in set(table.columns) ^ set(reference.columns):
-        if column in INPUT_UNITS or column == 'leaving_angle':
+        if column in INPUT_COLUMNS or column == 'leaving_angle':
             has, lacks = (table, reference) if column in table.columns else (reference, table)
             raise UserError(
                 f'{lacks.name}: no column {column!r}, which {has.name} has; state it in both'

@@ -13,14 +13,14 @@ import numpy as np
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.tables.averaging import MINIMUM_ROWS, MOST_ROWS, averaged
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
-    INPUT_UNITS,
+    INPUT_COLUMNS,
     ONE_OF,
     ORDER_COLUMNS,
     QUANTITIES,
-    UNITS,
     SteadyTable,
 )
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.frames import unit_of
 
 Mask = BoolArray
 
@@ -70,7 +70,7 @@ def check_table(
         )
     stated = _columns(arrays, tuple(f'{q}_std' for q in QUANTITIES), count)
     slip_std = np.nan_to_num(arrays.get('slip_std', np.zeros(count)), nan=0.0)
-    inputs = {key: arrays[key] for key in INPUT_UNITS if key in arrays}
+    inputs = {key: arrays[key] for key in INPUT_COLUMNS if key in arrays}
     # No inputs of the model: a measured angle, and when the rows of a drive were.
     beside = ('leaving_angle', 'time', *ORDER_COLUMNS)
     inputs.update({key: arrays[key] for key in beside if key in arrays})
@@ -91,7 +91,7 @@ def check_table(
             f'{before} rows were averaged to {len(table)} over neighbouring inputs; '
             'a line number below is the first of its rows'
         )
-    constant = [key for key in inputs if key in INPUT_UNITS and key not in table.varying()]
+    constant = [key for key in inputs if key in INPUT_COLUMNS and key not in table.varying()]
     if constant:
         remarks.append(f'constant in this table: {", ".join(constant)}')
     return replace(table, notes=tuple(remarks))
@@ -183,13 +183,13 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray
             measured = np.isfinite(force)
             if measured.sum() > 2 and 0.0 < abs(force[measured]).max() < _NO_FORCE * load.max():
                 refuse(measured, column, _KILONEWTON)
-    for quantity, unit in UNITS.items():
+    for quantity in QUANTITIES:
         if quantity in arrays and f'{quantity}_std' in arrays:
             std, values = arrays[f'{quantity}_std'], np.abs(arrays[quantity])
             greatest = values[np.isfinite(values)].max(initial=0.0)
             # A deviation beside which its whole column is nothing has another unit.
             if np.nanmin(std, initial=np.inf) > 10.0 * greatest > 0.0:
-                far = f'is over ten times the largest {quantity}; give both in {unit}'
+                far = f'is over ten times the largest {quantity}; give both in {unit_of(quantity)}'
                 refuse(np.isfinite(std), f'{quantity}_std', far)
 
 
@@ -262,7 +262,7 @@ def _check_dead_columns(table: SteadyTable, remarks: list[str]) -> None:
             )
         if len(values) < MINIMUM_ROWS or np.ptp(values) > 0.0:
             continue
-        said = f'{values[0]:g} {UNITS[quantity]} in all {len(values)} rows'
+        said = f'{values[0]:g} {unit_of(quantity)} in all {len(values)} rows'
         if np.isfinite(table.stated_std[here, q]).all():
             remarks.append(f'{quantity} is {said}: taken as measured, with its stated deviation')
             continue

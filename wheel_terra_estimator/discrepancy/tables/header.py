@@ -23,12 +23,11 @@ from wheel_terra_estimator.configuration.column_map import (
 from wheel_terra_estimator.configuration.parameters import nearest, plain_table
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     COLUMNS,
-    INPUT_UNITS,
     ORDER_COLUMNS,
     STD_COLUMNS,
 )
-from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS as QUANTITY_UNITS
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.frames import unit_of
 
 _TITLES = plain_table(Path(__file__).with_name('titles.yaml'))
 _STD_ENDS = ('std', 'sd', 'stddev', 'stdev', 'sigma')
@@ -101,16 +100,6 @@ class Title:
     name: str
     unit: str = ''
     asked: bool = False
-
-
-def unit_of(name: str) -> str:
-    """Return the SI unit of a column."""
-    quantity = name.removesuffix('_std')
-    if quantity == 'leaving_angle':
-        return 'rad'
-    if quantity in ORDER_COLUMNS:
-        return '-'
-    return INPUT_UNITS.get(quantity) or QUANTITY_UNITS[quantity]
 
 
 def _key(text: str) -> str:

@@ -31,7 +31,6 @@ from wheel_terra_estimator.discrepancy.tables.header import (
     Header,
     Title,
     meaning_of,
-    unit_of,
     with_unit,
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
@@ -41,7 +40,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     SteadyTable,
 )
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.frames import arrays_of, units_in
+from wheel_terra_estimator.frames import arrays_of, unit_of, units_in
 from wheel_terra_estimator.input_file import LARGEST_TABLE
 
 Rows = Iterable[tuple[int, Sequence[Any]]]

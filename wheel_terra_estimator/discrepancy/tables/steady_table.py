@@ -16,25 +16,16 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 QUANTITIES = ('sinkage', 'drawbar_pull', 'torque', 'lateral_force')
-UNITS = {'sinkage': 'm', 'drawbar_pull': 'N', 'torque': 'N m', 'lateral_force': 'N'}
 ONE_OF = QUANTITIES[:3]  # of which each row has at least one
-INPUT_UNITS = {
-    'slip': '-',
-    'normal_load': 'N',
-    'slope': 'rad',
-    'slip_angle': 'rad',
-    'wheel_radius': 'm',
-    'wheel_width': 'm',
-    'lug_height': 'm',
-    'lug_count': '-',
-    'gravity': 'm/s^2',
-    'angular_velocity': 'rad/s',
-    'pass_number': '-',
-}
+INPUT_COLUMNS = (
+    *('slip', 'normal_load', 'slope', 'slip_angle'),
+    *('wheel_radius', 'wheel_width', 'lug_height', 'lug_count'),
+    *('gravity', 'angular_velocity', 'pass_number'),
+)
 STD_COLUMNS = ('slip_std', *(f'{quantity}_std' for quantity in QUANTITIES), 'leaving_angle_std')
 # When and how the rows were taken: no inputs of the model, but residuals may change along them.
 ORDER_COLUMNS = ('row_order', 'trial', 'date', 'direction')
-COLUMNS = (*INPUT_UNITS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS, *ORDER_COLUMNS)
+COLUMNS = (*INPUT_COLUMNS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS, *ORDER_COLUMNS)
 ON_ONE_BED = ('slip', 'pass_number')  # inputs that change within a sweep
 _LEAST_ROWS = 3  # of a sweep, in the mean
 _APART = 0.05  # of the range, between loads (...) of two sweeps
@@ -75,7 +66,7 @@ class SteadyTable:
         found = []
         for name, values in self.columns.items():
             finite = values[np.isfinite(values)]
-            if name in INPUT_UNITS and finite.size and np.ptp(finite) > 1e-9 * abs(finite).max():
+            if name in INPUT_COLUMNS and finite.size and np.ptp(finite) > 1e-9 * abs(finite).max():
                 found.append(name)
         return tuple(found)
 
@@ -144,7 +135,7 @@ def concatenated(name: str, parts: Sequence[SteadyTable], notes: tuple[str, ...]
 def new_rows(table: SteadyTable, earlier: Sequence[SteadyTable]) -> SteadyTable:
     """Return the table without rows that have all inputs and readings of one of earlier tables."""
     whole = concatenated(table.name, [*earlier, table], table.notes)
-    inputs = [values for key, values in whole.columns.items() if key in INPUT_UNITS]
+    inputs = [values for key, values in whole.columns.items() if key in INPUT_COLUMNS]
     cells = np.nan_to_num(np.column_stack([*inputs, whole.measured]), nan=np.inf)
     rows = list(map(tuple, cells.tolist()))
     known = set(rows[: -len(table)])
