@@ -25,29 +25,20 @@ from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
 EXAMPLE = Path(__file__).with_name('columns_example.yaml').read_text(encoding='utf-8')
 
-_SI = {
-    'time': 's',
-    'rate': 'rad/s',
-    'angle': 'rad',
-    'torque': 'N m',
-    'acceleration': 'm/s^2',
-    'length': 'm',
-    'speed': 'm/s',
-    'number': '-',
-}
-_AXES = 'xyz'
+# Readings and their SI units.
+_JOINT = {'velocity': 'rad/s', 'effort': 'N m', 'position': 'rad'}
 _IMU = {
-    **{f'linear_acceleration.{axis}': 'acceleration' for axis in _AXES},
-    **{f'angular_velocity.{axis}': 'rate' for axis in _AXES},
-    **{f'orientation.{axis}': 'number' for axis in (*_AXES, 'w')},
+    **{f'linear_acceleration.{axis}': 'm/s^2' for axis in 'xyz'},
+    **{f'angular_velocity.{axis}': 'rad/s' for axis in 'xyz'},
+    **{f'orientation.{axis}': '-' for axis in 'xyzw'},
 }
 _REFERENCE = {
-    'linear.x': 'speed',
-    'variance': 'number',
-    'position.x': 'length',
-    'position.y': 'length',
-    'latitude': 'angle',
-    'longitude': 'angle',
+    'linear.x': 'm/s',
+    'variance': '-',
+    'position.x': 'm',
+    'position.y': 'm',
+    'latitude': 'rad',
+    'longitude': 'rad',
 }
 _PLACES = (('position.x', 'position.y'), ('latitude', 'longitude'))
 EARTH_RADIUS = 6_371_000.0  # mean [m]
@@ -55,7 +46,6 @@ BASELINE = 1.0  # positions so far apart [s] make a speed: closer ones are noise
 ONE_WAY = 0.5
 """Share of their rate that the wheels have in common, metre for metre, if all count one way [-]."""
 _LATEST = 2**31 - 1  # stamp that a message can hold [s]
-_JOINT = {'velocity': 'rate', 'effort': 'torque', 'position': 'angle'}
 _TOPICS = ('joint_states', 'imu/data', 'sinkage', 'reference_odom')
 REGULAR = 0.8
 """Share of the runs of one value as long as the others of a sensor whose value is held [-]."""
@@ -166,7 +156,7 @@ def _read_map(path: Path, header: list[str], table: Path) -> ColumnMap:
                 'position alone)'
             )
     sinkage = {
-        str(wheel): reader.column(f'sinkage.{wheel}', entry, 'length')
+        str(wheel): reader.column(f'sinkage.{wheel}', entry, 'm')
         for wheel, entry in reader.mapping('sinkage', document.get('sinkage') or {}).items()
     }
     imu = reader.group('imu/data', document.get('imu/data') or {}, _IMU)
@@ -178,7 +168,7 @@ def _read_map(path: Path, header: list[str], table: Path) -> ColumnMap:
             f'{path}: reference_odom: give linear.x, or position.x and position.y, or latitude and '
             'longitude'
         )
-    time = reader.column('time', document['time'], 'time')
+    time = reader.column('time', document['time'], 's')
     return ColumnMap(time, joints, imu, sinkage, reference)
 
 
@@ -193,26 +183,26 @@ class _MapReader:
             raise UserError(f'{self.path}: {where}: must be entries, one a line')
         return entry
 
-    def group(self, where: str, entry: Any, kinds: Mapping[str, str]) -> dict[str, Column]:
+    def group(self, where: str, entry: Any, units: Mapping[str, str]) -> dict[str, Column]:
         found = {}
         for key, value in self.mapping(where, entry).items():
-            if key not in kinds:
+            if key not in units:
                 raise UserError(
-                    f"{self.path}: {where}: unknown '{key}'; nearest: '{nearest(str(key), kinds)}'"
+                    f"{self.path}: {where}: unknown '{key}'; nearest: '{nearest(str(key), units)}'"
                 )
-            found[str(key)] = self.column(f'{where}.{key}', value, kinds[key])
+            found[str(key)] = self.column(f'{where}.{key}', value, units[key])
         return found
 
-    def column(self, where: str, value: Any, kind: str) -> Column:
+    def column(self, where: str, value: Any, si: str) -> Column:
         value = dict(self.mapping(where, value))
-        si, radius = _SI[kind], 1.0
-        if kind == 'rate' and 'radius' in value:  # a rim speed
+        radius = 1.0
+        if si == 'rad/s' and 'radius' in value:  # a rim speed
             si, radius = 'm/s', self._radius(where, value.pop('radius'))
         entry = entry_of(value, f'{self.path}: {where}')
         times = factor(si, entry.unit) if entry.unit else 1.0
         if times is None:
             known = ', '.join(UNITS[si])
-            rim = ', nor m/s with radius: 0.15' if si == _SI['rate'] else ''
+            rim = ', nor m/s with radius: 0.15' if si == 'rad/s' else ''
             raise UserError(f"{self.path}: {where}: unit '{entry.unit}' is none of {known}{rim}")
         if entry.column not in self.header:
             raise UserError(
@@ -298,10 +288,10 @@ class _Sender:
         if not values or any(math.isnan(value) for value in values.values()):
             return
         force, rate = (
-            [values.get(f'{name}.{axis}', 0.0) for axis in _AXES]
+            [values.get(f'{name}.{axis}', 0.0) for axis in 'xyz']
             for name in ('linear_acceleration', 'angular_velocity')
         )
-        quaternion = [values.get(f'orientation.{axis}') for axis in (*_AXES, 'w')]
+        quaternion = [values.get(f'orientation.{axis}') for axis in 'xyzw']
         whole = all(part is not None for part in quaternion)
         orientation = [float(part or 0.0) for part in quaternion] if whole else None
         self.bag.write('/imu/data', pack.imu(stamp, force, rate, orientation), stamp)
