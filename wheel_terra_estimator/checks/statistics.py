@@ -64,14 +64,7 @@ def robust_std(values: FloatArray) -> float:
     values = values[np.isfinite(values)]
     if not values.size:
         return math.nan
-    return MAD_TO_STD * middle(np.abs(values - middle(values)))
-
-
-def middle(values: FloatArray) -> float:
-    """Return the median of finite (k,) values: of few ones in a fifth of the time of numpy's."""
-    half = values.size // 2
-    below, above = np.partition(values, [half - 1, half])[[half - 1, half]].tolist()
-    return float(above if values.size % 2 else 0.5 * (below + above))
+    return MAD_TO_STD * float(np.median(np.abs(values - np.median(values))))
 
 
 def block_fit(
