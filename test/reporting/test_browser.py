@@ -20,6 +20,7 @@ from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, St
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.report.page import write_report
+from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import summarise
 from wheel_terra_estimator.reporting.fleet_summary import CLASSES, DriveRow, write_summary_page
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
@@ -144,7 +145,8 @@ def an_hour() -> tuple[EstimateHistory, Truth]:
 @pytest.fixture(scope='module')
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     history, truth = an_hour()
-    summary = summarise('an hour', history, {'joint_states': '/joint_states'}, {}, {}, ['a note'])
+    topics, border = {'joint_states': '/joint_states'}, Border(0.25, np.inf)
+    summary = summarise('an hour', history, topics, {}, {}, ['a note'], border, ())
     path = tmp_path_factory.mktemp('report') / 'report.html'
     write_replay_report(path, summary, history, truth, reader.load(['generic_six_wheel']))
     return path

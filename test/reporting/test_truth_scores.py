@@ -99,7 +99,7 @@ def test_a_warning_before_slip_without_a_class_is_not_judged(unknown_from, said)
     """Inputs that are found wrong after it: what the filter makes of them says nothing."""
     classes = np.where(np.arange(100) >= unknown_from, SlipClass.UNKNOWN, SlipClass.LOW)
     drive = history(np.zeros((100, 2)), classes[:, None], (StuckWarning(int(STAMP[40]), None, ''),))
-    (verdict,) = seen_later(drive, Border())
+    (verdict,) = seen_later(drive, Border(0.25, np.inf))
     assert said in verdict
 
 

@@ -24,10 +24,8 @@ CLASS_COLOURS = {
 """They differ in grey and for every eye; unknown is drawn thinner."""
 BAND = 2.0
 """Half width of the drawn bands in standard deviations."""
-SLIP_BORDER = 0.25
-"""Default of ``filter.class_std``: the standard deviation beyond which slip is not known [-]."""
 SINKAGE_BORDER = 0.5
-"""The same of the sinkage, over the wheel radius [-]."""
+"""Standard deviation beyond which the sinkage is not known, over the wheel radius [-]."""
 NOT_KNOWN = 'not known'
 
 
@@ -35,8 +33,8 @@ NOT_KNOWN = 'not known'
 class Border:
     """Standard deviations beyond which slip [-] and sinkage [m] (scalar or (n,)) are not known."""
 
-    slip: float = SLIP_BORDER
-    sinkage: float | FloatArray = np.inf
+    slip: float
+    sinkage: float | FloatArray
 
     @classmethod
     def of(cls, configuration: Configuration) -> Border:

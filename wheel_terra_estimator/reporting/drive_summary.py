@@ -119,11 +119,10 @@ def summarise(
     counts: Mapping[str, int],
     rejected: Mapping[tuple[str, str], int],
     notes: Sequence[str],
-    border: Border | None = None,
-    taught: Sequence[Taught] = (),
+    border: Border,
+    taught: Sequence[Taught],
 ) -> DriveSummary:
     """Sum a drive up; ``topics`` and ``counts`` go by input topic, ``rejected`` by reason, too."""
-    border = border or Border()
     figures = history.figures()
     return DriveSummary(
         title=title,
