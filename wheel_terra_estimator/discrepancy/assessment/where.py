@@ -13,10 +13,7 @@ from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, with_unit
 from wheel_terra_estimator.discrepancy.result import InputRange, Where
-from wheel_terra_estimator.discrepancy.tables.steady_table import (
-    QUANTITIES,
-    SteadyTable,
-)
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.frames import unit_of
 
 _LEVELS = 7  # steps into which an input is cut
