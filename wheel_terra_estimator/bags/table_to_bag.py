@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.configuration.column_map import UNITS, entry_of, factor, read_map
+from wheel_terra_estimator.configuration.column_map import UNITS, Column, entry_of, factor, read_map
 from wheel_terra_estimator.configuration.parameters import nearest
 from wheel_terra_estimator.csv_file import CsvFile, check_width, number, open_csv
 from wheel_terra_estimator.errors import UserError
@@ -50,15 +50,6 @@ _TOPICS = ('joint_states', 'imu/data', 'sinkage', 'reference_odom')
 REGULAR = 0.8
 """Share of the runs of one value as long as the others of a sensor whose value is held [-]."""
 LEAST_RUNS = 10  # runs of one value that tell it
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of the table: its index, and the factor to SI units with the sign."""
-
-    name: str
-    index: int
-    factor: float
 
 
 @dataclass(frozen=True)
@@ -126,7 +117,7 @@ def _held(table: Path, layout: ColumnMap) -> dict[str, int]:
 
 
 def _cells(row: list[str], columns: Mapping[str, Column]) -> list[str]:
-    return [row[column.index] for column in columns.values() if column.index < len(row)]
+    return [row[column.place] for column in columns.values() if column.place < len(row)]
 
 
 def _used(layout: ColumnMap) -> list[str]:
@@ -210,7 +201,7 @@ class _MapReader:
                 f"'{nearest(entry.column, self.header) if self.header else ''}'"
             )
         place = self.header.index(entry.column)
-        return Column(entry.column, place, entry.sign * times / radius)
+        return Column(place, entry.column, entry.sign * times / radius)
 
     def _radius(self, where: str, radius: Any) -> float:
         if not isinstance(radius, (int, float)) or not 0.0 < radius < math.inf:
@@ -276,11 +267,11 @@ class _Sender:
     def value(self, line: int, row: list[str], column: Column | None) -> float:
         if column is None:
             return math.nan
-        if column.index >= len(row):
+        if column.place >= len(row):
             self.short[line] = None
             return math.nan
         where = f'{self.table}, line {line}, column {column.name}'
-        return column.factor * number(row[column.index], where, self.decimal_comma)
+        return column.factor * number(row[column.place], where, self.decimal_comma)
 
     def _imu(self, line: int, row: list[str], stamp: int) -> None:
         columns = self.layout.imu

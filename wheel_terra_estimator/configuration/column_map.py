@@ -90,6 +90,15 @@ class Entry:
     sign: int = 1  # -1 turns it round
 
 
+@dataclass(frozen=True)
+class Column:
+    """A column that is read: its place in the table, its name, the factor to SI with the sign."""
+
+    place: int
+    name: str
+    factor: float
+
+
 def entry_of(value: Any, where: str) -> Entry:
     """Return an entry from ``TITLE`` or ``{column: TITLE, unit: mm, sign: -1}``.
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from wheel_terra_estimator.configuration.column_map import (
     UNITS,
+    Column,
     Entry,
     entry_of,
     factor,
@@ -82,15 +83,6 @@ def _entries(columns: Mapping[Any, Any], source: str) -> dict[str, Entry]:
                 f"{source}: no column '{name}' is read; nearest: '{nearest(str(name), COLUMNS)}'"
             )
     return {str(name): entry_of(value, f'{source}: {name}') for name, value in columns.items()}
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column that is read: its place in the table, its name, the factor to SI."""
-
-    place: int
-    name: str
-    factor: float = 1.0
 
 
 @dataclass(frozen=True)
