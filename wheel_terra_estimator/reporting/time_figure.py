@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -87,10 +87,7 @@ class _Line:
     panel: int
     x: FloatArray
     y: FloatArray  # (k,), or (2, k): lower and upper edge of a band
-    classes: str
-    name: str = ''
-    colour: str = ''
-    width: float = 1.4
+    curve: Curve  # without its path, which the limits of the panel decide
 
 
 @dataclass
@@ -119,14 +116,15 @@ class TimeFigure:
         """Add a line; nan is a gap."""
         points = thin(x, values, LINE_POINTS)
         classes = f'line {self._classes(switches)}'
-        self._lines.append(_Line(panel, *points, classes, name, colour, width))
+        self._lines.append(_Line(panel, *points, Curve('', classes, name, colour, width)))
 
     def truth(
         self, panel: int, x: FloatArray, values: FloatArray, name: str, *switches: str
     ) -> None:
         """Add a dashed line in the page's ink."""
         points = thin(x, values, TRUTH_POINTS)
-        self._lines.append(_Line(panel, *points, f'truth {self._classes(switches)}', name))
+        classes = f'truth {self._classes(switches)}'
+        self._lines.append(_Line(panel, *points, Curve('', classes, name)))
 
     def band(
         self,
@@ -141,7 +139,7 @@ class TimeFigure:
         few, low = thin(x, values - half, BAND_POINTS)
         edges = np.vstack([low, np.interp(few, x, values + half)])
         classes = f'band {self._classes(("band", *switches))}'
-        self._lines.append(_Line(panel, few, edges, classes, '', colour))
+        self._lines.append(_Line(panel, few, edges, Curve('', classes, light=colour)))
 
     def strips(
         self, panel: int, x: FloatArray, member: BoolArray, name: str, colour: str,
@@ -190,10 +188,7 @@ class TimeFigure:
     def _line_panel(self, number: int, panel: Panel) -> Drawn:
         mine = [line for line in self._lines if line.panel == number]
         low, high = panel.limits or limits(*(line.y for line in mine if line.y.ndim == 1))
-        curves = tuple(
-            Curve(_path(line, low, high), line.classes, line.name, line.colour, line.width)
-            for line in mine
-        )
+        curves = tuple(replace(line.curve, path=_path(line, low, high)) for line in mine)
         ticks = tuple(Mark(text, (high - value) / (high - low)) for value, text in nice(low, high))
         return Drawn(panel.title, panel.share, low, high, curves, ticks, strips=False)
 
