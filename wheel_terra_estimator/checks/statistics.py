@@ -195,9 +195,7 @@ def step_of(values: FloatArray) -> float:
     step = float(np.quantile(np.diff(distinct), 0.1, method='lower'))
     for _ in range(2):  # refined by all multiples
         count = np.round(values / step)
-        step = float(values @ count / (count @ count)) if count.any() else 0.0
-        if step <= 0.0:
-            return 0.0
+        step = float(values @ count / (count @ count))
     fits = np.abs(values / step - np.round(values / step)) < OFF_A_STEP
     return step if float(np.mean(fits)) > 0.95 else 0.0
 
