@@ -395,10 +395,8 @@ def _remove_own_files(folder: Path) -> None:
         entry = folder / name
         entry.rmdir() if name.endswith('/') else entry.unlink()
     (folder / MARKER).unlink(missing_ok=True)
-    for below in sorted(
-        (Path(place) for place, _, _ in os.walk(folder)), key=lambda p: len(p.parts), reverse=True
-    ):
-        below.rmdir()
+    for place, _, _ in os.walk(folder, topdown=False):
+        Path(place).rmdir()
 
 
 def _put_in_place(fresh: Path, path: Path, beside: Path) -> None:
