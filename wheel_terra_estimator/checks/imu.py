@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.evidence import (
@@ -161,8 +162,6 @@ def check_imu(state: ImuState) -> Judged:
 
 def _up_by_orientation(state: ImuState) -> Judged:
     """Return an orientation that has up elsewhere than the specific force, both in its frame."""
-    from scipy.spatial.transform import Rotation  # heavy
-
     imu = state.imu
     norm = np.linalg.norm(imu.orientation, axis=1)
     known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
@@ -274,8 +273,6 @@ def _against_orientation(state: ImuState) -> Judged:
 
     Where they differ about x or y, the specific force shows which of them tells the slope.
     """
-    from scipy.spatial.transform import Rotation  # heavy
-
     imu = state.imu
     time, q = imu.stamp * 1e-9, imu.orientation
     if not np.isfinite(q).all(axis=1).mean() > 0.9 or imu.stamp.size < 200:
@@ -317,8 +314,6 @@ def _against_orientation(state: ImuState) -> Judged:
 
 def _slopes_alike(state: ImuState, known: BoolArray, axis: int) -> float:
     """Return the correlation of up by orientation and by specific force along an axis [-]."""
-    from scipy.spatial.transform import Rotation  # heavy
-
     imu = state.imu
     up = Rotation.from_quat(imu.orientation[known]).inv().apply([0.0, 0.0, 1.0])[:, axis]
     width = round(SLOPE_TIME / imu.period)
@@ -347,8 +342,6 @@ class Mounting:
 
     def taken_off(self, rotation: FloatArray) -> FloatArray:
         """Return a rotation into ``base_link`` without the tilt: about x, then y."""
-        from scipy.spatial.transform import Rotation  # heavy
-
         tilt = Rotation.from_euler('xy', [self.roll, self.pitch])
         return np.asarray(tilt.as_matrix() @ rotation)
 
@@ -358,8 +351,6 @@ def gross_tilt(evidence: Evidence) -> FloatArray | None:
 
     By whole quarter turns where a slope explains what is left; else all of it is the mounting.
     """
-    from scipy.spatial.transform import Rotation  # heavy
-
     if evidence.force is None:
         return None
     up = np.median(evidence.force, axis=0)
@@ -498,8 +489,6 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def without_yaw(seen: Estimate) -> FloatArray:
     """Return the rotation that takes a yaw off; right angles are meant where they fit."""
-    from scipy.spatial.transform import Rotation  # heavy
-
     angle, apart = seen.value, math.remainder(seen.value, math.pi / 2.0)
     if abs(apart) < 2.5 * max(seen.std, math.radians(4.0)) and abs(angle) > LEAST_QUARTER:
         angle = round(angle / (math.pi / 2.0)) * math.pi / 2.0
@@ -572,8 +561,6 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def mounting_angles(rotation: FloatArray) -> list[float]:
     """Return roll, pitch, yaw [deg] of a rotation (fixed axes x, then y, then z, as in URDF)."""
-    from scipy.spatial.transform import Rotation  # heavy
-
     with warnings.catch_warnings():  # of an IMU on its side yaw is left at 0
         warnings.simplefilter('ignore', UserWarning)
         angles: list[float] = Rotation.from_matrix(rotation).as_euler('xyz', degrees=True).tolist()

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration import reader
@@ -57,8 +58,6 @@ class RoverFacts:
     @cached_property
     def mounting(self) -> FloatArray:
         """Stated (3, 3) rotation from the IMU's frame into ``base_link``."""
-        from scipy.spatial.transform import Rotation  # heavy
-
         angles = [
             getattr(self.sensors, f'imu_mounting_{axis}') for axis in ('roll', 'pitch', 'yaw')
         ]

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
-from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.measurements import (
@@ -93,6 +92,7 @@ def run_estimator(
 
     Returns its sets and its health.
     """
+    from wheel_terra_estimator.checks.input_judge import InputJudge
     from wheel_terra_estimator.estimation.core import EstimatorCore
     from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 
