@@ -7,6 +7,9 @@ from __future__ import annotations
 import argparse
 import re
 
+from wheel_terra_estimator.configuration import shipped
+from wheel_terra_estimator.errors import UserError
+
 EXAMPLES = ('wheel-terra config list rovers', 'wheel-terra config show frostyboy')
 
 
@@ -25,8 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    from wheel_terra_estimator.configuration import shipped
-
     if arguments.action == 'show':
         print(shipped.find(arguments.name).read_text(encoding='utf-8'), end='')
     elif arguments.action == 'path':
@@ -37,9 +38,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _list(folder: str) -> None:
-    from wheel_terra_estimator.configuration import shipped
-    from wheel_terra_estimator.errors import UserError
-
     files = shipped.files()
     folders = sorted({name.split('/')[0] for name in files})
     if folder and folder not in folders:

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wheel_terra_estimator.cli.outputs import add_output
+from wheel_terra_estimator.configuration.shipped import demo_recording
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, working_folder
 
@@ -150,8 +151,6 @@ def _run(command: Sequence[str], environment: Mapping[str, str]) -> Part:
 
 def _trial(folder: Path) -> Part:
     """Diagnose the shipped table blind."""
-    from wheel_terra_estimator.configuration.shipped import demo_recording
-
     shipped = demo_recording('trial')
     command = ['wheel_terra_estimator.cli.main', 'diagnose', '--overwrite']
     command += [str(shipped / 'blind.csv'), '--config', str(shipped / 'rig.yaml')]
@@ -161,8 +160,6 @@ def _trial(folder: Path) -> Part:
 
 def _named(folder: Path) -> str:
     """Reveal the truth; return whether what was named is what was hidden."""
-    from wheel_terra_estimator.configuration.shipped import demo_recording
-
     path = demo_recording('trial') / 'sealed.json'
     sealed = path.read_bytes()
     if hashlib.sha256(sealed).hexdigest() != SEAL_SHA256:
@@ -185,8 +182,6 @@ def _drive(number: int, output: Path, live: bool) -> Part:
 
 
 def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:
-    from wheel_terra_estimator.configuration.shipped import demo_recording
-
     command = ['wheel_terra_lab.live_drive']
     if not live:
         command = ['wheel_terra_estimator.cli.main', 'replay']
@@ -216,7 +211,6 @@ def _outcome(drive: DemoDrive, output: Path) -> str:
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_truth
     from wheel_terra_estimator.configuration import reader
-    from wheel_terra_estimator.configuration.shipped import demo_recording
     from wheel_terra_estimator.reporting.truth_scores import truth_errors
 
     configuration = reader.load(drive.configuration)

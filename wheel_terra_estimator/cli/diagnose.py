@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.cli.outputs import add_output, add_remaps, file_or_entry
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 
@@ -27,8 +28,6 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    from wheel_terra_estimator.configuration import reader
-
     parser.add_argument(
         'data',
         type=Path,
@@ -149,7 +148,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
     """Return the diagnosis of all data as one table."""
-    from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.discrepancy.tables.averaging import together
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
