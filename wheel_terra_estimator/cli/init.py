@@ -8,13 +8,15 @@ import argparse
 import shlex
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.cli.outputs import add_output, add_remaps
+from wheel_terra_estimator.configuration.rover_template import (
+    CENTRE_HEIGHT,
+    DEFAULT_WIDTH_SHARE,
+    RoverSketch,
+    rover_file,
+)
 from wheel_terra_estimator.errors import UserError
-
-if TYPE_CHECKING:
-    from wheel_terra_estimator.configuration.rover_template import RoverSketch
 
 EXAMPLES = (
     'wheel-terra init --urdf rover.urdf -o my_rover.yaml',
@@ -69,7 +71,6 @@ def _positive(text: str) -> float:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.configuration import reader
-    from wheel_terra_estimator.configuration.rover_template import rover_file
     from wheel_terra_estimator.output_folder import check_file, new_file
 
     check_file(arguments.output, arguments.overwrite)
@@ -152,11 +153,6 @@ def _wheels_of(path: Path, remaps: list[str]) -> list[str]:
 
 def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSketch:
     from wheel_terra_estimator.checks.rover_facts import side_of
-    from wheel_terra_estimator.configuration.rover_template import (
-        CENTRE_HEIGHT,
-        DEFAULT_WIDTH_SHARE,
-        RoverSketch,
-    )
 
     measures = {name: getattr(arguments, name) for name, _, _ in _MEASURES}
     for name, most in (('wheelbase', 2), ('track', 1)):

@@ -11,14 +11,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.configuration import reader as configuration_reader
-from wheel_terra_estimator.configuration.configuration import Readings
+from wheel_terra_estimator.configuration.configuration import Configuration, Readings
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_COLUMNS,
@@ -36,10 +36,6 @@ from wheel_terra_estimator.terramechanics.contact_law import (
 from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
 from wheel_terra_estimator.terramechanics.model import METHODS, OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-
-if TYPE_CHECKING:
-    from wheel_terra_estimator.configuration.configuration import Configuration
-
 
 EXAMPLES = (
     'wheel-terra predict --config hit_wh3 --config hit_fit --slip 0:0.6:13 --load 80',
