@@ -16,12 +16,11 @@ from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 from wheel_terra_estimator.bags import bag_metadata
 from wheel_terra_estimator.bags.salvage import RawMessage, Topic
 from wheel_terra_estimator.bags.salvage.compression import ZSTD_MAGIC, unpack_file, unpack_message
-from wheel_terra_estimator.bags.salvage.losses import Losses
 from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
 from wheel_terra_estimator.bags.salvage.sqlite_file import SqliteFile
 from wheel_terra_estimator.errors import UserError
@@ -29,20 +28,12 @@ from wheel_terra_estimator.input_file import check_regular
 from wheel_terra_estimator.messages.unpack import TYPES, DamagedMessageError, unpack
 
 STORAGE_SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
+_Source: TypeAlias = McapFile | SqliteFile
 
 
 def is_bag(path: Path) -> bool:
     """Return whether a path names a recording, and no table."""
     return path.is_dir() or path.name.endswith(STORAGE_SUFFIXES)
-
-
-class _Source(Protocol):
-    topics: list[Topic]
-    losses: Losses
-
-    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]: ...
-
-    def notes(self) -> list[str]: ...
 
 
 class Bag:
@@ -64,12 +55,15 @@ class Bag:
     @property
     def notes(self) -> list[str]:
         """What was wrong with the recording and what was done about it; grows while reading."""
-        return [*self._notes, *(note for source in self._sources for note in source.notes())]
+        return [
+            *self._notes,
+            *(note for source in self._sources for note in source.losses.in_words()),
+        ]
 
     @property
     def damaged(self) -> bool:
         """Whether something of a file was lost, as far as it is known by now."""
-        return any(source.notes() for source in self._sources)
+        return any(source.losses.in_words() for source in self._sources)
 
     @property
     def lost(self) -> float:
@@ -192,7 +186,7 @@ def _compare(metadata: bag_metadata.Metadata, sources: list[_Source], notes: lis
     """Let the metadata say how much there should be, or say that they lie."""
     if metadata.fault:
         return
-    if any(source.notes() for source in sources):
+    if any(source.losses.in_words() for source in sources):
         if len(sources) == 1 and sources[0].losses.declared is None and metadata.counts:
             sources[0].losses.declared = dict(metadata.counts)
         return

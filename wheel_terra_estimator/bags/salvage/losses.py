@@ -17,6 +17,7 @@ LONGEST_END = 60_000_000_000  # [ns] behind the last message that was read
 class Losses:
     """What is known of a file's losses; grows while it is read."""
 
+    name: str  # of the file
     # Messages on each topic, as the file itself states; None where it does not
     declared: Mapping[str, int] | None = None
     # Messages on each topic that were read to the end
@@ -41,7 +42,7 @@ class Losses:
             }
         )
 
-    def in_words(self, name: str) -> list[str]:
+    def in_words(self) -> list[str]:
         """Return what the reader should know of a file, nothing if nothing is wrong."""
         lost = self.lost()
         if not (self.state or self.spans or self.doubtful or self.left_out or lost):
@@ -49,7 +50,7 @@ class Losses:
         total = sum(self.recovered.values())
         declared = sum((self.declared or {}).get(topic, 0) for topic in self.recovered)
         of = f' of {declared}' if declared >= total and self.declared else ''
-        words = [f'{name} {self.state or "is damaged"}: {total}{of} whole messages recovered']
+        words = [f'{self.name} {self.state or "is damaged"}: {total}{of} whole messages recovered']
         if lost:
             topics = ', '.join(
                 f'{count} of {(self.declared or {})[topic]} on {topic}'

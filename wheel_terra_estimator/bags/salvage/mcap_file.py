@@ -96,7 +96,7 @@ class McapFile:
 
     def __init__(self, path: Path, stack: ExitStack) -> None:
         self.path = path
-        self.losses = Losses()
+        self.losses = Losses(path.name)
         self._pieces: list[Piece] = []
         self._definitions = _Definitions()
         self._counts: Counter[int] = Counter()
@@ -117,10 +117,6 @@ class McapFile:
             self.losses.start = min(piece.start for piece in self._pieces)
             self.losses.last = max(piece.last for piece in self._pieces)
         self._count_topics()
-
-    def notes(self) -> list[str]:
-        """Return what is wrong with the file, as far as it is known by now."""
-        return self.losses.in_words(self.path.name)
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of some topics in the order of their log times."""

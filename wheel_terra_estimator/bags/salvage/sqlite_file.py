@@ -39,8 +39,7 @@ class SqliteFile:
     """
 
     def __init__(self, path: Path, stack: ExitStack) -> None:
-        self.path = path
-        self.losses = Losses()
+        self.losses = Losses(path.name)
         self._number = array('q')  # of the row, and its log time: only where the order differs
         self._time = array('q')
         self._topics: dict[int, tuple[str, str]] = {}  # number -> name and type
@@ -66,10 +65,6 @@ class SqliteFile:
             self.losses.recovered[topic.name] = found + topic.message_count
         if unknown := sum(n for number, n in counts.items() if number not in self._topics):
             self.losses.left_out.append(f'{unknown} messages of topics that are not described')
-
-    def notes(self) -> list[str]:
-        """Return what is wrong with the file."""
-        return self.losses.in_words(self.path.name)
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of some topics in the order of their log times."""
