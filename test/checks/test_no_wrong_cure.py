@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 from rolling_rover import checked
+from scipy.ndimage import gaussian_filter1d
 
-from wheel_terra_estimator.checks import turning
+from wheel_terra_estimator.checks import evidence, turning
 from wheel_terra_estimator.checks.calibration import calibrate
 from wheel_terra_estimator.checks.evidence import gather
 from wheel_terra_estimator.checks.rover_facts import from_configuration
@@ -477,3 +478,66 @@ def test_an_imu_on_its_back_is_written_only_where_turns_tell_it():
         imu = replace(whole.imu, force=whole.imu.force * over, rate=whole.imu.rate * over)
         written = calibrate(replace(whole, imu=imu), rolling.rover()).changes
         assert any('mounting_roll' in change.key for change in written) == turns
+
+
+def later(name, seconds, stamp=0.0):
+    """A channel that arrives later, with a stamp that is later by another time [s]."""
+    channel = getattr(WHOLE, name)
+    stamps = channel.stamp + np.round(1e9 * (stamp + np.zeros(channel.stamp.size))).astype(np.int64)
+    log_time = channel.log_time + round(1e9 * seconds)
+    return {name: replace(channel, stamp=stamps, log_time=log_time)}
+
+
+@pytest.mark.parametrize('name', ['imu', 'joints'])
+def test_messages_that_come_late_have_right_stamps(name):
+    assert faults(checked(**later(name, 1.5))) == []
+
+
+@pytest.mark.parametrize(('name', 'key'), [('imu', 'imu'), ('joints', 'wheel_odometry')])
+def test_stamps_that_are_off_of_messages_that_come_late(name, key):
+    """Log time tells their sum: the motions tell what of it is in the stamps."""
+    (told,) = checked(**later(name, 0.4, stamp=1.9)).findings
+    assert told.fault == f'{key}_offset' and told.value == pytest.approx(1.9, abs=0.1)
+
+
+def test_log_time_alone_does_not_tell_a_clock_from_a_slow_way():
+    dead = {
+        'rate': 0.0 * WHOLE.imu.rate,
+        'force': np.tile([0.0, 0.0, 9.81], (WHOLE.imu.stamp.size, 1)),
+    }
+    for way, stamp in ((3.0, 0.0), (0.0, 3.0)):
+        imu = replace(later('imu', way, stamp)['imu'], **dead)
+        told = [f for f in checked(imu=imu).findings if f.fault == 'imu_offset']
+        assert [f.value for f in told] == pytest.approx([stamp - way])
+        assert ('come late' in told[0].words) == (told[0].confidence < 0.8) == (way > 0.0)
+
+
+@pytest.mark.parametrize('name', ['reference', 'sinkage', 'imu'])
+def test_an_input_beyond_the_history_silences_no_other(name):
+    told = [f for f in checked(**later(name, 6.0)).findings if f.fault != 'imu_offset']
+    assert [(f.fault, f.parameter, f.value) for f in told] == [('too_late', 'history', 10.0)]
+    assert told[0].topic == getattr(WHOLE, name).topic
+
+
+@pytest.mark.parametrize('name', ['imu', 'joints', 'reference'])
+def test_a_clock_that_drifts_has_no_offset(name):
+    channel = getattr(WHOLE, name)
+    drift = later(name, 0.0, stamp=0.002 * channel.seconds)
+    assert faults(checked(**drift)) == ['order']
+
+
+def test_time_since_start_is_no_offset():
+    assert faults(checked(**later('reference', 0.0, stamp=-1.7e9))) == ['order']
+
+
+def test_no_yaw_seems_better_known_than_it_scatters(monkeypatch):
+    """A motion beside hills of three times its size, neither of which the other knows of."""
+    random, told = np.random.default_rng(1), []
+    for _ in range(100):
+        real, imaginary = gaussian_filter1d(random.standard_normal((2, 2, 3000)), 8.0)
+        motion, hills = real + 1j * imaginary
+        monkeypatch.setattr(evidence, '_motions', lambda *_, m=motion, h=hills: (m, m + 3.0 * h))
+        told.append(evidence.felt_yaw(None))
+    value, std = np.array([yaw for yaw in told if yaw is not None]).T
+    assert value.size > 90 and std.min() > 0.7 * value.std()
+    assert np.median(std) < 1.3 * value.std()

@@ -108,15 +108,50 @@ def corrected(recording: Recording, facts: RoverFacts) -> Recording:
 def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return which sensor's stamps are off, and the evidence with the reference on the wheels'."""
     told = {'imu': _of_imu(evidence), 'reference': _of_reference(evidence)}
+    by_log = _moved(evidence, 'imu') - _moved(evidence, 'joints')
+    if by_log and isinstance(told['imu'], NotChecked):
+        told['imu'] = _lag_by_log(by_log)
     outcomes: list[Outcome] = [one for one in told.values() if isinstance(one, NotChecked)]
     lags = {name: one for name, one in told.items() if not isinstance(one, NotChecked)}
-    for name, off in _blamed(evidence, lags).items():
-        outcomes.append(_outcome(evidence, name, off))
+    blamed = _blamed(evidence, lags)
+    for name, off in blamed.items():
+        if abs(off.value) <= MOST_OFFSET:  # else another clock
+            outcomes.append(_outcome(evidence, name, off))
+    outcomes += _too_late(evidence, {name for name in blamed if name != 'wheel_odometry'})
     reference, velocity = lags.get('reference'), evidence.recording.reference
     if reference and velocity is not None and reference.counts(evidence, 'reference'):
-        stamp = shifted(velocity, round(reference.value * 1e9)).stamp
+        left = reference.value + _moved(evidence, 'joints')
+        stamp = shifted(velocity, round(left * 1e9)).stamp
         evidence = evidence.with_channel('reference', stamp=stamp)
     return outcomes, evidence
+
+
+def _too_late(evidence: Evidence, off: set[str]) -> list[Outcome]:
+    """Return inputs that the estimator gets too late, but for those whose stamps are ``off``."""
+    outcomes, history = list[Outcome](), evidence.facts.configuration.history
+    for name in ('imu', 'sinkage', 'reference'):
+        if getattr(evidence.recording, name) is None or name in off:
+            continue
+        late = _late(evidence, name) - _late(evidence, 'joints')
+        if history < late < MOST_LATE:
+            topic, value = _channel(evidence, name).topic, float(math.ceil(1.5 * late))
+            finding = found('too_late', topic, 0.9, value=value, late=late, history=history)
+            outcomes.append(finding)
+    return outcomes
+
+
+def _moved(evidence: Evidence, name: str) -> float:
+    """Return what log time has taken off the stamps of a channel [s]."""
+    return evidence.recording.moved.get(name, 0.0)
+
+
+def _late(evidence: Evidence, name: str) -> float:
+    """Return the usual log time less stamp of a channel as it was sent [s]."""
+    return float(np.median(_channel(evidence, name).late)) - _moved(evidence, name)
+
+
+def _lag_by_log(late: float) -> Lag:
+    return Lag(late, BY_LOG, (late, late), Trial(1.0, 0.0))
 
 
 def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
@@ -141,8 +176,7 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
 
 def _by_arrival(evidence: Evidence, name: str, late: float) -> bool:
     """Return whether the wheels' stamps lie off their arrival, not those of one ``late`` [s]."""
-    channels = evidence.joints, _channel(evidence, name)
-    own, others = (float(np.median(channel.late)) for channel in channels)
+    own, others = _late(evidence, 'joints'), _late(evidence, name)
     if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
         return abs(own - late) < abs(own) - 0.5 * abs(late) or own < FUTURE < others
     return abs(others) + abs(own - late) < abs(own) + abs(others + late)
@@ -165,9 +199,13 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
         off = ' and '.join(f'{late:+.2f} s' for late in told.halves)
         return untold('delay', 'drifts', topic=channel.topic, off=off)
     std = _whole_std(evidence, name, told)
-    against = told.by + ('' if told.by == BY_LOG else told.trial.words('unlike part', ''))
+    against, sure = told.by + told.trial.words('unlike part', ''), 0.97
+    if told.by == BY_LOG:
+        on_the_way = -LONGEST_WAY < told.value < 0.0
+        rival, sure = (', or its messages come late', 0.5) if on_the_way else ('', 0.97)
+        against = f'log time: two clocks{rival}'
     told_of = of_offset(name, told.value, std, against, evidence.facts)
-    return evidence.found(f'{name}_offset', 0.97, **told_of)
+    return evidence.found(f'{name}_offset', sure, **told_of)
 
 
 # Lags of pairs -----------------------------------------------------------------------------------
@@ -181,19 +219,25 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
     if evidence.period > SLOWEST:
         return untold('delay', 'seldom')
     time, at = even_times(evidence.time, STEP), evidence.seconds(imu)
+    by_log = _moved(evidence, 'imu') - _moved(evidence, 'joints')
+
+    def after(first: FloatArray, second: FloatArray, by: str) -> Lag | None:
+        around = [lag_of(time, first, time + by_log, second, by, log) for log in {by_log, 0.0}]
+        return min(filter(None, around), key=lambda one: one.trial.after, default=None)
+
     turned = started = None
     if np.isfinite(difference).any():
         yaw = averaged(at, (imu.rate @ evidence.rotation.T)[:, 2:3], time, 2 * STEP)[:, 0]
         wheels = _even(evidence, difference, time)
         wheels = wheels * np.sign(correlation(wheels, yaw) or 1.0)
-        turned = lag_of(time, wheels, time, yaw, 'turns')
+        turned = after(wheels, yaw, 'turns')
     if evidence.force is not None and time.size > 2:
         width = round(SMOOTHING / STEP)
         speed = moving_mean(_even(evidence, evidence.rim, time), width)
         forward = averaged(at, (imu.force @ evidence.rotation.T)[:, :1], time, 2 * STEP)[:, 0]
         change = without_drift(np.gradient(speed, STEP), STEP)
         felt = without_drift(moving_mean(forward, width), STEP)
-        started = lag_of(time, change, time, felt, 'starts')
+        started = after(change, felt, 'starts')
     best = turned or started
     if best is None:
         return untold('delay', 'no_turns', limit=round(_longest('turns', time), 1))
@@ -217,13 +261,14 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
         return untold('delay', 'no_change')
 
     def around(near: float) -> Lag | None:  # means are those up to a time
-        return lag_of(time - STEP, rim, at[order], forward, 'speeds', near)
+        sent = at[order] - _moved(evidence, 'joints')
+        return lag_of(time - STEP, rim, sent, forward, 'speeds', near)
 
-    own, wheels = (float(np.median(one.late)) for one in (reference, evidence.joints))
+    own, wheels = _late(evidence, 'reference'), _late(evidence, 'joints')
     by_log = wheels - own
     told = around(0.0) or (around(by_log) if abs(by_log) > CLOCK_DIFFERENCE else None)
     if told is None and own < -CLOCK_DIFFERENCE < wheels:  # the future, whatever the speeds are
-        told = Lag(by_log, BY_LOG, (by_log, by_log), Trial(1.0, 0.0))
+        told = _lag_by_log(by_log)
     if told is None:
         return untold('delay', 'does_not_follow', limit=LONGEST['speeds'])
     evidence.figures['reference.delay_s'] = round(told.value, 3)
@@ -325,7 +370,10 @@ MOST_STEPS = 5  # of a clock that is set; more are of another kind and stay
 FUTURE = -0.1  # arrival less stamp that no message has [s]
 MOST_OFFSET = 1e4  # offset that a rover file may state, either way [s]
 ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
+MOST_LATE = 40.0  # beyond which a history is no cure [s]
+QUARTERS, UNEVEN = 4, 0.5  # parts of a drive; unlike gains of a drift over their mean, at most [-]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
+LONGEST_WAY = 10.0  # of a message into the log [s]
 
 
 def check_transport(
@@ -353,9 +401,15 @@ def check_transport(
         elif not order:
             outcomes += _drop_outs(name, one, figures)
         if channel.late.size and not step:
-            ends = np.array_split(channel.late, 4)[:: 3 if channel.late.size > 3 else 1]
-            late[name] = float(np.median(channel.late))
-            shifts[name] = float(np.median(ends[0]) - np.median(ends[-1]))
+            parts = np.array_split(channel.late, min(QUARTERS, channel.late.size))
+            by_time = [float(np.median(part)) for part in parts]
+            late[name], shifts[name] = float(np.median(channel.late)), by_time[0] - by_time[-1]
+            if drift := _drift(by_time):
+                how = f'its stamps drift by {drift:+.2g} s over the drive against their arrival'
+                outcomes.append(found('order', channel.topic, 0.97, how=how))
+                share = np.linspace(0.0, 1.0, channel.stamp.size)
+                mended[name] = shifted(channel, np.round(1e9 * drift * share).astype(np.int64))
+                late[name], shifts[name] = by_time[0], 0.0
     if steps:  # of one clock, whatever it stamps
         topic, *rest = steps
         how = f'they step by {steps[topic]:+.3g} s against their arrival'
@@ -369,7 +423,16 @@ def check_transport(
         how = f'its stamps shift by {shifts[name]:.2g} s against log time: a clock set, or drifting'
         topic = getattr(recording, name).topic
         return [*outcomes, found('order', topic, 0.97, how=how)], replace(recording, **mended)
-    off, joints = {}, late['joints']
+    off, recording = _clocks(replace(recording, **mended), late, facts)
+    return outcomes + off, recording
+
+
+def _clocks(
+    recording: Recording, late: dict[str, float], facts: RoverFacts
+) -> tuple[list[Outcome], Recording]:
+    """Return channels of another clock, and the recording on one; ``late``: arrival less stamp."""
+    outcomes, mended = list[Outcome](), dict[str, Any]()
+    off, moved, joints = {}, dict[str, float](), late['joints']
     if abs(joints - late.get('imu', joints)) > CLOCK_DIFFERENCE:
         # Stamps lie near their arrival: those that are farther off are wrong.
         by_wheels = abs(joints) > abs(late['imu'])
@@ -379,16 +442,19 @@ def check_transport(
         if ahead or abs(late.get(name, joints) - joints) > MOST_OFFSET:
             off[name] = late[name] - joints
     for key, value in off.items():
-        channel, name = getattr(recording, key), 'wheel_odometry' if key == 'joints' else key
+        channel = getattr(recording, key)
         if abs(value) > MOST_OFFSET:
             how = f'its stamps lie {abs(value):.3g} s off: another clock, such as time since start'
             outcomes.append(found('order', channel.topic, 0.99, how=how))
             continue
-        std = math.hypot(robust_std(channel.late), robust_std(recording.joints.late), ARRIVAL_STD)
-        words = of_offset(name, -value, std, 'log time: two clocks', facts)
-        outcomes.append(found(f'{name}_offset', channel.topic, 0.999, **words))
         mended[key] = shifted(channel, round(-value * 1e9))
-    return outcomes, replace(recording, **mended)
+        if key != 'sinkage':  # the motions tell the rest
+            moved[key] = -value
+            continue
+        std = math.hypot(robust_std(channel.late), robust_std(recording.joints.late), ARRIVAL_STD)
+        words = of_offset(key, -value, std, 'log time: two clocks', facts)
+        outcomes.append(found(f'{key}_offset', channel.topic, 0.999, **words))
+    return outcomes, replace(recording, **mended, moved=moved)
 
 
 def _from_buffer(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome], Recording]:
@@ -434,6 +500,19 @@ def _bursts(stamp: IntArray) -> IntArray | None:
     return ends if regular and np.median(count) >= LEAST_IN_A_BURST else None
 
 
+def _drift(late: list[float]) -> float:
+    """Return by how much stamps gain evenly on their arrival over a drive [s]; 0 for not at all.
+
+    ``late``: log time less stamp [s] of each quarter.
+    """
+    if len(late) < QUARTERS:
+        return 0.0
+    gain = -np.diff(late)
+    drift = float(gain.sum()) * QUARTERS / (QUARTERS - 1)
+    even = np.ptp(gain) < UNEVEN * abs(float(gain.mean()))
+    return drift if even and abs(drift) > LEAST_OFFSET else 0.0
+
+
 def _steps(channel: Channel) -> FloatArray:
     """Return the steps (k,) before stamps that messages do not arrive by [s]; 0 for none."""
     stamped = channel.stamp > 0
@@ -468,16 +547,18 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
 
 def _silent(recording: Recording) -> list[Outcome]:
     """Return inputs that end before others do, and wheel rates or an IMU that begin after them."""
-    heard: dict[str, tuple[float, float]] = {}
+    heard, way = dict[str, tuple[float, float]](), dict[str, float]()
     for name in CHECKED:
         if (channel := getattr(recording, name)) is not None:
             end = recording.heard.get(channel.topic, int(channel.log_time.max()))
             heard[name] = int(channel.log_time.min()) * 1e-9, end * 1e-9
+            late = float(np.median(channel.late)) if channel.late.size else 0.0
+            way[name] = late if 0.0 < late < LONGEST_WAY else 0.0
     begin = min((first for first, _ in heard.values()), default=0.0)
-    latest = max((last for _, last in heard.values()), default=0.0)
+    latest = max((last - way[name] for name, (_, last) in heard.items()), default=0.0)
     outcomes: list[Outcome] = []
     for name, (first, last) in heard.items():
-        late = first - begin if name in ('joints', 'imu') else 0.0
+        late = first - way[name] - begin if name in ('joints', 'imu') else 0.0
         for where, silence in (('first', late), ('last', latest - last)):
             channel = getattr(recording, name)
             usual = (last - first) / max(channel.log_time.size - 1, 1)

@@ -416,7 +416,17 @@ def felt_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
     parts = np.array([np.vdot(wheels, felt) for wheels, felt in blocks])
     total = parts.sum()
     spread = float(np.linalg.norm(parts - total / parts.size))
-    if not 0.5 * energy[-1] < abs(total) < 2.0 * energy[-1] or abs(total) < 3.0 * spread:
+    chance = _by_chance(motion, seen, total)
+    felt = 0.5 * energy[-1] < abs(total) < 2.0 * energy[-1]
+    if not felt or abs(total) < 3.0 * max(spread, chance):
         return None
     aside = (parts * np.conj(total)).imag / abs(total) ** 2  # along it they differ without a turn
-    return Estimate(float(np.angle(total)), float(np.linalg.norm(aside)))
+    std = max(float(np.linalg.norm(aside)), chance / abs(total))
+    return Estimate(float(np.angle(total)), std)
+
+
+def _by_chance(motion: Complex, seen: Complex, total: complex) -> float:
+    """Return how alike a motion and what it leaves of what is felt are at other times, one way."""
+    left = seen - motion * total / np.vdot(motion, motion)
+    at_lags = np.fft.ifft(np.fft.fft(left) * np.conj(np.fft.fft(motion)))
+    return float(np.sqrt(0.5 * np.mean(np.abs(at_lags) ** 2)))

@@ -154,7 +154,7 @@ class Recording:
     ``topics`` lists (name, type, number of messages) of everything that was recorded; ``heard``
     has the last log time [ns] of a topic where more is there than was read; ``lost`` is the share
     of messages that a damage took, as far as it is known; ``notes`` say what is damaged, and
-    whether it is read to its end.
+    whether it is read to its end; ``moved`` has the time [s] that log time took off stamps.
     """
 
     name: str
@@ -167,3 +167,4 @@ class Recording:
     heard: Mapping[str, int] = field(default_factory=dict)
     lost: float = 0.0
     notes: tuple[str, ...] = ()
+    moved: Mapping[str, float] = field(default_factory=dict)
