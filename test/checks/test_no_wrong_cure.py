@@ -404,9 +404,11 @@ def test_an_orientation_that_hardly_turns_tells_degrees_per_second():
 
 def test_a_specific_force_a_little_off_gravity_is_reported():
     """A zero along z, a scale or another gravity: nothing in a recording tells which."""
-    report = checked(imu=replace(WHOLE.imu, force=WHOLE.imu.force + 0.6 * np.eye(3)[2]))
-    assert not [f for f in report.findings if f.kind in ('gravity', 'unit', 'zero')]
-    assert any('z zero' in e.reason for e in report.not_checked if e.kind == 'gravity')
+    for force in (WHOLE.imu.force + 0.6 * np.eye(3)[2], 1.25 * WHOLE.imu.force):
+        told = checked(imu=replace(WHOLE.imu, force=force)).findings
+        told = [f for f in told if f.kind in ('gravity', 'unit', 'zero')]
+        assert [f.fault for f in told] == ['force_scale'] and told[0].parameter is None
+        assert 'z zero' in told[0].words and 'rover.gravity' in told[0].words
 
 
 def test_a_crawl_below_the_noise_of_the_rates_is_no_standstill_that_tells_a_zero():
@@ -541,3 +543,64 @@ def test_no_yaw_seems_better_known_than_it_scatters(monkeypatch):
     value, std = np.array([yaw for yaw in told if yaw is not None]).T
     assert value.size > 90 and std.min() > 0.7 * value.std()
     assert np.median(std) < 1.3 * value.std()
+
+
+@pytest.mark.parametrize(('costs', 'told'), [(0.08, True), (0.17, False)])
+def test_slip_that_loose_soil_makes_is_no_radius(costs, told):
+    """The rover makes 0.6 of its way; what that costs is that of firm ground, or of loose."""
+    sense = np.sign(np.round(WHOLE.joints.rate, 1))
+    weight = rolling.MASS * rolling.GRAVITY
+    more = (costs - rolling.RESISTANCE) * weight * rolling.RADIUS / 4 * sense
+    joints = replace(WHOLE.joints, torque=WHOLE.joints.torque + more)
+    slower = replace(WHOLE.reference, velocity=0.6 * WHOLE.reference.velocity)
+    report = checked(joints=joints, reference=slower, sinkage=None)
+    assert bool({*faults(report)} & {'radius', 'reference_scale'}) == told
+    if not told:
+        assert any('torques ask for 0.17' in e.reason for e in report.not_checked)
+
+
+@pytest.mark.parametrize('dead', [False, True])
+def test_a_wheel_between_the_sides_stands_in_a_turn_on_the_spot(dead):
+    motion = rolling.ten_minute_drive()
+    rows = (motion.time > 25.0) & (motion.time < 50.0)
+    speed = np.where(rows & ~dead, 0.0, motion.speed)
+    yaw = np.where(rows & ~dead, 0.5, motion.yaw_rate)
+    whole = rolling.recording(replace(motion, speed=speed, yaw_rate=yaw))
+    rate = whole.joints.rate.copy()
+    rate[:, 2:] = rate[:, :2].mean(axis=1, keepdims=True)
+    rate[rows, 2] = 0.0
+    half, torque = rolling.HALF_TRACK, np.full_like(rate, np.nan)
+    places = {'wheels.x': [0.1, 0.1, -0.1, -0.2], 'wheels.y': [half, -half, 0.0, 0.0]}
+    joints = replace(whole.joints, rate=rate, torque=torque)
+    told = faults(checked(rolling.rover(**places), whole=whole, joints=joints))
+    assert ('rate_frozen' in told) == dead
+
+
+@pytest.mark.parametrize(
+    ('factor', 'slip', 'units'),
+    [
+        (3.6, 0.0, ['kilometres']),
+        (2.23694, 0.0, ['miles']),
+        (2.23694, 0.13, ['knots', 'miles']),
+        (1.9438, 0.0, ['knots', 'miles']),
+        (2.23694, 0.25, ['miles', 'kilometres', 'knots']),
+    ],
+)
+def test_units_of_a_reference_that_slip_leaves_open_are_told_together(factor, slip, units):
+    velocity = factor * (1.0 - slip) * WHOLE.reference.velocity
+    report = checked(reference=replace(WHOLE.reference, velocity=velocity))
+    told = [f for f in report.findings if f.fault == 'reference_unit']
+    assert sorted(f.words.split(' in ')[1].split()[0] for f in told) == sorted(units)
+    assert min(abs(f.value * factor - 1.0) for f in told) < 1e-4
+    assert len(units) == 1 or max(f.confidence for f in told) < 0.8
+
+
+def test_without_a_turn_the_unit_may_be_that_of_the_rates_or_of_the_reference():
+    """At a radius of 0.265 m metres per second of the rim are as far from rad/s as km/h."""
+    whole = rolling.recording(rolling.ten_minute_drive(turns=False))
+    smaller = replace(whole.joints, rate=whole.joints.rate * rolling.RADIUS / 0.265)
+    faster = replace(whole.reference, velocity=3.6 * 0.75 * whole.reference.velocity)
+    rover = rolling.rover(**{'wheels.radius': [0.265] * 4})
+    told = checked(rover, whole=whole, joints=smaller, reference=faster).findings
+    assert {'rate_unit', 'reference_unit'} <= {f.fault for f in told}
+    assert max(f.confidence for f in told if f.kind == 'unit') < 0.8

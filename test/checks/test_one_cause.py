@@ -55,6 +55,31 @@ def test_a_pitch_that_counts_nose_up_is_no_reversed_gyro():
     assert finding.fault == 'orientation_frame'
 
 
+def test_a_gyro_whose_pitch_runs_against_a_gentle_hill():
+    """The orientation tells it; the wheels see no pitch."""
+    imu = replace(WHOLE.imu, orientation=attitude(WHOLE.imu.seconds))
+    (finding,) = found(imu=replace(imu, rate=imu.rate * [1.0, -1.0, 1.0]))
+    assert finding.fault == 'gyro_reversed' and 'angular_velocity.y' in finding.words
+
+
+def test_an_imu_on_its_back_beside_an_orientation_of_the_rover():
+    turned = {name: getattr(WHOLE.imu, name) * [1.0, -1.0, -1.0] for name in ('force', 'rate')}
+    imu = replace(WHOLE.imu, orientation=attitude(WHOLE.imu.seconds), **turned)
+    assert {f.fault for f in found(imu=imu)} == {'imu_upside', 'orientation_frame'}
+
+
+def test_an_imu_on_its_back_among_swapped_sides():
+    """Its orientation says so too: not the accelerometer is wrong."""
+    back = Rotation.from_euler('x', math.pi)
+    right = Rotation.from_quat(attitude(WHOLE.imu.seconds))
+    turned = {name: getattr(WHOLE.imu, name) * [1.0, -1.0, -1.0] for name in ('force', 'rate')}
+    imu = replace(WHOLE.imu, orientation=(right * back).as_quat(), **turned)
+    swapped = replace(WHOLE.joints, rate=WHOLE.joints.rate[:, [1, 0, 3, 2]])
+    told = {f.fault: f for f in found(imu=imu, joints=swapped)}
+    assert {*told} == {'imu_upside', 'swapped_sides'}
+    assert told['imu_upside'].value == pytest.approx(180.0)
+
+
 def test_a_pitch_of_the_imu_that_no_circle_shows_is_named_beside_zeros_of_all_torques():
     motion = rolling.ten_minute_drive(turns=False)
     whole = rolling.recording(motion)

@@ -56,6 +56,7 @@ LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
 MOST_HIDDEN = 0.7  # speed over rim speed of slip that torques off zero may hide, at least [-]
 MOST_SOFT = 0.93  # the same on soft ground that no sinkage tells, at least [-]: slip is 7 % there
+MOST_SLIP = 20.0  # slip over the square of what loose soil costs of the weight, at most [-]
 UNSEEN_SLIP = 0.035  # slip that widens a track where no straight tells it, one deviation [-]
 STEERED_STD = 0.04  # slip of steered wheels in curves, as a share of the track, one deviation [-]
 MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steered, at most [-]
@@ -165,6 +166,10 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     as_slip = (plain.value < 1.0) == (middle >= 0.0)  # downhill wheels skid: faster than the rims
     if as_slip and depth > SOFT_DEPTH:
         return untold('radius', 'soft', depth=depth)
+    costs = float(np.median(traction - demand))
+    unseen = _depth(evidence) is FIRM_DEPTH and 1.0 - MOST_SLIP * costs**2 < plain.value
+    if unseen and plain.value < MOST_SOFT and middle >= 0.0:
+        return untold('radius', 'costly', seen=costs)
     seen = NOT_SEEN
     if demand.any():
         both = block_fit(

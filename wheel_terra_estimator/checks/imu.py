@@ -160,19 +160,25 @@ def check_imu(state: ImuState) -> Judged:
     return outcomes, state
 
 
+def _up_apart(imu: ImuSeries) -> float:
+    """Return the angle between up by orientation and by specific force [rad]; nan: not told."""
+    norm = np.linalg.norm(imu.orientation, axis=1)
+    known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
+    if known.size < LEAST_MESSAGES:
+        return math.nan
+    some = known[:: max(known.size // MOST_COMPARED, 1)]
+    up = Rotation.from_quat(imu.orientation[some]).apply(imu.force[some])[:, 2]
+    size = np.linalg.norm(np.median(imu.force, axis=0))  # without noise and vibration
+    return math.acos(float(np.clip(np.median(up) / size, -1.0, 1.0)))
+
+
 def _up_by_orientation(state: ImuState) -> Judged:
     """Return an orientation that has up elsewhere than the specific force, both in its frame."""
     imu = state.imu
-    norm = np.linalg.norm(imu.orientation, axis=1)
-    known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
-    usual = np.median(imu.force, axis=0)  # without noise and vibration
-    if known.size < LEAST_MESSAGES or not np.isfinite(usual).all():
-        return [], state
-    some = known[:: max(known.size // MOST_COMPARED, 1)]
-    up = Rotation.from_quat(imu.orientation[some]).apply(imu.force[some])[:, 2]
-    cosine = float(np.clip(np.median(up) / np.linalg.norm(usual), -1.0, 1.0))
-    apart, upright = math.acos(cosine), float((state.rotation @ usual)[2]) > 0.0
-    if apart < UP_APART or (apart > math.pi - UP_APART and not upright):  # see `check_upside`
+    apart = _up_apart(imu)
+    upright = float((state.rotation @ np.median(imu.force, axis=0))[2]) > 0.0
+    turned_round = apart > math.pi - UP_APART and not upright  # see `check_upside`
+    if not apart >= UP_APART or turned_round:
         return [], state
     told = state.found('orientation_tilt', 0.97, apart=math.degrees(apart))
     return [told], state.with_values(orientation=np.full_like(imu.orientation, np.nan))
@@ -244,7 +250,7 @@ def _gravity(state: ImuState) -> Judged:
     off = abs(size - gravity)
     if off <= max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):
         small = off <= max(SLOPES * gravity, GRAVITY_BIAS)
-        return [] if small else [untold('gravity', 'unlike', size=size, gravity=gravity)], state
+        return [] if small else [_scale_of_force(state, size)], state
 
     def told(key: str, value: float, **figures: Any) -> list[Outcome]:
         return [state.found(key, 0.98, value=value, size=size, gravity=gravity, **figures)]
@@ -265,7 +271,12 @@ def _gravity(state: ImuState) -> Judged:
     if place:
         there = GRAVITIES[place]
         return told('planet', there, place=place), replace(state, gravity=there)
-    return [untold('gravity', 'unlike', size=size, gravity=gravity)], state
+    return [_scale_of_force(state, size)], state
+
+
+def _scale_of_force(state: ImuState, size: float) -> Finding:
+    value = round(state.gravity / size, 4)
+    return state.found('force_scale', 0.9, value=value, size=size, gravity=state.gravity)
 
 
 def _against_orientation(state: ImuState) -> Judged:
@@ -293,7 +304,7 @@ def _against_orientation(state: ImuState) -> Judged:
     for axis, name in enumerate('xyz'):
         x, y = seen[:, axis], told[:, axis]
         fit = correlation(x, y)
-        if abs(fit) < 0.6 or float(np.std(x)) < 0.01:
+        if abs(fit) < 0.6:
             continue
         if fit < 0.0:
             if axis < 2 and _slopes_alike(state, known, 1 - axis) < -CLEAR_SLOPE:
@@ -309,6 +320,9 @@ def _against_orientation(state: ImuState) -> Judged:
         factor *= math.radians(1.0)
         words = {'times': degrees[0], 'how': 'turning of the orientation'}
         outcomes.append(state.found('gyro_degrees', 0.99, value=math.radians(1.0), **words))
+    if (factor < 0.0).sum() > 1:  # a half turn lies between both
+        told_of = state.found('orientation_frame', 0.97)
+        return [told_of], state.with_values(orientation=np.full_like(q, np.nan))
     return outcomes, state.with_values(rate=imu.rate * factor) if outcomes else state
 
 
@@ -505,8 +519,9 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words: dict[str, Any] = {'force': force}
     sure = 0.999
     if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
-        upright = _turns_upright(evidence)
-        if upright > CLEAR_AGREEMENT:
+        upright, imu = _turns_upright(evidence), evidence.recording.imu
+        as_oriented = imu is not None and _up_apart(imu) < UP_APART  # and the sides are swapped
+        if upright > CLEAR_AGREEMENT and not as_oriented:
             told = evidence.found('force_reversed', 0.97, **words)
             return [told], replace(evidence, force=-evidence.force)
         if upright > -CLEAR_AGREEMENT:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -42,6 +43,8 @@ FAR_ASIDE = math.radians(12.0)  # direction in which 2 % of a speed along x are 
 MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
 """Speed over that without slip of a rover that slips much, and error of the ratio without slip."""
 LEAST_UNIT_RATIO = 1.3  # speed over rim speed below which it may be the radius, not the unit [-]
+USUAL_SLIP = (0.75, 1.1)  # the same that lets a unit be a rival of one that fits without slip [-]
+NEAR_WEIGHT = 2.0  # likelihood of a unit without slip over one with a usual slip [-]
 NO_SCALE = 30.0  # speed over rim speed that is a unit, however much the rover slips [-]
 MOSTLY = 0.4  # mean over median rim speed of wheels most of which turn one way [-]
 CLEAR_SPEED = 5.0  # speed over the noise of the reference that a ratio of speeds needs [-]
@@ -51,6 +54,7 @@ KNOWN_UNITS = {
     'centimetres per second': 100.0,
     'millimetres per second': 1000.0,
     'knots': 1.9438,
+    'miles per hour': 2.23694,
 }
 
 
@@ -189,25 +193,36 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim))
     ratio = float(np.median(sense * reference.velocity[rows, 0] / rim[rows]))
-    fitting = {
-        unit: factor
+    if ratio < LEAST_UNIT_RATIO:
+        return [], evidence
+    fitting = units_of_reference(ratio, (MOST_SLIPPING, 1.25))
+    near = [unit for unit, one in fitting.items() if abs(ratio * one['value'] - 1.0) < WITHOUT_SLIP]
+    if near:  # else how much of it is slip is not known
+        fitting = units_of_reference(ratio, USUAL_SLIP)
+    # The slip hides which of several it is.
+    weight = {unit: NEAR_WEIGHT if unit in near else 1.0 for unit in fitting}
+    told = sorted(fitting, key=weight.__getitem__, reverse=True)
+    findings: list[Outcome] = [
+        evidence.found('reference_unit', 0.9 * weight[unit] / sum(weight.values()), **fitting[unit])
+        for unit in told
+    ]
+    if not findings or (len(told) > 1 and not near):
+        return findings, evidence
+    times = fitting[told[0]]['value']
+    velocity, variance = reference.velocity * times, reference.variance * times**2
+    return findings, evidence.with_channel('reference', velocity=velocity, variance=variance)
+
+
+def units_of_reference(ratio: float, band: tuple[float, float]) -> dict[str, dict[str, Any]]:
+    """Return what to tell of each unit of a speed that is so many times that of the rims.
+
+    ``band``: least and most speed over rim speed that the slip leaves.
+    """
+    return {
+        unit: {'value': 1.0 / factor, 'ratio': ratio, 'unit': unit}
         for unit, factor in KNOWN_UNITS.items()
-        if max(min(MOST_SLIPPING * factor, NO_SCALE), LEAST_UNIT_RATIO) < ratio < 1.25 * factor
+        if min(band[0], NO_SCALE / factor) < ratio / factor < band[1]
     }
-    near = {unit: f for unit, f in fitting.items() if abs(ratio / f - 1.0) < WITHOUT_SLIP}
-    if len(fitting) > 1 and not near:  # which of them, the slip hides
-        several = ' or '.join(fitting)
-        return [untold('unit', 'reference_several', ratio=ratio, units=several)], evidence
-    fitting = near or fitting
-    for unit, factor in fitting.items():
-        told = {'value': 1.0 / factor, 'ratio': ratio, 'unit': unit}
-        mended = evidence.with_channel(
-            'reference',
-            velocity=reference.velocity / factor,
-            variance=reference.variance / factor**2,
-        )
-        return [evidence.found('reference_unit', 0.9, **told)], mended
-    return [], evidence
 
 
 def hardly_moves(speed: FloatArray, rows: Mask) -> bool:

@@ -14,7 +14,12 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, untold
-from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead, hardly_moves
+from wheel_terra_estimator.checks.reference import (
+    LEAST_ROWS,
+    ahead,
+    hardly_moves,
+    units_of_reference,
+)
 from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import correlation, lonely, robust_std, runs, step_of
 
@@ -72,8 +77,11 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 def _stands(evidence: Evidence, index: int) -> float:
     """Return how long a rate is 0 while the others turn and no torque holds the wheel."""
     own, others = evidence.rate[:, index], np.delete(evidence.rate, index, axis=1)
-    busy = row_medians(np.abs(others)) > LIVELY * evidence.working_rate
     side = evidence.facts.side == evidence.facts.side[index]
+    between = evidence.facts.has_sides() and evidence.facts.side[index] == 0.0
+    # Between the sides a wheel stands in a turn on the spot.
+    usual = row_medians(others if between else np.abs(others))
+    busy = np.abs(usual) > LIVELY * evidence.working_rate
     if evidence.facts.has_sides() and side.sum() > 1:  # which the rover may turn about
         turned = np.abs(evidence.yaw) * float(np.ptp(evidence.facts.lateral))
         stands = (evidence.rate[:, side] == 0.0).all(axis=1)
@@ -193,6 +201,12 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not turns and radius < LARGE_WHEEL:  # else too near to rad/s
         known['metres per second of the rim'] = 1.0 / radius
     units = _fitting_units(ratio, track, known)
+    of_reference = {} if track is not None else units_of_reference(ratio or 0.0, UNIT_BAND)
+    if units and of_reference:  # no turn tells which of both it is
+        sure = 0.97 / (len(units) + len(of_reference))
+        told, evidence = _unit_findings(evidence, units, how, sure * len(units))
+        told += [evidence.found('reference_unit', sure, **one) for one in of_reference.values()]
+        return told, evidence.with_rate(evidence.rate * math.nan)
     rolls = ratio and track and abs(ratio * track - 1.0) < SAME_SCALE
     scaled = ratio is not None and ratio > MOST_COUNT and not OF_RADII[0] < ratio < OF_RADII[1]
     if track and rolls and scaled and not units:
