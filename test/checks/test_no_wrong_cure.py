@@ -604,3 +604,20 @@ def test_without_a_turn_the_unit_may_be_that_of_the_rates_or_of_the_reference():
     told = checked(rover, whole=whole, joints=smaller, reference=faster).findings
     assert {'rate_unit', 'reference_unit'} <= {f.fault for f in told}
     assert max(f.confidence for f in told if f.kind == 'unit') < 0.8
+
+
+@pytest.mark.parametrize('name', ['joints', 'imu'])
+@pytest.mark.parametrize('lost', [0.2, 0.6])
+def test_messages_that_are_lost_at_random_are_told(name, lost):
+    """Where most are lost two that follow each other are not usual."""
+    channel = getattr(WHOLE, name)
+    kept = np.random.default_rng(2).random(channel.stamp.size) > lost
+    report = checked(**{name: rows_of(channel, kept)})
+    (told,) = (f for f in report.findings if f.fault == 'drop_outs')
+    assert f'{100 * lost:.0f}' in told.words or f'{100 * lost - 1:.0f}.' in told.words
+    assert report.figures[f'{name}.rate_hz'] == pytest.approx(1e9 / np.diff(channel.stamp)[0])
+
+
+def test_places_of_wheels_in_another_unit():
+    places = {key: [0.1 * v for v in rolling.PARAMETERS[key]] for key in ('wheels.x', 'wheels.y')}
+    assert faults(checked(rolling.rover(**places))) == ['places']

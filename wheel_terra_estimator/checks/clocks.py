@@ -360,6 +360,7 @@ IN_PAUSES = 0.8  # share of the time that passes between bursts, at least [-]
 LEAST_BURSTS, LEAST_IN_A_BURST = 10, 3
 READ_AT_ONCE, READ_SHARE = 2e6, 0.1  # step within a burst [ns], over the period: less than this
 LONGEST_WAIT = 2.0  # for a burst, over the median; beyond it is a pause, or a step of the clock
+SHORT = 0.1  # share of the steps between messages that are shorter than a usual short one [-]
 SEVERAL = 10  # messages over which a period is taken where stamps jitter
 OFF_PERIOD, REGULAR = 0.2, 0.6
 """Distance of a step from a multiple of the period, as a share of it, and the share of steps nearer
@@ -572,10 +573,11 @@ def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Out
     if stamps.size <= SEVERAL:
         return []
     step = np.diff(stamps)
-    period = float(np.median(step))
-    off = np.abs(step / period - np.round(step / period))
-    if np.mean(off < OFF_PERIOD) < REGULAR:
-        # Stamps that jitter: their neighbours say nothing of the period.
+    for period in np.quantile(step, (0.5, SHORT)).tolist():  # where most are lost, none is usual
+        off = np.abs(step / period - np.round(step / period))
+        if np.mean(off < OFF_PERIOD) >= REGULAR:
+            break
+    else:  # Stamps that jitter: their neighbours say nothing of the period.
         period = float(np.median(stamps[SEVERAL:] - stamps[:-SEVERAL])) / SEVERAL
     figures[f'{name}.rate_hz'] = round(1.0 / period, 3) if period > 0.0 else None
     gaps = step[step > max(LONGEST_GAP, GAP_PERIODS * period)]

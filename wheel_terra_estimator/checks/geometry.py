@@ -15,6 +15,7 @@ from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask
 from wheel_terra_estimator.checks.finding import (
     LEAST_TURN_RATE,
+    SKID_TRACKS,
     NotChecked,
     Outcome,
     listed,
@@ -422,6 +423,8 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     times = ratio.value * evidence.likelier_radius
     figures['rover.effective_over_stated_track'] = round(times, 3)
     figures['rover.effective_track_m'] = round(times * stated, 4)
+    if times > SKID_TRACKS[1] and ratio.sigmas_from(SKID_TRACKS[1]) > RADIUS_SIGMAS:
+        return [evidence.found('places', 0.8, ratio=times, stated=stated)]
     if turning.skids(evidence):
         return [untold('track', 'skids', track=times * stated)]
     rolling = rolling_track(evidence)
