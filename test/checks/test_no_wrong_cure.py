@@ -621,3 +621,20 @@ def test_messages_that_are_lost_at_random_are_told(name, lost):
 def test_places_of_wheels_in_another_unit():
     places = {key: [0.1 * v for v in rolling.PARAMETERS[key]] for key in ('wheels.x', 'wheels.y')}
     assert faults(checked(rolling.rover(**places))) == ['places']
+
+
+@pytest.mark.parametrize('aside', [0.0, 0.4, -0.25])
+def test_a_reference_beside_base_link_is_told_by_turns(aside):
+    reference = WHOLE.reference
+    velocity = reference.velocity - np.outer(reference.yaw_rate * aside, [1.0, 0.0, 0.0])
+    told = checked(reference=replace(reference, velocity=velocity)).findings
+    assert [f.fault for f in told] == ['reference_place'] * (aside != 0.0)
+    assert all(f.value == pytest.approx(aside, abs=0.03) for f in told)
+
+
+def test_slip_that_differs_in_turns_is_no_place():
+    """Half of the way is lost, ten per cent more of it in turns to the left."""
+    reference = WHOLE.reference
+    left = 0.5 * (1.0 - 0.1 * (reference.yaw_rate > 0.1))
+    told = checked(reference=replace(reference, velocity=reference.velocity * left[:, None]))
+    assert 'reference_place' not in faults(told)

@@ -38,6 +38,8 @@ AHEAD = 0.3  # mean of the rims over the usual size of one, above which the rove
 CLEAR_HEADING = 1.0  # turn in which a frame of the world is told from one of the rover [rad]
 STEADY = 0.9  # length of the mean direction of a velocity that keeps to a frame [-]
 TURNED_SIGMAS, TURNED_STD = 4.0, math.radians(1.0)  # of the direction on straights, at least [rad]
+LEAST_ASIDE, ASIDE_SIGMAS = 0.1, 6.0  # distance of a place beside base_link [m], in deviations
+UNLIKE_SLIP = 0.2  # difference of the slip in turns to either side, over its mean [-]
 ASIDE = 'reference.aside_deg'
 FAR_ASIDE = math.radians(12.0)  # direction in which 2 % of a speed along x are lost [rad]
 MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
@@ -282,3 +284,29 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     noise = max(noise, LEAST_STD)
     told = {'noise': noise, 'variance': noise**2, 'stated': usual}
     return [evidence.found('covariance', 0.9, value=float(f'{noise:.2g}'), **told)]
+
+
+def check_place(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return a reference of a place beside base_link, which turns move, and it mended."""
+    reference = evidence.recording.reference
+    if reference is None or evidence.gyro is None or ASIDE in evidence.figures:
+        return [], evidence
+    rim, yaw = (evidence.rim_at(reference.stamp, one) for one in (evidence.rim, evidence.yaw))
+    forward = reference.velocity[:, 0]
+    rows = np.isfinite(rim) & np.isfinite(yaw) & np.isfinite(forward)
+    least = 0.5 * float(np.quantile(np.abs(yaw[rows]), 0.95)) if rows.any() else 0.0
+    if min((yaw[rows] > least).sum(), (yaw[rows] < -least).sum()) < LEAST_REFERENCES:
+        return [], evidence
+    # What turns cost slows the rover both ways round, unlike a place.
+    design = np.column_stack([rim, np.abs(yaw), yaw])[rows]
+    ratio, _, aside = block_fit(design, forward[rows])
+    slip = UNLIKE_SLIP * (1.0 - ratio.value) * float(np.median(np.abs(rim[rows]))) / least
+    aside = Estimate(aside.value, math.hypot(aside.std, slip))
+    if abs(aside.value) < LEAST_ASIDE or aside.sigmas_from(0.0) < ASIDE_SIGMAS:
+        return [], evidence
+    side = 'left' if aside.value < 0.0 else 'right'
+    told = {'value': -aside.value, 'std': aside.std, 'aside': abs(aside.value), 'side': side}
+    velocity = reference.velocity.copy()
+    velocity[:, 0] -= aside.value * np.nan_to_num(yaw)
+    mended = evidence.with_channel('reference', velocity=velocity)
+    return [evidence.found('reference_place', 0.9, **told)], mended

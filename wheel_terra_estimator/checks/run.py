@@ -226,6 +226,7 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('mounting', imu, 'check_yaw', DRIVING),
     ('jumps', reference, 'check_jumps', DRIVING),
     ('delay', clocks, 'check_clocks', DRIVING),
+    ('mounting', reference, 'check_place'),
     ('covariance', reference, 'check_covariance'),
     ('gain', turning, 'check_gyro_scale'),
     ('zero', imu, 'check_noise_and_zero'),
