@@ -248,9 +248,9 @@ def _gravity(state: ImuState) -> Judged:
     middle = np.median(imu.force, axis=0)
     size = float(np.linalg.norm(middle))
     off = abs(size - gravity)
-    if off <= max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):
-        small = off <= max(SLOPES * gravity, GRAVITY_BIAS)
-        return [] if small else [_scale_of_force(state, size)], state
+    if not off > max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):  # nan: an axis without a number
+        clear = off > max(SLOPES * gravity, GRAVITY_BIAS)
+        return [_scale_of_force(state, size)] if clear else [], state
 
     def told(key: str, value: float, **figures: Any) -> list[Outcome]:
         return [state.found(key, 0.98, value=value, size=size, gravity=gravity, **figures)]

@@ -200,7 +200,8 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     fitting = units_of_reference(ratio, (MOST_SLIPPING, 1.25))
     near = [unit for unit, one in fitting.items() if abs(ratio * one['value'] - 1.0) < WITHOUT_SLIP]
     if near:  # else how much of it is slip is not known
-        fitting = units_of_reference(ratio, USUAL_SLIP)
+        least, most = USUAL_SLIP
+        fitting = {u: one for u, one in fitting.items() if least < ratio * one['value'] < most}
     # The slip hides which of several it is.
     weight = {unit: NEAR_WEIGHT if unit in near else 1.0 for unit in fitting}
     told = sorted(fitting, key=weight.__getitem__, reverse=True)
