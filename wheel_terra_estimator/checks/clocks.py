@@ -452,7 +452,7 @@ def _clocks(
         if key != 'sinkage':  # the motions tell the rest
             moved[key] = -value
             continue
-        std = math.hypot(robust_std(channel.late), robust_std(recording.joints.late), ARRIVAL_STD)
+        std = math.hypot(robust_std(channel.late), ARRIVAL_STD)
         words = of_offset(key, -value, std, 'log time: two clocks', facts)
         outcomes.append(found(f'{key}_offset', channel.topic, 0.999, **words))
     return outcomes, replace(recording, **mended, moved=moved)
