@@ -627,8 +627,12 @@ def test_places_of_wheels_in_another_unit():
 def test_a_reference_beside_base_link_is_told_by_turns(aside):
     reference = WHOLE.reference
     velocity = reference.velocity - np.outer(reference.yaw_rate * aside, [1.0, 0.0, 0.0])
-    told = checked(reference=replace(reference, velocity=velocity)).findings
+    beside = replace(reference, velocity=velocity)
+    told = checked(reference=beside).findings
     assert [f.fault for f in told] == ['reference_place'] * (aside != 0.0)
+    dead = WHOLE.joints.rate * [1.0, 0.0, 1.0, 1.0]
+    uneven = checked(reference=beside, joints=replace(WHOLE.joints, rate=dead)).findings
+    assert ('reference_place' in {f.fault for f in uneven}) == (aside != 0.0)
     assert all(f.value == pytest.approx(aside, abs=0.03) for f in told)
 
 

@@ -292,7 +292,9 @@ def check_place(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     reference = evidence.recording.reference
     if reference is None or evidence.gyro is None or ASIDE in evidence.figures:
         return [], evidence
-    rim, yaw = (evidence.rim_at(reference.stamp, one) for one in (evidence.rim, evidence.yaw))
+    there = np.isfinite(evidence.rate).any(axis=0)  # more of them may be on one side
+    middle = evidence.rim + 0.5 * evidence.side_difference * evidence.facts.side[there].mean()
+    rim, yaw = (evidence.rim_at(reference.stamp, one) for one in (middle, evidence.yaw))
     forward = reference.velocity[:, 0]
     rows = np.isfinite(rim) & np.isfinite(yaw) & np.isfinite(forward)
     least = 0.5 * float(np.quantile(np.abs(yaw[rows]), 0.95)) if rows.any() else 0.0
