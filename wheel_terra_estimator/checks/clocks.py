@@ -117,7 +117,7 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     for name, off in blamed.items():
         if abs(off.value) <= MOST_OFFSET:  # else another clock
             outcomes.append(_outcome(evidence, name, off))
-    outcomes += _too_late(evidence, {name for name in blamed if name != 'wheel_odometry'})
+    outcomes += _too_late(evidence, {name: off.value for name, off in blamed.items()})
     reference, velocity = lags.get('reference'), evidence.recording.reference
     if reference and velocity is not None and reference.counts(evidence, 'reference'):
         left = reference.value + _moved(evidence, 'joints')
@@ -126,13 +126,14 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return outcomes, evidence
 
 
-def _too_late(evidence: Evidence, off: set[str]) -> list[Outcome]:
+def _too_late(evidence: Evidence, off: dict[str, float]) -> list[Outcome]:
     """Return inputs that the estimator gets too late, but for those whose stamps are ``off``."""
+    own = _late(evidence, 'joints') + off.get('wheel_odometry', 0.0)
     outcomes, history = list[Outcome](), evidence.facts.configuration.history
     for name in ('imu', 'sinkage', 'reference'):
         if getattr(evidence.recording, name) is None or name in off:
             continue
-        late = _late(evidence, name) - _late(evidence, 'joints')
+        late = _late(evidence, name) - own
         if history < late < MOST_LATE:
             topic, value = _channel(evidence, name).topic, float(math.ceil(1.5 * late))
             finding = found('too_late', topic, 0.9, value=value, late=late, history=history)
