@@ -131,7 +131,7 @@ def _too_late(evidence: Evidence, off: dict[str, float]) -> list[Outcome]:
     own = _late(evidence, 'joints') + off.get('wheel_odometry', 0.0)
     outcomes, history = list[Outcome](), evidence.facts.configuration.history
     for name in ('imu', 'sinkage', 'reference'):
-        if getattr(evidence.recording, name) is None or name in off:
+        if name in off:
             continue
         late = _late(evidence, name) - own
         if history < late < MOST_LATE:
@@ -147,8 +147,11 @@ def _moved(evidence: Evidence, name: str) -> float:
 
 
 def _late(evidence: Evidence, name: str) -> float:
-    """Return the usual log time less stamp of a channel as it was sent [s]."""
-    return float(np.median(_channel(evidence, name).late)) - _moved(evidence, name)
+    """Return the usual log time less stamp of a channel as it was sent [s]; nan: not known."""
+    channel: Channel | None = getattr(evidence.recording, name)
+    if channel is None or not channel.late.size:
+        return math.nan
+    return float(np.median(channel.late)) - _moved(evidence, name)
 
 
 def _lag_by_log(late: float) -> Lag:
