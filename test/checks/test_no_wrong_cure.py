@@ -486,8 +486,8 @@ def later(name, seconds, stamp=0.0):
     """A channel that arrives later, with a stamp that is later by another time [s]."""
     channel = getattr(WHOLE, name)
     stamps = channel.stamp + np.round(1e9 * (stamp + np.zeros(channel.stamp.size))).astype(np.int64)
-    log_time = channel.log_time + round(1e9 * seconds)
-    return {name: replace(channel, stamp=stamps, log_time=log_time)}
+    way = np.round(1e9 * (seconds + np.zeros(channel.stamp.size))).astype(np.int64)
+    return {name: replace(channel, stamp=stamps, log_time=channel.log_time + way)}
 
 
 @pytest.mark.parametrize('name', ['imu', 'joints'])
@@ -526,6 +526,42 @@ def test_a_clock_that_drifts_has_no_offset(name):
     channel = getattr(WHOLE, name)
     drift = later(name, 0.0, stamp=0.002 * channel.seconds)
     assert faults(checked(**drift)) == ['order']
+
+
+def test_a_logger_whose_clock_is_off_blames_no_input():
+    """Its clock gains on all stamps alike, or is ahead; or a reference grows older evenly."""
+
+    def of_all(way):
+        return {k: v for name in ('imu', 'joints', 'reference', 'sinkage')
+                for k, v in later(name, way(getattr(WHOLE, name))).items()}  # fmt: skip
+
+    assert not faults(checked(**of_all(lambda channel: 0.002 * channel.seconds)))
+    assert not faults(checked(**of_all(lambda channel: 5.0)))
+    aging = later('reference', 0.3 + 0.6 * WHOLE.reference.seconds / WHOLE.reference.seconds[-1])
+    assert not faults(checked(**aging))
+    ahead = of_all(lambda channel: 9.0)
+    early = rows_of(ahead['imu'], WHOLE.imu.seconds < WHOLE.imu.seconds[-1] - 12.0)
+    assert 'silent' in faults(checked(**{**ahead, 'imu': early}))
+
+
+def test_stamps_of_a_coarse_clock_are_no_losses():
+    """64 Hz by a clock of 10 ms: 10 or 20 ms apart, never more."""
+    stamp = WHOLE.imu.stamp
+    even = np.arange(stamp[0], stamp[-1], 10**9 // 64)
+    rows = np.minimum(np.searchsorted(stamp, even), stamp.size - 1)
+    coarse = even // 10**7 * 10**7
+    imu = replace(rows_of(WHOLE.imu, rows), stamp=coarse, log_time=even)
+    assert 'drop_outs' not in faults(checked(imu=imu))
+
+
+def test_circles_on_a_slope_are_no_scale_of_the_accelerometer():
+    """In each of them the slope's share of gravity comes from all sides."""
+    turned, slope = 0.4 * WHOLE.imu.seconds, np.radians(22.0)
+    aside = 9.81 * np.sin(slope) * np.column_stack([np.cos(turned), np.sin(turned)])
+    force = np.column_stack([aside, np.full(turned.size, 9.81 * np.cos(slope))])
+    told = faults(checked(imu=replace(WHOLE.imu, force=force)))
+    assert 'force_scale' not in told
+    assert 'force_scale' in faults(checked(imu=replace(WHOLE.imu, force=0.94 * force)))
 
 
 def test_time_since_start_is_no_offset():

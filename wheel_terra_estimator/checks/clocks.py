@@ -365,6 +365,7 @@ LEAST_BURSTS, LEAST_IN_A_BURST = 10, 3
 READ_AT_ONCE, READ_SHARE = 2e6, 0.1  # step within a burst [ns], over the period: less than this
 LONGEST_WAIT = 2.0  # for a burst, over the median; beyond it is a pause, or a step of the clock
 SHORT = 0.1  # share of the steps between messages that are shorter than a usual short one [-]
+IN_A_ROW = 0.2  # share of the steps over which two messages or more are lost, at least [-]
 SEVERAL = 10  # messages over which a period is taken where stamps jitter
 OFF_PERIOD, REGULAR = 0.2, 0.6
 """Distance of a step from a multiple of the period, as a share of it, and the share of steps nearer
@@ -390,6 +391,7 @@ def check_transport(
     outcomes += read
     late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
     mended: dict[str, Any] = {}
+    quarters = dict[str, list[float]]()  # usual log time less stamp in parts of the drive [s]
     for name in CHECKED:
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
@@ -409,12 +411,18 @@ def check_transport(
             parts = np.array_split(channel.late, min(QUARTERS, channel.late.size))
             by_time = [float(np.median(part)) for part in parts]
             late[name], shifts[name] = float(np.median(channel.late)), by_time[0] - by_time[-1]
-            if drift := _drift(by_time):
-                how = f'its stamps drift by {drift:+.2g} s over the drive against their arrival'
-                outcomes.append(found('order', channel.topic, 0.97, how=how))
-                share = np.linspace(0.0, 1.0, channel.stamp.size)
-                mended[name] = shifted(channel, np.round(1e9 * drift * share).astype(np.int64))
-                late[name], shifts[name] = by_time[0], 0.0
+            quarters[name] = by_time
+    for name, by_time in quarters.items():
+        if name not in ('joints', 'imu') and min(by_time) > FUTURE:
+            continue  # its age is honest
+        others = [one for other, one in quarters.items() if other != name]
+        if drift := _drift(by_time, others):
+            channel = getattr(recording, name)
+            how = f'its stamps drift by {drift:+.2g} s over the drive against their arrival'
+            outcomes.append(found('order', channel.topic, 0.97, how=how))
+            share = np.linspace(0.0, 1.0, channel.stamp.size)
+            mended[name] = shifted(channel, np.round(1e9 * drift * share).astype(np.int64))
+            late[name], shifts[name] = by_time[0], 0.0
     if steps:  # of one clock, whatever it stamps
         topic, *rest = steps
         how = f'they step by {steps[topic]:+.3g} s against their arrival'
@@ -505,17 +513,19 @@ def _bursts(stamp: IntArray) -> IntArray | None:
     return ends if regular and np.median(count) >= LEAST_IN_A_BURST else None
 
 
-def _drift(late: list[float]) -> float:
+def _drift(late: list[float], others: list[list[float]]) -> float:
     """Return by how much stamps gain evenly on their arrival over a drive [s]; 0 for not at all.
 
-    ``late``: log time less stamp [s] of each quarter.
+    ``late``, ``others``: log time less stamp [s] of each quarter. Where all gain alike the logger's
+    clock does.
     """
-    if len(late) < QUARTERS:
+    compared = [one for one in others if len(one) == QUARTERS]
+    if len(late) < QUARTERS or not compared:
         return 0.0
-    gain = -np.diff(late)
-    drift = float(gain.sum()) * QUARTERS / (QUARTERS - 1)
+    gain, beside = -np.diff(late), -np.diff(np.median(compared, axis=0))
+    drift, apart = (float(one.sum()) * QUARTERS / (QUARTERS - 1) for one in (gain, gain - beside))
     even = np.ptp(gain) < UNEVEN * abs(float(gain.mean()))
-    return drift if even and abs(drift) > LEAST_OFFSET else 0.0
+    return drift if even and min(abs(drift), abs(apart)) > LEAST_OFFSET else 0.0
 
 
 def _steps(channel: Channel) -> FloatArray:
@@ -559,12 +569,15 @@ def _silent(recording: Recording) -> list[Outcome]:
             heard[name] = int(channel.log_time.min()) * 1e-9, end * 1e-9
             late = float(np.median(channel.late)) if channel.late.size else 0.0
             way[name] = late if 0.0 < late < LONGEST_WAY else 0.0
-    begin = min((first for first, _ in heard.values()), default=0.0)
-    latest = max((last - way[name] for name, (_, last) in heard.items()), default=0.0)
+    sent = {name: (first - way[name], last - way[name]) for name, (first, last) in heard.items()}
     outcomes: list[Outcome] = []
     for name, (first, last) in heard.items():
-        late = first - way[name] - begin if name in ('joints', 'imu') else 0.0
-        for where, silence in (('first', late), ('last', latest - last)):
+        # As heard and as sent: a message may come late, or its stamp be off.
+        spans = [(one[name], np.array([*one.values()])) for one in (heard, sent)]
+        late = min(own[0] - all_of[:, 0].min() for own, all_of in spans)
+        ended = min(all_of[:, 1].max() - own[1] for own, all_of in spans)
+        late = late if name in ('joints', 'imu') else 0.0
+        for where, silence in (('first', late), ('last', ended)):
             channel = getattr(recording, name)
             usual = (last - first) / max(channel.log_time.size - 1, 1)
             if silence > max(LONGEST_SILENCE, GAP_PERIODS * usual):
@@ -577,7 +590,10 @@ def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Out
     if stamps.size <= SEVERAL:
         return []
     step = np.diff(stamps)
-    for period in np.quantile(step, (0.5, SHORT)).tolist():  # where most are lost, none is usual
+    usual, short = np.quantile(step, (0.5, SHORT)).tolist()
+    # Where most are lost at random, a quarter are two or more in a row; a coarse clock has none.
+    random = name in ('joints', 'imu') and np.mean(step > 2.5 * short) > IN_A_ROW
+    for period in (usual, short) if random else (usual,):
         off = np.abs(step / period - np.round(step / period))
         if np.mean(off < OFF_PERIOD) >= REGULAR:
             break

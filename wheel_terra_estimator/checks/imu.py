@@ -246,7 +246,10 @@ def _wild(state: ImuState) -> Judged:
 def _gravity(state: ImuState) -> Judged:
     imu, gravity = state.imu, state.gravity
     middle = np.median(imu.force, axis=0)
-    size = float(np.linalg.norm(middle))
+    # Second by second: vibration goes, and a slope is the same while a rover turns on it.
+    seconds = max(int(np.ptp(imu.stamp) * 1e-9), 1)
+    parts = np.array_split(imu.force, min(seconds, len(imu.force)))
+    size = float(np.median([np.linalg.norm(np.median(part, axis=0)) for part in parts]))
     off = abs(size - gravity)
     if not off > max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):  # nan: an axis without a number
         clear = off > max(SLOPES * gravity, GRAVITY_BIAS)
