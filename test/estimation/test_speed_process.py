@@ -269,7 +269,7 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
 
     def after(travel):
         cycle = Parts(reader.load(SAND)).cycle([rim] * 6, dt=travel / rim)
-        return made.towards_equilibrium_slip(free, cycle, 1.0)
+        return made.towards_equilibrium_slip(free, cycle, 1.0, length)
 
     assert after(length).speed_gain == pytest.approx(np.exp(-1.0))
     usual = after(1e3 * length).constant

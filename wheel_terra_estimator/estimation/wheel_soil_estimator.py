@@ -54,7 +54,11 @@ from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
-from wheel_terra_estimator.estimation.filter.speed_process import SpeedProcess
+from wheel_terra_estimator.estimation.filter.speed_process import (
+    HELD_LENGTH,
+    USUAL_LENGTH,
+    SpeedProcess,
+)
 from wheel_terra_estimator.estimation.filter.state import (
     GRAVITY_BIAS,
     SHEAR_MODULUS,
@@ -430,18 +434,18 @@ class WheelSoilEstimator:
         speed, direction = self._speed, self._contact_age.state.direction
         inflation = speed.state.inflation if cycle.reference_known else 0.0
         by_wheels = expected = speed.by_wheels(cycle.dt, cycle.yaw_compensated, inflation)
+        unseen = not cycle.still and not cycle.reference_known
         # No slip is usual where the ground holds the rover.
-        held = self._clock.assessment.holds
-        unseen = not (cycle.still or cycle.reference_known or held)
+        length = HELD_LENGTH if self._clock.assessment.holds else USUAL_LENGTH
         if unseen:
-            expected = speed.towards_equilibrium_slip(by_wheels, cycle, direction)
+            expected = speed.towards_equilibrium_slip(by_wheels, cycle, direction, length)
         lacking = speed.learn_bias(self._ekf, cycle, expected)
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
         x = self._ekf.mean
         prediction = Prediction.unchanged(x)
         step = speed.combined(by_wheels, cycle.dt, self._trusted(cycle.window, cycle.time))
         if unseen:
-            step = speed.towards_equilibrium_slip(step, cycle, direction)
+            step = speed.towards_equilibrium_slip(step, cycle, direction, length)
         speed.predict(prediction, step, cycle)
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:

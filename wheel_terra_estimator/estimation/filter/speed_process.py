@@ -100,6 +100,8 @@ _ATTITUDE_TIME = 20.0
 """Time constant of the errors of the attitude [s]: what changes faster is seen as noise."""
 _EQUILIBRIUM_SLIP_STD = 0.2  # about that of the configured soil on such a slope
 USUAL_LENGTH = 1.5  # rim travel over which slip returns to it [m]
+HELD_LENGTH = 15.0
+"""The same where the ground holds the rover [m]: who drives on does not drive for longer."""
 _LEAST_EQUILIBRIUM_SLIP = -0.2
 _MOST_EQUILIBRIUM_SLIP = 0.8
 _DRIVING = 0.3
@@ -380,12 +382,13 @@ class SpeedProcess(Component[SpeedState]):
         return max(spread(changes) - self._rim_noise, 0.0)
 
     def towards_equilibrium_slip(
-        self, step: SpeedStep, cycle: Cycle, direction: float
+        self, step: SpeedStep, cycle: Cycle, direction: float, length: float
     ) -> SpeedStep:
         """Without a reference velocity, let v / rim speed return to what such a slope takes.
 
         On deep or saturated contacts torque and pull hardly change with slip. There the posterior
-        is the prior, and a random walk is no prior: it ends anywhere.
+        is the prior, and a random walk is no prior: it ends anywhere. `length` is the rim travel
+        over which it returns [m].
         """
         rim, demand = cycle.yaw_compensated.typical, direction * cycle.loads.slope_share
         if not abs(rim) >= self._rover.low_rim:
@@ -393,7 +396,7 @@ class SpeedProcess(Component[SpeedState]):
         most = _MOST_EQUILIBRIUM_SLIP
         slip = self._equilibrium_slip.at(demand, beyond=most)
         usual = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
-        keep = math.exp(-abs(rim) * cycle.dt / USUAL_LENGTH)
+        keep = math.exp(-abs(rim) * cycle.dt / length)
         return SpeedStep(
             keep * step.speed_gain,
             keep * step.bias_gain,
