@@ -672,6 +672,14 @@ def test_a_reference_beside_base_link_is_told_by_turns(aside):
     assert all(f.value == pytest.approx(aside, abs=0.03) for f in told)
 
 
+def test_base_link_beside_the_middle_of_the_wheels_moves_no_reference():
+    aside = [y + 0.15 for y in rolling.PARAMETERS['wheels.y']]
+    reference = WHOLE.reference
+    velocity = reference.velocity + np.outer(reference.yaw_rate * 0.15, [1.0, 0.0, 0.0])
+    rover = rolling.rover(**{'wheels.y': aside})
+    assert not faults(checked(rover, reference=replace(reference, velocity=velocity)))
+
+
 def test_slip_that_differs_in_turns_is_no_place():
     """Half of the way is lost, ten per cent more of it in turns to the left."""
     reference = WHOLE.reference

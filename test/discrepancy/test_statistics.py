@@ -357,6 +357,21 @@ def test_repeats_give_the_noise():
         assert found.std[0, 2] == pytest.approx(max(stated, std) if notes else stated)
 
 
+def test_repeats_that_scatter_as_stated_leave_what_is_stated():
+    """Rows five times noisier than others, as they say; or one wild reading in 24 pairs."""
+    rng = np.random.default_rng(4)
+    slip = np.repeat(np.linspace(0.1, 0.8, 24), 2)
+    std = 0.02 * np.where(np.arange(48) % 6 < 2, 5.0, 1.0)
+    columns = {'slip': slip, 'normal_load': np.full(48, 80.0)}
+    even, one = np.full(48, 0.02), 0.6 * (np.arange(48) == 9)
+    for stated, wild in ((std, 0.0), (even, one)):
+        reading = 3.0 + slip + stated * rng.standard_normal(48) + wild
+        table = check_table('x', {**columns, 'torque': reading, 'torque_std': stated})
+        found = noise.stated_noise(table, np.ones(len(QUANTITIES)), np.zeros(48))
+        assert found.origin == {'torque': 'given'}
+        np.testing.assert_array_equal(found.std[:, 2], stated)
+
+
 def test_confidence_follows_what_speaks_for_a_name():
     """The fitted map has a weight per feature, and each piece of evidence acts the right way."""
     sure = dict.fromkeys(confidence.FEATURES, 0.0)

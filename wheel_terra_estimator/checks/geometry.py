@@ -57,7 +57,8 @@ LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
 MOST_HIDDEN = 0.7  # speed over rim speed of slip that torques off zero may hide, at least [-]
 MOST_SOFT = 0.93  # the same on soft ground that no sinkage tells, at least [-]: slip is 7 % there
-MOST_SLIP = 20.0  # slip over the square of what loose soil costs of the weight, at most [-]
+MOST_COST = 0.175
+"""What loose soil costs over the weight where all may be slip [-]; half of that, a sixteenth."""
 UNSEEN_SLIP = 0.035  # slip that widens a track where no straight tells it, one deviation [-]
 STEERED_STD = 0.04  # slip of steered wheels in curves, as a share of the track, one deviation [-]
 MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steered, at most [-]
@@ -168,7 +169,7 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     if as_slip and depth > SOFT_DEPTH:
         return untold('radius', 'soft', depth=depth)
     costs = float(np.median(traction - demand))
-    unseen = _depth(evidence) is FIRM_DEPTH and 1.0 - MOST_SLIP * costs**2 < plain.value
+    unseen = _depth(evidence) is FIRM_DEPTH and 1.0 - (costs / MOST_COST) ** 4 < plain.value
     if unseen and plain.value < MOST_SOFT and middle >= 0.0:
         return untold('radius', 'costly', seen=costs)
     seen = NOT_SEEN

@@ -87,6 +87,7 @@ BIAS_SIGMAS = 5.0
 TILT_IS_MOUNTING = 0.7  # probability that a tilt in circles is the mounting, not a zero [-]
 CROSS_AXIS = 0.01  # gyro against accelerometer in one housing [rad]; data sheets of MEMS
 UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
+ORIENTED = 0.75  # of the latter, where its orientation says so too [-]
 LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_WILD = 3
@@ -323,7 +324,8 @@ def _against_orientation(state: ImuState) -> Judged:
         factor *= math.radians(1.0)
         words = {'times': degrees[0], 'how': 'turning of the orientation'}
         outcomes.append(state.found('gyro_degrees', 0.99, value=math.radians(1.0), **words))
-    if (factor < 0.0).sum() > 1:  # a half turn lies between both
+    half_turn = _up_apart(imu) > math.pi - UP_APART  # in the specific force as well
+    if (factor < 0.0).sum() > 1 and half_turn:
         told_of = state.found('orientation_frame', 0.97)
         return [told_of], state.with_values(orientation=np.full_like(q, np.nan))
     return outcomes, state.with_values(rate=imu.rate * factor) if outcomes else state
@@ -523,9 +525,10 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sure = 0.999
     if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
         upright, imu = _turns_upright(evidence), evidence.recording.imu
-        as_oriented = imu is not None and _up_apart(imu) < UP_APART  # and the sides are swapped
-        if upright > CLEAR_AGREEMENT and not as_oriented:
-            told = evidence.found('force_reversed', 0.97, **words)
+        if upright > CLEAR_AGREEMENT:
+            # Its orientation may come from that force, or the sides are swapped as well.
+            as_oriented = imu is not None and _up_apart(imu) < UP_APART
+            told = evidence.found('force_reversed', ORIENTED if as_oriented else 0.97, **words)
             return [told], replace(evidence, force=-evidence.force)
         if upright > -CLEAR_AGREEMENT:
             sure = UNTURNED

@@ -293,7 +293,10 @@ def check_place(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if reference is None or evidence.gyro is None or ASIDE in evidence.figures:
         return [], evidence
     there = np.isfinite(evidence.rate).any(axis=0)  # more of them may be on one side
-    middle = evidence.rim + 0.5 * evidence.side_difference * evidence.facts.side[there].mean()
+    side, lateral = evidence.facts.side[there], evidence.facts.lateral[there]
+    middle = evidence.rim + 0.5 * evidence.side_difference * side.mean()
+    if len(set(side)) > 1:  # base_link may lie beside the middle between the sides
+        middle = middle + evidence.yaw * 0.5 * sum(lateral[side == one].mean() for one in (-1, 1))
     rim, yaw = (evidence.rim_at(reference.stamp, one) for one in (middle, evidence.yaw))
     forward = reference.velocity[:, 0]
     rows = np.isfinite(rim) & np.isfinite(yaw) & np.isfinite(forward)
@@ -307,8 +310,8 @@ def check_place(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     aside = Estimate(aside.value, math.hypot(aside.std, slip))
     if abs(aside.value) < LEAST_ASIDE or aside.sigmas_from(0.0) < ASIDE_SIGMAS:
         return [], evidence
-    side = 'left' if aside.value < 0.0 else 'right'
-    told = {'value': -aside.value, 'std': aside.std, 'aside': abs(aside.value), 'side': side}
+    where = 'left' if aside.value < 0.0 else 'right'
+    told = {'value': -aside.value, 'std': aside.std, 'aside': abs(aside.value), 'side': where}
     velocity = reference.velocity.copy()
     velocity[:, 0] -= aside.value * np.nan_to_num(yaw)
     mended = evidence.with_channel('reference', velocity=velocity)

@@ -26,6 +26,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
 )
 
 ENOUGH_REPEATS = 6  # degrees of freedom from which repeats alone set the noise
+_WILD = 3.0  # times the usual scatter: more of the worst repeats is a wild reading
 SCATTER_CHANCE = 1e-3  # below which repeated rows do not have the stated noise
 # Amplitudes of the smooth misfit that compete while the noise is estimated: whatever is smooth,
 # effects included, must not be counted as noise.
@@ -61,9 +62,9 @@ def stated_noise(table: SteadyTable, scale: FloatArray, apart: FloatArray) -> No
             std[here & ~stated, q] = usual
             origin[quantity] = 'given'
             # An instrument's noise is not all that repeated runs scatter by: beds do as well.
-            chance = float(chdtrc(count, count * (pooled / usual) ** 2)) if count else 1.0
-            if count >= ENOUGH_REPEATS and chance < SCATTER_CHANCE:
-                std[here, q] *= pooled / usual
+            times, count = repeats(table, q, apart, std[:, q])
+            if count >= ENOUGH_REPEATS and chdtrc(count, count * times**2) < SCATTER_CHANCE:
+                std[here, q] *= times
                 origin[quantity] = 'repeats'
             continue
         if count >= ENOUGH_REPEATS:
@@ -75,14 +76,19 @@ def stated_noise(table: SteadyTable, scale: FloatArray, apart: FloatArray) -> No
     return Noise(std, origin, repeatability)
 
 
-def repeats(table: SteadyTable, quantity: int, apart: FloatArray) -> tuple[float, int]:
-    """Return the pooled deviation of rows with equal inputs, and its degrees of freedom."""
+def repeats(
+    table: SteadyTable, quantity: int, apart: FloatArray, stated: FloatArray | None = None
+) -> tuple[float, int]:
+    """Return the pooled deviation of rows with equal inputs, and its degrees of freedom.
+
+    Over the ``stated`` deviations (N,), where given: a single wild reading is then no noise.
+    """
     inputs = [values for name, values in table.columns.items() if name in INPUT_COLUMNS]
     keys = np.round(np.nan_to_num(np.column_stack([*inputs, apart])), 9)
     _, group = np.unique(keys, axis=0, return_inverse=True)
     group = np.ravel(group)
     values = table.measured[:, quantity]
-    square, freedom = 0.0, 0
+    squares = list[tuple[float, int]]()
     for g in range(group.max() + 1):
         mine = values[(group == g) & np.isfinite(values)]
         if len(mine) > 1:
@@ -90,9 +96,18 @@ def repeats(table: SteadyTable, quantity: int, apart: FloatArray) -> tuple[float
             centre = np.median(mine) if len(mine) > 2 else mine.mean()
             spread = 1.4826 * float(np.median(np.abs(mine - np.median(mine))))
             clip = (5.0 * spread) ** 2 if spread else np.inf
-            square += float(np.minimum((mine - centre) ** 2, clip).sum())
-            freedom += len(mine) - 1
-    return (float(np.sqrt(square / freedom)), freedom) if freedom else (np.nan, 0)
+            each = np.minimum((mine - centre) ** 2, clip)
+            if stated is not None:
+                each /= stated[(group == g) & np.isfinite(values)] ** 2
+            squares.append((float(each.sum()), len(mine) - 1))
+    if stated is not None and len(squares) > 1:
+        worst, count = max(squares)
+        squares.remove((worst, count))
+        usual = sum(square for square, _ in squares) / sum(n for _, n in squares)
+        squares.append((min(worst, _WILD**2 * count * usual), count))
+    freedom = sum(count for _, count in squares)
+    total = sum(square for square, _ in squares)
+    return (math.sqrt(total / freedom), freedom) if freedom else (math.nan, 0)
 
 
 def estimate_noise(
