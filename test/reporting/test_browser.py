@@ -16,12 +16,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator import api
-from wheel_terra_estimator.bags.history import (
-    WHEEL_FIELDS,
-    DriveFigures,
-    EstimateHistory,
-    StuckWarning,
-)
+from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, StuckWarning
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.report.page import write_report
@@ -131,9 +126,6 @@ def an_hour() -> tuple[EstimateHistory, Truth]:
     classes = np.repeat(random.integers(0, 4, (count // 100, len(names))), 100, axis=0)
     classes[:20] = 255
     warning = StuckWarning(int(stamp[20_000]), int(stamp[22_000]), 'median slip 0.83: digging in')
-    figures = DriveFigures(len(names))
-    for i, now in enumerate(stamp.tolist()):
-        figures.add(now, classes[i], {name: column[i] for name, column in values.items()})
     history = EstimateHistory(
         names,
         stamp,
@@ -142,7 +134,6 @@ def an_hour() -> tuple[EstimateHistory, Truth]:
         values['slip'][:, 0],
         values['slip_std'][:, 0],
         (warning,),
-        figures,
     )
     known = {
         name: WheelTruth(stamp, values[name] + 0.01) for name in ('slip', 'sinkage', 'drawbar_pull')

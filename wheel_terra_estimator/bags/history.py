@@ -182,7 +182,7 @@ class EstimateHistory:
     forward_velocity: FloatArray  # [m/s]
     forward_velocity_std: FloatArray
     warnings: tuple[StuckWarning, ...]
-    whole: DriveFigures | None = None  # None: read from a bag
+    whole: DriveFigures | None = None  # None: the arrays are all there is
     slip_on_slope: SlipOnSlope | None = None  # as the drive ended; None: not known
 
     @property
@@ -207,6 +207,16 @@ class EstimateHistory:
             until = True if warning.end is None else self.stamp < warning.end
             running |= (self.stamp >= warning.start) & until
         return running
+
+    def figures(self) -> DriveFigures:
+        """Return the figures of the whole drive."""
+        if self.whole is not None:
+            return self.whole
+        found = DriveFigures(len(self.names))
+        for i, stamp in enumerate(self.stamp.tolist()):
+            row = {name: values[i] for name, values in self.values.items()}
+            found.add(stamp, self.slip_class[i], row)
+        return found
 
 
 class HistoryRecorder:

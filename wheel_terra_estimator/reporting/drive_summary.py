@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.bags.history import DriveFigures, EstimateHistory
+from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.taught import LEARNED, Taught
 from wheel_terra_estimator.reporting import truth_scores
@@ -123,13 +123,12 @@ def summarise(
     taught: Sequence[Taught],
 ) -> DriveSummary:
     """Sum a drive up; ``topics`` and ``counts`` go by input topic, ``rejected`` by reason, too."""
-    figures = history.whole
-    assert figures is not None  # of a replay
+    figures = history.figures()
     return DriveSummary(
         title=title,
         duration=figures.duration,
         sets=figures.sets,
-        wheels=_wheels(history, figures, border) if figures.sets else (),
+        wheels=_wheels(history, border) if figures.sets else (),
         warnings=tuple(
             WarningSpan(*times, warning.reason, later)
             for times, warning, later in zip(
@@ -156,9 +155,8 @@ def short_names(names: Sequence[str]) -> list[str]:
     return ['_'.join(p) for p in parts]
 
 
-def _wheels(
-    history: EstimateHistory, figures: DriveFigures, border: Border
-) -> tuple[WheelSummary, ...]:
+def _wheels(history: EstimateHistory, border: Border) -> tuple[WheelSummary, ...]:
+    figures = history.figures()
     times = figures.seconds_in_class
     total = np.maximum(sum(times.values()), 1e-9)
     slips = np.abs(known(history, 'slip', border))
