@@ -69,7 +69,7 @@ def test_an_imu_on_its_back_beside_an_orientation_of_the_rover():
 
 
 def test_an_imu_on_its_back_among_swapped_sides():
-    """Its orientation says so too: not the accelerometer is wrong."""
+    """Starts are felt forward: not the accelerometer is wrong."""
     back = Rotation.from_euler('x', math.pi)
     right = Rotation.from_quat(attitude(WHOLE.imu.seconds))
     turned = {name: getattr(WHOLE.imu, name) * [1.0, -1.0, -1.0] for name in ('force', 'rate')}

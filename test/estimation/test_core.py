@@ -217,5 +217,5 @@ def test_health_names_topic_and_reason():
     assert health['odom_used'] == 2
     assert health['imu/data_used'] == 1, 'its angular rate is good'
     assert health['imu/data_rejected: specific force not finite or absurd'] == 1
-    assert health['sinkage_rejected: sinkage infinite or larger than the wheel'] == 1
+    assert health['sinkage_rejected: sinkage infinite or larger than the wheel radius'] == 1
     assert health['fake_steps'] >= 2

@@ -76,16 +76,12 @@ def test_wrong_number_of_wheels(checks):
 
 @pytest.mark.parametrize(
     ('depth', 'passes'),
-    [
-        (0.1, True), (0.15, True), (0.2001, False), (INF, False),
-        (-0.01, True), (-0.06, False), (-INF, False),
-    ],
-)  # fmt: skip
+    [(0.1, True), (0.1001, False), (INF, False), (-0.01, True), (-0.06, False), (-INF, False)],
+)
 def test_sinkage_larger_than_the_wheel(checks, depth, passes):
-    """A wheel may be buried over its hub: the models know no deeper one than to the hub."""
     m = check(checks, SinkageReading(stamp_at(0.0), np.array([depth, 0.02])))
     assert m.sinkage[1] == 0.02
-    np.testing.assert_equal(m.sinkage[0], min(depth, 0.1) if passes else NAN)
+    assert np.isnan(m.sinkage[0]) != passes
     assert bool(reasons(checks)) != passes
 
 

@@ -87,7 +87,6 @@ BIAS_SIGMAS = 5.0
 TILT_IS_MOUNTING = 0.7  # probability that a tilt in circles is the mounting, not a zero [-]
 CROSS_AXIS = 0.01  # gyro against accelerometer in one housing [rad]; data sheets of MEMS
 UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
-ORIENTED = 0.75  # of the latter, where its orientation says so too [-]
 LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_WILD = 3
@@ -524,12 +523,13 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words: dict[str, Any] = {'force': force}
     sure = 0.999
     if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
-        upright, imu = _turns_upright(evidence), evidence.recording.imu
-        if upright > CLEAR_AGREEMENT:
-            # Its orientation may come from that force, or the sides are swapped as well.
-            as_oriented = imu is not None and _up_apart(imu) < UP_APART
-            told = evidence.found('force_reversed', ORIENTED if as_oriented else 0.97, **words)
-            return [told], replace(evidence, force=-evidence.force)
+        upright, reversed_force = _turns_upright(evidence), replace(evidence, force=-evidence.force)
+        starts = felt_yaw(reversed_force)
+        turned_round = (
+            starts is not None and abs(starts.value) > 0.5 * math.pi
+        )  # sides are swapped, too
+        if upright > CLEAR_AGREEMENT and not turned_round:
+            return [evidence.found('force_reversed', 0.97, **words)], reversed_force
         if upright > -CLEAR_AGREEMENT:
             sure = UNTURNED
             words['rival'] = ', or linear_acceleration has the wrong sign: drive circles'

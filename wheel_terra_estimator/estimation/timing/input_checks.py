@@ -50,10 +50,10 @@ CHANNELS: dict[type, int] = {
 
 WHEEL_ODOMETRY, INERTIAL, SINKAGE, LEAVING_ANGLE, REFERENCE = range(5)
 
-_TOO_DEEP = 'sinkage infinite or larger than the wheel'
+_TOO_DEEP = 'sinkage infinite or larger than the wheel radius'
 _VOID = 'variance says that nothing is known'
 REMEDIES = {
-    _TOO_DEEP: 'in millimetres? multiply position by 0.001 in the driver (m)',
+    _TOO_DEEP: 'buried, or millimetres? multiply position by 0.001 in the driver (m)',
     _VOID: 'a placeholder? send the variance, or 0 and state sensors.reference_std',
 }
 """Reason for leaving something out -> what corrects it."""
@@ -104,8 +104,7 @@ class InputChecks:
         self._torques = _symmetric([GREATEST_TORQUE] * self._count)
         self._steering = _symmetric([GREATEST_STEERING] * self._count)
         self._angles = _symmetric([0.5 * math.pi] * self._count)
-        self._buried = [(-math.inf, 2.0 * radius) for radius in wheels.radius.tolist()]
-        self._deepest = wheels.radius  # to which the models go
+        self._deepest = [(-math.inf, radius) for radius in wheels.radius.tolist()]
         self._highest = [(-0.5 * radius, math.inf) for radius in wheels.radius.tolist()]
         self._checks: tuple[Callable[[Any], Any], ...] = (
             self._wheel_odometry,
@@ -214,10 +213,8 @@ class InputChecks:
         if len(m.sinkage) != self._count:
             self.refuse(SINKAGE, 'wrong number of wheels')
             return None
-        kept = self._within(SINKAGE, m.sinkage, self._buried, _TOO_DEEP)
+        kept = self._within(SINKAGE, m.sinkage, self._deepest, _TOO_DEEP)
         kept = self._within(SINKAGE, kept, self._highest, 'sinkage far above the surface')
-        if (kept > self._deepest).any():
-            kept = np.minimum(kept, self._deepest)
         return m if kept is m.sinkage else SinkageReading(m.stamp, kept)
 
     def _leaving_angle(self, m: LeavingAngleReading) -> LeavingAngleReading | None:
