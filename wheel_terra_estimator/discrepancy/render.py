@@ -58,6 +58,8 @@ def render(
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
     soil = _shifts(findings, after, variance, 'soil')
     bed = words.another_bed(after)
+    fresh = words.fresh_bed(decision.beds_differ, table)
+    beds_first = decision.beds_differ > 0.5  # more likely than not
     moved = (*soil, *_shifts(findings, after, variance, *setting.forward.base_effects))
     return Diagnosis(
         verdict=decision.verdict.status,
@@ -71,9 +73,10 @@ def render(
         smallest_visible=_smallest_visible(findings, known),
         where=locate(both, setting.problem, findings.nothing, variance, setting.forward.active),
         next_measurement=(
-            *words.fresh_bed(decision.beds_differ, table),
+            *(fresh if beds_first else ()),
             *([words.REFERENCE_AGAIN] if bed else []),
             *_next(decision),
+            *(() if beds_first else fresh),
         ),
         curves=decision.curves,
         noise=replace(findings.noise, std=findings.noise.std[: len(table)]),
