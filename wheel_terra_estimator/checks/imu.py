@@ -525,10 +525,9 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
         upright, reversed_force = _turns_upright(evidence), replace(evidence, force=-evidence.force)
         starts = felt_yaw(reversed_force)
-        turned_round = (
-            starts is not None and abs(starts.value) > 0.5 * math.pi
-        )  # sides are swapped, too
-        if upright > CLEAR_AGREEMENT and not turned_round:
+        # Felt backward then: it lies on its back, and the sides are swapped.
+        backward = starts is not None and abs(starts.value) > 0.5 * math.pi
+        if upright > CLEAR_AGREEMENT and not backward:
             return [evidence.found('force_reversed', 0.97, **words)], reversed_force
         if upright > -CLEAR_AGREEMENT:
             sure = UNTURNED

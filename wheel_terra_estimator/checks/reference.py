@@ -295,7 +295,7 @@ def check_place(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     there = np.isfinite(evidence.rate).any(axis=0)  # more of them may be on one side
     side, lateral = evidence.facts.side[there], evidence.facts.lateral[there]
     middle = evidence.rim + 0.5 * evidence.side_difference * side.mean()
-    if len(set(side)) > 1:  # base_link may lie beside the middle between the sides
+    if {-1.0, 1.0} <= set(side):  # base_link may lie beside the middle between the sides
         middle = middle + evidence.yaw * 0.5 * sum(lateral[side == one].mean() for one in (-1, 1))
     rim, yaw = (evidence.rim_at(reference.stamp, one) for one in (middle, evidence.yaw))
     forward = reference.velocity[:, 0]

@@ -316,7 +316,8 @@ class WheelSoilEstimator:
 
         if not cycle.reference_known:
             self._speed.keep_with_rims(ekf, cycle.yaw_compensated)
-            self._speed.keep_behind_driving_wheels(ekf, cycle)
+            if cycle.lateral_motion <= _SHARP_TURN:  # in it no wheel tells of the body
+                self._speed.keep_behind_driving_wheels(ekf, cycle)
         self._speed.end_cycle(
             time,
             ekf,
