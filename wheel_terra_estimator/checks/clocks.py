@@ -570,12 +570,16 @@ def _silent(recording: Recording) -> list[Outcome]:
             late = float(np.median(channel.late)) if channel.late.size else 0.0
             way[name] = late if 0.0 < late < LONGEST_WAY else 0.0
     sent = {name: (first - way[name], last - way[name]) for name, (first, last) in heard.items()}
+    # As heard and as sent: a message may come late, or its stamp be off.
+    spans = [
+        (one, min(first for first, _ in one.values()), max(last for _, last in one.values()))
+        for one in (heard, sent)
+        if one
+    ]
     outcomes: list[Outcome] = []
     for name, (first, last) in heard.items():
-        # As heard and as sent: a message may come late, or its stamp be off.
-        spans = [(one[name], np.array([*one.values()])) for one in (heard, sent)]
-        late = min(own[0] - all_of[:, 0].min() for own, all_of in spans)
-        ended = min(all_of[:, 1].max() - own[1] for own, all_of in spans)
+        late = min(one[name][0] - begin for one, begin, _ in spans)
+        ended = min(end - one[name][1] for one, _, end in spans)
         late = late if name in ('joints', 'imu') else 0.0
         for where, silence in (('first', late), ('last', ended)):
             channel = getattr(recording, name)

@@ -523,12 +523,13 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words: dict[str, Any] = {'force': force}
     sure = 0.999
     if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
-        upright, reversed_force = _turns_upright(evidence), replace(evidence, force=-evidence.force)
-        starts = felt_yaw(reversed_force)
-        # Felt backward then: it lies on its back, and the sides are swapped.
-        backward = starts is not None and abs(starts.value) > 0.5 * math.pi
-        if upright > CLEAR_AGREEMENT and not backward:
-            return [evidence.found('force_reversed', 0.97, **words)], reversed_force
+        upright = _turns_upright(evidence)
+        if upright > CLEAR_AGREEMENT:
+            reversed_force = replace(evidence, force=-evidence.force)
+            starts = felt_yaw(reversed_force)
+            # Felt backward then it lies on its back, and the sides are swapped.
+            if starts is None or abs(starts.value) <= 0.5 * math.pi:
+                return [evidence.found('force_reversed', 0.97, **words)], reversed_force
         if upright > -CLEAR_AGREEMENT:
             sure = UNTURNED
             words['rival'] = ', or linear_acceleration has the wrong sign: drive circles'

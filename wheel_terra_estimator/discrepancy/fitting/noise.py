@@ -58,8 +58,7 @@ def stated_noise(table: SteadyTable, scale: FloatArray, apart: FloatArray) -> No
         stated = here & np.isfinite(std[:, q])
         if stated.any():
             # Cells without a stated deviation take the median of the stated ones.
-            usual = np.median(std[stated, q])
-            std[here & ~stated, q] = usual
+            std[here & ~stated, q] = np.median(std[stated, q])
             origin[quantity] = 'given'
             # An instrument's noise is not all that repeated runs scatter by: beds do as well.
             times, count = repeats(table, q, apart, std[:, q])

@@ -263,9 +263,8 @@ def _repeatability(table: SteadyTable, noise: Noise) -> list[str]:
         stated = float(np.nanmedian(column))
         chance = float(chdtrc(count, count * (pooled / stated) ** 2))
         if not SCATTER_CHANCE < chance < 1.0 - SCATTER_CHANCE:
-            so = (
-                'the scatter is used' if noise.origin[name] == 'repeats' else 'one of them is wrong'
-            )
+            used = noise.origin[name] == 'repeats'
+            so = 'the scatter is used' if used else 'one of them is wrong'
             found.append(
                 f'{plain(name)}: rows that repeat one another scatter by '
                 f'{amount(name, pooled, 2)} {SHOWN[name][1]}, its stated noise is '
@@ -309,7 +308,7 @@ def another_bed(fitted: Fit) -> str:
     farthest = max((c.stated * abs(u) for c, u in sure), default=0.0)
     so = 'more than beds usually differ' if farthest > _USUAL_OF_BEDS else 'beds differ so'
     usual = ' and '.join(map(percent, BED_SCATTER.values()))
-    return factors and (f'the bed has {factors} of that of the reference: {so} ({usual} are usual)')
+    return factors and f'the bed has {factors} of that of the reference: {so} ({usual} are usual)'
 
 
 def alone(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
@@ -320,14 +319,10 @@ def alone(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
         for name, item in gap.items()
         if item.fitted > _SHARED * item.after
     ]
-    return (
-        (
-            f'the error that table and reference share is in no file: model.yaml alone errs by '
-            f'{", ".join(errors)}',
-        )
-        if errors
-        else ()
-    )
+    if not errors:
+        return ()
+    share = 'the error that table and reference share is in no file: model.yaml alone errs by'
+    return (f'{share} {", ".join(errors)}',)
 
 
 def _swept(table: SteadyTable) -> str:

@@ -456,8 +456,7 @@ class SpeedProcess(Component[SpeedState]):
         Only a slide does that, and no force of its wheels would ever end it.
         """
         if abs(rims.typical) > self._rover.low_rim and rims.oppose(float(ekf.mean[SPEED])):
-            least = (_FIRST_RATIO_STD * rims.typical) ** 2
-            ekf.set(SPEED, 0.0, max(float(ekf.covariance[SPEED, SPEED]), least))
+            _put_right(ekf, 0.0, rims)
 
     def keep_behind_driving_wheels(self, ekf: GatedFilter, cycle: Cycle) -> None:
         """Let a rover without a reference velocity be no faster than a wheel that drives it.
@@ -474,10 +473,9 @@ class SpeedProcess(Component[SpeedState]):
             if way * torque > _DRIVING * load * radius
         ]
         slowest = min(known(driving), default=math.inf)
-        variance = float(ekf.covariance[SPEED, SPEED])
-        if way * float(ekf.mean[SPEED]) - slowest > _SURELY * math.sqrt(variance):
-            least = (_FIRST_RATIO_STD * rims.typical) ** 2
-            ekf.set(SPEED, way * slowest, max(variance, least))
+        doubt = _SURELY * math.sqrt(float(ekf.covariance[SPEED, SPEED]))
+        if way * float(ekf.mean[SPEED]) - slowest > doubt:
+            _put_right(ekf, way * slowest, rims)
 
     def keep_least_variance(self, ekf: GatedFilter, rims: Floats) -> None:
         """Keep a least slip deviation."""
@@ -512,6 +510,12 @@ class SpeedProcess(Component[SpeedState]):
             inflation=inflation,
             settled=settled,
         )
+
+
+def _put_right(ekf: GatedFilter, speed: float, rims: RimSpeeds) -> None:
+    """Set a speed [m/s] that cannot be to one that can, no surer than a first slip is."""
+    least = (_FIRST_RATIO_STD * rims.typical) ** 2
+    ekf.set(SPEED, speed, max(float(ekf.covariance[SPEED, SPEED]), least))
 
 
 def spread(changes: Sequence[float]) -> float:
