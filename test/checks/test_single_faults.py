@@ -49,6 +49,14 @@ def in_steps(values):
     return step * np.round(values / step)
 
 
+def of_the_wheels(velocity):
+    """Mean of the rates times a radius, as controllers of wheels publish it."""
+    joints, reference = WHOLE.joints, WHOLE.reference
+    near = np.abs(reference.stamp[:, None] - joints.stamp).argmin(axis=1)
+    speed = 1.03 * rolling.RADIUS * joints.rate[near].mean(axis=1)
+    return np.column_stack([speed, 0.0 * speed, 0.0 * speed])
+
+
 def one_number(*numbers):
     return lambda values: np.tile(numbers, (len(values), 1))
 
@@ -98,6 +106,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (REFERENCE, {'velocity': np.negative}, 'reference_reversed', None, None, ''),
     (REFERENCE, {'velocity': np.abs}, 'reference_unsigned', None, None, ''),
     (REFERENCE, {'velocity': by(0.0)}, 'reference_zero', None, None, ''),
+    (REFERENCE, {'velocity': of_the_wheels}, 'reference_wheels', None, None, 'slip is always 0'),
     (REFERENCE, {'velocity': by(3.6)}, 'reference_unit', None, approx(1.0 / 3.6), ''),
     (REFERENCE, units(100.0), 'reference_unit', None, approx(0.01), ''),
     (REFERENCE, units(1000.0), 'reference_unit', None, approx(0.001), ''),

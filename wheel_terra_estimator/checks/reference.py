@@ -5,14 +5,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import Evidence, Mask
+from wheel_terra_estimator.checks.evidence import BEND_OF_NOISE, Evidence, Mask
 from wheel_terra_estimator.checks.finding import Outcome, untold
-from wheel_terra_estimator.checks.series import VelocitySeries
+from wheel_terra_estimator.checks.series import VelocitySeries, nearest
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
     bend_noise,
@@ -26,6 +27,7 @@ from wheel_terra_estimator.checks.statistics import (
 LEAST_REFERENCES = 10
 ALIKE_BOTH_WAYS = 0.5  # slower over faster of the speeds forward and back [-]
 SELDOM_NEGATIVE = 0.1  # share of negative speeds of what has no sign, by noise, at most [-]
+SHARES_NOISE = 0.3  # of the rates: what differs by less from the wheels has their noise in it [-]
 JUMP_FACTOR = 8.0  # a jump over the usual change [-]
 JUMP_SHARE = 0.005  # share of jumps that is a fault of the source, not a single wild reading
 LEAST_JUMPS = 3
@@ -98,6 +100,28 @@ def _without_sign(speed: FloatArray, other: FloatArray) -> bool:
     usual = [float(np.median(way)) for way in ways]
     against = [float(np.mean(way < 0.0)) for way in ways]
     return min(usual) > ALIKE_BOTH_WAYS * max(usual) and max(against) <= SELDOM_NEGATIVE
+
+
+def check_source(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return a reference that has the noise of the wheel rates in it, and the evidence without it.
+
+    A velocity of another source differs from the wheels by their noise, at the least.
+    """
+    recording, reference = evidence.recording, evidence.recording.reference
+    if reference is None:
+        return [], evidence
+    rim = nearest(evidence.joints.stamp, evidence.rim, reference.stamp)
+    rows = np.abs(rim) > AHEAD * np.nanquantile(np.abs(rim), 0.9)
+    if rows.sum() < LEAST_REFERENCES:
+        return [], evidence
+    forward, rim = reference.velocity[rows, 0], rim[rows]
+    scale = float(np.median(forward / rim))
+    noise = abs(scale) * robust_std(np.diff(evidence.rim[evidence.moving], 4)) / BEND_OF_NOISE
+    if not robust_std(forward - scale * rim) < SHARES_NOISE * noise:
+        return [], evidence
+    return [evidence.found('reference_wheels', 0.95)], replace(
+        evidence, recording=replace(recording, reference=None)
+    )
 
 
 def check_frame(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -217,6 +217,7 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('sign', turning, 'check_signs', DRIVING),
     ('sign', turning, 'check_steering_sign'),
     ('sign', reference, 'check_sense', DRIVING),
+    ('placeholder', reference, 'check_source', DRIVING),
     ('unit', turning, 'check_gyro_unit', DRIVING),
     ('unit', wheel_rates, 'check_unit', DRIVING),
     ('noise', wheel_rates, 'check_noise'),
