@@ -104,6 +104,21 @@ def test_messages_that_hold_some_of_the_wheels_complete_one_another():
     assert 'joint_states_stamp_repeated' not in core.health()
 
 
+def test_sets_wait_for_the_second_part_of_a_stamp():
+    def halves(t):
+        return [
+            WheelOdometry(stamp_at(t), np.array(rate), np.full(2, math.nan))
+            for rate in ([3.0, math.nan], [math.nan, 2.0])
+        ]
+
+    times = [0.1 * i for i in range(6)]
+    core, _ = make_core(max_lag=-1.0)
+    sets = play(core, [part for t in times for part in halves(t)])
+    whole, _ = make_core()
+    both = [WheelOdometry(stamp_at(t), np.array([3.0, 2.0]), np.full(2, math.nan)) for t in times]
+    assert essence(sets)[1:] == essence(play(whole, both))[1:]  # the first one comes at once
+
+
 def test_max_lag_holds_back_until_the_newest_stamp_passes():
     core, _ = make_core(max_lag=0.2)
     assert core.add(odometry(0.0)) == []

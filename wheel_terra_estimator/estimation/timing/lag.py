@@ -4,7 +4,8 @@
 
 Where one of them comes late for good, waiting for it is cheaper than running again for each of its
 messages, and no set is lost. A lag of a few milliseconds is not waited for: one step is soon run
-again, and a message at 10 Hz that is held for the next one is a tenth of a second old.
+again, and a message at 10 Hz that is held for the next one is a tenth of a second old. Where wheel
+odometry of one stamp comes in several messages, a later stamp is waited for.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ _MEMORY = 64  # messages of a channel
 _SHARE = 0.95  # of them that are waited for
 _LEARN_EVERY = 8  # messages, once the memory is half full
 _ROOM = 1.05  # over the lag that was seen
+_IN_PARTS = 0.25
+"""Share of repeated stamps above which a stamp comes in parts (half of them in two, and so on)."""
 
 
 class LagLearner:
@@ -35,6 +38,8 @@ class LagLearner:
         self.fixed = fixed
         self._lags = {c: deque[int](maxlen=_MEMORY) for c in (WHEEL_ODOMETRY, INERTIAL)}
         self._counts = dict.fromkeys(self._lags, 0)
+        self._repeats = deque[bool](maxlen=_MEMORY)
+        self._odometry: int | None = None  # last stamp of it
         self._newest: int | None = None
         self._first: int | None = None
         self._odometry_heard = False
@@ -57,7 +62,10 @@ class LagLearner:
         lags = self._lags.get(channel)
         if lags is None:
             return
-        self._odometry_heard |= channel == WHEEL_ODOMETRY
+        if channel == WHEEL_ODOMETRY:
+            self._odometry_heard = True
+            self._repeats.append(stamp == self._odometry)
+            self._odometry = stamp
         newest = self._newest
         self._newest = stamp if newest is None else max(newest, stamp)
         lags.append(0 if newest is None else max(newest - stamp, 0))
@@ -76,4 +84,5 @@ class LagLearner:
             and newest - self._first < 2 * LONGEST_HOLD
         ):
             return LONGEST_HOLD  # it may be on its way
-        return min(max(self.learned.values()), LONGEST_HOLD)
+        in_parts = sum(self._repeats) > _IN_PARTS * len(self._repeats)
+        return min(max(*self.learned.values(), int(in_parts)), LONGEST_HOLD)
