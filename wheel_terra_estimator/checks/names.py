@@ -125,11 +125,11 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         outcomes.append(_missing(joints.topic, facts.names, how))
     mute = [name for name in facts.names if name in silent]
     if mute:
-        outcomes.append(
-            _missing(
-                joints.topic, mute, 'without a rate: velocity is empty, or not as long as name'
-            )
-        )
+        at = joints.position
+        angles = at is not None and np.isfinite(at[:, joints.names.index(mute[0])]).any()
+        how = 'velocity is empty, or not as long as name'
+        how = 'position alone, from which the driver can work out velocity' if angles else how
+        outcomes.append(_missing(joints.topic, mute, f'without a rate: {how}'))
     for name in spare:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
             outcomes.append(found('spare_joint', joints.topic, 0.7, wheel=name))
