@@ -13,6 +13,7 @@ from wheel_terra_estimator.estimation.contacts.measured_wheels import (
     SpeedAndVariance,
     pooled,
     slip_of_torque,
+    torque_of_slip,
 )
 from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
@@ -66,6 +67,24 @@ def test_steeper_takes_more_and_no_soil_gives_all(usual):
     assert usual.at(-2.0, beyond=0.8) == -0.5
 
 
+def test_sand_that_nobody_stated_holds_no_rover_on_the_level():
+    """Thirty kilograms on two wheels of 26 mm would be buried in it; on the level it rolls."""
+    tiny = {
+        'wheels.names': ['left', 'right'],
+        'wheels.radius': [0.026, 0.026],
+        'wheels.width': [0.05, 0.05],
+        'wheels.y': [0.25, -0.25],
+        'rover.mass': 30.0,
+    }
+    slips = {}
+    for stated in ({}, {'soil.cohesion': 170.0}):
+        configuration = reader.from_parameters(tiny | stated)
+        parts = Parts(configuration)
+        slips[bool(stated)] = UsualSlip(configuration, parts.rover).at(0.0, beyond=0.8)
+    assert slips[False] < 0.1
+    assert slips[True] == 0.8  # that of the file
+
+
 @pytest.mark.parametrize('slip', [0.05, 0.15, 0.3])
 @pytest.mark.parametrize('stated', [False, True])
 def test_lugs_of_which_no_file_says_it_shear_half_way_up(slip, stated):
@@ -97,6 +116,8 @@ def test_measured_wheels_lie_within_the_stated_interval(wheel):
 def test_half_of_the_greatest_torque_takes_the_scale_times_ln_2():
     usual = slip_of_torque(0.275)
     assert usual.slip == pytest.approx(0.17 * math.log(2.0))
+    there_and_back = torque_of_slip(np.array([usual.slip, -usual.slip]))
+    assert there_and_back == pytest.approx([0.275, -0.275])
 
 
 def test_braking_wheels_skid_as_driving_ones_slip():

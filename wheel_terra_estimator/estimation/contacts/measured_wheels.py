@@ -13,6 +13,9 @@ import math
 from math import isnan
 from typing import NamedTuple
 
+import numpy as np
+
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.scalars import NAN
 
 # The curve and its spread, with that of wheels in three simulators of different laws.
@@ -29,6 +32,11 @@ class SlipOfTorque(NamedTuple):
 
     slip: float
     std: float
+
+
+def torque_of_slip(slip: FloatArray) -> FloatArray:
+    """Return the torque of measured wheels over load times radius at slips [-]; odd in the slip."""
+    return np.sign(slip) * _GREATEST_TORQUE * -np.expm1(-np.abs(slip) / _SLIP_SCALE)
 
 
 def slip_of_torque(coefficient: float) -> SlipOfTorque:

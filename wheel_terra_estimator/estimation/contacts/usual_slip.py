@@ -12,12 +12,15 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
+from wheel_terra_estimator.estimation.contacts.measured_wheels import torque_of_slip
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 
 _SLIPS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9)
 """Slips of the curve, close together where it is steep."""
+_MOST_ON_LEVEL = 0.3  # slip of a rover that drives on level ground, whatever it is [-]
+_ROLLING_RESISTANCE = 0.1  # of measured wheels on loose soil, over the load [-]
 _BISECTIONS = 20  # of the logarithm of the sinkage: to a hundred thousandth
 _SHALLOWEST = 1e-4  # sinkage [m]
 _DEEPEST = 0.9  # of the radius
@@ -53,7 +56,12 @@ class UsualSlip:
     def curve(self) -> tuple[list[float], list[float]]:
         """Pull over load and slip, both increasing, up to the greatest pull."""
         models, rover = contact_models(self._configuration), self._rover
-        shares = steady_pull(models, rover, np.array(_SLIPS))
+        all_slips = np.array(_SLIPS)
+        shares = steady_pull(models, rover, all_slips)
+        carries = np.interp(_MOST_ON_LEVEL, all_slips, shares) > 0.0
+        if not (self._configuration.soil_stated or carries):
+            # Sand that nobody stated would hold this rover on the level: it is other ground.
+            shares = torque_of_slip(all_slips) - _ROLLING_RESISTANCE
         pulls: list[float] = []
         slips: list[float] = []
         for slip, share in zip(_SLIPS, shares.tolist(), strict=True):
