@@ -686,3 +686,20 @@ def test_slip_that_differs_in_turns_is_no_place():
     left = 0.5 * (1.0 - 0.1 * (reference.yaw_rate > 0.1))
     told = checked(reference=replace(reference, velocity=reference.velocity * left[:, None]))
     assert 'reference_place' not in faults(told)
+
+
+@pytest.mark.parametrize(
+    'torques, told',
+    [
+        ((2.0, -1.5, -0.7, 1.0), False),  # ground that hardly gives: slower wheels brake
+        ((3.0, -2.8, 3.2, 3.1), True),  # loose ground
+    ],
+)
+def test_wheels_that_fight_on_firm_ground_have_no_wrong_sign(torques, told):
+    time = np.arange(0.0, 60.0, 1.0 / rolling.RATE)
+    motion = rolling.Motion(time, np.interp(time, [3.0, 6.0], [0.0, 0.3]), 0.0 * time, 0.0 * time)
+    whole = rolling.recording(motion)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(whole.joints.torque.shape)
+    torque = np.outer(motion.speed / motion.speed.max(), torques) + noise
+    report = rolling.checked(whole=whole, joints=replace(whole.joints, torque=torque))
+    assert ('torque_sign' in faults(report)) == told

@@ -32,6 +32,7 @@ from wheel_terra_estimator.checks.statistics import (
 UPHILL_ENOUGH = -0.02  # specific force along the drive at which a wheel takes power [g]
 SIGN_SIGMAS = 4.0
 LEAST_ANSWER = 0.3  # answer of a torque to slopes over the others' that tells its sign [-]
+LEAST_LOOSE = 0.03  # sum of T/r over the weight on loose level ground, at least [-]
 MOST_TRACTION = 0.85  # sum of T/r over the weight that no soil gives (tangent of 40 degrees)
 UNIT_TRACTION = 15.0  # the same, above which the torque is in N mm
 LEAST_TRACTION = 4e-3  # the same, that no ground or drive costs less than
@@ -96,6 +97,8 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence, bool]:
     The mean alone does not tell: a wheel whose radius is a little smaller is dragged by the others.
     """
     facts, told = evidence.facts, answers(evidence)
+    if told is not None and _fight(evidence, told):
+        told = None
     if told is None:
         return [untold('sign', 'torque_no_change')], evidence, False
     usual = float(np.median([abs(answer.value) for answer, _ in told]))
@@ -119,6 +122,22 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence, bool]:
     names = ', '.join(facts.names[i] for i in wrong)
     outcomes.append(evidence.found('torque_sign', sure, wheel=names, value=-1.0))
     return outcomes, evidence.with_rate(evidence.rate, torque), bool(unsure)
+
+
+def _fight(evidence: Evidence, told: list[tuple[Estimate, Estimate]]) -> bool:
+    """Return whether wheels may fight one another: torques of both signs leave next to nothing.
+
+    On firm ground they do so from the start on: without slopes nothing then tells the signs.
+    """
+    facts, levels = evidence.facts, [level.value for _, level in told]
+    rows = evidence.steady & evidence.unturned
+    if not (facts.known and rows.any() and min(levels) < 0.0 < max(levels)):
+        return False
+    assert evidence.force is not None
+    pushed, along = thrust(evidence) * np.sign(evidence.common_rate), evidence.force[:, 0]
+    pushed, along = (moving_mean(values, SMOOTH_ROWS)[rows] for values in (pushed, along))
+    firm = abs(np.quantile(pushed, 0.25)) < LEAST_LOOSE * facts.mass * facts.gravity
+    return bool(firm and np.std(along) < LEAST_SLOPE_STD)
 
 
 def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
