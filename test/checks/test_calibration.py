@@ -48,6 +48,18 @@ def test_radius_track_and_mounting(seed):
     assert told['sensors.imu_mounting_pitch_deg'].after == pytest.approx(0.0, abs=0.3)
 
 
+def test_a_reversed_gyro_leaves_the_wheels_on_their_sides():
+    """Swapped sides are its rival; without starts nothing tells which of both it is."""
+    imu = rolling.recording().imu
+    calibration, _ = calibrated(
+        imu=replace(imu, rate=imu.rate * [1.0, 1.0, -1.0], force=imu.force * [1.0, 0.0, 1.0])
+    )
+    told = {change.key: change.after for change in calibration.changes}
+    assert told['wheels.y'] == pytest.approx(
+        [rolling.HALF_TRACK, -rolling.HALF_TRACK] * 2, rel=0.02
+    )
+
+
 def test_a_zero_of_the_accelerometer_is_written_and_what_stays_wrong_is_told():
     imu, reference = rolling.recording().imu, rolling.recording().reference
     off = replace(imu, force=imu.force + np.array([0.6, 0.0, 0.0]))

@@ -60,8 +60,7 @@ def calibrate(
         read_off = told.fault.endswith('_offset') or told.fault == 'planet'
         if read_off and told.parameter and told.value is not None:
             changes.add(told.parameter, told.value, told.std, told.words)
-    _mounting(changes, evidence, report)
-    _biases(changes, evidence, report)
+    _biases(changes, _mounting(changes, evidence, report), report)
     _noises_and_rates(changes, report)
     evidence = _radius(changes, evidence, report)
     if np.isfinite(evidence.torque).any(axis=0).all():
@@ -107,7 +106,8 @@ def _directions(changes: _Changes, report: CheckReport, configuration: Configura
     changes.add('wheels.direction', after, None, f'{told.wheel}: {told.words}')
 
 
-def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
+def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
+    """Note the mounting; return the evidence in the frame of the file that is written."""
     all_told = [f for f in report.findings if f.parameter in imu.MOUNTING]
     if any(f.confidence <= imu.UNTURNED for f in all_told):  # a rival may be it
         evidence, all_told = evidence.turned(evidence.facts.mounting), []
@@ -123,6 +123,7 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
     for key, new in zip(imu.MOUNTING, imu.mounting_angles(rotation), strict=True):
         if abs(math.remainder(new - changes.number(key), 360.0)) > imu.LEAST_SHOWN:
             changes.add(key, round(new, 3), std, source)
+    return evidence
 
 
 def _biases(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
@@ -209,7 +210,7 @@ def _track(changes: _Changes, evidence: Evidence) -> None:
     told = None if turning.skids(evidence) else geometry.rolling_track(evidence)
     sure = isinstance(told, geometry.Told) and told.alone
     if isinstance(told, geometry.Told) and sure and told.ratio.sigmas_from(1.0) > CLEAR:
-        lateral = evidence.facts.lateral
+        lateral = evidence.facts.configuration.wheels.y  # in which no side is swapped
         std = float(np.abs(lateral).max()) * told.ratio.std
         source = 'gyro against the difference of the sides in turns'
         changes.add('wheels.y', (lateral * told.ratio.value).round(4).tolist(), std, source)

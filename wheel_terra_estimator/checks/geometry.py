@@ -442,6 +442,6 @@ def check_track(evidence: Evidence) -> list[Outcome]:
         separate += ', or drive straight by a reference'
     words |= {'rival': rival, 'separate': separate, 'ratio': ratio.value, 'off': ratio.std}
     value, std = round(stated * ratio.value, 4), round(stated * ratio.std, 4)
-    lateral = listed(evidence.facts.lateral * ratio.value, '.3f')
+    lateral = listed(evidence.facts.configuration.wheels.y * ratio.value, '.3f')
     sure = 0.9 * sure if alone else 0.5
     return [evidence.found('track', sure, value=value, std=std, lateral=lateral, **words)]
