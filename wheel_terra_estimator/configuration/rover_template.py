@@ -87,6 +87,7 @@ _WORTH_STATING = (
     'sensors.specific_force_std',
     'sensors.angular_rate_std',
     'sensors.reference_std',
+    'sensors.reference_wander_std',
     'sensors.imu_mounting_roll_deg',
     'sensors.imu_mounting_pitch_deg',
     'sensors.imu_mounting_yaw_deg',
