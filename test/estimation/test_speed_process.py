@@ -267,13 +267,14 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
     free = SpeedStep(1.0, 0.0, 0.0, 0.0)
     length = USUAL_LENGTH
 
-    def after(travel):
+    def after(travel, buried=False):
         cycle = Parts(reader.load(SAND)).cycle([rim] * 6, dt=travel / rim)
-        return made.towards_equilibrium_slip(free, cycle, 1.0, length)
+        return made.towards_equilibrium_slip(free, cycle, 1.0, length, buried=buried)
 
     assert after(length).speed_gain == pytest.approx(np.exp(-1.0))
     usual = after(1e3 * length).constant
     assert 0.5 * rim < usual < rim
+    assert after(1e3 * length, buried=True).constant == pytest.approx(0.2 * rim)
     twice = after(0.5 * length)
     gain, constant = twice.speed_gain, twice.constant
     assert gain * constant + constant == pytest.approx(after(length).constant), 'two halves'

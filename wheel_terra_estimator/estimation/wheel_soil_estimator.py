@@ -58,6 +58,7 @@ from wheel_terra_estimator.estimation.filter.speed_process import (
     HELD_LENGTH,
     USUAL_LENGTH,
     SpeedProcess,
+    SpeedStep,
 )
 from wheel_terra_estimator.estimation.filter.state import (
     GRAVITY_BIAS,
@@ -437,16 +438,23 @@ class WheelSoilEstimator:
         by_wheels = expected = speed.by_wheels(cycle.dt, cycle.yaw_compensated, inflation)
         unseen = not cycle.still and not cycle.reference_known
         # No slip is usual where the ground holds the rover.
-        length = HELD_LENGTH if self._clock.assessment.holds else USUAL_LENGTH
+        held = self._clock.assessment
+        length = HELD_LENGTH if held.holds and not held.buried else USUAL_LENGTH
+
+        def usual(step: SpeedStep) -> SpeedStep:
+            return speed.towards_equilibrium_slip(
+                step, cycle, direction, length, buried=held.buried
+            )
+
         if unseen:
-            expected = speed.towards_equilibrium_slip(by_wheels, cycle, direction, length)
+            expected = usual(by_wheels)
         lacking = speed.learn_bias(self._ekf, cycle, expected)
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
         x = self._ekf.mean
         prediction = Prediction.unchanged(x)
         step = speed.combined(by_wheels, cycle.dt, self._trusted(cycle.window, cycle.time))
         if unseen:
-            step = speed.towards_equilibrium_slip(step, cycle, direction, length)
+            step = usual(step)
         speed.predict(prediction, step, cycle)
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:

@@ -65,6 +65,32 @@ def test_entrapment_is_announced_before_it_has_lasted_a_second(slips, ahead):
     assert when <= entrapped - ahead
 
 
+@pytest.mark.parametrize(
+    ('known', 'read', 'growth', 'wheels', 'warned'),
+    [
+        (False, True, 0.05, 6, True),
+        (True, True, 0.05, 6, False),  # a speed says that the rover gets on
+        (False, False, 0.05, 6, False),  # a depth that only its model tells
+        (False, True, 0.0, 6, False),  # deep snow
+        (False, True, 0.05, 2, False),  # two of six in a hole
+    ],
+)
+def test_without_a_speed_wheels_that_are_read_to_bury_themselves(
+    known, read, growth, wheels, warned
+):
+    """At slip 0.1, as it seems; depth in metres per metre of rim travel, from 0.42 radii on."""
+    monitor, found = StuckMonitor(SETTINGS), []
+    for i in range(120):
+        deep = 0.05 + growth * 0.05 * 0.1 * i
+        rows = [wheel(0.1)._replace(sinkage=deep if n < wheels else 0.05) for n in range(6)]
+        found.append(judge(monitor, 0.1 * i, 0.045, known, rows, depth_read=read))
+    assert (first(found) is not None) == warned
+    assert found[-1].buried == warned
+    if warned:
+        raised = next(a for a in found if a.stuck)
+        assert 'of their radius deep' in raised.reason
+
+
 def test_steep_climb_that_holds_raises_nothing():
     slips = [min(0.1 + 0.01 * 0.1 * i, 0.6) for i in range(1500)]
     assert first(course([[wheel(s)] * 6 for s in slips])) is None

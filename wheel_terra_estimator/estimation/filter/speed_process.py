@@ -382,19 +382,19 @@ class SpeedProcess(Component[SpeedState]):
         return max(spread(changes) - self._rim_noise, 0.0)
 
     def towards_equilibrium_slip(
-        self, step: SpeedStep, cycle: Cycle, direction: float, length: float
+        self, step: SpeedStep, cycle: Cycle, direction: float, length: float, *, buried: bool
     ) -> SpeedStep:
         """Without a reference velocity, let v / rim speed return to what such a slope takes.
 
         On deep or saturated contacts torque and pull hardly change with slip. There the posterior
         is the prior, and a random walk is no prior: it ends anywhere. `length` is the rim travel
-        over which it returns [m].
+        over which it returns [m]; wheels that are `buried` have no usual slip but the greatest.
         """
         rim, demand = cycle.yaw_compensated.typical, direction * cycle.loads.slope_share
         if not abs(rim) >= self._rover.low_rim:
             return step
         most = _MOST_EQUILIBRIUM_SLIP
-        slip = self._equilibrium_slip.at(demand, beyond=most)
+        slip = most if buried else self._equilibrium_slip.at(demand, beyond=most)
         usual = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
         keep = math.exp(-abs(rim) * cycle.dt / length)
         return SpeedStep(

@@ -1,10 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Stuck warning: raised by either of two criteria, cleared when neither has been there for a while.
+"""Stuck warning: raised by any of three criteria, cleared when none has been there for a while.
 
 Slip: an entrapment, ahead or under way, is more likely than the threshold, or the median slip is
-above 0.8. Standing: the wheels stand for want of power. Only driving slip counts, and a single
-wheel never raises a warning.
+above 0.8. Standing: the wheels stand for want of power. Burying: without a speed, most wheels are
+read too deep to climb out and sink on. Only driving slip counts, and a single wheel never raises a
+warning.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ ADVICE = 'stop, back out'
 """What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
 HOLD, SINKING_HOLD, STANDING_HOLD = 0.95, 0.45, 0.15
 """Times [s] that a criterion must hold, half a cycle short of 1, 0.5, 0.2 s: slip, slip of wheels
-that sink, standing (two readings of wheel odometry). Where the rover stops, a reference stands up
-to 0.9 s before the wheels do, and none of them sinks."""
+that sink, standing (two readings of wheel odometry); burying as slip. Where the rover stops, a
+reference stands up to 0.9 s before the wheels do, and none of them sinks."""
 _SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
 _DIGGING_SLIP = 0.8  # median slip above which a rover that drives on digs itself in
 _EASED = 0.05
@@ -56,13 +57,15 @@ class StuckAssessment(NamedTuple):
     """Whether something says so that no wrong sign or unit of the wheels' readings makes up."""
     holds: bool = False
     """Whether the ground holds the rover still: it drives on, and is asked for no less."""
+    buried: bool = False
+    """Whether it does, and most wheels are read too deep to climb out."""
 
 
 class StuckState(NamedTuple):
     """What the monitor remembers."""
 
     memory: Memory = Memory()
-    since: tuple[float, ...] = (NAN, NAN)  # when each criterion was met [s], nan = it is not
+    since: tuple[float, ...] = (NAN, NAN, NAN)  # when each criterion was met [s], nan = it is not
     stuck: bool = False
     reason: str = ''
     direction: int = 0
@@ -86,13 +89,14 @@ class StuckMonitor(Component[StuckState]):
         at_once = motion.slip_told and _stands(situation) and not motion.turning
         digs = digs and (situation.settled or at_once)
         likely = ahead.probability > settings.threshold or digs
-        there = likely and not situation.braked, situation.standing
+        there = likely and not situation.braked, situation.standing, situation.burying
         since = tuple(
             (time if isnan(begun) else begun) if met else NAN
             for met, begun in zip(there, old.since, strict=True)
         )
-        holds = SINKING_HOLD if situation.digging > _SINKING else HOLD, STANDING_HOLD
-        held = [time - begun > hold for begun, hold in zip(since, holds, strict=True)]
+        slip_hold = SINKING_HOLD if situation.digging > _SINKING else HOLD
+        times = zip(since, (slip_hold, STANDING_HOLD, HOLD), strict=True)
+        held = [time - begun > hold for begun, hold in times]
         state = old._replace(memory=situation.memory, since=since, clear_since=NAN)
         if any(held) and not old.stuck:
             memory = situation.memory
@@ -110,6 +114,8 @@ class StuckMonitor(Component[StuckState]):
             free = time - clear >= settings.clear_time
             state = StuckState(situation.memory) if free else state._replace(clear_since=clear)
         self.state = state
+        ways = state.direction * situation.memory.way
+        holds = state.stuck and ways >= 0 and not motion.demand < state.demand - _EASED
         return StuckAssessment(
             state.stuck,
             state.reason,
@@ -118,9 +124,8 @@ class StuckMonitor(Component[StuckState]):
             state.direction,
             situation.digging,
             state.stuck and _confirmed(situation),
-            state.stuck
-            and state.direction * situation.memory.way >= 0
-            and not motion.demand < state.demand - _EASED,
+            holds,
+            holds and situation.sunk,
         )
 
 
@@ -145,6 +150,8 @@ def _in_words(s: Situation, ahead: Outlook, settings: StuckSettings, held: list[
         text = f'{count} wheels stalled near their torque limit'
     elif held[1]:
         text = f'wheels slowed to {s.rim:.2f} m/s near their torque limit'
+    elif held[2]:
+        text = f'most wheels {s.depth:.0%} of their radius deep'
     elif s.slip > ENTRAPPED_SLIP:
         text = f'median slip {s.slip:.2f}: entrapment under way'
     elif ahead.probability <= settings.threshold:

@@ -24,6 +24,8 @@ _DEEP = 0.4
 """Sinkage over the radius from which a wheel does not climb out: its entrance angle is 53 degrees
 there, and the normal stress, centred at about half of it, leans back by 27 degrees, as much as the
 friction of loose soil pulls forward."""
+_DEEPENING_RADII, _DEEPENED = 5.0, 0.1
+"""Rim travel over which a depth is usual, and how much more is none; both over the radius [-]."""
 _CRUISE_TIME = 5.0  # [s] in which the speed before is forgotten
 _SLOWED = 0.2  # of the rim speed: more is missing where wheels are held, or stopped
 NEAR_LIMIT = 0.7
@@ -73,6 +75,7 @@ class Memory(NamedTuple):
     rolled: float = 0.0  # rim travel since the wheels stood or turned the rover [m]
     cruise: float = 0.0  # typical rim speed, a lower one followed slowly [m/s]
     ruts: tuple[float, ...] = ()  # sinkage of each wheel, followed over its rim travel [m]
+    depth: float = NAN  # usual typical sinkage over the radius [-]
     way: int = 0  # of the rims: 1 forward, -1 backward, 0 both
     way_since: float = NAN  # [s]
 
@@ -133,12 +136,20 @@ class Situation:
             for wheel, rut in zip(self.motion.wheels, self.memory.ruts, strict=True)
         )
 
+    @cached_property
+    def depth(self) -> float:
+        """Typical sinkage over the radius [-]."""
+        return median([w.sinkage / w.radius for w in self.motion.wheels])
+
     @property
     def sunk(self) -> bool:
         """Whether the wheels are read too deep to climb out, and no speed says that they do."""
-        depths = [w.sinkage / w.radius for w in self.motion.wheels]
-        told = self.motion.depth_read and not self.motion.speed_known
-        return told and median(depths) > _DEEP
+        return self.motion.depth_read and not self.motion.speed_known and self.depth > _DEEP
+
+    @property
+    def burying(self) -> bool:
+        """Whether they sink on besides: a rover that gets on has a depth that stays."""
+        return self.sunk and self.depth - self.memory.depth > _DEEPENED
 
     @cached_property
     def travel_until_too_deep(self) -> tuple[float, ...]:
@@ -207,6 +218,8 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
     rolled = memory.rolled + now.fastest * dt if moves and not motion.turning else 0.0
     fresh = rolled < _START_TRAVEL
     ruts = memory.ruts or tuple([w.sinkage for w in motion.wheels])
+    length = _DEEPENING_RADII * median([w.radius for w in motion.wheels])
+    usual = now.depth if isnan(memory.depth) else memory.depth
     way = memory.way
     if moves:
         forward = sum([1 if w.rim_speed > 0.0 else -1 for w in now.moving])
@@ -227,6 +240,7 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
                     for w, rut in zip(motion.wheels, ruts, strict=True)
                 ]
             ),
+            depth=usual + gain_of(now.rim * dt, length) * (now.depth - usual),
             way=way,
             way_since=memory.way_since if way == memory.way else time,
         ),
