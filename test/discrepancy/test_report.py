@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from test_workflow import FEW, run
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision
@@ -26,7 +27,8 @@ from wheel_terra_estimator.discrepancy.report.words import FACTORS, _leaves, in_
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.selection.verdict import Remainder
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
-from wheel_terra_lab.studies.campaigns import Plan, make_campaign, scoring
+from wheel_terra_estimator.discrepancy.workflow import Options
+from wheel_terra_lab.studies.campaigns import Plan, make_campaign
 
 
 class Page(HTMLParser):
@@ -85,8 +87,10 @@ def grey_levels(png: bytes) -> tuple[int, int, int]:
     return width, height, len(set(zlib.decompress(data)))
 
 
-def campaign_diagnosis(seed=12, design='slope48', **plan):
-    return scoring.diagnose(make_campaign(seed, design, Plan(**plan)))
+def campaign_diagnosis(seed, design='slope48', **plan):
+    campaign = make_campaign(seed, design, Plan(**plan))
+    few = Options((*campaign.hidden, *FEW.effects))
+    return run(campaign.table, campaign.settings(), options=few)
 
 
 @pytest.fixture(scope='module')

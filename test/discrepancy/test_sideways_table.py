@@ -70,18 +70,21 @@ def test_a_table_of_lateral_force_is_read_in_its_units_and_checked(tmp_path):
         check_table('t', {**row, 'lateral_force': -20.0 - np.arange(8)})
 
 
-def test_what_the_flank_does_is_named_from_the_lateral_force(capsys):
+FEW = 'side_bulldozing', 'bulldozing', 'cohesion'
+
+
+@pytest.mark.parametrize('effects', [FEW, pytest.param(None, marks=pytest.mark.slow)])
+def test_what_the_flank_does_is_named_from_the_lateral_force(capsys, effects):
     flank = ('-p', 'effects.side_bulldozing.enabled:=true', '-p', 'effects.side_bulldozing.ks:=2.0')
     noise = ('--noise', '0.0003,0.5,0.1,0.3', '--seed', '4')
     rows = predicted(capsys, *GRID, '--load', '60,110', *flank, *noise)
-    found = diagnose(rows, ('hit_wh3', 'hit_fit'))
+    found = diagnose(rows, ('hit_wh3', 'hit_fit'), effects=effects)
     assert [effect.name for effect in found.effects] == ['side_bulldozing']
     assert found.effects[0].parameters['ks'].value == pytest.approx(2.0, abs=0.5)
     gap = found.gap['lateral_force']
     assert gap.after < 0.5 * gap.before
     assert gap.after == pytest.approx(0.3, rel=0.5)
     straight = {name: values for name, values in rows.items() if 'lateral' not in name}
-    few = ('side_bulldozing', 'bulldozing', 'cohesion')
-    unseen = diagnose(straight, ('hit_wh3', 'hit_fit'), effects=few)
+    unseen = diagnose(straight, ('hit_wh3', 'hit_fit'), effects=FEW)
     assert 'lateral_force' not in unseen.gap
     assert 'side_bulldozing' not in [effect.name for effect in unseen.effects]

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_workflow import make, noisy, run
+from test_workflow import FEW, make, noisy, run
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
@@ -48,9 +48,12 @@ def with_effect(design, seed, name, **parameters):
     return table, values
 
 
-def test_thrust_of_grousers_at_its_usual_share_is_named_without_being_asked_for():
+@pytest.mark.parametrize(
+    'effects', [('grouser_thrust', *FEW.effects), pytest.param(None, marks=pytest.mark.slow)]
+)
+def test_thrust_of_grousers_at_its_usual_share_is_named(effects):
     table, values = with_effect('lugs48', 6, 'grouser_thrust')
-    found = run(table, values)
+    found = run(table, values, options=Options(effects))
     assert [effect.name for effect in found.effects] == ['grouser_thrust']
     competitors = found.effects[0].confounded_with
     by_name = {candidate.names: candidate for candidate in found.candidates}
@@ -59,8 +62,8 @@ def test_thrust_of_grousers_at_its_usual_share_is_named_without_being_asked_for(
         assert by_name[(competitor,)].log_evidence > 1.0
 
 
-def test_every_effect_is_named_tried_or_said_not_to_be():
-    table, values, *_ = make('sweep40')
+def test_every_effect_is_named_tried_or_said_not_to_be(unproposed):
+    table, values, *_ = make('basic16')
     values |= {'effects.lug_shear_radius.enabled': True}
     found = run(table, values, options=Options(effects=('cohesion', 'bulldozing')))
     assert set(found.not_tried) == set(catalogue()) - {'cohesion', 'bulldozing'}
@@ -89,7 +92,8 @@ def test_a_channel_that_is_off_on_unseen_rows_does_not_agree(unproposed):
     assert item['floor'] >= 0.0
 
 
-def test_beds_that_differ_from_sweep_to_sweep_are_no_effect():
+@pytest.mark.parametrize('options', [FEW, pytest.param(None, marks=pytest.mark.slow)])
+def test_beds_that_differ_from_sweep_to_sweep_are_no_effect(options):
     table, values, soil, rows = make('sweep40')
     plain, load = solve(rows, soil), rows['normal_load']
     for share, one in zip((0.8, 1.1, 1.25, 0.9, 1.05), np.unique(load), strict=True):
@@ -97,7 +101,7 @@ def test_beds_that_differ_from_sweep_to_sweep_are_no_effect():
         change = solve(rows, other)
         for key in ('sinkage', 'drawbar_pull', 'torque'):
             table[key] = table[key] + np.where(load == one, change[key] - plain[key], 0.0)
-    found = run(table, values)
+    found = run(table, values, options=options)
     assert (found.verdict, found.effects) == ('agrees', ())
     assert 'fresh bed' in found.next_measurement[0].what
     assert any('beds differ' in note for note in found.notes)
@@ -106,7 +110,7 @@ def test_beds_that_differ_from_sweep_to_sweep_are_no_effect():
     stiff = solve(rows, replace(soil, frictional_modulus=1.25 * soil.frictional_modulus))
     second = noisy(rows, solve(rows, soil), stiff, np.random.default_rng(9))
     trials = {key: np.r_[column, second[key]] for key, column in first.items()}
-    found = run({**trials, 'trial': np.repeat([1.0, 2.0], 16)}, values)
+    found = run({**trials, 'trial': np.repeat([1.0, 2.0], 16)}, values, options=options)
     assert found.verdict == 'agrees'
     assert found.noise.std[0, 0] == pytest.approx(second['sinkage_std'][0], rel=0.4)
     repeated = SimpleNamespace(columns={'trial': rows['slip']}, varying=lambda: ('normal_load',))
@@ -170,7 +174,7 @@ def test_the_bed_of_a_reference_is_another():
     assert not any('bed.' in note for note in loose.notes)
     each_counts_anew = {'trial': np.ones(40)}
     reference = check_table('a.csv', {**table, **each_counts_anew})
-    same = run({**again, **each_counts_anew}, values, reference=reference)
+    same = run({**again, **each_counts_anew}, values, reference=reference, options=FEW)
     assert (same.verdict, same.effects) == ('agrees', ())
 
 
@@ -274,15 +278,21 @@ def test_a_patchwork_of_doubtful_names_is_not_given(monkeypatch):
         ('sinkage', 10.0, 'mm in place of cm'),
         ('sinkage', 0.1, 'cm in place of mm'),
         ('torque', 0.1, 'kgf m in place of N m'),
-        ('normal_load', 1.0 / 4.4482216, 'lbf in place of N'),
-        ('normal_load', 2.0, 'of one wheel or of a pair?'),
+        *(
+            pytest.param('normal_load', factor, units, marks=pytest.mark.slow)
+            for factor, units in (
+                (1.0 / 4.4482216, 'lbf in place of N'),
+                (2.0, 'of one wheel or of a pair?'),
+            )
+        ),
     ],
 )
 def test_a_wrong_unit_is_said_before_any_effect(column, factor, units):
     campaign = make_campaign(92_510_001, 'sweep40', Plan(hide='none'))
     for name in {column, f'{column}_std'} & campaign.table.keys():
         campaign.table[name] = factor * campaign.table[name]
-    found = diagnose_campaign(campaign)
+    options = None if column == 'normal_load' else FEW  # loads are tried where all effects are
+    found = run(campaign.table, campaign.settings(), options=options)
     assert found.verdict == 'unexplained'
     assert not found.effects
     assert not found.proposal
@@ -290,8 +300,11 @@ def test_a_wrong_unit_is_said_before_any_effect(column, factor, units):
     assert f'The unit of {column.replace("_", " ")} looks wrong ({units})' in found.sentence
 
 
-@pytest.mark.parametrize(('design', 'factor'), [('sweep40', 2.0), ('basic16', 1.0 / 4.4482216)])
-def test_a_wrong_load_is_found_where_neither_noise_nor_soil_is_known(design, factor):
+@pytest.mark.parametrize(
+    ('design', 'factor'),
+    [pytest.param('sweep40', 2.0, marks=pytest.mark.slow), ('basic16', 1.0 / 4.4482216)],
+)
+def test_a_wrong_load_is_found_where_neither_noise_nor_soil_is_known(design, factor, unproposed):
     table, values, *_ = make(design, stds=False)
     values['soil.frictional_modulus'] *= 3.0
     assert 'normal_load' not in run(table, values).misread
