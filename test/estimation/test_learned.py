@@ -42,7 +42,7 @@ def deviation(key):
 
 @pytest.fixture(scope='module')
 def drive():
-    scenario = {'configuration': ['generic_six_wheel', 'dry_sand_ding2015'], 'duration': 14.0}
+    scenario = {'configuration': ['generic_six_wheel', 'dry_sand_ding2015'], 'duration': 9.0}
     return simulate(load(scenario | {'slope.angle_deg': [8.0]}), 3)
 
 
@@ -109,12 +109,12 @@ def test_the_second_drive_begins_where_the_first_one_ended(driven, drive, tmp_pa
 def test_zeros_of_the_gyro_are_learned_at_rest_on_top_of_those_stated():
     rover = reader.load(['frostyboy', 'dry_sand_ding2015'])
     rate = (0.004, -0.006, 0.01)
-    core, before = run(rover, standing(20.0, rate))
+    core, before = run(rover, standing(14.0, rate))
     learned = core.learned()['sensors.angular_rate_bias']
     np.testing.assert_allclose(learned, [0.0, -0.006, 0.01], atol=2e-4)
     again = rover.replace({'sensors.angular_rate_bias': learned})
     moved = tuple(r + 0.002 for r in rate)
-    core, sets = run(again, standing(20.0, moved))
+    core, sets = run(again, standing(14.0, moved))
     assert max(abs(s.yaw_rate) for s in sets) < 0.0021
     assert max(abs(s.yaw_rate) for s in before) > 0.005
     np.testing.assert_allclose(
@@ -129,7 +129,7 @@ def test_the_bias_of_the_accelerometer_has_the_sign_of_the_sensor():
     rim_rate = 0.1 / float(rover.wheels.slip_radius[0])
 
     def driving():
-        for i in range(50 * 9):
+        for i in range(50 * 6):
             stamp = START + i * SECOND // 50
             yield InertialReading(stamp, np.array([0.08, 0.0, GRAVITY]), np.zeros(3), LEVEL)
             if i % 5 == 0:

@@ -60,7 +60,7 @@ def recording_core(**changes):
     return EstimatorCore(config, fake), fake
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=settings.default.max_examples // 2, deadline=None)
 @example([1, 9_999_998], 100.0)  # a nanosecond early
 @example([33_333_333, 33_333_334, 33_333_333], 30.0)
 @given(

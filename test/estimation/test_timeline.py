@@ -131,7 +131,7 @@ def test_max_lag_holds_back_until_the_newest_stamp_passes():
 # -- Order of arrival -----------------------------------------------------------------------------
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4, deadline=None)
 @given(st.data())
 def test_with_a_large_max_lag_the_order_of_arrival_is_nothing(data):
     stream = drive(1.0)
@@ -143,7 +143,7 @@ def test_with_a_large_max_lag_the_order_of_arrival_is_nothing(data):
     assert essence(play(core, shuffled)) == expected
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4, deadline=None)
 @given(st.data())
 def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(data):
     """The definition itself: laziness, kept states, forgetting and merged steps must not show.
@@ -165,7 +165,7 @@ def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(data):
             assert essence([estimates]) == essence([expected])
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4, deadline=None)
 @given(st.data())
 def test_steps_made_before_a_set_asks_for_them_change_no_number(data):
     stream = drive(1.5)
@@ -376,7 +376,7 @@ def test_the_reference_is_thinned_by_stamps():
     assert sets[-1].yaw_rate == 10.0  # the fake counts the references that it was given
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=settings.default.max_examples // 5, deadline=None)
 @given(st.permutations(range(20)))
 def test_thinning_does_not_depend_on_the_order_of_arrival(order):
     stream = [reference(0.05 * i + 0.003, forward=0.01 * i) for i in order]
@@ -391,7 +391,7 @@ def test_thinning_does_not_depend_on_the_order_of_arrival(order):
 # -- Whatever comes -------------------------------------------------------------------------------
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=settings.default.max_examples, deadline=None)
 @given(
     st.lists(
         st.tuples(
