@@ -141,7 +141,7 @@ def test_what_was_not_judged_live_is_not_judged_later(pairs):
 
 def test_a_late_reference_is_smoothed_at_its_own_stamp(drive):
     """However late references come, within the history, the smoothed drive is nearly the same."""
-    early = [a for a in drive.arrivals if a.measurement.stamp < drive.truth.stamp[0] + 4e9]
+    early = [a for a in drive.arrivals if a.measurement.stamp < drive.truth.stamp[0] + 6e9]
 
     def delayed(seconds):
         def arrival(a):
@@ -150,7 +150,7 @@ def test_a_late_reference_is_smoothed_at_its_own_stamp(drive):
 
         return [a.measurement for a in sorted(early, key=arrival)]
 
-    one, other = run(drive, delayed(0.0)), run(drive, delayed(1.0))
+    one, other = run(drive, delayed(0.0)), run(drive, delayed(1.5))
     assert len(one) == len(other)
     assert any((a[1].slip != b[1].slip).any() for a, b in zip(one, other, strict=True))
     settled = [i for i, (s, _) in enumerate(one) if s.stamp < one[-1][0].stamp - 2e9]
@@ -165,22 +165,22 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
     scenario = load(
         {
             'configuration': ['generic_six_wheel', 'hit_lss1'],
-            'duration': 6.5,
+            'duration': 9.5,
             'slope.angle_deg': [6.0],
-            'drive.time': [0.0, 3.0, 4.0],
+            'drive.time': [0.0, 6.0, 7.0],
             'drive.forward': [0.05, 0.05, -0.05],
         }
     )
     drive = simulate(scenario, 1)
-    turned = drive.truth.stamp[0] + round(3.6e9)  # the commands cross zero at 3.5 s
+    turned = drive.truth.stamp[0] + round(6.6e9)  # the commands cross zero at 6.5 s
 
     def slips(until):
         heard = (a.measurement for a in drive.arrivals)
         sets = run(drive, takewhile(lambda m: m.stamp <= until, heard))
-        return {s.stamp: s.slip for s, _ in sets if s.stamp < turned - round(1e9)}
+        return {s.stamp: s.slip for s, _ in sets if s.stamp < turned - round(2e9)}
 
     whole, climb = slips(drive.truth.stamp[-1]), slips(turned)
-    assert len(whole) > 20
+    assert len(whole) > 40
     for stamp, slip in climb.items():
         np.testing.assert_allclose(whole[stamp], slip, atol=0.01)
 
