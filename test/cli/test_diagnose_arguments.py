@@ -37,7 +37,9 @@ def test_a_soil_that_nobody_stated_is_said(tmp_path, printed):
     assert 'no soil was stated' in printed([*command, '--no-pictures', '--only', 'cohesion'])
 
 
-@pytest.mark.parametrize('soil', ['grenville_loam_24', 'snow_us'])
+@pytest.mark.parametrize(
+    'soil', ['grenville_loam_24', pytest.param('snow_us', marks=pytest.mark.slow)]
+)
 def test_a_soil_that_nobody_stated_may_be_any(tmp_path, capsys, soil):
     rig, rows = ['--config', 'generic_six_wheel'], str(tmp_path / 'rows.csv')
     noise = ['--slip', '0:0.6:12', '--load', '30', '--noise', '0.0005,0.8,0.05']

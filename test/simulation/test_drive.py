@@ -69,8 +69,8 @@ def test_exact_sensors_show_the_truth(exact):
 
 
 def test_reference_comes_late_by_its_delay():
-    for delay in (0.0, 0.4, 2.0):
-        drive = simulate(load(EXACT | {'sensors.reference_delay': delay, 'duration': 4.0}))
+    for delay in (0.4, 2.0):
+        drive = simulate(load(EXACT | {'sensors.reference_delay': delay, 'duration': 3.0}))
         late = [
             a.arrival - a.measurement.stamp
             for a in drive.arrivals
@@ -83,19 +83,19 @@ def test_reference_comes_late_by_its_delay():
 
 def test_a_seed_is_a_drive():
     scenario = load('firm_drive')
-    first, again, other = (simulate(scenario, seed, 3.0) for seed in (1, 1, 2))
+    first, again, other = (simulate(scenario, seed, 1.5) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.truth.sinkage, again.truth.sinkage)
     assert [a.arrival for a in first.arrivals] == [a.arrival for a in again.arrivals]
     assert not np.allclose(first.truth.sinkage, other.truth.sinkage)
     # Sensors do not change the drive.
-    blind = simulate(load('firm_drive', sensors__sinkage=False, sensors__torque=False), 1, 3.0)
+    blind = simulate(load('firm_drive', sensors__sinkage=False, sensors__torque=False), 1, 1.5)
     np.testing.assert_array_equal(first.truth.sinkage, blind.truth.sinkage)
     assert not kind(blind, SinkageReading)
     assert all(np.isnan(m.torque).all() for m in kind(blind, WheelOdometry))
 
 
 def test_noise_has_the_stated_size():
-    still = {'sensors.sinkage_outliers': 0.0, 'duration': 15.0, 'drive.forward': [0.0]}
+    still = {'sensors.sinkage_outliers': 0.0, 'duration': 9.0, 'drive.forward': [0.0]}
     drive = simulate(load(LEVEL | still), 4)
     figures = drive.configuration.sensors
     for type_, name in (
@@ -174,10 +174,10 @@ def test_a_weak_drive_ends_at_a_quarter_of_its_torque_and_a_coasting_one_has_non
 
 def test_closed_loop_steps_and_profile_agree():
     scenario = load('firm_drive')
-    whole = simulate(scenario, 5, 3.0)
+    whole = simulate(scenario, 5, 1.5)
     drive = Drive(scenario, 5)
     arrivals = []
-    while drive.plant.time < 3.0 - 1e-9:
+    while drive.plant.time < 1.5 - 1e-9:
         command = scenario.profile.at(drive.plant.time)
         factor = drive.speed_factor
         arrivals += drive.step(Command(factor * command.forward, factor * command.turn_rate))
