@@ -33,7 +33,8 @@ def tutorials():
     for page in sorted(FOLDER.glob('*.md')):
         text = page.read_text(encoding='utf-8')
         if BLOCK.search(text):
-            marks = [pytest.mark.slow] if '<!-- slow' in text else []
+            slow = '<!-- slow' in text or page.stem == 'diagnose_table'  # 7 s
+            marks = [pytest.mark.slow] * slow
             yield pytest.param(page, id=page.stem, marks=marks)
 
 
