@@ -156,22 +156,6 @@ def test_wheels_that_roll_ask_for_the_speed_of_the_body(parts):
     assert math.isnan(found.body_speed(0, NAN, yaw_rate))
 
 
-@pytest.mark.parametrize('degrees', [5.0, 49.0, 80.0])
-def test_wheels_that_push_against_one_another_ask_for_little_way(parts, degrees):
-    """Corner wheels turned inwards, as behind a spin: the motion with the least of all slips."""
-    rover, rim = parts.rover, 0.04
-    x, y = np.array(rover.longitudinal), np.array(rover.lateral)
-    angles = math.radians(degrees) * -np.sign(x * y)
-    assert np.abs(angles).max() > 0.0
-    found = headings(rover, angles.tolist())
-    motions = [np.concatenate(rigid_body(rover, angles, *motion)) for motion in np.eye(3)]
-    wanted = np.concatenate([np.full(6, rim), np.zeros(6)])
-    (speed, drift, yaw_rate), *_ = np.linalg.lstsq(np.column_stack(motions), wanted, rcond=None)
-    assert (drift, yaw_rate) == pytest.approx((0.0, 0.0), abs=1e-12)
-    asked = [found.body_speed(i, rim, 0.0) for i in range(6)]
-    assert np.mean(asked) == pytest.approx(speed)
-
-
 def followed(parts, rims_told):
     """Return the errors of the yaw rate through a turn that begins within a second [rad/s]."""
     turning, straight = Turning(parts.rover, parts.sensors), straight_headings(parts.rover)
@@ -569,10 +553,10 @@ def test_the_doubt_of_the_shear_model_is_the_stated_one_at_a_contact_length(part
 
 def test_half_of_an_excess_of_twice_the_noise_is_believed(parts):
     """James and Stein (1961) by hand: 1 - 2 noise / excess^2, the noise the sensor's zero alone."""
-    parts.sensors = replace(parts.sensors, torque_std=0.0, torque_gain_std=0.0, torque_zero_std=0.5)
-    pull, forces = published_pull(parts, 1.0)  # 1 - 2 * 0.5^2 / 1^2 = 0.5
+    parts.sensors = replace(parts.sensors, torque_std=0.0, torque_gain_std=0.0, torque_zero_std=1.0)
+    pull, forces = published_pull(parts, 2.0)  # 1 - 2 * 1^2 / 2^2 = 0.5
     gain = forces.pull_rows[:, SHEAR_STRENGTH] / forces.torque_rows[:, SHEAR_STRENGTH]
-    assert pull - forces.pull == pytest.approx(0.5 * gain, rel=1e-2)
+    assert pull - forces.pull == pytest.approx(1.0 * gain, rel=1e-2)
 
 
 @pytest.mark.parametrize(

@@ -104,6 +104,11 @@ def test_a_lateral_reference_corrects_the_model_and_fades():
         near = motion.update(0.1 * k, given)
     assert near.velocity == pytest.approx(truth, abs=1e-3)
     assert near.velocity_variance < 0.1 * alone.velocity_variance
+    between = SidewaysMotion(ROVER)
+    between.update(0.0, given)
+    between.correct(truth, alone.velocity_variance)  # no better than the model: half way
+    half = between.update(0.0, given)
+    assert half.velocity == pytest.approx(0.5 * (alone.velocity + truth), rel=1e-3)
     late = motion.update(1e4, given)
     assert late.velocity == pytest.approx(alone.velocity, abs=1e-4)
     assert late.velocity_variance == pytest.approx(alone.velocity_variance, rel=1e-3)
