@@ -58,10 +58,10 @@ def sinking(slip, growth=0.0, std=0.03, seconds=20.0, radius=0.12):
     return followed(motion(slip, growth * RIM * time, std, radius) for time in times)
 
 
-@pytest.mark.parametrize(('sinks', 'digging'), [(4, 0.03), (3, 0.0)])
-def test_digging_is_what_more_than_half_of_the_wheels_do(sinks, digging):
+@pytest.mark.parametrize(('sinks', 'of', 'digging'), [(4, 6, 0.03), (3, 6, 0.0), (2, 3, 0.03)])
+def test_digging_is_what_more_than_half_of_the_wheels_do(sinks, of, digging):
     """A sinkage that a first-order lag of 8 cm follows stays 8 cm times its growth ahead of it."""
-    growths = [0.03] * sinks + [0.0] * (6 - sinks)
+    growths = [0.03] * sinks + [0.0] * (of - sinks)
     motions = []
     for time in 0.1 * np.arange(301):
         (wheel, *_) = motion(0.3).wheels
