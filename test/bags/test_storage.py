@@ -81,6 +81,7 @@ def test_truncated_mcap_gives_the_messages_before_the_cut(make_bag, whole, tmp_p
     ('name', 'content', 'words'),
     [
         ('gone', None, 'no such bag'),
+        ('drive.bag', b'#ROSBAG V2.0\n', 'rosbags-convert --src'),
         ('notes.txt', b'hello', 'not a bag'),
         ('log.csv', b'time,rate', 'wheel-terra convert'),
         ('empty.mcap', b'', 'not one message can be read'),

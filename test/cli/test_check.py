@@ -53,11 +53,6 @@ def test_all_topics_of_a_long_recording_end_at_one_time():
     assert min(told.heard.values()) * 1e-9 > max(ends) + 19.0, 'of the whole recording'
 
 
-def test_a_bag_of_ros_1_names_its_converter(tmp_path, refused):
-    (tmp_path / 'drive.bag').write_bytes(b'#ROSBAG V2.0\n')
-    refused(['check', str(tmp_path / 'drive.bag')], 'rosbags-convert --src')
-
-
 def test_an_imu_that_says_it_has_no_accelerometer(tmp_path, factory):
     with BagFile(tmp_path / 'bag', {'/imu/data': 'sensor_msgs/msg/Imu'}) as bag:
         for stamp in range(10**9, 4 * 10**9, 10**8):
