@@ -83,7 +83,10 @@ def recordings(draw):
     )
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
+HALF = settings.default.max_examples // 2
+
+
+@settings(max_examples=HALF, deadline=None, suppress_health_check=list(HealthCheck))
 @given(recordings(), st.booleans())
 def test_no_check_fails(any_recording, with_rover):
     with warnings.catch_warnings():

@@ -311,7 +311,7 @@ def one_wheel_seldom(joints):
     return replace(joints, rate=rate, torque=torque)
 
 
-@pytest.mark.parametrize('apart', [0.0, 0.0002, 0.025, None])
+@pytest.mark.parametrize('apart', [0.025, None, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_messages_that_hold_some_of_the_wheels_are_checked_as_whole_ones(apart):
     usual, joints = checked(), WHOLE.joints
     some = one_wheel_seldom(joints) if apart is None else in_messages_of_their_own(joints, apart)

@@ -374,7 +374,7 @@ def test_a_gyro_that_no_rest_tells_the_zero_of_exchanges_no_wheels():
     assert not {'exchanged', 'backwards', 'swapped_sides'} & {*told}
 
 
-@pytest.mark.parametrize('angle', [90.0, -50.0, 140.0, 15.0])
+@pytest.mark.parametrize('angle', [90.0, 15.0, pytest.param(-140.0, marks=pytest.mark.slow)])
 def test_a_reference_that_points_aside_is_no_reversed_one(angle):
     forward, a = WHOLE.reference.velocity[:, 0], math.radians(angle)
     aside = np.column_stack([forward * math.cos(a), forward * math.sin(a), 0.0 * forward])
@@ -521,7 +521,7 @@ def test_an_input_beyond_the_history_silences_no_other(name):
     assert told[0].topic == getattr(WHOLE, name).topic
 
 
-@pytest.mark.parametrize('name', ['imu', 'joints', 'reference'])
+@pytest.mark.parametrize('name', ['imu', 'reference'])
 def test_a_clock_that_drifts_has_no_offset(name):
     channel = getattr(WHOLE, name)
     drift = later(name, 0.0, stamp=0.002 * channel.seconds)
@@ -616,9 +616,8 @@ def test_a_wheel_between_the_sides_stands_in_a_turn_on_the_spot(dead):
     ('factor', 'slip', 'units'),
     [
         (3.6, 0.0, ['kilometres']),
-        (2.23694, 0.0, ['miles']),
         (2.23694, 0.13, ['knots', 'miles']),
-        (1.9438, 0.0, ['knots', 'miles']),
+        pytest.param(1.9438, 0.0, ['knots', 'miles'], marks=pytest.mark.slow),
         (2.23694, 0.25, ['miles', 'kilometres', 'knots']),
     ],
 )
@@ -642,8 +641,7 @@ def test_without_a_turn_the_unit_may_be_that_of_the_rates_or_of_the_reference():
     assert max(f.confidence for f in told if f.kind == 'unit') < 0.8
 
 
-@pytest.mark.parametrize('name', ['joints', 'imu'])
-@pytest.mark.parametrize('lost', [0.2, 0.6])
+@pytest.mark.parametrize(('name', 'lost'), [('joints', 0.2), ('imu', 0.6)])
 def test_messages_that_are_lost_at_random_are_told(name, lost):
     """Where most are lost two that follow each other are not usual."""
     channel = getattr(WHOLE, name)
@@ -659,7 +657,7 @@ def test_places_of_wheels_in_another_unit():
     assert faults(checked(rolling.rover(**places))) == ['places']
 
 
-@pytest.mark.parametrize('aside', [0.0, 0.4, -0.25])
+@pytest.mark.parametrize('aside', [-0.25, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_a_reference_beside_base_link_is_told_by_turns(aside):
     reference = WHOLE.reference
     velocity = reference.velocity - np.outer(reference.yaw_rate * aside, [1.0, 0.0, 0.0])

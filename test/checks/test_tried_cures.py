@@ -62,7 +62,7 @@ def test_slopes_tell_whether_wheels_or_reference_run_backwards(what):
     assert any(unsure in f.words for f in findings) is ('torque' in what)
 
 
-@pytest.mark.parametrize('factor', [0.9, 1.12])
+@pytest.mark.parametrize('factor', [0.9, pytest.param(1.12, marks=pytest.mark.slow)])
 def test_a_scale_of_the_reference_is_no_radius(factor):
     """Where the rover turns without skid the gyro tells them apart; else both are named."""
     whole = rolling.recording()
@@ -81,7 +81,7 @@ def test_a_scale_of_the_reference_is_no_radius(factor):
     assert track == pytest.approx(turned, rel=0.02)
 
 
-@pytest.mark.parametrize('zero', [8.0, -8.0])
+@pytest.mark.parametrize('zero', [8.0, pytest.param(-8.0, marks=pytest.mark.slow)])
 def test_a_zero_of_the_torques_is_no_radius(zero):
     motion = rolling.ten_minute_drive()
     forward = replace(motion, speed=np.maximum(motion.speed, 0.0))
@@ -92,9 +92,7 @@ def test_a_zero_of_the_torques_is_no_radius(zero):
         assert 'radius' not in {f.kind for f in found}, [str(f) for f in found]
 
 
-@pytest.mark.parametrize(
-    ('since', 'until', 'moment'), [(20.0, 50.0, 80.0), (-1.0, np.inf, 80.0), (20.0, 50.0, -1.0)]
-)
+@pytest.mark.parametrize(('since', 'until', 'moment'), [(-1.0, np.inf, 80.0), (20.0, 50.0, -1.0)])
 def test_a_wheel_held_under_torque_is_not_frozen(since, until, moment):
     """By more than the others pull, or, dragged by them, as much against them."""
     whole = rolling.recording()
@@ -110,9 +108,7 @@ def test_a_wheel_held_under_torque_is_not_frozen(since, until, moment):
     assert ('frozen', 'front_right') in {(f.kind, f.wheel) for f in found}
 
 
-@pytest.mark.parametrize(
-    'channel, offset', [('imu', 0.7), ('reference', -0.8), ('reference', 18.0), ('joints', 0.6)]
-)
+@pytest.mark.parametrize('channel, offset', [('imu', 0.7), ('reference', -0.8), ('joints', 0.6)])
 def test_stamps_that_are_off_are_mended_by_a_parameter(channel, offset):
     whole = rolling.recording()
     series = getattr(whole, channel)
