@@ -352,7 +352,7 @@ def test_repeats_give_the_noise():
     for stated, notes in ((0.02, 1), (0.05, 0), (0.2, 1)):
         given = replace(table, stated_std=np.full_like(table.stated_std, stated))
         found = noise.stated_noise(given, np.ones(len(QUANTITIES)), one)
-        said = _repeatability(given, found)
+        said = _repeatability(found)
         assert len(said) == notes and all('scatter by' in text for text in said)
         assert found.std[0, 2] == pytest.approx(max(stated, std) if notes else stated)
 
@@ -370,6 +370,25 @@ def test_repeats_that_scatter_as_stated_leave_what_is_stated():
         found = noise.stated_noise(table, np.ones(len(QUANTITIES)), np.zeros(48))
         assert found.origin == {'torque': 'given'}
         np.testing.assert_array_equal(found.std[:, 2], stated)
+        assert not _repeatability(found)
+
+
+@pytest.mark.parametrize('stated', [True, False])
+def test_repeats_of_a_reference_say_nothing_of_the_other_table(stated):
+    """The reference scatters five times as much: each has its own scatter, and its own note."""
+    rng = np.random.default_rng(4)
+    slip = np.tile(np.repeat(np.linspace(0.1, 0.8, 12), 2), 2)
+    theirs = np.arange(48) >= 24
+    reading = 3.0 + slip + 0.02 * np.where(theirs, 5.0, 1.0) * rng.standard_normal(48)
+    columns = {'slip': slip, 'normal_load': np.full(48, 80.0), 'torque': reading}
+    if stated:
+        columns['torque_std'] = np.full(48, 0.02)
+    table = check_table('x', columns)
+    found = noise.stated_noise(table, np.ones(len(QUANTITIES)), np.zeros(48), theirs)
+    assert found.std[:24, 2] == pytest.approx(0.02, rel=1e-12 if stated else 0.4)
+    assert found.std[24:, 2] == pytest.approx(0.1, rel=0.4)
+    said = _repeatability(found)
+    assert len(said) == stated and all('torque of the reference' in text for text in said)
 
 
 def test_confidence_follows_what_speaks_for_a_name():

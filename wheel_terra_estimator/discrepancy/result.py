@@ -227,6 +227,8 @@ class Noise:
     origin: Mapping[str, str]
     # Quantity -> pooled deviation of rows that repeat one another, its degrees of freedom
     repeatability: Mapping[str, tuple[float, int]] = field(default_factory=dict)
+    # The same over the stated deviation of each row, of table and reference apart
+    scatter: Mapping[str, tuple[float, int]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

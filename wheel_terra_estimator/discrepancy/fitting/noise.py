@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import bdtrc, chdtrc
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import OUTLIER_FACTOR, Problem
 from wheel_terra_estimator.discrepancy.result import Noise
@@ -40,39 +40,44 @@ _UNSEEN, _UNSEEN_NOISE = 4.0, 0.02
 _CLEARLY = 3.0  # nats by which noise of another shape must be more likely
 
 
-def stated_noise(table: SteadyTable, scale: FloatArray, apart: FloatArray) -> Noise:
+def stated_noise(
+    table: SteadyTable, scale: FloatArray, apart: FloatArray, reference: BoolArray | None = None
+) -> Noise:
     """Return the stated deviations, those of repeats that scatter by more, a guess for the rest.
 
-    ``apart``: (N,) rows of other numbers do not repeat one another (another bed, a reference).
+    ``apart``: (N,) rows of other numbers do not repeat one another (another bed). Rows of a
+    ``reference`` (N,) have a scatter of their own.
     """
-    std = table.stated_std.copy()
-    origin: dict[str, str] = {}
-    repeatability: dict[str, tuple[float, int]] = {}
+    std, origin = table.stated_std.copy(), dict[str, str]()
+    repeatability, scatter = dict[str, tuple[float, int]](), dict[str, tuple[float, int]]()
+    theirs = np.zeros(len(table), dtype=bool) if reference is None else reference
     for q, quantity in enumerate(QUANTITIES):
         here = np.isfinite(table.measured[:, q])
         if not here.any():
             continue
-        pooled, count = repeats(table, q, apart)
+        pooled, count = repeats(table, q, 2.0 * apart + theirs)
         if count:
             repeatability[quantity] = pooled, count
-        stated = here & np.isfinite(std[:, q])
-        if stated.any():
-            # Cells without a stated deviation take the median of the stated ones.
-            std[here & ~stated, q] = np.median(std[stated, q])
-            origin[quantity] = 'given'
-            # An instrument's noise is not all that repeated runs scatter by: beds do as well.
-            times, count = repeats(table, q, apart, std[:, q])
-            if count >= ENOUGH_REPEATS and chdtrc(count, count * times**2) < SCATTER_CHANCE:
-                std[here, q] *= times
-                origin[quantity] = 'repeats'
-            continue
+        given = here & np.isfinite(std[:, q])
+        origin[quantity], guess = 'estimated', _FIRST_GUESS * scale[q]
         if count >= ENOUGH_REPEATS:
-            std[here, q] = max(pooled, _LEAST * scale[q])
-            origin[quantity] = 'repeats'
-        else:
-            std[here, q] = _FIRST_GUESS * scale[q]
-            origin[quantity] = 'estimated'
-    return Noise(std, origin, repeatability)
+            origin[quantity], guess = 'repeats', max(pooled, _LEAST * scale[q])
+        if given.any():
+            # Cells without a stated deviation take the median of the stated ones.
+            origin[quantity], guess = 'given', float(np.median(std[given, q]))
+        std[here & ~given, q] = guess
+        for whose, rows in (('', here & ~theirs), (' of the reference', here & theirs)):
+            if not (rows.any() and count):
+                continue
+            times, own = repeats(table.select(rows), q, apart[rows], std[rows, q])
+            if given.any() and own:
+                scatter[quantity + whose] = times, own
+            # An instrument's noise is not all that repeated runs scatter by: beds do as well.
+            wider = own >= ENOUGH_REPEATS and chdtrc(own, own * times**2) < SCATTER_CHANCE
+            if wider or (own >= ENOUGH_REPEATS and not given.any() and theirs.any()):
+                std[rows, q] *= times
+                origin[quantity] = 'repeats'
+    return Noise(std, origin, repeatability, scatter)
 
 
 def repeats(

@@ -18,7 +18,7 @@ from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import BED, BED_SCATTER
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.fitting.noise import SCATTER_CHANCE
+from wheel_terra_estimator.discrepancy.fitting.noise import ENOUGH_REPEATS, SCATTER_CHANCE
 from wheel_terra_estimator.discrepancy.numbers import (
     OF_BEDS,
     SHOWN,
@@ -236,7 +236,7 @@ def notes(
             'errors that neighbouring rows share (digitised figures) are not in it; state them in '
             '*_std columns'
         )
-    found += _repeatability(table, findings.noise)
+    found += _repeatability(findings.noise)
     if findings.outliers:
         count = len(findings.outliers)
         several = f'{count} cells were rejected as outliers'
@@ -253,22 +253,17 @@ def notes(
     return tuple(found)
 
 
-def _repeatability(table: SteadyTable, noise: Noise) -> list[str]:
+def _repeatability(noise: Noise) -> list[str]:
     """Return where rows that repeat one another scatter by another amount than was stated."""
     found = []
-    for name, (pooled, count) in noise.repeatability.items():
-        column = table.stated_std[:, QUANTITIES.index(name)]
-        if np.isnan(column).all():
-            continue
-        stated = float(np.nanmedian(column))
-        chance = float(chdtrc(count, count * (pooled / stated) ** 2))
+    for name, (times, count) in noise.scatter.items():
+        chance = float(chdtrc(count, count * times**2))
         if not SCATTER_CHANCE < chance < 1.0 - SCATTER_CHANCE:
-            used = noise.origin[name] == 'repeats'
-            so = 'the scatter is used' if used else 'one of them is wrong'
+            used = times > 1.0 and count >= ENOUGH_REPEATS
+            so = 'the scatter is used' if used else 'one of the two is wrong'
             found.append(
-                f'{plain(name)}: rows that repeat one another scatter by '
-                f'{amount(name, pooled, 2)} {SHOWN[name][1]}, its stated noise is '
-                f'{amount(name, stated, 2)}; {so}'
+                f'{plain(name)}: rows that repeat one another scatter by {number(times, 2)} times '
+                f'their stated noise; {so}'
             )
     return found
 

@@ -86,7 +86,7 @@ def search(
 ) -> Findings:
     """Find noise, outliers and the weights of all explanations by effects that may be named."""
     builder = _Builder(table, forward, nuisance)
-    noise = noises.stated_noise(table, builder.scale, builder.apart)
+    noise = noises.stated_noise(table, builder.scale, builder.trials, builder.reference)
     problem, nothing = builder.fit_nothing(noise.std, (), None)
     for each in () if beds is None else (beds, beds):  # one bed may end far from where several do
         builder.part_beds(each, problem, nothing)
@@ -248,8 +248,9 @@ class _Builder:
         self.by_angle: FloatArray | None = None
         self.by_bed: list[CommonError] = []
         # What differs between trials, each on its bed, or from a reference is no noise.
-        trials = np.zeros(len(table)) if table.sweeps() is None else table.trials()
-        self.apart = trials if forward.active is None else 2.0 * trials + forward.active
+        self.trials = np.zeros(len(table)) if table.sweeps() is None else table.trials()
+        self.reference = None if forward.active is None else ~forward.active
+        self.apart = self.trials if forward.active is None else 2.0 * self.trials + forward.active
         self._moved: FloatArray | None = None
         # Rows share a reading of the slip that is equal to the last digit and no set value.
         slip = table.columns['slip']
