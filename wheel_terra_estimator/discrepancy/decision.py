@@ -77,8 +77,8 @@ class Decision:
     gap: Mapping[str, QuantityGap]  # quantity -> QuantityGap
     names: tuple[Naming, ...] = ()  # strongest first; empty unless ``named``
     doubtful: tuple[Naming, ...] = ()  # names that would have been given, were they likely enough
-    # Quantity -> factor by which its unit looks wrong; nothing is named then
-    misread: Mapping[str, float] = field(default_factory=dict)
+    # Column -> factor that it lacks, or what it is, where it looks misread; nothing is named then
+    misread: Mapping[str, float | str] = field(default_factory=dict)
     proposal: Proposal | None = None  # A law, where something is missing and no name is given
     beds_differ: float = 0.0  # probability that only the beds of the sweeps differ, where notable
 
@@ -111,7 +111,7 @@ class Decider:
     both: SteadyTable  # with the rows of a reference behind those of the table
     findings: Findings
     allowed_error: float  # model error that is no reason for doubt [share of the range]
-    misread: Mapping[str, float] = field(default_factory=dict)  # as in the decision
+    misread: Mapping[str, float | str] = field(default_factory=dict)  # as in the decision
     beds_differ: bool = False  # from sweep to sweep: unseen rows may be off by more than noise
     # The best law beside each floor, soil held or not: it competes with doubtful names, or is
     # proposed
@@ -126,6 +126,8 @@ class Decider:
             enough = self.misread or len(tried) >= _MOST_TRIED
             barred = everything if enough else frozenset(tried)
             verdict = choose(selection, problem, off=off, excluded=barred)
+            if self.misread:
+                verdict = replace(verdict, status='unexplained')
             decision = self._judged(verdict)
             agrees = verdict.status == 'agrees' and not off and not self.beds_differ
             if agrees and channels_off(decision.gap):

@@ -90,7 +90,7 @@ def render(
         remainder_amplitude=left.amplitude,
         floor=decision.floor,
         notes=(
-            *words.notes(both, findings, after, moved, stretch),
+            *words.notes(both, findings, after, () if decision.misread else moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
             *words.own_beds(decision.beds_differ, table),
             *([bed] if bed else []),

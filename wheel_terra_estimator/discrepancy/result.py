@@ -271,8 +271,8 @@ class Diagnosis:
     # Quantities whose residuals change along the order of the rows
     along_rows: tuple[Change, ...] = ()
     proposal: Proposal | None = None  # A law for what no listed effect explains, where one helps
-    # Quantity -> factor by which its column has to be multiplied, where its unit looks wrong
-    misread: Mapping[str, float] = field(default_factory=dict)
+    # Column -> factor by which it has to be multiplied, or what it is, where it looks misread
+    misread: Mapping[str, float | str] = field(default_factory=dict)
     # Effect of the catalogue that was not tried -> why
     not_tried: Mapping[str, str] = field(default_factory=dict)
     seconds: float = field(default=0.0, metadata=_ASIDE)  # time the diagnosis took

@@ -15,7 +15,6 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration, Readings
 from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
-    Coordinate,
     base_coordinates,
     bed_coordinates,
     soil_coordinates,
@@ -23,30 +22,21 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
-from wheel_terra_estimator.discrepancy.selection.search import Findings, search
-from wheel_terra_estimator.discrepancy.selection.verdict import choose, remainder
+from wheel_terra_estimator.discrepancy.selection import readings
+from wheel_terra_estimator.discrepancy.selection.search import search
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
 from wheel_terra_estimator.discrepancy.tables.averaging import join
 from wheel_terra_estimator.discrepancy.tables.checks import (
     check_against_wheel,
     check_pull_against_model,
     check_wheel_of_model,
-    decades_off,
 )
-from wheel_terra_estimator.discrepancy.tables.steady_table import (
-    QUANTITIES,
-    SteadyTable,
-    operating_points,
-)
+from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable, operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
-_CLEARLY_MISREAD = 10.0  # nats by which another unit must explain the rows better
-_LIKELIER_LOAD = 5.0  # nats by which soil alone under other loads must beat any explanation
-_FLOOR_NEEDED = 0.8  # probability of a structural error from which soil alone does not fit
-# Factors by which loads may be off: of a pair of wheels, or one of it; units of force read as N.
-_LOADS = (0.5, 2.0, *(f**s for f in (9.80665, 4.4482216) for s in (-1, 1)))
+_MOST_ODDS = 10.0  # nats
 _UNLIKELY = 0.05  # odds of beds that differ, below which nothing is said of them
 _BEDS_DIFFER = 0.2  # prior probability, where every sweep has a bed of its own; assumed
 
@@ -95,9 +85,9 @@ def diagnose(
     check_against_wheel(both, np.broadcast_to(points.wheel.radius, (len(both),)))
     known = catalogue()
     effects, not_tried = _effects_to_try(configuration, chosen, known)
-    readings = Readings.of(configuration).true_on(both.true_rows)
+    read = Readings.of(configuration).true_on(both.true_rows)
     forward = Forward(
-        points, configuration.soil, configuration.effects, known, active=active, readings=readings
+        points, configuration.soil, configuration.effects, known, active=active, readings=read
     )
     configured = _check_soil_carries(both, forward)
     check_pull_against_model(both, configured[:, 1])
@@ -111,23 +101,15 @@ def diagnose(
     floors = default_floors(chosen.floor) if reference is None else shared_floors()
 
     findings = search(both, forward, nuisance, effects, floors)
-    misread = {}
-    for quantity, times in decades_off(both, configured).items():
-        scaled = search(both.scaled(quantity, times), forward, nuisance, effects, floors)
-        cells = int((findings.setting.problem.quantity == QUANTITIES.index(quantity)).sum())
-        # The odds of two explanations of the same rows, in whatever unit.
-        gain = scaled.selection.best + cells * math.log(times) - findings.selection.best
-        if gain > _CLEARLY_MISREAD:
-            misread[quantity] = times
-    verdict = choose(findings.selection, findings.setting.problem)
-    if chosen.effects is None and (misread or verdict.status != 'agrees'):
-        misread = _load_misread(both, findings, nuisance, forward) or misread
+    misread: Mapping[str, float | str] = {}
+    if chosen.effects is None:
+        misread = readings.misread(both, forward, nuisance, effects, findings, configured)
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
     if sweeps is not None and decision.verdict.status != 'agrees':
         known_noise = replace(table, stated_std=findings.noise.std)
         apart = search(known_noise, forward, nuisance, effects, floors, sweeps)
-        odds = math.exp(min(apart.selection.best - findings.selection.best, _CLEARLY_MISREAD))
+        odds = math.exp(min(apart.selection.best - findings.selection.best, _MOST_ODDS))
         odds *= _BEDS_DIFFER / (1.0 - _BEDS_DIFFER)
         if odds > _UNLIKELY:
             apart = replace(apart, noise=findings.noise)
@@ -154,30 +136,6 @@ def diagnose(
     seconds = time.perf_counter() - started
     notes = (*notes, *diagnosis.notes)
     return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
-
-
-def _load_misread(
-    table: SteadyTable, findings: Findings, nuisance: tuple[Coordinate, ...], forward: Forward
-) -> dict[str, float]:
-    """Return by what the loads are off, where soil alone then fits and beats any explanation.
-
-    Noise that is not stated is estimated anew: that under a wrong load is another one. Soil may go
-    far, where its numbers are wrong as well, unless it fits the loads as they are without a floor.
-    """
-    as_they_are = remainder(
-        findings.selection, findings.selection.nothing, findings.setting.problem
-    )
-    far = as_they_are.probability_of_any > _FLOOR_NEEDED or not (
-        as_they_are.only_far or as_they_are.accounted_for
-    )
-    best, found = findings.selection.best + (_LIKELIER_LOAD if far else _CLEARLY_MISREAD), {}
-    for times in _LOADS:
-        points = replace(forward.points, normal_load=times * forward.points.normal_load)
-        alone = search(table, forward.at(points), nuisance, {}, findings.setting.floors)
-        left = choose(alone.selection, alone.setting.problem).left
-        if alone.selection.best > best and (not left.significant or (far and left.only_far)):
-            best, found = alone.selection.best, {'normal_load': times}
-    return found
 
 
 def _effects_to_try(

@@ -38,6 +38,7 @@ from wheel_terra_estimator.discrepancy.result import (
     QuantityGap,
     SoilShift,
 )
+from wheel_terra_estimator.discrepancy.selection.readings import BY_RIM, BY_SPEED
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import (
     IMPROBABLE,
@@ -89,7 +90,7 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
     if diagnosis.verdict in OPEN and not still_off:
         left.append('Why these rows need another soil, or more scatter, than was stated.')
     if diagnosis.misread:
-        return {'open': left, 'next': ['Correct the unit, and diagnose again.']}
+        return {'open': left, 'next': ['Correct the column, and diagnose again.']}
     settled = not left
     if settled:
         left.append('Nothing beyond noise and the allowed model error.')
@@ -334,10 +335,22 @@ def untried(alike: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
     )
 
 
-def wrong_units(misread: Mapping[str, float]) -> str:
-    """Return which columns look as if they had another unit than was said, and the remedy."""
+_SLIPS = {
+    'rim': ('referred to the rim', 'set slip_radius: rim'),
+    'lug_tip': ('referred to the tips of the lugs', 'set slip_radius: lug_tip'),
+    BY_SPEED: ('were r w/v - 1', 'a driving one of i is i/(1 + i)'),
+    BY_RIM: ('were 1 - v/(r w)', 'a braking one of -i is -i/(1 + i)'),
+}
+
+
+def wrong_columns(misread: Mapping[str, float | str]) -> str:
+    """Return which columns look as if they held something else than was said, and the remedy."""
     parts = []
     for name, times in misread.items():
+        if isinstance(times, str):
+            looks, remedy = _SLIPS[times]
+            parts.append(f'the {name} looks as if it {looks} ({remedy})')
+            continue
         units = UNITS[unit_of(name)]
         usual = ' (of one wheel or of a pair?)' if name == 'normal_load' else ''
         alike = (
@@ -346,13 +359,12 @@ def wrong_units(misread: Mapping[str, float]) -> str:
             if abs(math.log(units[found] / units[said] / times)) < _SAME_FACTOR
         )
         parts.append(
-            f'the unit of {plain(name)} looks wrong{next(alike, usual)}: times {times:g} the rows '
-            'are explained far better than by any effect'
+            f'the unit of {plain(name)} looks wrong{next(alike, usual)}, times {times:.4g}'
         )
-    text = '; '.join(parts)
+    text = ' and '.join(parts)
     return (
-        f'{text[0].upper()}{text[1:]}. Correct the column, or the soil of --config if the unit is '
-        'right; no effect is named before.'
+        f'{text[0].upper()}{text[1:]}: so the rows are explained far better than by any effect. '
+        'Correct the column, or the soil of --config if it is right; no effect is named before.'
     )
 
 
@@ -405,7 +417,7 @@ def sentence(
     """Return the verdict in words."""
     verdict, left = decision.verdict, decision.verdict.left
     if decision.misread:
-        return wrong_units(decision.misread)
+        return wrong_columns(decision.misread)
     if verdict.status == 'undecided':
         return _undecided(decision.gap, nearest)
     if verdict.status == 'agrees':

@@ -101,7 +101,7 @@ def _columns(arrays: Mapping[str, FloatArray], names: Sequence[str], count: int)
     return np.column_stack([arrays.get(name, np.full(count, np.nan)) for name in names])
 
 
-_PERCENT = 'looks like percent; divide the column by 100'
+_NO_SLIP = 'is outside -1..1; divide percent by 100, and turn i = r w/v - 1 into i/(1 + i)'
 _KILONEWTON = 'looks like kN; multiply the column by 1000'
 _DEGREES = 'looks like degrees; multiply the column by pi/180'
 _MILLIMETRES = 'looks like millimetres; divide the column by 1000'
@@ -114,8 +114,7 @@ _MOST = math.inf
 _LEAST = 5e-324  # above nought
 # Columns, in SI: the least and the greatest value that can be, and what one beyond looks like.
 _RANGES: tuple[tuple[str, float, float, str], ...] = (
-    ('slip', -1.5, 1.5, _PERCENT),
-    ('slip', -1.0, 1.0, 'is outside -1..1; check how the slip ratio was computed'),
+    ('slip', -1.0, 1.0, _NO_SLIP),
     ('normal_load', _LEAST, _MOST, 'is not positive; state the load in N'),
     ('normal_load', _LEAST, 1e7, 'is more than any wheel bears; state the load in N'),
     ('slope', -0.9, 0.9, _DEGREES),
@@ -327,22 +326,6 @@ def check_pull_against_model(table: SteadyTable, predicted: FloatArray) -> None:
             f'slip {table.columns["slip"][row]:g}, as in most rows of the other sign than the '
             'model gives; a pull of the wheel forward is positive: multiply the column by -1'
         )
-
-
-def decades_off(table: SteadyTable, predicted: FloatArray) -> dict[str, float]:
-    """Return quantity -> power of ten that brings it to the size that the model gives.
-
-    ``predicted`` are (N, 4) values of the configured model. Only those that are off by more than
-    half a decade: units differ by tens, or by 9.8 (kilopond). Where all are, it is no unit.
-    """
-    found: dict[str, float] = {}
-    for q, quantity in enumerate(QUANTITIES):
-        here = np.isfinite(table.measured[:, q])
-        size, due = (np.sum(np.abs(values[here, q])) for values in (table.measured, predicted))
-        decades = round(math.log10(due / size)) if size > 0.0 and due > 0.0 else 0
-        if decades:
-            found[quantity] = 10.0**decades
-    return found if len(found) < len(table.quantities) else {}
 
 
 def _without_copies(table: SteadyTable) -> tuple[SteadyTable, int]:

@@ -93,11 +93,6 @@ class SteadyTable:
             columns.append((values - values.min()) / np.ptp(values))
         return np.column_stack(columns) if columns else np.zeros((len(self), 0))
 
-    def scaled(self, quantity: str, times: float) -> SteadyTable:
-        """Return the table with a quantity and its stated deviation in another unit."""
-        by = np.where(np.array(QUANTITIES) == quantity, times, 1.0)
-        return replace(self, measured=self.measured * by, stated_std=self.stated_std * by)
-
     def select(self, rows: IndexArray | BoolArray) -> SteadyTable:
         """Return the table of these rows."""
         return replace(
