@@ -15,6 +15,7 @@ from test_workflow import FEW, make, noisy, run
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision
+from wheel_terra_estimator.discrepancy.proposal import find
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
@@ -254,6 +255,15 @@ def test_a_name_leaves_room_for_an_effect_that_looks_like_it_and_was_not_tried()
     assert narrow.effects[0].confidence <= 0.5
     assert any('bulldozing' in note and 'not tried' in note for note in narrow.notes)
     assert not any('not tried' in note for note in free.notes)
+
+
+def test_three_names_are_given_where_they_predict_levels_that_they_did_not_see(monkeypatch):
+    few = ('lug_digging', 'drivetrain_friction', 'bulldozing')
+    table, values, *_ = make('lugs48', few, 3.0)
+    options = Options(effects=few)
+    assert {e.name for e in run(table, values, options=options).effects} == set(few)
+    monkeypatch.setattr(find, 'TOO_FAR', 0.5)
+    assert len(run(table, values, options=options).effects) < 3
 
 
 @pytest.mark.slow

@@ -47,6 +47,8 @@ _MOST_TRIED = 3  # doubtful names, after which none is given
 # than not; below the second figure a law has to do worse than the name.
 _LIKELY = 0.5
 _BEYOND_DOUBT = 0.85
+# So many can imitate any smooth rows: they are named where they predict unseen levels to the noise.
+_SEVERAL = 3
 _CLEARLY = 0.05  # of the gap: so much more a law must close than a doubtful name, or the name
 # Odds for several names that close more than any law and leave noise alone, or for those that a law
 # says as well (chosen on seeds 3200 to 3209).
@@ -158,10 +160,13 @@ class Decider:
         self, decision: Decision, names: tuple[Naming, ...]
     ) -> tuple[tuple[Naming, ...], bool]:
         """Return the names, as sure as they are beside a law, and whether they are given."""
+        gap = self._gap(decision)
+        if len(names) >= _SEVERAL and not gap.leaves_noise(decision.after):
+            return names, False
         if _least(names) >= _BEYOND_DOUBT:
             return names, True
         law = self._law(decision)
-        ahead = self._gap(decision).closed_by(decision.after) - (law.closed if law else 0.0)
+        ahead = gap.closed(gap.unseen(decision.after)) - (law.closed if law else 0.0)
         same = law is not None and effects_said(law) == {effect_of(n.key) for n in names}
         if law is not None and ahead < -_CLEARLY and not same:
             return names, False
