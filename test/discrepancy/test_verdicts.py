@@ -342,3 +342,13 @@ def test_a_slip_by_another_rule_is_asked_for_and_no_effect(rule, read, said):
     assert found.misread == {'slip': rule}
     assert found.verdict == 'unexplained' and not found.effects
     assert said in found.sentence
+
+
+def test_a_bias_of_the_radius_as_high_as_the_lugs_asks_for_the_radius_of_the_slip():
+    table, values, _, rows = make('sweep40')
+    ratio = 1.0 + rows['lug_height'] / rows['wheel_radius']
+    assert np.ptp(ratio) == 0.0
+    for times, asked in ((ratio, 1), (1.0 - 0.5 * (ratio - 1.0), 0)):
+        found = run({**table, 'slip': 1.0 - (1.0 - table['slip']) * times}, values)
+        assert found.misread == {} and found.effects[0].name == 'wheel_radius_bias'
+        assert sum('set slip_radius: rim' in note for note in found.notes) == asked

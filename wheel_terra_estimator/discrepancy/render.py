@@ -92,6 +92,7 @@ def render(
         notes=(
             *words.notes(both, findings, after, () if decision.misread else moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
+            *words.radius_of_slip(after, setting.forward.points),
             *words.own_beds(decision.beds_differ, table),
             *([bed] if bed else []),
             *words.alone(decision.gap),

@@ -56,6 +56,7 @@ from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
 FACTORS = {
     'stiffness': 'the factor on soil.frictional_modulus and soil.cohesive_modulus',
@@ -64,7 +65,7 @@ FACTORS = {
 # Inputs that tell effects apart, in the order of how easily a rig varies them.
 _WORTH_VARYING = ('normal_load', 'lug_height')
 _SAME_FACTOR = 0.03  # between two units: a factor of ten, or that of a kilopond
-_SURE_OF_BED = 2.0  # deviations, after the fit
+_SURE = 2.0  # deviations, after the fit
 _SHARED = 1.5  # times the error on unseen rows: more on seen ones is not in the model
 _USUAL_OF_BEDS = 3.0  # deviations of ``BED_SCATTER``
 REFERENCE_AGAIN = NextMeasurement(
@@ -269,6 +270,23 @@ def _repeatability(noise: Noise) -> list[str]:
     return found
 
 
+def radius_of_slip(fitted: Fit, points: OperatingPoints) -> tuple[str, ...]:
+    """Return a question where a named bias of the radius is the height of the lugs."""
+    height = float(np.median(points.wheel.lug_height / points.wheel.radius))
+    share = height / (1.0 + height)
+    other, due = {'rim': ('lug_tip', -share), 'lug_tip': ('rim', height)}.get(
+        points.slip_radius, ('', math.inf)
+    )
+    std = np.sqrt(np.diag(fitted.covariance()))
+    return tuple(
+        f'the bias of the radius is that of a slip that refers to the other radius; if it does, '
+        f'set slip_radius: {other}'
+        for c, u, s in zip(fitted.coordinates, fitted.u, std, strict=True)
+        if c.key == 'wheel_radius_bias.bias' and height > 0.0
+        if abs(float(c.value(u)) - due) < _SURE * c.deviation(float(u), float(s))
+    )
+
+
 def own_beds(probability: float, table: SteadyTable) -> tuple[str, ...]:
     """Return a remark where every sweep has a bed of its own, and the beds may differ."""
     if not probability:
@@ -296,7 +314,7 @@ def another_bed(fitted: Fit) -> str:
     sure = [
         (c, float(u))
         for c, u, s in zip(fitted.coordinates, fitted.u, std, strict=True)
-        if c.owner == BED and abs(u) > _SURE_OF_BED * s
+        if c.owner == BED and abs(u) > _SURE * s
     ]
     factors = ' and '.join(
         f'{number(float(c.value(u)), 3)} times the {OF_BEDS[c.name]}' for c, u in sure

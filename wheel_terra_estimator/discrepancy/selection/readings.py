@@ -66,7 +66,6 @@ def misread(
     far = as_they_are.probability_of_any > _FLOOR_NEEDED or not (
         as_they_are.only_far or as_they_are.accounted_for
     )
-    needed = selection.best + (_LIKELIER if far else _CLEARLY)
     variance = setting.problem.variance(_ROUGH)
     nothing = setting.fit([()], [findings.nothing.u], findings.nothing.angle, variance)[0]
     several = len(selection.explanations[0].names) > 1
@@ -92,7 +91,9 @@ def misread(
             verdict = choose(found.selection, found.setting.problem)
             left = verdict.left
             fits = verdict.status in ('agrees', 'named') or (far and left.only_far)
-            if fits and found.selection.best + density > needed:
+            # A radius is no rule: a biased one looks the same where all lugs are alike.
+            needed = _LIKELIER if far and 'slip' not in reading.said else _CLEARLY
+            if fits and found.selection.best + density > selection.best + needed:
                 return reading.said
     return {}
 
