@@ -15,8 +15,9 @@ import pytest
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy import workflow
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
-from wheel_terra_estimator.discrepancy.selection.weights import log_prior
+from wheel_terra_estimator.discrepancy.selection.weights import default_floors, log_prior
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 from wheel_terra_estimator.errors import UserError
@@ -302,13 +303,15 @@ def test_what_turns_in_the_air_tells_no_friction_that_grows_with_the_torque(unpr
 
 
 @pytest.mark.slow
-def test_where_the_verdict_is_open_the_soil_goes_where_the_rows_pull_it():
+def test_where_the_verdict_is_open_the_soil_goes_where_the_rows_pull_it(monkeypatch):
     """Side drag pulls the soil far: however the fit gets there, it ends at the same errors."""
     plan = Plan(hide='outside', noise='mixed', names=('side_drag',), least=8.0)
     campaign = make_campaign(50037, 'sweep40', plan)
     columns, values = campaign.table, campaign.settings()
     open_one = run(columns, values)
-    soil_alone = run(columns, values, options=Options(effects=(), floor=0.0))
+    exact = next(floor for floor in default_floors() if floor.largest == 0.0)
+    monkeypatch.setattr(workflow, 'default_floors', lambda: (exact,))
+    soil_alone = run(columns, values, options=Options(effects=()))
     assert open_one.verdict == 'unexplained'
     for quantity, gap in open_one.gap.items():
         assert gap.fitted == pytest.approx(soil_alone.gap[quantity].fitted, rel=0.01)

@@ -76,13 +76,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='effect that may be named; may be given several times (default: all)',
     )
     parser.add_argument(
-        '--floor',
-        type=float,
-        metavar='SHARE',
-        help="greatest model-error floor, share of each quantity's range (default: as the data "
-        'ask, up to 0.04; 0: the model is exact)',
-    )
-    parser.add_argument(
         '--allowed-error',
         type=float,
         default=0.02,
@@ -118,11 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     output: Path = arguments.output
     check_folder(output, arguments.overwrite)
-    for option, least, most in (
-        ('floor', 0.0, 0.2),
-        ('allowed_error', 0.0, 0.5),
-        ('soil_known_to', 1e-6, 2.0),
-    ):
+    for option, least, most in (('allowed_error', 0.0, 0.5), ('soil_known_to', 1e-6, 2.0)):
         share = getattr(arguments, option)
         if share is not None and not least <= share <= most:
             name = option.replace('_', '-')
@@ -159,7 +148,6 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
         reference = _read(arguments.reference, arguments, configuration)
     options = Options(
         tuple(arguments.only) or None,
-        arguments.floor,
         arguments.allowed_error,
         arguments.soil_known_to,
     )

@@ -47,8 +47,6 @@ class Options:
 
     # Effects that may be named; None = all candidates of the catalogue
     effects: tuple[str, ...] | None = None
-    # Greatest model-error floor, share of each quantity's range; None = as the data ask, to 4 %
-    floor: float | None = None
     # Model error that is no reason for doubt, share of each quantity's range: a channel that is off
     # by more than twice its root sum of squares with the noise does not agree
     allowed_error: float = 0.02
@@ -98,7 +96,7 @@ def diagnose(
         *(bed_coordinates() if reference is not None else ()),
         *base_coordinates(configuration.effects, configuration.effects_std, known),
     )
-    floors = default_floors(chosen.floor) if reference is None else shared_floors()
+    floors = default_floors() if reference is None else shared_floors()
 
     findings = search(both, forward, nuisance, effects, floors)
     misread: Mapping[str, float | str] = {}

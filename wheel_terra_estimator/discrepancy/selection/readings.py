@@ -68,7 +68,7 @@ def misread(
     )
     variance = setting.problem.variance(_ROUGH)
     nothing = setting.fit([()], [findings.nothing.u], findings.nothing.angle, variance)[0]
-    several = len(selection.explanations[0].names) > 1
+    count = len(selection.explanations[0].names)
     ranked = []
     for reading in _readings(table, forward.points, configured):
         cells = reading.scale[setting.problem.quantity]
@@ -84,15 +84,18 @@ def misread(
     for _, reading in ranked[:_TRIED]:
         # Density of the same rows in whatever unit.
         density = float(np.log(reading.scale[setting.problem.quantity]).sum())
-        for tried in ({}, effects)[: 2 if density or several else 1]:
+        for tried in ({}, effects)[: 2 if density or count > 1 else 1]:
             found = search(
                 reading.table, forward.at(reading.points), nuisance, tried, setting.floors
             )
             verdict = choose(found.selection, found.setting.problem)
-            left = verdict.left
-            fits = verdict.status in ('agrees', 'named') or (far and left.only_far)
-            # A radius is no rule: a biased one looks the same where all lugs are alike.
-            needed = _LIKELIER if far and 'slip' not in reading.said else _CLEARLY
+            fits = verdict.status == 'agrees' or (far and verdict.left.only_far)
+            if tried:  # effects beside it: fewer than without it, and nothing is left
+                names = found.selection.explanations[verdict.index].names
+                fits = len(names) + (not density) <= count and not verdict.left.noticeable
+            # A biased radius looks like another one where all lugs are alike.
+            surely = tried or not far or 'slip' in reading.said
+            needed = _CLEARLY if surely else _LIKELIER
             if fits and found.selection.best + density > selection.best + needed:
                 return reading.said
     return {}

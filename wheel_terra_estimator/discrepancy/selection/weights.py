@@ -209,16 +209,10 @@ _COMPETITORS = 2  # other effects that are put in the place of each effect of a 
 _PROMISE = 1.5
 
 
-def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
-    """Return the assumptions on the structural error with their priors.
-
-    ``greatest``: amplitude up to which an error counts as floor; given by the user or by a
-    reference table.
-    """
-    most = math.inf if greatest is None else greatest
-    kept = [(a, p) for a, p in _FLOORS if a <= most] or [_FLOORS[0]]
-    share = (1.0 - _UNEXPLAINED_PRIOR) / sum(p for _, p in kept)
-    floors = [Floor((a,) * len(QUANTITIES), math.log(p * share), False) for a, p in kept]
+def default_floors() -> tuple[Floor, ...]:
+    """Return the assumptions on the structural error with their priors."""
+    share = (1.0 - _UNEXPLAINED_PRIOR) / sum(p for _, p in _FLOORS)
+    floors = [Floor((a,) * len(QUANTITIES), math.log(p * share), False) for a, p in _FLOORS]
     patterns = [(a,) * len(QUANTITIES) for a in _UNEXPLAINED]
     patterns += [
         tuple(a * there for there in some)
