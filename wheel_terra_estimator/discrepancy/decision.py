@@ -49,7 +49,7 @@ _LIKELY = 0.5
 _BEYOND_DOUBT = 0.85
 # So many can imitate any smooth rows: they are named where they predict unseen levels to the noise.
 _SEVERAL = 3
-# How sure these can be: of such sets on granular and resistive-force tables (1 in 9 of 56) most
+# How sure these can be: of such sets on granular and resistive-force tables (12 of 56) most
 # names are wrong, and a law outside the catalogue is as likely beforehand as three effects at once.
 _OF_SEVERAL = 0.75
 _CLEARLY = 0.05  # of the gap: so much more a law must close than a doubtful name, or the name
