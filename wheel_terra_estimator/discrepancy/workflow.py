@@ -100,7 +100,7 @@ def diagnose(
 
     findings = search(both, forward, nuisance, effects, floors)
     misread: Mapping[str, float | str] = {}
-    if chosen.effects is None:
+    if chosen.effects is None and reference is None:  # its floors take any reading
         misread = readings.misread(both, forward, nuisance, effects, findings, configured)
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
