@@ -100,8 +100,11 @@ def diagnose(
 
     findings = search(both, forward, nuisance, effects, floors)
     misread: Mapping[str, float | str] = {}
-    if chosen.effects is None and reference is None:  # its floors take any reading
-        misread = readings.misread(both, forward, nuisance, effects, findings, configured)
+    if reference is None:  # its floors take any reading; few effects leave much to another one
+        tens_only = chosen.effects is not None
+        misread = readings.misread(
+            both, forward, nuisance, effects, findings, configured, tens_only=tens_only
+        )
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
     if sweeps is not None and decision.verdict.status != 'agrees':

@@ -55,11 +55,13 @@ def misread(
     effects: Mapping[str, Effect],
     findings: Findings,  # of the rows as they are
     configured: FloatArray,  # (N, 4) values of the configured model
+    *,
+    tens_only: bool,
 ) -> Mapping[str, float | str]:
     """Return columns with the factor that they lack, or what they are; empty where none is clear.
 
     Soil may go far, where its numbers are wrong as well, unless it fits the rows as they are
-    without a floor.
+    without a floor. `tens_only`: units are off by powers of ten, and nothing else is asked.
     """
     setting, selection = findings.setting, findings.selection
     as_they_are = remainder(selection, selection.nothing, setting.problem)
@@ -70,7 +72,7 @@ def misread(
     nothing = setting.fit([()], [findings.nothing.u], findings.nothing.angle, variance)[0]
     count = len(selection.explanations[0].names)
     ranked = []
-    for reading in _readings(table, forward.points, configured):
+    for reading in _readings(table, forward.points, configured, tens_only=tens_only):
         cells = reading.scale[setting.problem.quantity]
         problem = replace(
             setting.problem,
@@ -102,11 +104,11 @@ def misread(
 
 
 def _readings(
-    table: SteadyTable, points: OperatingPoints, configured: FloatArray
+    table: SteadyTable, points: OperatingPoints, configured: FloatArray, *, tens_only: bool
 ) -> Iterator[Reading]:
     """Yield what the columns may hold."""
     one = np.ones(len(QUANTITIES))
-    for times in _LOADS:
+    for times in () if tens_only else _LOADS:
         other = replace(points, normal_load=times * points.normal_load)
         yield Reading({'normal_load': times}, table, other, one)
         if times in _FORCES and 'drawbar_pull' in table.quantities:
@@ -115,11 +117,11 @@ def _readings(
     for q, quantity in enumerate(QUANTITIES):
         here = np.isfinite(table.measured[:, q])
         size, due = (np.sum(np.abs(values[here, q])) for values in (table.measured, configured))
-        units = UNITS[unit_of(quantity)].values()
+        units = () if tens_only else UNITS[unit_of(quantity)].values()
         for times in {*_TENS, *units, *(1.0 / f for f in units)} if size > 0.0 < due else ():
             if times != 1.0 and abs(math.log(times * size / due)) < _LIKE_MODEL:
                 yield _scaled({quantity: times}, table, points)
-    if table.true_rows.any():
+    if tens_only or table.true_rows.any():
         return  # slips of a drive are our own
     slip = table.columns['slip']
     for rule, read in (
