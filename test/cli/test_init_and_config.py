@@ -77,6 +77,32 @@ def test_from_a_urdf(init):
     assert init(urdf=CART) == 2  # nothing is overwritten
 
 
+def test_a_wheel_of_meshes_takes_the_size_that_is_given(init, capsys):
+    """What the document lacks is asked for at once."""
+    meshes = re.sub('<cylinder[^>]*>', '<mesh filename="wheel.stl"/>', CART)
+    assert init(urdf=meshes) == 2
+    assert '--radius and --width' in capsys.readouterr().err
+    rover = init('--radius', 0.25, '--width', 0.15, urdf=meshes)
+    assert rover.wheels.radius.tolist() == [0.25] * 2 and rover.wheels.width.tolist() == [0.15] * 2
+    assert 'a guess' not in capsys.readouterr().out
+
+
+def test_the_tyre_of_a_wheel_is_its_largest_cylinder(init):
+    """As of the Leo Rover, whose hub comes first and is the wider."""
+    hub = '<collision><geometry><cylinder radius="0.15" length="0.3"/></geometry></collision>'
+    rover = init(urdf=CART.replace('<collision>', f'{hub}<collision>'))
+    assert rover.wheels.radius.tolist() == [0.2] * 2 and rover.wheels.width.tolist() == [0.1] * 2
+
+
+def test_a_dummy_above_the_wheels_is_none(init, capsys):
+    """As of the Hunter SE, whose wheels have other names."""
+    dummy = wheel('middle', '0 0 0.25').replace('0.2"', '0.005"')
+    urdf = CART.replace('_wheel_joint', '_rim').replace('</robot>', f'{dummy}</robot>')
+    assert init(urdf=urdf) == 2
+    assert '--wheels right_rim,left_rim' in capsys.readouterr().err
+    assert init('--wheels', 'right_rim,left_rim', urdf=urdf).wheels.count == 2
+
+
 @pytest.mark.parametrize('recorded', [False, True])
 def test_an_expanded_urdf_with_the_comments_of_xacro(init, tmp_path, recorded):
     """A file, or the robot description in a recording."""
@@ -85,9 +111,11 @@ def test_an_expanded_urdf_with_the_comments_of_xacro(init, tmp_path, recorded):
         with BagFile(tmp_path / 'bag', {'/robot_description': 'std_msgs/msg/String'}) as bag:
             data = b'\0\1\0\0' + struct.pack('<I', len(text)) + text
             bag.write('/robot_description', data, 1)
-    rover = init('--bag', tmp_path / 'bag') if recorded else init(urdf=EXPANDED)
+    given = '--radius', 0.21, '--mass', 9
+    rover = init('--bag', tmp_path / 'bag', *given) if recorded else init(*given, urdf=EXPANDED)
     assert set(rover.wheels.names) == {'left_wheel_joint', 'right_wheel_joint'}
-    np.testing.assert_allclose(rover.wheels.radius, 0.2)
+    np.testing.assert_allclose(rover.wheels.radius, 0.21)
+    assert rover.rover.mass == 9.0
     np.testing.assert_allclose(np.sort(rover.wheels.y), [-0.3, 0.3])
 
 

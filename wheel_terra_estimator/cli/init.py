@@ -87,22 +87,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _sketch(arguments: argparse.Namespace) -> RoverSketch:
     wheels = _names(arguments.wheels)
-    if arguments.urdf:
-        from wheel_terra_estimator.configuration.urdf import read_urdf
-
-        sketch = read_urdf(arguments.urdf, wheels)
-        count = len(sketch.wheels)
-        if arguments.radius:
-            sketch = replace(sketch, radius=[arguments.radius] * count)
-        if arguments.width:
-            sketch = replace(sketch, width=[arguments.width] * count)
+    sketch = _described(arguments, wheels)
+    if sketch is not None:
         if arguments.mass:
             guessed = sketch.guessed - {'rover.mass'}
             sketch = replace(sketch, mass=arguments.mass, guessed=guessed)
         return replace(sketch, name=arguments.name or sketch.name)
-    described = _description_of(arguments) if arguments.bag and not arguments.radius else None
-    if described is not None:
-        return replace(described, name=arguments.name or described.name)
     if arguments.bag:
         wheels = wheels or _wheels_of(arguments.bag, arguments.remap)
     elif not wheels:
@@ -117,18 +107,20 @@ def _names(text: str | None) -> list[str]:
     return names
 
 
-def _description_of(arguments: argparse.Namespace) -> RoverSketch | None:
-    """Return the rover of /robot_description; None where the recording has none."""
+def _described(arguments: argparse.Namespace, wheels: list[str]) -> RoverSketch | None:
+    """Return the rover of a URDF or of /robot_description; None where there is none."""
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.configuration.urdf import read_urdf
 
-    with open_bag(arguments.bag) as bag:
-        if DESCRIPTION not in bag.topics:
-            return None
-        messages = bag.messages([DESCRIPTION])
-        data = next((bytes(data) for _, _, data in messages if len(data) > TEXT_AT), b'')
-    text = data[TEXT_AT:].rstrip(b'\0')  # std_msgs/String in CDR
-    return read_urdf(Path(f'{arguments.bag}:{DESCRIPTION}'), _names(arguments.wheels), text)
+    path, text = arguments.urdf, None
+    if arguments.bag and not (arguments.track or arguments.wheelbase):
+        with open_bag(arguments.bag) as bag:
+            if DESCRIPTION in bag.topics:
+                messages = bag.messages([DESCRIPTION])
+                data = next((bytes(data) for _, _, data in messages if len(data) > TEXT_AT), b'')
+                text = data[TEXT_AT:].rstrip(b'\0')  # std_msgs/String in CDR
+                path = Path(f'{arguments.bag}:{DESCRIPTION}')
+    return read_urdf(path, wheels, text, arguments.radius, arguments.width) if path else None
 
 
 def _wheels_of(path: Path, remaps: list[str]) -> list[str]:

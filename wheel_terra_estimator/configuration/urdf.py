@@ -28,17 +28,25 @@ LARGEST_FILE = 20_000_000  # [byte]
 DEEPEST_CHAIN = 1000
 BASE_LINKS = ('base_link', 'base_footprint')
 
+_ROUND = ('cylinder', 'sphere')
 _ACROSS = 0.1  # y of an axis below which nothing tells its sign
 _UPRIGHT = 0.8  # cosine between the axis of a joint that steers and the vertical, at least
 
 Pose = FloatArray  # (4, 4)
 
 
-def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None) -> RoverSketch:
+def read_urdf(
+    path: Path,
+    wheels: Sequence[str] = (),
+    data: bytes | None = None,
+    radius: float | None = None,
+    width: float | None = None,
+) -> RoverSketch:
     """Return the rover that a URDF describes (xacro has to be expanded first).
 
     ``wheels``: names of the wheel joints; default: continuous joints whose name or link says wheel.
     ``data``: the document, where it does not stand in a file; ``path`` then names it in errors.
+    ``radius``, ``width``: of the wheels [m], in place of those of the document.
     Raises UserError for no URDF, no wheels, or a wheel without a radius.
     """
     robot = _Robot(path, _parse(path, data))
@@ -55,9 +63,23 @@ def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None)
     placed.sort(key=lambda item: (-round(item[1][0, 3], 3), -item[1][1, 3]))
     names = [name for name, _ in placed]
     poses = [pose for _, pose in placed]
-    shapes = [robot.cylinder(joints[name]) for name in names]
-    guessed = {'wheels.width'} if any(width is None for _, width in shapes) else set()
-    radius = [r for r, _ in shapes]
+    shapes = [robot.shape(joints[name]) for name in names]
+    ground = min(p[2, 3] - (r or math.inf) for p, (r, _) in zip(poses, shapes, strict=True))
+    turning = [name for name, joint in joints.items() if joint.get('type') == 'continuous']
+    lower = [name for name in turning if robot.pose(joints[name])[2, 3] < ground]
+    if lower and not wheels:
+        raise UserError(
+            f'{path}: {", ".join(lower)} would turn below the ground that {", ".join(names)} '
+            f'stands on; give the wheels: --wheels {",".join(lower)}'
+        )
+    shapes = [(radius or r, width or w) for r, w in shapes]
+    if bare := [name for name, (r, _) in zip(names, shapes, strict=True) if not r]:
+        raise UserError(
+            f'{path}: no cylinder to take the radius from: {", ".join(bare)}; give --radius'
+            + ('' if width else ' and --width')
+        )
+    guessed = set() if all(w for _, w in shapes) else {'wheels.width'}
+    radii = [r for r, _ in shapes]
     leftward = [_leftward(joints[n], p, path) for n, p in zip(names, poses, strict=True)]
     if any(abs(left) < _ACROSS for left in leftward):
         guessed.add('wheels.direction')
@@ -67,13 +89,13 @@ def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None)
     mass, centre = robot.mass()
     if not mass:
         guessed |= {'rover.mass', 'rover.centre_of_gravity'}
-        ground = min(float(p[2, 3]) - r for p, r in zip(poses, radius, strict=True))
-        centre = [0.0, 0.0, round(ground + CENTRE_HEIGHT * max(radius), 4)]
+        ground = min(float(p[2, 3]) - r for p, r in zip(poses, radii, strict=True))
+        centre = [0.0, 0.0, round(ground + CENTRE_HEIGHT * max(radii), 4)]
     return RoverSketch(
         name=robot.name,
         wheels=names,
-        radius=radius,
-        width=[w if w is not None else DEFAULT_WIDTH_SHARE * r for r, w in shapes],
+        radius=radii,
+        width=[w or DEFAULT_WIDTH_SHARE * r for r, w in shapes],
         x=[round(float(p[0, 3]), 5) for p in poses],
         y=[round(float(p[1, 3]), 5) for p in poses],
         z=[round(float(p[2, 3]), 5) for p in poses],
@@ -200,24 +222,20 @@ class _Robot:
             link = _link(joint, 'parent')
         raise UserError(f'{self.path}: the joints of link {start} form a loop')
 
-    def cylinder(self, joint: ElementTree.Element) -> tuple[float, float | None]:
-        """Return radius and width of a wheel from its collision or visual shape."""
+    def shape(self, joint: ElementTree.Element) -> tuple[float, float]:
+        """Return radius and width of a wheel, the largest of its link; 0 for what is not told."""
         link = self._links.get(_link(joint, 'child'))
         for kind in ('collision', 'visual'):
-            for part in link.iter(kind) if link is not None else ():
-                for cylinder in part.iter('cylinder'):
-                    radius = _numbers(cylinder.get('radius'), (0.0,), self.path)[0]
-                    length = _numbers(cylinder.get('length'), (0.0,), self.path)[0]
-                    if radius > 0.0:
-                        return radius, length or None
-                for sphere in part.iter('sphere'):
-                    radius = _numbers(sphere.get('radius'), (0.0,), self.path)[0]
-                    if radius > 0.0:
-                        return radius, None
-        raise UserError(
-            f'{self.path}: wheel {joint.get("name")} has no cylinder to take its radius from; give '
-            '--radius'
-        )
+            parts = link.iter(kind) if link is not None else ()
+            forms = [form for part in parts for name in _ROUND for form in part.iter(name)]
+            sizes = [
+                [_numbers(form.get(key), (0.0,), self.path)[0] for key in ('radius', 'length')]
+                for form in forms
+            ]
+            radius, length = max(sizes, default=(0.0, 0.0))
+            if radius > 0.0:
+                return radius, length
+        return 0.0, 0.0
 
     def steering_joint(self, wheel: ElementTree.Element) -> tuple[str, float]:
         """Return the joint that steers a wheel, and the z of its axis in the base: -1 counts right.
