@@ -59,7 +59,8 @@ def test_points_of_a_table(tmp_path, printed, refused):
     assert got['lug_height'].tolist() == [0.01, 0.0, 0.01]
     assert len(set(got['drawbar_pull'].tolist())) == 3
     path.write_text('slip,Fz\n0.2,80\n')
-    refused([*BASE, '--points', str(path)], "no column 'normal_load'")
+    said = refused([*BASE, '--points', str(path)], "no column 'normal_load'")
+    assert 'name it in the file: normal_load' in said and '--' not in said  # no option of predict
     path.write_text('slip,normal_load\n')
     refused([*BASE, '--points', str(path)], 'no rows below the column names')
     path.write_text('slip,normal_load\n0.2,80\n0.3,heavy\n')

@@ -49,7 +49,7 @@ UNITS: dict[str, dict[str, float]] = {
     '-': {'-': 1.0, '%': 0.01, '1': 1.0, 'percent': 0.01, 'pct': 0.01},
 }
 """SI unit -> spelling of a unit -> factor to the SI unit."""
-_SPACES = re.compile('[\\s*\u00b7.]+')
+_SPACES = re.compile('[\\s*\u00b7\u22c5.]+|(?<=[a-z])-')
 
 
 def _plain(unit: str) -> str:

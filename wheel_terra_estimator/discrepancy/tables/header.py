@@ -238,7 +238,8 @@ class Header:
         if missing:
             faults.append(f'{" and ".join(missing)} among {", ".join(self.titles)}')
             if not meant:
-                faults.append('add it, or say which title stands for it: --columns NAME=TITLE')
+                or_say = ', or say which title stands for it: --columns NAME=TITLE'
+                faults.append('add it' + ('' if self._leave_all else or_say))
         if faults:
             faults += [self._question(meant)] if meant else []
             raise UserError(f'{self.source}: {"; ".join(faults)}')
@@ -269,6 +270,8 @@ class Header:
         answers: dict[str, str] = {}
         for title, (name, _) in zip(titles, hints, strict=True):
             answers.setdefault(name or 'NAME', title)
+        if self._leave_all:
+            return f'not used: {listed}; name it in the file: {", ".join(answers)}'
         options = (f'--columns {shlex.quote(f"{name}={title}")}' for name, title in answers.items())
         left_out = shlex.quote(titles[0]) if len(titles) == 1 else ALL
         return (
