@@ -132,6 +132,13 @@ def test_a_map_without_what_is_needed_says_so(convert, example, capsys, entry):
     assert 'time and joint_states are needed' in capsys.readouterr().err
 
 
+def test_angles_of_wheels_are_no_rates(convert, capsys):
+    joints = {side: {'position': {'column': side, 'unit': 'deg'}} for side in ('left', 'right')}
+    columns = {'time': {'column': 'time'}, 'joint_states': joints}
+    assert convert('time,left,right\n1,0,0\n2,9,9', columns) == 2
+    assert 'no velocity; of angles of wheels, add columns' in capsys.readouterr().err
+
+
 def test_rows_that_are_too_long_or_cut_short(convert, capsys):
     assert convert('\n'.join([HEADER, *(f'{row},,' for row in ROWS)])) != 2  # empty cells are none
     assert 'note' not in capsys.readouterr().out

@@ -146,6 +146,11 @@ def _read_map(path: Path, header: list[str], table: Path) -> ColumnMap:
                 f'{path}: joint_states.{joint}: velocity is missing (a joint that steers has '
                 'position alone)'
             )
+    if not any('velocity' in found for found in joints.values()):
+        raise UserError(
+            f'{path}: joint_states: no velocity; of angles of wheels, add columns of their change '
+            'per time to the table, and name these as velocity'
+        )
     sinkage = {
         str(wheel): reader.column(f'sinkage.{wheel}', entry, 'm')
         for wheel, entry in reader.mapping('sinkage', document.get('sinkage') or {}).items()
