@@ -164,6 +164,8 @@ def test_a_required_input_that_is_missing_is_the_first_finding():
     odometry = replace(WHOLE.reference, topic='/wheel/odometry')
     report = check_recording(replace(WHOLE, joints=None, wheel_odometry=odometry), CONFIGURATION)
     assert '-p wheel_odometry:=odom --remap odom:=/wheel/odometry' in report.findings[0].cure
+    report = check_recording(replace(WHOLE, joints=None, wheel_odometry=odometry), None)
+    assert report.findings[0].cure.startswith('wheel-terra init --bag BAG --wheels NAMES')
 
 
 def test_a_few_wheel_rates_in_a_long_time_are_not_correlated():

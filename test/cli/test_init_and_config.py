@@ -219,6 +219,20 @@ def test_wheels_are_where_their_names_say_or_a_guess(init, make_bag, factory, ca
     assert guessed is (names == 'a b c d')
 
 
+def test_odometry_alone_then_checked(init, make_bag, factory, tmp_path, capsys):
+    """The options that are printed are those that make the next command work."""
+    twist = factory.twist_with_covariance(0.3, 0.0, np.zeros((6, 6)))
+    stamps = range(STAMP, STAMP + 20_000_000_000, 100_000_000)
+    bag = make_bag([('/rover/odom', factory.odometry(factory.header(n), twist), n) for n in stamps])
+    rover = init('--bag', bag, '--wheels', 'left,right', *MEASURES)
+    assert rover.wheel_odometry == 'odom'
+    remap = re.search(r'--remap odom:=\S+', capsys.readouterr().out).group().split()
+    main(['check', str(bag), '--config', str(tmp_path / 'rover.yaml'), *remap])
+    said = capsys.readouterr().out
+    assert '/imu/data: no IMU' in said and 'no wheel rates' not in said and 'odom:=' not in said
+    assert init('--overwrite', '--wheels', 'left,right', *MEASURES).wheel_odometry != 'odom'
+
+
 def test_a_turning_joint_that_is_left_out_is_told(init, tmp_path, capsys):
     def rename(topic, message):
         if topic == '/joint_states':

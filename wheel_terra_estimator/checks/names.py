@@ -30,17 +30,17 @@ DEFAULT_TOPICS = {
 }
 
 
-def check_required(recording: Recording, own: str) -> list[Outcome]:
-    """Return the inputs that the estimator cannot do without and the recording does not have.
-
-    ``own``: topic of the wheel odometry.
-    """
+def check_required(recording: Recording, facts: RoverFacts) -> list[Outcome]:
+    """Return the inputs that the estimator cannot do without and the recording does not have."""
+    own = facts.configuration.wheel_odometry
     outcomes: list[Outcome] = []
     if (recording.joints if own == 'joint_states' else recording.wheel_odometry) is None:
         other = recording.wheel_odometry
         cure = f'record the wheel rates, or name their topic: --remap {own}:=/TOPIC'
         if own == 'joint_states' and other is not None:
             cure = f'-p wheel_odometry:=odom --remap odom:={other.topic}'
+            if not facts.known:
+                cure = 'wheel-terra init --bag BAG --wheels NAMES makes a rover file for that'
         outcomes.append(_required(own, 'wheel rates', 'there is nothing to estimate', cure))
     if recording.imu is None:
         effect = 'a reference velocity alone then tells slip, and nothing the slope'

@@ -134,7 +134,7 @@ def _examined(
     topic = recording.joints.topic if recording.joints is not None else ''
     if recording.lost > LEAST_LOST:
         report.take([found('damaged', topic, 0.99, share=100.0 * recording.lost)])
-    mended('drop_outs', None, lambda: names.check_required(recording, own))
+    mended('drop_outs', None, lambda: names.check_required(recording, facts))
     mended('unknown_name', None, lambda: names.check_topics(recording, remapped, own))
     checks = AGAINST_EACH_OTHER
     if own == 'odom':  # in which radius and track are its publisher's

@@ -93,11 +93,14 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
             guessed = sketch.guessed - {'rover.mass'}
             sketch = replace(sketch, mass=arguments.mass, guessed=guessed)
         return replace(sketch, name=arguments.name or sketch.name)
+    topic = _odometry_alone(arguments) if arguments.bag and wheels else ''
     if arguments.bag:
         wheels = wheels or _wheels_of(arguments.bag, arguments.remap)
     elif not wheels:
         raise UserError('give --urdf, --bag or --wheels')
-    return _from_measures(arguments, wheels)
+    if topic:
+        print(f'note: no joint states, so wheel_odometry: odom, with --remap odom:={topic}')
+    return replace(_from_measures(arguments, wheels), wheel_odometry='odom' if topic else '')
 
 
 def _names(text: str | None) -> list[str]:
@@ -121,6 +124,17 @@ def _described(arguments: argparse.Namespace, wheels: list[str]) -> RoverSketch 
                 text = data[TEXT_AT:].rstrip(b'\0')  # std_msgs/String in CDR
                 path = Path(f'{arguments.bag}:{DESCRIPTION}')
     return read_urdf(path, wheels, text, arguments.radius, arguments.width) if path else None
+
+
+def _odometry_alone(arguments: argparse.Namespace) -> str:
+    """Return the topic of the odometry of a recording without joint states; '' for none."""
+    from wheel_terra_estimator.bags.reader import parse_remaps
+    from wheel_terra_estimator.bags.storage import open_bag
+    from wheel_terra_estimator.bags.topic_choice import choose_topics
+
+    with open_bag(arguments.bag) as bag:
+        chosen = choose_topics(bag, parse_remaps(arguments.remap))
+    return '' if 'joint_states' in chosen else chosen.get('odom', '')
 
 
 def _wheels_of(path: Path, remaps: list[str]) -> list[str]:

@@ -33,6 +33,7 @@ class RoverSketch:
     mass: float  # [kg]
     centre_of_gravity: Sequence[float]  # [m]
     direction: Sequence[int] = ()
+    wheel_odometry: str = ''  # topic that carries the rates; '': joint_states
     steering_joints: Sequence[str] = ()  # that steer each wheel, '' = not steered
     guessed: frozenset[str] = field(default_factory=frozenset)
     source: str = ''
@@ -55,6 +56,8 @@ def rover_file(sketch: RoverSketch) -> str:
     }
     if any(sketch.steering_joints):
         values['wheels.steering_joints'] = list(sketch.steering_joints)
+    if sketch.wheel_odometry:
+        values['wheel_odometry'] = sketch.wheel_odometry
     values['wheels.passes'] = passes(sketch.x, sketch.y)
     table = declared()
     comment = f'{sketch.name}: made by `wheel-terra init`\n\n'
