@@ -323,6 +323,22 @@ def test_messages_that_hold_some_of_the_wheels_are_checked_as_whole_ones(apart):
     only(checked(joints=rows_of(some, np.repeat(np.arange(some.stamp.size), 2))), 'order')
 
 
+@pytest.mark.parametrize('jitter', [0.0, 0.004])
+def test_noise_of_an_encoder_is_that_of_its_counts_and_stamps(jitter):
+    """720 counts a turn, read too early or too late; the check proposes what is calibrated."""
+    joints, step, period = WHOLE.joints, 2.0 * np.pi / 720, 1.0 / rolling.RATE
+    angle = np.cumsum(joints.rate, axis=0) * period
+    read = angle + jitter * np.random.default_rng(1).standard_normal(angle.shape)
+    rate = np.diff(step * np.floor(read / step), axis=0, prepend=0.0) / period
+    report = checked(joints=replace(joints, rate=rate))
+    turning = np.abs(joints.rate) > 0.5
+    truth = np.std((rate - joints.rate)[turning])
+    seen = report.figures['wheels.rate_noise_rad_s']
+    assert seen == pytest.approx(truth, rel=0.15)
+    found = [f.value for f in report.findings if f.parameter == 'sensors.wheel_rate_std']
+    assert found == [pytest.approx(seen, rel=0.05)]
+
+
 def test_without_a_rover_file_signs_are_found_all_the_same():
     flip = np.array([1.0, 1.0, 1.0, -1.0])
     joints = replace(WHOLE.joints, rate=WHOLE.joints.rate * flip, torque=WHOLE.joints.torque * flip)

@@ -47,6 +47,9 @@ DRAGGED_TORQUE = 0.5  # the same against theirs, of one that the others drag [-]
 NOISE_FACTOR = 5.0
 LEAST_NOISE_SHARE = 0.08  # noise of a rate that matters, as a share of the working rate
 COUNTING_STD = 1.0 / math.sqrt(6.0)  # of a rate from two counts, in counts
+COUNTING_SHARE = 0.2  # of the scatter, from which the counts make it
+COUNTING_BEND = math.sqrt(0.6 * math.pi / 2.0)
+"""Noise of a rate from two counts, over the mean size of its bend: 2 in 20/6 variances [-]."""
 STEP_FACTOR = 1.5  # noise by the steps over the one stated, above which it matters [-]
 KEPT = 0.9  # share of repeated rates from which they are rounded, not counted [-]
 LEAST_STEP_SHARE = 0.02  # noise by steps that matters, over the working rate [-]
@@ -289,8 +292,10 @@ def check_noise(evidence: Evidence) -> list[Outcome]:
         bend = np.diff(rate, 2)[rows[1:-1]] / math.sqrt(6.0)
         bend = bend[np.isfinite(bend)]
         enough = bend.size > 50
-        noise.append(robust_std(bend) if enough else 0.0)
         by_steps.append(rate_step(rate[rows], interval) * COUNTING_STD if enough else 0.0)
+        noise.append(robust_std(bend) if enough else 0.0)
+        if by_steps[-1] > COUNTING_SHARE * noise[-1]:
+            noise[-1] = max(by_steps[-1], COUNTING_BEND * float(np.abs(bend).mean()))
     figures, working = evidence.figures, evidence.working_rate
     figures['wheels.rate_noise_rad_s'] = float(f'{np.median(noise):.3g}')
     if np.median(by_steps):
@@ -299,13 +304,12 @@ def check_noise(evidence: Evidence) -> list[Outcome]:
     noisy = np.array(noise) > max(NOISE_FACTOR * stated, LEAST_NOISE_SHARE * working)
     if not (coarse | noisy).any():
         return []
-    key, wrong, sizes = (
-        ('rate_steps', coarse, by_steps) if coarse.any() else ('rate_noise', noisy, noise)
-    )
-    seen = float(np.median(np.array(sizes)[wrong]))
-    step, period = seen / COUNTING_STD, evidence.period
+    key, wrong = ('rate_steps', coarse) if coarse.any() else ('rate_noise', noisy)
+    seen = float(np.median(np.array(noise)[wrong]))
+    step, period = float(np.median(np.array(by_steps)[wrong])) / COUNTING_STD, evidence.period
     told: dict[str, Any] = {'noise': seen, 'stated': stated, 'step': step, 'period': period}
-    told |= {'share': 100.0 * step / max(working, 1e-9), 'counts': 2.0 * math.pi / (step * period)}
+    told |= {'share': 100.0 * step / max(working, 1e-9)}
+    told |= {'counts': 2.0 * math.pi / max(step * period, 1e-9)}
     wheel = None if 2 * wrong.sum() > wrong.size else evidence.facts.named(wrong)
     return [evidence.found(key, 0.95, wheel=wheel, value=float(f'{seen:.2g}'), **told)]
 
