@@ -103,6 +103,14 @@ def test_a_dummy_above_the_wheels_is_none(init, capsys):
     assert init('--wheels', 'right_rim,left_rim', urdf=urdf).wheels.count == 2
 
 
+def test_a_joint_as_low_as_the_wheels_is_told(init, capsys):
+    """As of the Hunter 2, whose rear wheels are not named as wheels; a turret is higher."""
+    rear = wheel('rear', '-0.4 0 0.2').replace('_wheel_joint', '_axle')
+    turret = wheel('turret', '0 0 0.7').replace('_wheel_joint', '_joint')
+    assert init(urdf=CART.replace('</robot>', f'{rear}{turret}</robot>')).wheels.count == 2
+    assert 'not taken for wheels by their names: rear_axle; if' in capsys.readouterr().out
+
+
 @pytest.mark.parametrize('recorded', [False, True])
 def test_an_expanded_urdf_with_the_comments_of_xacro(init, tmp_path, recorded):
     """A file, or the robot description in a recording."""

@@ -79,6 +79,8 @@ def run(arguments: argparse.Namespace) -> int:
         path.write_text(rover_file(sketch), encoding='utf-8')
     reader.load([arguments.output])
     print(f'rover file: {arguments.output} ({len(sketch.wheels)} wheels, {sketch.mass:g} kg)')
+    if others := ', '.join(sketch.left_out):
+        print(f'  not taken for wheels by their names: {others}; if they are: --wheels')
     for key in sorted(sketch.guessed):
         print(f'  {key} is a guess: measure it')
     print(f'next: wheel-terra check RECORDING --config {shlex.quote(str(arguments.output))}')

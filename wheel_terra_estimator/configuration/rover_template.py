@@ -35,6 +35,7 @@ class RoverSketch:
     direction: Sequence[int] = ()
     wheel_odometry: str = ''  # topic that carries the rates; '': joint_states
     steering_joints: Sequence[str] = ()  # that steer each wheel, '' = not steered
+    left_out: Sequence[str] = ()  # joints that may be wheels, by their height
     guessed: frozenset[str] = field(default_factory=frozenset)
     source: str = ''
 

@@ -30,6 +30,7 @@ BASE_LINKS = ('base_link', 'base_footprint')
 
 _ROUND = ('cylinder', 'sphere')
 _ACROSS = 0.1  # y of an axis below which nothing tells its sign
+_NEAR = 0.01  # axles that differ less in height may be of wheels alike [m]
 _UPRIGHT = 0.8  # cosine between the axis of a joint that steers and the vertical, at least
 
 Pose = FloatArray  # (4, 4)
@@ -66,8 +67,9 @@ def read_urdf(
     shapes = [robot.shape(joints[name]) for name in names]
     ground = min(p[2, 3] - (r or math.inf) for p, (r, _) in zip(poses, shapes, strict=True))
     turning = [name for name, joint in joints.items() if joint.get('type') == 'continuous']
-    lower = [name for name in turning if robot.pose(joints[name])[2, 3] < ground]
-    if lower and not wheels:
+    height = {n: robot.pose(joints[n])[2, 3] for n in turning if n not in names and not wheels}
+    lower = [name for name, z in height.items() if z < ground]
+    if lower:
         raise UserError(
             f'{path}: {", ".join(lower)} would turn below the ground that {", ".join(names)} '
             f'stands on; give the wheels: --wheels {",".join(lower)}'
@@ -103,6 +105,7 @@ def read_urdf(
         centre_of_gravity=centre,
         direction=[-1 if left < -_ACROSS else 1 for left in leftward],
         steering_joints=[joint for joint, _ in steering],
+        left_out=[n for n, z in height.items() if z < max(p[2, 3] for p in poses) + _NEAR],
         guessed=frozenset(guessed),
         source=f'{path.name}, relative to {robot.base}',
     )
