@@ -691,6 +691,7 @@ def test_slip_that_differs_in_turns_is_no_place():
     [
         ((2.0, -1.5, -0.7, 1.0), False),  # ground that hardly gives: slower wheels brake
         ((3.0, -2.8, 3.2, 3.1), True),  # loose ground
+        ((3.0, -2.8, 3.2, -3.1), True),  # a side reversed
     ],
 )
 def test_wheels_that_fight_on_firm_ground_have_no_wrong_sign(torques, told):

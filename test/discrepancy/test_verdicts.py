@@ -310,6 +310,13 @@ def test_a_wrong_unit_is_said_before_any_effect(column, factor, units):
     assert f'The unit of {column.replace("_", " ")} looks wrong ({units})' in found.sentence
 
 
+def test_two_columns_in_another_unit_are_both_asked_for(unproposed):
+    table, values, *_ = make('sweep40')
+    table |= {'sinkage': 10.0 * table['sinkage'], 'torque': 0.1 * table['torque']}
+    found = run({k: v for k, v in table.items() if not k.endswith('_std')}, values, options=FEW)
+    assert found.misread == {'sinkage': pytest.approx(0.1), 'torque': pytest.approx(10.0)}
+
+
 @pytest.mark.parametrize(
     ('design', 'factor', 'units'),
     [

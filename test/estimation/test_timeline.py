@@ -327,6 +327,14 @@ def test_a_reference_that_is_always_late_ends_no_run():
     assert core.health()['reference_odom_late'] == 15
 
 
+def test_one_stamp_from_the_future_does_no_harm():
+    core, _ = make_core()
+    stream = drive(2.0)
+    spoilt = [*stream[:60], imu(5000.0), *stream[60:]]
+    assert essence(play(core, spoilt)) == essence(play(make_core()[0], stream))
+    assert core.health()['imu/data_rejected: stamp far ahead of all others'] == 1
+
+
 def test_a_pause_of_all_topics_is_no_new_run():
     core, _ = make_core()
     later = [odometry(60.0), imu(60.01), odometry(60.1)]

@@ -47,15 +47,6 @@ def test_the_default_form_of_shear_deformation_is_a_factor_on_the_modulus(slip):
     assert ours == pytest.approx(state(slip, LOAD, soil=stiff).outputs()[0])
 
 
-@pytest.mark.parametrize('slip', SLIPS)
-def test_no_cohesion_below_nought(slip):
-    """A soil that holds together by less than nothing there is not; more of it is added."""
-    for delta, left in ((-2.0 * SAND.cohesion - 100.0, 0.0), (50.0, SAND.cohesion + 50.0)):
-        soil = Soil(**{**SAND.__dict__, 'cohesion': left})
-        ours = model(slip, 'cohesion', values={'delta': delta})
-        assert ours == pytest.approx(state(slip, LOAD, soil=soil).outputs()[0])
-
-
 def test_friction_by_torque_or_rate_costs_whichever_way_they_go():
     """Of other effects on a channel the campaigns' own formulas are the truth (test/lab/trials)."""
     braking = state(-0.3, LOAD).torque[0]

@@ -32,6 +32,7 @@ from wheel_terra_estimator.checks.statistics import (
 UPHILL_ENOUGH = -0.02  # specific force along the drive at which a wheel takes power [g]
 SIGN_SIGMAS = 4.0
 LEAST_ANSWER = 0.3  # answer of a torque to slopes over the others' that tells its sign [-]
+ALIKE_LEVELS = 0.5  # least over greatest of torques that drive alike [-]
 LEAST_LOOSE = 0.03  # sum of T/r over the weight on loose level ground, at least [-]
 MOST_TRACTION = 0.85  # sum of T/r over the weight that no soil gives (tangent of 40 degrees)
 UNIT_TRACTION = 15.0  # the same, above which the torque is in N mm
@@ -127,11 +128,13 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence, bool]:
 def _fight(evidence: Evidence, told: list[tuple[Estimate, Estimate]]) -> bool:
     """Return whether wheels may fight one another: torques of both signs leave next to nothing.
 
-    On firm ground they do so from the start on: without slopes nothing then tells the signs.
+    On firm ground they do so from the start on: without slopes nothing then tells the signs. Those
+    of wheels that are reversed are as large as the others.
     """
-    facts, levels = evidence.facts, [level.value for _, level in told]
-    rows = evidence.steady & evidence.unturned
-    if not (facts.known and rows.any() and min(levels) < 0.0 < max(levels)):
+    facts, levels = evidence.facts, np.array([level.value for _, level in told])
+    rows, sizes = evidence.steady & evidence.unturned, np.abs(levels)
+    alike = sizes.min() > ALIKE_LEVELS * sizes.max()
+    if alike or not (facts.known and rows.any() and levels.min() < 0.0 < levels.max()):
         return False
     assert evidence.force is not None
     pushed, along = thrust(evidence) * np.sign(evidence.common_rate), evidence.force[:, 0]

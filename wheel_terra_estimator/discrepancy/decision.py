@@ -47,7 +47,7 @@ _MOST_TRIED = 3  # doubtful names, after which none is given
 # than not; below the second figure a law has to do worse than the name.
 _LIKELY = 0.5
 _BEYOND_DOUBT = 0.85
-# So many can imitate any smooth rows: they are named where they predict unseen levels to the noise.
+# So many can imitate any smooth rows: they are named where they predict unseen levels.
 _SEVERAL = 3
 # How sure these can be: of such sets on granular and resistive-force tables (12 of 56) most
 # names are wrong, and a law outside the catalogue is as likely beforehand as three effects at once.
@@ -163,8 +163,11 @@ class Decider:
     ) -> tuple[tuple[Naming, ...], bool]:
         """Return the names, as sure as they are beside a law, and whether they are given."""
         gap = self._gap(decision)
-        left = decision.verdict.left.noticeable
-        if len(names) >= _SEVERAL and (left or not gap.leaves_noise(decision.after)):
+        more = len(names) > _SEVERAL
+        imitates = more and decision.verdict.left.noticeable
+        if len(names) >= _SEVERAL and (
+            imitates or not gap.leaves_noise(decision.after, alone=more)
+        ):
             return names, False
         if _least(names) >= _BEYOND_DOUBT:
             return names, True

@@ -100,11 +100,11 @@ def diagnose(
 
     findings = search(both, forward, nuisance, effects, floors)
     misread: Mapping[str, float | str] = {}
-    if reference is None:  # its floors take any reading; few effects leave much to another one
-        tens_only = chosen.effects is not None
-        misread = readings.misread(
-            both, forward, nuisance, effects, findings, configured, tens_only=tens_only
-        )
+    if reference is None:  # its floors take any reading
+        rows = both, forward, nuisance, effects, findings, configured
+        misread = readings.tens_off(*rows)
+        if chosen.effects is None:
+            misread = readings.misread(*rows) or misread
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
     if sweeps is not None and decision.verdict.status != 'agrees':

@@ -235,7 +235,9 @@ ReferenceVelocity
             self._end_run(keep_soil=True)
             self._clock_stepped = True
         for arrival in judgement.accepted:
-            self._lags.note(arrival.channel, arrival.measurement.stamp)
+            rate = getattr(arrival.measurement, 'rate', None)
+            whole = rate is None or not np.isnan(rate).any()
+            self._lags.note(arrival.channel, arrival.measurement.stamp, whole=whole)
             sets += self._insert(arrival)
         newest = self._watch.newest
         if judgement.accepted and newest is not None:

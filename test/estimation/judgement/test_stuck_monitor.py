@@ -73,6 +73,7 @@ def test_entrapment_is_announced_before_it_has_lasted_a_second(slips, ahead):
         (False, False, 0.05, 6, False),  # a depth that only its model tells
         (False, True, 0.0, 6, False),  # deep snow
         (False, True, 0.05, 2, False),  # two of six in a hole
+        (False, True, 2.0, 6, False),  # a border to soft soil
     ],
 )
 def test_without_a_speed_wheels_that_are_read_to_bury_themselves(
@@ -80,8 +81,8 @@ def test_without_a_speed_wheels_that_are_read_to_bury_themselves(
 ):
     """At slip 0.1, as it seems; depth in metres per metre of rim travel, from 0.42 radii on."""
     monitor, found = StuckMonitor(SETTINGS), []
-    for i in range(120):
-        deep = 0.05 + growth * 0.05 * 0.1 * i
+    for i in range(600):  # 25 radii of rim travel
+        deep = min(0.05 + growth * 0.05 * 0.1 * i, 0.12)
         rows = [wheel(0.1)._replace(sinkage=deep if n < wheels else 0.05) for n in range(6)]
         found.append(judge(monitor, 0.1 * i, 0.045, known, rows, depth_read=read))
     assert (first(found) is not None) == warned

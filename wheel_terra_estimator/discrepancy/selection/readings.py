@@ -30,7 +30,6 @@ _LIKELIER = 5.0  # the same, where the rows as they are do not fit the soil
 _FLOOR_NEEDED = 0.8  # probability of a structural error from which soil alone does not fit
 _FORCES = [times for f in (9.80665, 4.4482216) for times in (f, 1.0 / f)]  # kgf, lbf; or N as these
 _LOADS = (0.5, 2.0, *_FORCES)  # of a pair of wheels, or one of it
-_TENS = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1000.0)
 _LIKE_MODEL = math.log(3.0)  # a reading must come so near to the size that the model gives
 _ROUGH = 0.03  # floor beside which readings are ranked [share of the range]
 _TRIED = 2  # best of them that are weighed
@@ -48,6 +47,37 @@ class Reading:
     scale: FloatArray  # (4,) factor on the quantities
 
 
+def tens_off(
+    table: SteadyTable,
+    forward: Forward,
+    nuisance: tuple[Coordinate, ...],
+    effects: Mapping[str, Effect],
+    findings: Findings,  # of the rows as they are
+    configured: FloatArray,  # (N, 4) values of the configured model
+) -> dict[str, float | str]:
+    """Return quantity -> power of ten that it lacks, where the rows are then far likelier.
+
+    Only those more than half a decade off the model's size. Where all are, it is no unit.
+    """
+    found: dict[str, float] = {}
+    for q, quantity in enumerate(QUANTITIES):
+        here = np.isfinite(table.measured[:, q])
+        size, due = (np.sum(np.abs(values[here, q])) for values in (table.measured, configured))
+        decades = round(math.log10(due / size)) if size > 0.0 and due > 0.0 else 0
+        if decades:
+            found[quantity] = 10.0**decades
+    if len(found) == len(table.quantities):
+        return {}
+    said: dict[str, float | str] = {}
+    for quantity, times in found.items():
+        scaled = _scaled({quantity: times}, table, forward.points)
+        other = search(scaled.table, forward, nuisance, effects, findings.setting.floors)
+        density = float(np.log(scaled.scale[findings.setting.problem.quantity]).sum())
+        if other.selection.best + density > findings.selection.best + _CLEARLY:
+            said[quantity] = times
+    return said
+
+
 def misread(
     table: SteadyTable,
     forward: Forward,
@@ -55,13 +85,11 @@ def misread(
     effects: Mapping[str, Effect],
     findings: Findings,  # of the rows as they are
     configured: FloatArray,  # (N, 4) values of the configured model
-    *,
-    tens_only: bool,
 ) -> Mapping[str, float | str]:
     """Return columns with the factor that they lack, or what they are; empty where none is clear.
 
     Soil may go far, where its numbers are wrong as well, unless it fits the rows as they are
-    without a floor. `tens_only`: units are off by powers of ten, and nothing else is asked.
+    without a floor.
     """
     setting, selection = findings.setting, findings.selection
     as_they_are = remainder(selection, selection.nothing, setting.problem)
@@ -72,7 +100,7 @@ def misread(
     nothing = setting.fit([()], [findings.nothing.u], findings.nothing.angle, variance)[0]
     count = len(selection.explanations[0].names)
     ranked = []
-    for reading in _readings(table, forward.points, configured, tens_only=tens_only):
+    for reading in _readings(table, forward.points, configured):
         cells = reading.scale[setting.problem.quantity]
         problem = replace(
             setting.problem,
@@ -104,11 +132,11 @@ def misread(
 
 
 def _readings(
-    table: SteadyTable, points: OperatingPoints, configured: FloatArray, *, tens_only: bool
+    table: SteadyTable, points: OperatingPoints, configured: FloatArray
 ) -> Iterator[Reading]:
     """Yield what the columns may hold."""
     one = np.ones(len(QUANTITIES))
-    for times in () if tens_only else _LOADS:
+    for times in _LOADS:
         other = replace(points, normal_load=times * points.normal_load)
         yield Reading({'normal_load': times}, table, other, one)
         if times in _FORCES and 'drawbar_pull' in table.quantities:
@@ -117,11 +145,11 @@ def _readings(
     for q, quantity in enumerate(QUANTITIES):
         here = np.isfinite(table.measured[:, q])
         size, due = (np.sum(np.abs(values[here, q])) for values in (table.measured, configured))
-        units = () if tens_only else UNITS[unit_of(quantity)].values()
-        for times in {*_TENS, *units, *(1.0 / f for f in units)} if size > 0.0 < due else ():
+        units = UNITS[unit_of(quantity)].values()
+        for times in {*units, *(1.0 / f for f in units)} if size > 0.0 < due else ():
             if times != 1.0 and abs(math.log(times * size / due)) < _LIKE_MODEL:
                 yield _scaled({quantity: times}, table, points)
-    if tens_only or table.true_rows.any():
+    if table.true_rows.any():
         return  # slips of a drive are our own
     slip = table.columns['slip']
     for rule, read in (

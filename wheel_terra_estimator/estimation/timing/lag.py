@@ -55,8 +55,8 @@ class LagLearner:
         self._newest = self._first = None
         self._odometry_heard = False
 
-    def note(self, channel: int, stamp: int) -> None:
-        """Take the stamp [ns] of an accepted message."""
+    def note(self, channel: int, stamp: int, *, whole: bool = True) -> None:
+        """Take the stamp [ns] of an accepted message, that may hold some of the wheels only."""
         if self._first is None:
             self._first = stamp
         lags = self._lags.get(channel)
@@ -64,7 +64,7 @@ class LagLearner:
             return
         if channel == WHEEL_ODOMETRY:
             self._odometry_heard = True
-            self._repeats.append(stamp == self._odometry)
+            self._repeats.append(stamp == self._odometry and not whole)
             self._odometry = stamp
         newest = self._newest
         self._newest = stamp if newest is None else max(newest, stamp)

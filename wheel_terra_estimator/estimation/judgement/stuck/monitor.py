@@ -35,8 +35,11 @@ ADVICE = 'stop, back out'
 """What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
 HOLD, SINKING_HOLD, STANDING_HOLD = 0.95, 0.45, 0.15
 """Times [s] that a criterion must hold, half a cycle short of 1, 0.5, 0.2 s: slip, slip of wheels
-that sink, standing (two readings of wheel odometry); burying as slip. Where the rover stops, a
-reference stands up to 0.9 s before the wheels do, and none of them sinks."""
+that sink, standing (two readings of wheel odometry). Where the rover stops, a reference stands up
+to 0.9 s before the wheels do, and none of them sinks."""
+_BORDER_RADII = 10.0
+"""Rim travel for which burying must hold, over the radius [-]: behind a border to soft soil wheels
+sink for less."""
 _SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
 _DIGGING_SLIP = 0.8  # median slip above which a rover that drives on digs itself in
 _EASED = 0.05
@@ -95,7 +98,8 @@ class StuckMonitor(Component[StuckState]):
             for met, begun in zip(there, old.since, strict=True)
         )
         slip_hold = SINKING_HOLD if situation.digging > _SINKING else HOLD
-        times = zip(since, (slip_hold, STANDING_HOLD, HOLD), strict=True)
+        border = _BORDER_RADII * situation.radius / max(situation.rim, 1e-9)
+        times = zip(since, (slip_hold, STANDING_HOLD, max(HOLD, border)), strict=True)
         held = [time - begun > hold for begun, hold in times]
         state = old._replace(memory=situation.memory, since=since, clear_since=NAN)
         if any(held) and not old.stuck:

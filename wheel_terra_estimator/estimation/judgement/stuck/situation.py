@@ -137,6 +137,11 @@ class Situation:
         )
 
     @cached_property
+    def radius(self) -> float:
+        """Typical radius [m]."""
+        return median([w.radius for w in self.motion.wheels])
+
+    @cached_property
     def depth(self) -> float:
         """Typical sinkage over the radius [-]."""
         return median([w.sinkage / w.radius for w in self.motion.wheels])
@@ -149,7 +154,7 @@ class Situation:
     @property
     def burying(self) -> bool:
         """Whether they sink on besides: a rover that gets on has a depth that stays."""
-        return self.sunk and self.depth - self.memory.depth > _DEEPENED
+        return self.settled and self.sunk and self.depth - self.memory.depth > _DEEPENED
 
     @cached_property
     def travel_until_too_deep(self) -> tuple[float, ...]:
@@ -218,7 +223,6 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
     rolled = memory.rolled + now.fastest * dt if moves and not motion.turning else 0.0
     fresh = rolled < _START_TRAVEL
     ruts = memory.ruts or tuple([w.sinkage for w in motion.wheels])
-    length = _DEEPENING_RADII * median([w.radius for w in motion.wheels])
     usual = now.depth if isnan(memory.depth) else memory.depth
     way = memory.way
     if moves:
@@ -240,7 +244,8 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
                     for w, rut in zip(motion.wheels, ruts, strict=True)
                 ]
             ),
-            depth=usual + gain_of(now.rim * dt, length) * (now.depth - usual),
+            depth=usual
+            + gain_of(now.rim * dt, _DEEPENING_RADII * now.radius) * (now.depth - usual),
             way=way,
             way_since=memory.way_since if way == memory.way else time,
         ),
