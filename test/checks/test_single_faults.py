@@ -96,7 +96,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (IMU, {'rate': by(math.nan)}, 'imu_nan', None, None, 'angular_velocity'),
     (IMU, {'force': by([math.nan, 1, 1])}, 'imu_nan', None, None, 'linear_acceleration'),
     (REFERENCE, {'velocity': by(math.nan)}, 'reference_nan', None, None, 'NaN'),
-    (JOINTS, {'rate': by([1, 1, math.nan, 1])}, 'missing_wheel', RL, None, 'velocity is empty'),
+    (JOINTS, {'rate': by([1, 1, math.nan, 1])}, 'missing_wheel', RL, None, 'velocity empty'),
     (JOINTS, {'rate': by([1, 1, math.nan, 1]), 'position': lambda _: 0.0 * WHOLE.joints.rate},
      'missing_wheel', RL, None, 'position alone'),
     (IMU, {'rate': plus(0.0, 0.0, 0.03)}, 'gyro_bias', None, approx(0.03, abs=1e-3), ''),

@@ -310,6 +310,13 @@ def test_a_wrong_unit_is_said_before_any_effect(column, factor, units):
     assert f'The unit of {column.replace("_", " ")} looks wrong ({units})' in found.sentence
 
 
+def test_a_column_of_zeros_may_be_what_a_law_is_proposed_for():
+    """Sinkage as a placeholder: no share of its mean."""
+    table, values, *_ = make('sweep40')
+    found = run({**table, 'sinkage': 0.0 * table['sinkage']}, values, options=FEW)
+    assert found.verdict == 'unexplained'
+
+
 def test_two_columns_in_another_unit_are_both_asked_for(unproposed):
     table, values, *_ = make('sweep40')
     table |= {'sinkage': 10.0 * table['sinkage'], 'torque': 0.1 * table['torque']}

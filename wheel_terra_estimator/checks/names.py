@@ -127,8 +127,7 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     if mute:
         at = joints.position
         angles = at is not None and np.isfinite(at[:, joints.names.index(mute[0])]).any()
-        how = 'velocity is empty, or not as long as name'
-        how = 'position alone, from which the driver can work out velocity' if angles else how
+        how = 'position alone: form its change' if angles else 'velocity empty, or too short'
         outcomes.append(_missing(joints.topic, mute, f'without a rate: {how}'))
     for name in spare:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:

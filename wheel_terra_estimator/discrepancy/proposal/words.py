@@ -90,7 +90,7 @@ def _size(target: str, change: float, table: SteadyTable, points: OperatingPoint
     size = change * float(np.mean(scale))
     mean = float(np.nanmean(np.abs(table.measured[:, QUANTITIES.index(target)])))
     shown = f'{amount(target, size, 2)} {SHOWN[target][1]}'
-    return f'{shown} ({number(100 * size / mean, 2)} % of its mean)'
+    return f'{shown} ({number(100 * size / mean, 2)} % of its mean)' if mean else shown
 
 
 def limits_of_trust(table: SteadyTable) -> tuple[str, ...]:
