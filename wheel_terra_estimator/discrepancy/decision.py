@@ -162,17 +162,18 @@ class Decider:
         self, decision: Decision, names: tuple[Naming, ...]
     ) -> tuple[tuple[Naming, ...], bool]:
         """Return the names, as sure as they are beside a law, and whether they are given."""
-        gap = self._gap(decision)
-        more = len(names) > _SEVERAL
+        beyond_doubt = _least(names) >= _BEYOND_DOUBT
+        if beyond_doubt and len(names) < _SEVERAL:
+            return names, True
+        gap, more = self._gap(decision), len(names) > _SEVERAL
+        unseen = gap.unseen(decision.after)
         imitates = more and decision.verdict.left.noticeable
-        if len(names) >= _SEVERAL and (
-            imitates or not gap.leaves_noise(decision.after, alone=more)
-        ):
+        if len(names) >= _SEVERAL and (imitates or not gap.leaves_noise(unseen, alone=more)):
             return names, False
-        if _least(names) >= _BEYOND_DOUBT:
+        if beyond_doubt:
             return names, True
         law = self._law(decision)
-        ahead = gap.closed(gap.unseen(decision.after)) - (law.closed if law else 0.0)
+        ahead = gap.closed(unseen) - (law.closed if law else 0.0)
         same = law is not None and effects_said(law) == {effect_of(n.key) for n in names}
         if law is not None and ahead < -_CLEARLY and not same:
             return names, False

@@ -22,7 +22,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
-from wheel_terra_estimator.discrepancy.selection import readings
+from wheel_terra_estimator.discrepancy.selection.readings import Columns
 from wheel_terra_estimator.discrepancy.selection.search import search
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
 from wheel_terra_estimator.discrepancy.tables.averaging import join
@@ -83,9 +83,9 @@ def diagnose(
     check_against_wheel(both, np.broadcast_to(points.wheel.radius, (len(both),)))
     known = catalogue()
     effects, not_tried = _effects_to_try(configuration, chosen, known)
-    read = Readings.of(configuration).true_on(both.true_rows)
+    readings = Readings.of(configuration).true_on(both.true_rows)
     forward = Forward(
-        points, configuration.soil, configuration.effects, known, active=active, readings=read
+        points, configuration.soil, configuration.effects, known, active=active, readings=readings
     )
     configured = _check_soil_carries(both, forward)
     check_pull_against_model(both, configured[:, 1])
@@ -101,10 +101,10 @@ def diagnose(
     findings = search(both, forward, nuisance, effects, floors)
     misread: Mapping[str, float | str] = {}
     if reference is None:  # its floors take any reading
-        rows = both, forward, nuisance, effects, findings, configured
-        misread = readings.tens_off(*rows)
+        columns = Columns(both, forward, nuisance, effects, findings, configured)
+        misread = columns.tens_off()
         if chosen.effects is None:
-            misread = readings.misread(*rows) or misread
+            misread = columns.misread() or misread
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
     if sweeps is not None and decision.verdict.status != 'agrees':

@@ -24,7 +24,7 @@ from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.judgement.classes import PublishedClasses
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import OncePerSecond
 from wheel_terra_estimator.estimation.judgement.stuck.memory import StuckMemory
-from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.estimation.measurements import Measurement, WheelOdometry
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
 from wheel_terra_estimator.estimation.scalars import NANOSECOND, SECOND
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
@@ -235,9 +235,9 @@ ReferenceVelocity
             self._end_run(keep_soil=True)
             self._clock_stepped = True
         for arrival in judgement.accepted:
-            rate = getattr(arrival.measurement, 'rate', None)
-            whole = rate is None or not np.isnan(rate).any()
-            self._lags.note(arrival.channel, arrival.measurement.stamp, whole=whole)
+            measured = arrival.measurement
+            whole = not (isinstance(measured, WheelOdometry) and np.isnan(measured.rate).any())
+            self._lags.note(arrival.channel, measured.stamp, whole=whole)
             sets += self._insert(arrival)
         newest = self._watch.newest
         if judgement.accepted and newest is not None:

@@ -58,7 +58,6 @@ from wheel_terra_estimator.estimation.filter.speed_process import (
     HELD_LENGTH,
     USUAL_LENGTH,
     SpeedProcess,
-    SpeedStep,
 )
 from wheel_terra_estimator.estimation.filter.state import (
     GRAVITY_BIAS,
@@ -438,23 +437,19 @@ class WheelSoilEstimator:
         by_wheels = expected = speed.by_wheels(cycle.dt, cycle.yaw_compensated, inflation)
         unseen = not cycle.still and not cycle.reference_known
         # No slip is usual where the ground holds the rover.
-        held = self._clock.assessment
-        length = HELD_LENGTH if held.holds and not held.buried else USUAL_LENGTH
-
-        def usual(step: SpeedStep) -> SpeedStep:
-            return speed.towards_equilibrium_slip(
-                step, cycle, direction, length, buried=held.buried
-            )
-
+        held, buried = self._clock.assessment.holds, self._clock.assessment.buried
+        length = HELD_LENGTH if held and not buried else USUAL_LENGTH
         if unseen:
-            expected = usual(by_wheels)
+            expected = speed.towards_equilibrium_slip(
+                by_wheels, cycle, direction, length, buried=buried
+            )
         lacking = speed.learn_bias(self._ekf, cycle, expected)
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
         x = self._ekf.mean
         prediction = Prediction.unchanged(x)
         step = speed.combined(by_wheels, cycle.dt, self._trusted(cycle.window, cycle.time))
         if unseen:
-            step = usual(step)
+            step = speed.towards_equilibrium_slip(step, cycle, direction, length, buried=buried)
         speed.predict(prediction, step, cycle)
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:

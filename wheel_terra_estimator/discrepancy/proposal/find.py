@@ -105,17 +105,15 @@ class Gap:
         fits = [setting.fit([f.names], [f.u], f.angle, self.variance)[0] for f in (nothing, fitted)]
         return self.on_levels(setting, fits)
 
-    def leaves_noise(self, fitted: Fit, *, alone: bool) -> bool:
-        """Return whether a set of effects predicts left-out levels to the noise.
-
-        `alone`: else to that and the allowed error.
+    def leaves_noise(self, unseen: Mapping[str, Mapping[str, LeftOut]], *, alone: bool) -> bool:
+        """Return whether errors on left-out levels are noise; with allowed error unless `alone`.
 
         Three to five hidden effects ended at up to 1.7 times, sets that imitate other laws at 1.8,
         and 4.9 to 12.
         """
         return all(
             item.law <= (TOO_FAR * (gap.noise or 1e-9) if alone else gap.limit)
-            for column, quantities in self.unseen(fitted).items()
+            for column, quantities in unseen.items()
             for gap, item in ((self.reported[name], item) for name, item in quantities.items())
             if column != 'pass_number'  # without one of few passes their law is open
         )

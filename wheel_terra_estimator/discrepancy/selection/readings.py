@@ -33,7 +33,7 @@ _LOADS = (0.5, 2.0, *_FORCES)  # of a pair of wheels, or one of it
 _LIKE_MODEL = math.log(3.0)  # a reading must come so near to the size that the model gives
 _ROUGH = 0.03  # floor beside which readings are ranked [share of the range]
 _TRIED = 2  # best of them that are weighed
-_LEAST_SKID = 0.02
+_LEAST_CHANGE = 4e-4  # of a slip by another rule [-]: that of a slip of 2 %
 BY_SPEED, BY_RIM = 'r w/v - 1', '1 - v/(r w)'
 
 
@@ -47,121 +47,130 @@ class Reading:
     scale: FloatArray  # (4,) factor on the quantities
 
 
-def tens_off(
-    table: SteadyTable,
-    forward: Forward,
-    nuisance: tuple[Coordinate, ...],
-    effects: Mapping[str, Effect],
-    findings: Findings,  # of the rows as they are
-    configured: FloatArray,  # (N, 4) values of the configured model
-) -> dict[str, float | str]:
-    """Return quantity -> power of ten that it lacks, where the rows are then far likelier.
+@dataclass(frozen=True)
+class Columns:
+    """The columns as they were taken, and what explains them so."""
 
-    Only those more than half a decade off the model's size. Where all are, it is no unit.
-    """
-    found: dict[str, float] = {}
-    for q, quantity in enumerate(QUANTITIES):
-        here = np.isfinite(table.measured[:, q])
-        size, due = (np.sum(np.abs(values[here, q])) for values in (table.measured, configured))
-        decades = round(math.log10(due / size)) if size > 0.0 and due > 0.0 else 0
-        if decades:
-            found[quantity] = 10.0**decades
-    if len(found) == len(table.quantities):
-        return {}
-    said: dict[str, float | str] = {}
-    for quantity, times in found.items():
-        scaled = _scaled({quantity: times}, table, forward.points)
-        other = search(scaled.table, forward, nuisance, effects, findings.setting.floors)
-        density = float(np.log(scaled.scale[findings.setting.problem.quantity]).sum())
-        if other.selection.best + density > findings.selection.best + _CLEARLY:
-            said[quantity] = times
-    return said
+    table: SteadyTable
+    forward: Forward
+    nuisance: tuple[Coordinate, ...]
+    effects: Mapping[str, Effect]
+    findings: Findings
+    configured: FloatArray  # (N, 4) values of the configured model
 
+    def tens_off(self) -> dict[str, float | str]:
+        """Return quantity -> power of ten that it lacks, where the rows are then far likelier.
 
-def misread(
-    table: SteadyTable,
-    forward: Forward,
-    nuisance: tuple[Coordinate, ...],
-    effects: Mapping[str, Effect],
-    findings: Findings,  # of the rows as they are
-    configured: FloatArray,  # (N, 4) values of the configured model
-) -> Mapping[str, float | str]:
-    """Return columns with the factor that they lack, or what they are; empty where none is clear.
+        Only those more than half a decade off the model's size. Where all are, it is no unit.
+        """
+        found: dict[str, float] = {}
+        for quantity, size, due in self._sizes():
+            if decades := round(math.log10(due / size)):
+                found[quantity] = 10.0**decades
+        if len(found) == len(self.table.quantities):
+            return {}
+        said: dict[str, float | str] = {}
+        for quantity, times in found.items():
+            reading = _scaled({quantity: times}, self.table, self.forward.points)
+            other = self._explained(reading, self.effects)
+            gain = other.selection.best - self.findings.selection.best
+            if gain + self._density(reading) > _CLEARLY:
+                said[quantity] = times
+        return said
 
-    Soil may go far, where its numbers are wrong as well, unless it fits the rows as they are
-    without a floor.
-    """
-    setting, selection = findings.setting, findings.selection
-    as_they_are = remainder(selection, selection.nothing, setting.problem)
-    far = as_they_are.probability_of_any > _FLOOR_NEEDED or not (
-        as_they_are.only_far or as_they_are.accounted_for
-    )
-    variance = setting.problem.variance(_ROUGH)
-    nothing = setting.fit([()], [findings.nothing.u], findings.nothing.angle, variance)[0]
-    count = len(selection.explanations[0].names)
-    ranked = []
-    for reading in _readings(table, forward.points, configured):
-        cells = reading.scale[setting.problem.quantity]
-        problem = replace(
-            setting.problem,
-            wanted=setting.problem.wanted * cells,
-            rotation=setting.problem.rotation / cells,
+    def misread(self) -> Mapping[str, float | str]:
+        """Return columns with the factor that they lack, or what they are; empty: none is clear.
+
+        Soil may go far, where its numbers are wrong as well, unless it fits the rows as they are
+        without a floor.
+        """
+        setting, selection = self.findings.setting, self.findings.selection
+        as_they_are = remainder(selection, selection.nothing, setting.problem)
+        far = as_they_are.probability_of_any > _FLOOR_NEEDED or not (
+            as_they_are.only_far or as_they_are.accounted_for
         )
-        other = replace(setting, forward=forward.at(reading.points), problem=problem)
-        fitted = other.fit([()], [np.zeros(len(nuisance))], None, variance)[0]
-        ranked.append((fitted.objective, reading))
-    ranked = sorted((r for r in ranked if r[0] < nothing.objective - _LIKELIER), key=lambda r: r[0])
-    for _, reading in ranked[:_TRIED]:
-        # Density of the same rows in whatever unit.
-        density = float(np.log(reading.scale[setting.problem.quantity]).sum())
-        for tried in ({}, effects)[: 2 if density or count > 1 else 1]:
-            found = search(
-                reading.table, forward.at(reading.points), nuisance, tried, setting.floors
+        count = len(selection.explanations[0].names)
+        for reading in self._likeliest():
+            density = self._density(reading)
+            for tried in ({}, self.effects)[: 2 if density or count > 1 else 1]:
+                found = self._explained(reading, tried)
+                verdict = choose(found.selection, found.setting.problem)
+                fits = verdict.status == 'agrees' or (far and verdict.left.only_far)
+                if tried:  # effects beside it: fewer than without it, and nothing is left
+                    names = found.selection.explanations[verdict.index].names
+                    fits = len(names) + (not density) <= count and not verdict.left.noticeable
+                # A biased radius looks like another one where all lugs are alike.
+                surely = tried or not far or 'slip' in reading.said
+                needed = _CLEARLY if surely else _LIKELIER
+                if fits and found.selection.best + density > selection.best + needed:
+                    return reading.said
+        return {}
+
+    def _likeliest(self) -> list[Reading]:
+        """Return the readings that soil alone fits best, by one fit each, likeliest first."""
+        setting, plain = self.findings.setting, self.findings.nothing
+        variance = setting.problem.variance(_ROUGH)
+        nothing = setting.fit([()], [plain.u], plain.angle, variance)[0]
+        ranked = []
+        for reading in self._readings():
+            cells = reading.scale[setting.problem.quantity]
+            problem = replace(
+                setting.problem,
+                wanted=setting.problem.wanted * cells,
+                rotation=setting.problem.rotation / cells,
             )
-            verdict = choose(found.selection, found.setting.problem)
-            fits = verdict.status == 'agrees' or (far and verdict.left.only_far)
-            if tried:  # effects beside it: fewer than without it, and nothing is left
-                names = found.selection.explanations[verdict.index].names
-                fits = len(names) + (not density) <= count and not verdict.left.noticeable
-            # A biased radius looks like another one where all lugs are alike.
-            surely = tried or not far or 'slip' in reading.said
-            needed = _CLEARLY if surely else _LIKELIER
-            if fits and found.selection.best + density > selection.best + needed:
-                return reading.said
-    return {}
+            other = replace(setting, forward=self.forward.at(reading.points), problem=problem)
+            fitted = other.fit([()], [np.zeros(len(self.nuisance))], None, variance)[0]
+            if fitted.objective < nothing.objective - _LIKELIER:
+                ranked.append((fitted.objective, reading))
+        return [reading for _, reading in sorted(ranked, key=lambda r: r[0])[:_TRIED]]
 
+    def _explained(self, reading: Reading, effects: Mapping[str, Effect]) -> Findings:
+        forward, floors = self.forward.at(reading.points), self.findings.setting.floors
+        return search(reading.table, forward, self.nuisance, effects, floors)
 
-def _readings(
-    table: SteadyTable, points: OperatingPoints, configured: FloatArray
-) -> Iterator[Reading]:
-    """Yield what the columns may hold."""
-    one = np.ones(len(QUANTITIES))
-    for times in _LOADS:
-        other = replace(points, normal_load=times * points.normal_load)
-        yield Reading({'normal_load': times}, table, other, one)
-        if times in _FORCES and 'drawbar_pull' in table.quantities:
-            said = {'normal_load': times, 'drawbar_pull': times}
-            yield _scaled(said, table, other)
-    for q, quantity in enumerate(QUANTITIES):
-        here = np.isfinite(table.measured[:, q])
-        size, due = (np.sum(np.abs(values[here, q])) for values in (table.measured, configured))
-        units = UNITS[unit_of(quantity)].values()
-        for times in {*units, *(1.0 / f for f in units)} if size > 0.0 < due else ():
-            if times != 1.0 and abs(math.log(times * size / due)) < _LIKE_MODEL:
-                yield _scaled({quantity: times}, table, points)
-    if table.true_rows.any():
-        return  # slips of a drive are our own
-    slip = table.columns['slip']
-    for rule, read in (
-        (BY_SPEED, np.where(slip > 0.0, slip / (1.0 + np.abs(slip)), slip)),
-        (BY_RIM, np.where(slip < 0.0, slip / (1.0 + np.abs(slip)), slip)),
-    ):
-        if np.abs(read - slip).max() > _LEAST_SKID**2:
-            rows = replace(table, columns={**table.columns, 'slip': read})
-            yield Reading({'slip': rule}, rows, replace(points, slip=read), one)
-    for radius in {'rim', 'lug_tip'} - {points.slip_radius}:
-        if np.max(points.wheel.lug_height) > 0.0:
-            yield Reading({'slip': radius}, table, replace(points, slip_radius=radius), one)
+    def _density(self, reading: Reading) -> float:
+        """Return what the density of the same rows gains in whatever unit [nats]."""
+        return float(np.log(reading.scale[self.findings.setting.problem.quantity]).sum())
+
+    def _sizes(self) -> Iterator[tuple[str, float, float]]:
+        """Yield each quantity with its size, and that by the configured model."""
+        measured = self.table.measured
+        for q, quantity in enumerate(QUANTITIES):
+            here = np.isfinite(measured[:, q])
+            size, due = (
+                float(np.sum(np.abs(values[here, q]))) for values in (measured, self.configured)
+            )
+            if size > 0.0 < due:
+                yield quantity, size, due
+
+    def _readings(self) -> Iterator[Reading]:
+        """Yield what the columns may hold."""
+        table, points, one = self.table, self.forward.points, np.ones(len(QUANTITIES))
+        for times in _LOADS:
+            other = replace(points, normal_load=times * points.normal_load)
+            yield Reading({'normal_load': times}, table, other, one)
+            if times in _FORCES and 'drawbar_pull' in table.quantities:
+                said = {'normal_load': times, 'drawbar_pull': times}
+                yield _scaled(said, table, other)
+        for quantity, size, due in self._sizes():
+            units = UNITS[unit_of(quantity)].values()
+            for times in {*units, *(1.0 / f for f in units)}:
+                if times != 1.0 and abs(math.log(times * size / due)) < _LIKE_MODEL:
+                    yield _scaled({quantity: times}, table, points)
+        if table.true_rows.any():
+            return  # slips of a drive are our own
+        slip = table.columns['slip']
+        for rule, read in (
+            (BY_SPEED, np.where(slip > 0.0, slip / (1.0 + np.abs(slip)), slip)),
+            (BY_RIM, np.where(slip < 0.0, slip / (1.0 + np.abs(slip)), slip)),
+        ):
+            if np.abs(read - slip).max() > _LEAST_CHANGE:
+                rows = replace(table, columns={**table.columns, 'slip': read})
+                yield Reading({'slip': rule}, rows, replace(points, slip=read), one)
+        for radius in {'rim', 'lug_tip'} - {points.slip_radius}:
+            if np.max(points.wheel.lug_height) > 0.0:
+                yield Reading({'slip': radius}, table, replace(points, slip_radius=radius), one)
 
 
 def _scaled(said: Mapping[str, float], table: SteadyTable, points: OperatingPoints) -> Reading:
