@@ -232,7 +232,7 @@ ReferenceVelocity
             self._clock_steps += 1
             sets += [self._published(due) for due in self._timeline.flush()]
             self.warning.begin_anew()
-            self._end_run(keep_soil=True)
+            self._end_run(keep_soil=self._ran_on())
             self._clock_stepped = True
         for arrival in judgement.accepted:
             measured = arrival.measurement
@@ -245,6 +245,16 @@ ReferenceVelocity
             overdue = max(self._lags.learned[WHEEL_ODOMETRY] - hold, 0)
             sets += [self._published(due) for due in self._timeline.advance(newest, hold, overdue)]
         return sets
+
+    def _ran_on(self) -> bool:
+        """Run to the last input, so that what is kept is the same whatever was run before."""
+        try:
+            with np.errstate(all='ignore'):
+                if self._timeline.released:
+                    self._log.run_to(self._timeline.released - 1)
+        except _FAILURES:
+            return False
+        return True
 
     def _end_run(self, keep_soil: bool) -> None:
         self._timeline.end_run(keep_soil=keep_soil)
