@@ -195,7 +195,7 @@ def test_a_late_input_that_was_settled_costs_the_next_set_one_step():
         core, fake = make_core(output_rate=10.0)
         play(core, [odometry(0.1 * i) for i in range(20)], flush=False)
         core.add(sinkage(1.87))
-        core.add(reference(1.95))
+        core.add(reference(1.88))
         if settled:
             core.process_pending()
         before = fake.steps

@@ -47,6 +47,8 @@ from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline
 
 _FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
 """What a step of the estimator may end with."""
+_GREATEST_HISTORY = 60 * SECOND
+"""How far back `history` may reach [ns]: what is older is of another clock."""
 
 
 class InputJudge(Stepped, Protocol):
@@ -203,9 +205,7 @@ ReferenceVelocity
             for reason, count in checks.rejected[channel].items():
                 result[f'{name}_rejected: {reason}'] = count
         result |= self._timeline.counts | log.counts
-        newest = self._watch.newest
-        hold = self._lags.hold(newest) if newest is not None else 0
-        result['held_back_s'] = hold * NANOSECOND
+        result['held_back_s'] = self._lags.hold() * NANOSECOND
         result['clock_steps_back'] = self._clock_steps
         result['resets'] = self._resets
         own = self._estimator.health()
@@ -237,13 +237,14 @@ ReferenceVelocity
         for arrival in judgement.accepted:
             measured = arrival.measurement
             whole = not (isinstance(measured, WheelOdometry) and np.isnan(measured.rate).any())
-            self._lags.note(arrival.channel, measured.stamp, whole=whole)
+            if not self._timeline.is_too_old(measured.stamp):
+                self._lags.note(arrival.channel, measured.stamp, whole=whole)
             sets += self._insert(arrival)
-        newest = self._watch.newest
-        if judgement.accepted and newest is not None:
-            hold = self._lags.hold(newest)
+        present = self._lags.present
+        if judgement.accepted and present is not None:
+            hold = self._lags.hold()
             overdue = max(self._lags.learned[WHEEL_ODOMETRY] - hold, 0)
-            sets += [self._published(due) for due in self._timeline.advance(newest, hold, overdue)]
+            sets += [self._published(due) for due in self._timeline.advance(present, hold, overdue)]
         return sets
 
     def _ran_on(self) -> bool:
@@ -272,7 +273,9 @@ ReferenceVelocity
             self._late[channel] += 1
             self._deferred |= fate is Fate.DEFERRED
         elif fate is Fate.TOO_OLD:
-            self._checks.refuse(channel, 'stamp older than `history` (raise it)')
+            far = (self._lags.present or 0) - measurement.stamp > _GREATEST_HISTORY
+            older = 'far behind all others' if far else 'older than `history` (raise it)'
+            self._checks.refuse(channel, f'stamp {older}')
         elif fate is Fate.FULL:
             self._checks.refuse(channel, 'more inputs than can be sorted')
         return [] if due is None else [self._published(due)]

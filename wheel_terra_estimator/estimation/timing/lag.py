@@ -6,6 +6,9 @@ Where one of them comes late for good, waiting for it is cheaper than running ag
 messages, and no set is lost. A lag of a few milliseconds is not waited for: one step is soon run
 again, and a message at 10 Hz that is held for the next one is a tenth of a second old. Where wheel
 odometry of one stamp comes in several messages, a later stamp is waited for.
+
+The time of the run is theirs, too: other topics may be stamped by a clock that is ahead, and only
+carry it on, by what they gain, while both are silent.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ class LagLearner:
     """Lag of each of the two channels, and how long to hold inputs back.
 
     `fixed` is how long [ns], below 0: as learned; it may be changed. `learned` has the lag of each
-    channel [ns].
+    channel [ns], `present` is the time of the run [ns].
     """
 
     def __init__(self, fixed: int) -> None:
@@ -40,7 +43,9 @@ class LagLearner:
         self._counts = dict.fromkeys(self._lags, 0)
         self._repeats = deque[bool](maxlen=_MEMORY)
         self._odometry: int | None = None  # last stamp of it
-        self._newest: int | None = None
+        self._newest: int | None = None  # stamp of either channel
+        self._others: dict[int, int] = {}  # first stamps of other channels since then
+        self.present: int | None = None
         self._first: int | None = None
         self._odometry_heard = False
         self.learned = dict.fromkeys(self._lags, 0)
@@ -52,7 +57,8 @@ class LagLearner:
 
     def begin_run(self) -> None:
         """Forget the time, not the lags: they belong to the transport."""
-        self._newest = self._first = None
+        self._newest = self._first = self.present = None
+        self._others.clear()
         self._odometry_heard = False
 
     def note(self, channel: int, stamp: int, *, whole: bool = True) -> None:
@@ -61,7 +67,11 @@ class LagLearner:
             self._first = stamp
         lags = self._lags.get(channel)
         if lags is None:
+            ahead = self._others.setdefault(channel, stamp) - (self._newest or stamp)
+            self._advance(stamp - max(ahead, 0))
             return
+        self._advance(stamp)
+        self._others.clear()
         if channel == WHEEL_ODOMETRY:
             self._odometry_heard = True
             self._repeats.append(stamp == self._odometry and not whole)
@@ -74,14 +84,18 @@ class LagLearner:
             usual = sorted(lags)[int(_SHARE * (len(lags) - 1) + 0.5)]
             self.learned[channel] = 0 if usual < SHORTEST_HOLD else round(_ROOM * usual)
 
-    def hold(self, newest: int) -> int:
-        """Return how long inputs are held back now [ns]; `newest` is the newest stamp of all."""
+    def _advance(self, stamp: int) -> None:
+        self.present = stamp if self.present is None else max(self.present, stamp)
+
+    def hold(self) -> int:
+        """Return how long inputs are held back now [ns]."""
         if self.fixed >= 0:
             return self.fixed
         if (
             not self._odometry_heard
             and self._first is not None
-            and newest - self._first < 2 * LONGEST_HOLD
+            and self.present is not None
+            and self.present - self._first < 2 * LONGEST_HOLD
         ):
             return LONGEST_HOLD  # it may be on its way
         in_parts = sum(self._repeats) > _IN_PARTS * len(self._repeats)

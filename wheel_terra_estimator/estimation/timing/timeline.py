@@ -101,7 +101,7 @@ class Timeline:
         the last set.
         """
         stamp = measurement.stamp
-        if self._is_too_old(stamp):
+        if self.is_too_old(stamp):
             return Fate.TOO_OLD, None
         if len(self._log.entries) >= GREATEST_LENGTH:
             return Fate.FULL, None
@@ -141,7 +141,8 @@ class Timeline:
         self._log.begin_after(due.entry)
         self.released -= due.entry + 1
 
-    def _is_too_old(self, stamp: int) -> bool:
+    def is_too_old(self, stamp: int) -> bool:
+        """Whether an input of this stamp [ns] comes too late to be used."""
         state = self._state
         if state is None:
             return False
@@ -175,7 +176,7 @@ class Timeline:
         self._allowance -= max(cost, 0)
         deferred, self._deferred = self._deferred, []
         for channel, measurement in deferred:
-            if self._is_too_old(measurement.stamp):
+            if self.is_too_old(measurement.stamp):
                 self.counts['late_inputs_dropped'] += 1
             else:
                 _, due = self._insert(channel, measurement)
