@@ -214,7 +214,7 @@ def test_an_input_older_than_the_history_is_dropped_and_counted():
     before.add(sinkage(1.91))
     assert essence(core.add(odometry(4.0))) == essence(before.add(odometry(4.0)))
     health = core.health()
-    assert health['sinkage_rejected: stamp older than `history` (raise it)'] == 1
+    assert health['sinkage_rejected: stamp older than `history` (raise it, or set its clock)'] == 1
     assert health['sinkage_late'] == 1
 
 
@@ -316,8 +316,11 @@ def test_one_stale_message_ends_no_run():
             core.add(imu(0.02 * i + 0.015))
     health = core.health()
     assert health['clock_steps_back'] == 0
-    assert health['sinkage_rejected: stamp older than `history` (raise it)'] == 2
-    assert health['joint_states_rejected: stamp older than `history` (raise it)'] == 2
+    assert health['sinkage_rejected: stamp older than `history` (raise it, or set its clock)'] == 2
+    assert (
+        health['joint_states_rejected: stamp older than `history` (raise it, or set its clock)']
+        == 2
+    )
 
 
 def test_a_reference_that_is_always_late_ends_no_run():

@@ -47,8 +47,6 @@ from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline
 
 _FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
 """What a step of the estimator may end with."""
-_GREATEST_HISTORY = 60 * SECOND
-"""How far back `history` may reach [ns]: what is older is of another clock."""
 
 
 class InputJudge(Stepped, Protocol):
@@ -273,9 +271,7 @@ ReferenceVelocity
             self._late[channel] += 1
             self._deferred |= fate is Fate.DEFERRED
         elif fate is Fate.TOO_OLD:
-            far = (self._lags.present or 0) - measurement.stamp > _GREATEST_HISTORY
-            older = 'far behind all others' if far else 'older than `history` (raise it)'
-            self._checks.refuse(channel, f'stamp {older}')
+            self._checks.refuse(channel, 'stamp older than `history` (raise it, or set its clock)')
         elif fate is Fate.FULL:
             self._checks.refuse(channel, 'more inputs than can be sorted')
         return [] if due is None else [self._published(due)]

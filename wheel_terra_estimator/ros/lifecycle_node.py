@@ -61,6 +61,7 @@ def _message_class(name: str) -> Any:
 MESSAGE_TYPES = {topic: _message_class(name) for topic, name in INPUT_TYPES.items()}
 
 WATCH_PERIOD = 0.25  # [s]
+LATEST_WATCH = 1.0  # [s] after the last, when messages keep the executor from its timers
 DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
 SILENCE = 1.5  # [s] of the steady clock without a set
 START = 1.0  # [s] in which the node says what it waits for, and not what is missing
@@ -213,6 +214,7 @@ class EstimatorNode(LifecycleNode):
         self._latest: EstimateSet | None = None
         self._started = self._seconds()
         self._set_at = self._diagnostics_at = float('-inf')
+        self._watched_at = self._saved_at = self._started
         self._rejected: Counter[tuple[str, str]] = Counter()  # while sets still flowed
         self._incompatible: dict[str, str] = {}
         self._numbered: set[str] = set()
@@ -229,7 +231,6 @@ class EstimatorNode(LifecycleNode):
             for period, callback in (
                 (WATCH_PERIOD, self._watch),
                 (NAMES_PERIOD, self._watch_names),
-                (SAVE_PERIOD, self._save_now_and_then),
             )
         ]
 
@@ -310,6 +311,8 @@ class EstimatorNode(LifecycleNode):
             self._take(estimates, now)
         if topic not in FREQUENT:  # often late: run through now, the next set is there sooner
             pipeline.core.process_pending()
+        if now - self._watched_at > LATEST_WATCH:
+            self._watch()
 
     def _take(self, estimates: EstimateSet, now: float) -> None:
         assert self._pipeline is not None and self._publisher is not None
@@ -405,10 +408,6 @@ class EstimatorNode(LifecycleNode):
             with suppress(UserError):  # stands in the diagnostics
                 self._kept.save(self._pipeline.core.learned() if soil else {}, self._warned)
 
-    def _save_now_and_then(self) -> None:
-        if self._latest is not None:
-            self._save_quietly()
-
     # -- What the operator sees -----------------------------------------------------------------
 
     def _say_stuck(self) -> None:
@@ -451,8 +450,12 @@ class EstimatorNode(LifecycleNode):
         """Keep diagnostics going when stamps do not: silence, or a slowly played bag."""
         assert self._pipeline is not None
         self._say_ready()
+        self._watched_at = self._seconds()
         self._catch_up()  # what waits to be taken is not silent
         now = self._seconds()
+        if self._latest is not None and now - self._saved_at >= SAVE_PERIOD:
+            self._saved_at = now
+            self._save_quietly()
         self._watch_inputs.looked(now, WATCH_PERIOD)
         diagnostics = self._pipeline.diagnostics
         diagnostics.look()
