@@ -7,6 +7,7 @@ import json
 import os
 import resource
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -178,11 +179,12 @@ def test_the_soil_is_saved_though_messages_keep_the_timers_waiting(listener, par
     arguments = [*ROVER, parameters, '-p', f'soil_file:={path}']
     estimator = EstimatorNode(context=listener[0].context, cli_args=arguments)
     try:
-        start = estimator._seconds()
+        start = estimator._started
         for i in range(240):
             estimator._seconds = lambda now=start + 0.05 * i: now
             message = wheel_message(reader.load(['pathfinder']).wheels.names, 100.0 + 0.05 * i)
-            estimator._hear('joint_states', serialize_message(message), {})
+            came = {'received_timestamp': time.time_ns() - 1_000_000_000, 'source_timestamp': 0}
+            estimator._arrive('joint_states', serialize_message(message), came)
             assert not (path.exists() and i < 200), f'{0.05 * i} s'
         assert path.exists()
     finally:

@@ -11,6 +11,7 @@ watch over silence.
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from collections import Counter
@@ -61,7 +62,7 @@ def _message_class(name: str) -> Any:
 MESSAGE_TYPES = {topic: _message_class(name) for topic, name in INPUT_TYPES.items()}
 
 WATCH_PERIOD = 0.25  # [s]
-LATEST_WATCH = 1.0  # [s] after the last, when messages keep the executor from its timers
+BEHIND = 500_000_000  # [ns] that a message waited, from which on this process is behind
 DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
 SILENCE = 1.5  # [s] of the steady clock without a set
 START = 1.0  # [s] in which the node says what it waits for, and not what is missing
@@ -72,6 +73,9 @@ NAMES_PERIOD = 1.0  # [s] between two looks for a node of the same name
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 
 _SECOND = 1_000_000_000
+
+_Message = tuple[str, bytes, dict[str, Any]]
+"""Topic, serialised message, what the middleware knows of it."""
 
 
 class WithInfo:
@@ -213,8 +217,8 @@ class EstimatorNode(LifecycleNode):
         self._watch_inputs = InputWatch()
         self._latest: EstimateSet | None = None
         self._started = self._seconds()
-        self._set_at = self._diagnostics_at = float('-inf')
-        self._watched_at = self._saved_at = self._started
+        self._set_at = self._diagnostics_at = -math.inf
+        self._saved_at = self._started
         self._rejected: Counter[tuple[str, str]] = Counter()  # while sets still flowed
         self._incompatible: dict[str, str] = {}
         self._numbered: set[str] = set()
@@ -269,7 +273,7 @@ class EstimatorNode(LifecycleNode):
             self._subscriptions_made[topic] = self.create_subscription(
                 MESSAGE_TYPES[topic],
                 topic,
-                WithInfo(partial(self._hear, topic)),
+                WithInfo(partial(self._arrive, topic)),
                 input_profile(topic),
                 event_callbacks=SubscriptionEventCallbacks(
                     message_lost=partial(self._on_message_lost, topic),
@@ -279,9 +283,17 @@ class EstimatorNode(LifecycleNode):
                 raw=True,  # rclpy builds every field of a message, most of them for nothing
             )
 
-    def _catch_up(self) -> None:
+    def _arrive(self, topic: str, data: bytes, info: dict[str, Any]) -> None:
+        """Take a message; with all that waits where timers and shorter queues are behind."""
+        came = info.get('received_timestamp')
+        if came and time.time_ns() - came > BEHIND and self._pipeline is not None:
+            self._watch((topic, data, info))
+        else:
+            self._hear(topic, data, info)
+
+    def _catch_up(self, *taken_before: _Message) -> None:
         """Take all that waits in the queues in the order in which it came: no topic runs ahead."""
-        taken: list[tuple[str, bytes, dict[str, Any]]] = []
+        taken = list(taken_before)
         for topic, subscription in self._subscriptions_made.items():
             with subscription.handle:
                 while found := subscription.handle.take_message(subscription.msg_type, True):
@@ -311,8 +323,6 @@ class EstimatorNode(LifecycleNode):
             self._take(estimates, now)
         if topic not in FREQUENT:  # often late: run through now, the next set is there sooner
             pipeline.core.process_pending()
-        if now - self._watched_at > LATEST_WATCH:
-            self._watch()
 
     def _take(self, estimates: EstimateSet, now: float) -> None:
         assert self._pipeline is not None and self._publisher is not None
@@ -446,12 +456,14 @@ class EstimatorNode(LifecycleNode):
         if new_faults:
             log.warning(new_faults)
 
-    def _watch(self) -> None:
-        """Keep diagnostics going when stamps do not: silence, or a slowly played bag."""
+    def _watch(self, *taken: _Message) -> None:
+        """Keep diagnostics going when stamps do not: silence, or a slowly played bag.
+
+        `taken` is what was taken already and not heard.
+        """
         assert self._pipeline is not None
         self._say_ready()
-        self._watched_at = self._seconds()
-        self._catch_up()  # what waits to be taken is not silent
+        self._catch_up(*taken)  # what waits to be taken is not silent
         now = self._seconds()
         if self._latest is not None and now - self._saved_at >= SAVE_PERIOD:
             self._saved_at = now
