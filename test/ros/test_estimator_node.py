@@ -248,3 +248,6 @@ def test_a_file_whose_section_is_for_another_name_is_told(executor, tmp_path, ot
     else:
         with pytest.raises(UserError, match=re.escape(words)):
             EstimatorNode(context=executor.context, cli_args=arguments)
+        path.write_text(path.read_text().replace('estimator:', 'estimater:'))
+        with pytest.raises(UserError, match="sections there: 'wheel_terra_estimater'; use"):
+            EstimatorNode(context=executor.context, cli_args=arguments)

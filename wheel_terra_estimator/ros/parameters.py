@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -48,17 +47,21 @@ def files(arguments: Sequence[str]) -> list[Path]:
 
 
 def unread(files: Iterable[Path], node: Node) -> str:
-    """Say which of the parameter files has a section for the estimator, but not for this node."""
+    """Say which of the parameter files has sections, but none for this node."""
+    refused = ''
     for path in files:
-        with suppress(UserError):  # has sections of other nodes only
+        try:
             keys = ros_yaml.read(path).keys() - set(reader.STANDARD_PARAMETERS)
-            if keys and not any(map(node.has_parameter, keys)):
-                there = ', '.join(f"'{section}:'" for section in ros_yaml.sections(path))
-                return (
-                    f'{path}: sections there: {there}; none is for the node '
-                    f"{node.get_fully_qualified_name()}, so nothing of it counts; use '/**:'"
-                )
-    return ''
+        except UserError as error:  # has sections of other nodes only, or a wrong name
+            refused = refused or str(error)
+            continue
+        if keys and not any(map(node.has_parameter, keys)):
+            there = ', '.join(f"'{section}:'" for section in ros_yaml.sections(path))
+            return (
+                f'{path}: sections there: {there}; none is for the node '
+                f"{node.get_fully_qualified_name()}, so nothing of it counts; use '/**:'"
+            )
+    return '' if node.has_parameter('wheels.names') else refused
 
 
 def configuration(given: Mapping[str, Any], warn: Callable[[str], Any]) -> Configuration:
