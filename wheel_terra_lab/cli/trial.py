@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from wheel_terra_lab.trials.trial import Outcome
 
 EXAMPLES = (
-    'wheel-terra trial --seed 3 -o trial',
+    'wheel-terra trial --seed 1 -o trial',
     'wheel-terra trial --many 20 --seed 100 --effect lug_digging -o trials',
 )
 MOST = 10_000

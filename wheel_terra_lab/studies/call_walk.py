@@ -110,7 +110,7 @@ def walk_of_message() -> Walk:
         if step % 50 == 10:
             twist = np.zeros(42)
             twist[[0, 6]] = 0.05, 1e-4
-            pipeline.hear('reference_odom', Message(stamp, (), (twist,)))
+            pipeline.hear('reference_odom', Message(stamp, (), (twist, np.zeros(3))))
         if step % 10 == 5:
             depths = np.full(len(names), 0.02), none, none
             pipeline.hear('sinkage', Message(stamp, names, depths))
