@@ -490,6 +490,20 @@ def test_the_pull_of_a_wheel_that_seems_in_the_air_is_as_open_as_its_load(parts)
     assert pulls.state.std[0] == pytest.approx(load_std * 3.4 / 9.2, rel=1e-3)
 
 
+def test_a_pull_is_as_open_as_its_load(parts):
+    """A load that is off by a share of the mean one takes as much of its pull along."""
+    forces, cycle, none = forces_at(parts), parts.cycle(), (NAN,) * 6
+    states = []
+    for share in (0.05, 0.2):
+        pulls = Pulls(replace(parts.rover, load_std=share), parts.sensors, (300.0,) * 6)
+        evidence = PullEvidence(forces, None, cycle, none, none, None, 0.0)
+        pulls.update(forces.state, 1e-9 * np.eye(len(forces.state)), evidence, tilt=0.0)
+        states.append(pulls.state)
+    of_load = 300.0 * np.array(states[0].pull) / cycle.loads.load
+    more = np.square(states[1].std) - np.square(states[0].std)
+    assert more == pytest.approx((0.2**2 - 0.05**2) * of_load**2, rel=1e-6)
+
+
 def published_pull(parts, excess, lateral_motion=0.0, aside=None):
     """Pulls after 40 cycles in which all torques read `excess` more than the model."""
     pulls = Pulls(parts.rover, parts.sensors, (300.0,) * 6)

@@ -145,6 +145,8 @@ def test_neither_a_rejected_reference_nor_one_at_rest_tells_of_slip(parts, ekf):
     assert not update.told_twice(3.1)
     hear(parts, update, ekf, 4.0, 0.02)
     assert update.told_twice(6.9) and not update.told_twice(7.1)
+    assert update.fresh(13.9) and not update.fresh(14.1)  # ten seconds after the last of all
+    assert not reference_update(parts).fresh(0.0)
 
 
 def wandering(rng, count, dt, std, time):

@@ -64,6 +64,38 @@ def test_restart_takes_the_remembered_ratio():
     assert step(0.0, before=0.0, now=0.02)[0] == pytest.approx(0.016)
 
 
+def test_the_speed_between_two_cycles_is_what_the_step_makes_of_the_last_one():
+    """Mean and variance of a linear function of speed and bias, by drawing them."""
+    made, window = process([0.05] * 6), InertialWindow(speed_change=0.003, duration=0.1)
+    ekf, rims = Parts(reader.load(SAND)).filter(), speeds([0.06] * 6)
+    ekf.set(SPEED, 0.04, 1e-6)
+    ekf.covariance[SPEED, GRAVITY_BIAS] = ekf.covariance[GRAVITY_BIAS, SPEED] = 3e-6
+    ekf.mean[GRAVITY_BIAS], ekf.covariance[GRAVITY_BIAS, GRAVITY_BIAS] = 0.1, 1e-4
+    assert made.present(ekf, 0.0, rims, window, inflated=True) == (0.04, pytest.approx(1e-6))
+    entries = [SPEED, GRAVITY_BIAS]
+    drawn = np.random.default_rng(1).multivariate_normal(
+        ekf.mean[entries], ekf.covariance[np.ix_(entries, entries)], 100_000
+    )
+    a, b, constant, noise, _ = made.step(0.1, rims, window, inflated=True)
+    mean, variance = made.present(ekf, 0.1, rims, window, inflated=True)
+    assert b != 0.0 and mean == pytest.approx(drawn[:, 0].mean() * a + 0.1 * b + constant, rel=1e-3)
+    assert variance - noise == pytest.approx(np.var(drawn @ [a, b]), rel=0.02)
+
+
+def test_wheels_that_are_first_heard_roll_or_spin_or_stand():
+    parts = Parts(reader.load(SAND))
+    for rim, std in ((0.5, 0.3 * 0.5), (-0.5, 0.3 * 0.5), (0.0, parts.rover.rest_speed)):
+        made, ekf = SpeedProcess(parts.configuration, parts.rover, parts.sensors), parts.filter()
+        made.begin(ekf, speeds([NAN] * 6))
+        made.begin(ekf, speeds([rim] * 6))
+        assert ekf.mean[SPEED] == pytest.approx(made.state.ratio * rim) and made.state.ratio > 0.5
+        assert ekf.covariance[SPEED, SPEED] == pytest.approx(std**2)
+        made.end_cycle(0.0, ekf, speeds([rim] * 6), settled=False)
+        ekf.set(SPEED, 0.01, 1e-6)
+        made.begin(ekf, speeds([rim] * 6))  # no more than once
+        assert ekf.mean[SPEED] == 0.01
+
+
 def test_fast_rover_follows_its_accelerometer_when_wheels_spin_up():
     window = InertialWindow(speed_change=0.05, duration=0.1)
     assert step(1.0, before=1.2, now=2.4, window=window)[0] == pytest.approx(1.05, abs=0.02)

@@ -36,6 +36,7 @@ from wheel_terra_estimator.estimation.timing.input_checks import (
     REFERENCE,
     WHEEL_ODOMETRY,
 )
+from wheel_terra_estimator.estimation.timing.lag import LagLearner
 from wheel_terra_estimator.estimation.timing.merging import same
 
 
@@ -339,6 +340,14 @@ def test_one_stamp_from_the_future_does_no_harm():
     spoilt = [*stream[:60], imu(5000.0), *stream[60:]]
     assert essence(play(core, spoilt)) == essence(play(make_core()[0], stream))
     assert core.health()['imu/data_rejected: stamp far ahead of all others'] == 1
+
+
+def test_wheels_that_come_in_parts_are_waited_for_and_copies_are_not():
+    for whole, held in ((False, True), (True, False)):
+        lags = LagLearner(-1)
+        for k in range(40):
+            lags.note(WHEEL_ODOMETRY, stamp_at(0.1 * (k // 2)), whole=whole)
+        assert bool(lags.hold(stamp_at(4.0))) is held
 
 
 def test_a_pause_of_all_topics_is_no_new_run():

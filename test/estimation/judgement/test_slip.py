@@ -98,6 +98,14 @@ def contradictions(sets, judged=None):
     return found
 
 
+def test_a_slip_is_known_to_a_thousandth_at_best_and_to_one_at_worst():
+    parts = Parts(reader.load(SAND))
+    judge = SlipJudge(parts.rover, replace(parts.sensors, wheel_rate_std=0.0))
+    for speed_std, std in ((1e-9, 1e-3), (5.0, 1.0)):
+        body = BodyMotion(0.04, speed_std, 0.0, 0.0, straight_headings(parts.rover), 0.0, False)
+        assert {wheel.std for wheel in judge.update(1.0, (0.05,) * 6, body)} == {std}
+
+
 @pytest.mark.parametrize(
     ('slip', 'expected'),
     [(0.0, 0), (0.3, 0), (0.301, 1), (-0.6, 1), (0.9, 2), (0.901, 3), (-1.0, 3)],
