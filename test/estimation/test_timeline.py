@@ -343,10 +343,10 @@ def test_one_stamp_from_the_future_does_no_harm():
 
 
 def test_wheels_that_come_in_parts_are_waited_for_and_copies_are_not():
-    for whole, held in ((False, True), (True, False)):
+    for parts, whole, held in ((2, False, True), (2, True, False), (1, False, False)):
         lags = LagLearner(-1)
         for k in range(40):
-            lags.note(WHEEL_ODOMETRY, stamp_at(0.1 * (k // 2)), whole=whole)
+            lags.note(WHEEL_ODOMETRY, stamp_at(0.1 * (k // parts)), whole=whole)
         assert bool(lags.hold(stamp_at(4.0))) is held
 
 
