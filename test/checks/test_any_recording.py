@@ -102,9 +102,9 @@ def test_no_check_fails(any_recording, with_rover):
     ('channel', 'field', 'value'),
     [
         ('joints', 'torque', np.nan),
-        ('joints', 'torque', 0.0),
+        pytest.param('joints', 'torque', 0.0, marks=pytest.mark.slow),
         ('joints', 'rate', np.inf),
-        ('imu', 'force', np.nan),
+        pytest.param('imu', 'force', np.nan, marks=pytest.mark.slow),
         ('imu', 'orientation', 1.0),
     ],
 )

@@ -265,7 +265,9 @@ def test_transport():
     assert 'step by +10 s against their arrival' in told.words
 
 
-@pytest.mark.parametrize('name', ['joints', 'imu', 'reference'])
+@pytest.mark.parametrize(
+    'name', ['joints', pytest.param('imu', marks=pytest.mark.slow), 'reference']
+)
 def test_an_input_that_is_not_there_at_an_end_is_told(name):
     channel = getattr(WHOLE, name)
     dies = only(checked(**{name: rows_of(channel, channel.seconds < 280.0)}), 'drop_outs')

@@ -433,7 +433,7 @@ def test_a_turn_on_the_spot_reverses_no_axis_of_the_accelerometer():
     assert 'force_mirrored' not in faults(checked(whole=whole, imu=replace(whole.imu, force=force)))
 
 
-@pytest.mark.parametrize('factor', [1.0, math.degrees(1.0)])
+@pytest.mark.parametrize('factor', [pytest.param(1.0, marks=pytest.mark.slow), math.degrees(1.0)])
 def test_wild_samples_of_a_gyro_are_told_in_any_unit(factor):
     rate = factor * WHOLE.imu.rate
     rate[500::2500] += 20.0 * factor
@@ -514,7 +514,9 @@ def test_log_time_alone_does_not_tell_a_clock_from_a_slow_way():
         assert ('come late' in told[0].words) == (told[0].confidence < 0.8) == (way > 0.0)
 
 
-@pytest.mark.parametrize('name', ['reference', 'sinkage', 'imu'])
+@pytest.mark.parametrize(
+    'name', [pytest.param('reference', marks=pytest.mark.slow), 'sinkage', 'imu']
+)
 def test_an_input_beyond_the_history_silences_no_other(name):
     told = [f for f in checked(**later(name, 6.0)).findings if f.fault != 'imu_offset']
     assert [(f.fault, f.parameter, f.value) for f in told] == [('too_late', 'history', 10.0)]
@@ -676,6 +678,20 @@ def test_base_link_beside_the_middle_of_the_wheels_moves_no_reference():
     velocity = reference.velocity + np.outer(reference.yaw_rate * 0.15, [1.0, 0.0, 0.0])
     rover = rolling.rover(**{'wheels.y': aside})
     assert not faults(checked(rover, reference=replace(reference, velocity=velocity)))
+
+
+@pytest.mark.parametrize(('noise', 'told'), [(1e-4, False), (1e-2, True)])
+def test_a_simulation_without_noise_and_slip_has_no_reference_of_its_wheels(noise, told):
+    motion, y = rolling.ten_minute_drive(), np.array(rolling.PARAMETERS['wheels.y'])
+    rate = (motion.speed[:, None] - motion.yaw_rate[:, None] * y) / rolling.rolling_radius()
+    rate += noise * np.random.default_rng(1).standard_normal(rate.shape)
+    speed = rolling.rolling_radius() * rate[::5].mean(axis=1)
+    velocity = np.column_stack([speed, 0.0 * speed, 0.0 * speed])
+    report = checked(
+        joints=replace(WHOLE.joints, rate=rate),
+        reference=replace(WHOLE.reference, velocity=velocity),
+    )
+    assert ('reference_wheels' in faults(report)) == told
 
 
 def test_slip_that_differs_in_turns_is_no_place():

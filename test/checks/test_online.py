@@ -168,7 +168,12 @@ def told(estimates):
     return {key: words for key, words in estimates.faults.items() if key.startswith('check of ')}
 
 
-@pytest.mark.parametrize('name', FAULTS)
+QUICK = FAULTS.keys() - {'thousand', 'torques'}  # as rpm and one_torque are
+
+
+@pytest.mark.parametrize(
+    'name', [pytest.param(n, marks=[pytest.mark.slow] * (n not in QUICK)) for n in FAULTS]
+)
 def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(name):
     fault, kind, topic, cure, begins = FAULTS[name]
     drive = drive_of(SIX)

@@ -57,7 +57,7 @@ def after(**what):
     return checks
 
 
-@pytest.mark.parametrize('late', [0.6, 1.6])
+@pytest.mark.parametrize('late', [pytest.param(0.6, marks=pytest.mark.slow), 1.6])
 def test_late_stamps_are_told_with_the_delay(late):
     checks = after(late=late)
     (remark,) = checks.remarks
@@ -68,7 +68,13 @@ def test_late_stamps_are_told_with_the_delay(late):
 
 
 @pytest.mark.parametrize(
-    'what', [{'late': 0.1}, {'slip': 0.6}, {'noise': 0.03}, {'late': 0.6, 'rate': 1.0}]
+    'what',
+    [
+        pytest.param({'late': 0.1}, marks=pytest.mark.slow),
+        {'slip': 0.6},
+        pytest.param({'noise': 0.03}, marks=pytest.mark.slow),
+        {'late': 0.6, 'rate': 1.0},
+    ],
 )
 def test_honest_stamps_are_not(what):
     """Nor what may lie between a few slow references: wheels that follow these do so late."""

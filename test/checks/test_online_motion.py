@@ -48,7 +48,7 @@ def test_a_sound_drive_is_silent():
     assert not told(rolling.recording(motion()))
 
 
-@pytest.mark.parametrize('degrees', [-90.0, 180.0])
+@pytest.mark.parametrize('degrees', [-90.0, pytest.param(180.0, marks=pytest.mark.slow)])
 def test_an_imu_turned_about_z(degrees):
     whole = rolling.recording(motion())
     turn = Rotation.from_euler('z', degrees, degrees=True).as_matrix()

@@ -117,7 +117,7 @@ def test_a_seldom_reference_that_stays_for_six_readings():
     assert finding.fault == 'reference_frozen'
 
 
-@pytest.mark.parametrize('times', [2, 5])
+@pytest.mark.parametrize('times', [2, pytest.param(5, marks=pytest.mark.slow)])
 def test_rates_that_are_sent_more_often_than_measured(times):
     rows = np.arange(WHOLE.joints.stamp.size) // times * times
     joints = replace(WHOLE.joints, rate=WHOLE.joints.rate[rows], torque=WHOLE.joints.torque[rows])

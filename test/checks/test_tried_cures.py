@@ -29,7 +29,7 @@ def test_turns_on_the_spot_reverse_no_side(seed):
     assert not report.findings, [str(f) for f in report.findings]
 
 
-@pytest.mark.parametrize('wheels', [(1,), (1, 3), (0, 2)])
+@pytest.mark.parametrize('wheels', [(1,), (1, 3), pytest.param((0, 2), marks=pytest.mark.slow)])
 def test_wheels_backwards_in_turns_on_the_spot_are_found_all_the_same(wheels):
     sound = rolling.recording(spot_turns())
     flip = np.where(np.isin(np.arange(4), wheels), -1.0, 1.0)
