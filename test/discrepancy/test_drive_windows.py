@@ -250,10 +250,10 @@ def simulated():
     stairs = scenario.load(
         {
             'configuration': ['generic_six_wheel'],
-            'duration': 60.0,
+            'duration': 45.0,
             'drive.time': [0.0],
             'drive.forward': [0.08],
-            'slope.position': [0.0, 1.6, 1.8],
+            'slope.position': [0.0, 1.2, 1.4],
             'slope.angle_deg': [0.0, 0.0, 6.0],
         }
     )

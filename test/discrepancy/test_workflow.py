@@ -157,7 +157,7 @@ def ding_wheel(seed):
     """Rows of the wheel of Ding et al. 2010 (157 mm, lugs of 0 to 15 mm) with all that it needs."""
     rng = np.random.default_rng(seed)
     soil = TrueSoil(2.4074e6, 0.8, np.radians(31.9), 0.0115, 250.0, 0.2, -0.11, 15.6e3, 1600.0)
-    axes = [0.0, 0.005, 0.010, 0.015], [35.0, 80.0, 125.0], [0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    axes = [0.0, 0.005, 0.015], [35.0, 80.0, 125.0], [0.03, 0.15, 0.3, 0.45, 0.6]
     lugs, load, slip = (axis.ravel() for axis in np.meshgrid(*axes, indexing='ij'))
     fixed = {
         'wheel_radius': 0.157,
@@ -176,7 +176,8 @@ def ding_wheel(seed):
 
 
 @pytest.mark.parametrize(
-    'effects', [(*DING_WHEEL, *FEW.effects), pytest.param(None, marks=pytest.mark.slow)]
+    'effects',
+    [(*DING_WHEEL, 'bulldozing', 'soil_mound'), pytest.param(None, marks=pytest.mark.slow)],
 )
 def test_the_whole_set_of_ding_s_wheel_is_found_in_one_run(effects):
     found = run(*ding_wheel(2), options=Options(effects))
@@ -213,9 +214,10 @@ def test_soil_that_changes_along_the_way_is_said_in_words(unproposed):
     assert 0.3 < float(factor) < 0.8
 
 
-def test_agrees_where_only_the_soil_is_off():
+@pytest.mark.parametrize('options', [FEW, pytest.param(None, marks=pytest.mark.slow)])
+def test_agrees_where_only_the_soil_is_off(options):
     table, values, *_ = make('lugs48')
-    diagnosis = run(table, values)
+    diagnosis = run(table, values, options=options)
     assert diagnosis.verdict == 'agrees'
     assert not diagnosis.effects
     assert diagnosis.proposal is None
@@ -335,7 +337,7 @@ def test_a_soil_that_nobody_can_believe_is_no_agreement(unproposed):
     rows = random_rows('sweep40', rng, soil)
     strange = OUTSIDE['friction_softening'].make(0.45, 0.5, rows, soil)
     table = noisy(rows, solve(rows, soil), solve(rows, soil, (strange,)), rng)
-    diagnosis = run(table, settings(soil, rows))
+    diagnosis = run(table, settings(soil, rows), options=FEW)
     assert diagnosis.verdict == 'unexplained'
     assert diagnosis.remainder_p_value > 1e-3, 'noise is all that is left'
     assert 'too far from the configured one' in diagnosis.sentence
