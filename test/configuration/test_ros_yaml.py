@@ -7,7 +7,7 @@ import textwrap
 
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from wheel_terra_estimator.configuration import ros_yaml
@@ -186,11 +186,14 @@ def test_files_that_cannot_be_read(tmp_path):
         ros_yaml.read(binary)
 
 
+LETTERS = 'abcxyzABC 0123456789.:;,#"\'\\-+~[]{}()<>|&*!%@`?=/_$^äß\u2028\u00a0\ufeff€\U0001f980'
+"""What YAML means something by, and some of the rest (all of Unicode takes hypothesis 2 s)."""
+
 scalars = st.one_of(
     st.booleans(),
     st.integers(-(2**63), 2**63 - 1),
     st.floats(allow_nan=False),
-    st.text(st.characters(codec='utf-8', exclude_categories=['Cc', 'Cs']), max_size=20),
+    st.text(LETTERS, max_size=20),
 )
 lists = st.one_of(
     st.lists(st.booleans(), min_size=1, max_size=4),
@@ -199,7 +202,6 @@ lists = st.one_of(
 )
 
 
-@settings(max_examples=50)
 @given(st.one_of(scalars, lists))
 def test_what_is_written_is_read_back(value):
     read = ros_yaml.parse_value(ros_yaml.format_value(value), 'test')
