@@ -23,7 +23,7 @@ from wheel_terra_estimator.estimation.measurements import (
 
 mpl.use('agg')
 MODULES = ('', '.models', '.soils', '.drives', '.tables')
-SECONDS = 4.0  # of the simulated drive
+SECONDS = 3.5  # of the simulated drive
 
 
 @pytest.mark.parametrize('name', MODULES)
@@ -69,7 +69,11 @@ TOO_HEAVY = {'slip': SLIPS, 'normal_load': [1e5] * 9, 'sinkage': 0.1 * SLIPS}
         (lambda: api.Model(api.Wheel(0.1, 0.1, 0.0, 12.6), 'dlr_mss'), r'12\.6 is not an integer'),
         (lambda: api.Model(WHEEL, 'dlr_mss', {'lug_digging': None}), 'effect lug_digging is of'),
         (lambda: api.Soil.fit(TOO_HEAVY, None), 'wheel is of type NoneType'),
-        (lambda: api.Soil.fit(TOO_HEAVY, WHEEL), 'no shipped soil carries .*: start'),
+        pytest.param(
+            lambda: api.Soil.fit(TOO_HEAVY, WHEEL),
+            'no shipped soil carries .*: start',
+            marks=pytest.mark.slow,
+        ),
         (
             lambda: api.Model(WHEEL, 'dlr_mss').sweep(0.1, 80.0, parameters={'soil.density': []}),
             r'no value for soil\.density',
@@ -252,7 +256,7 @@ def test_a_soil_is_saved_as_it_was(name, tmp_path):
         api.Soil.load('hit_wh3')
 
 
-@pytest.mark.parametrize('name', ['dlr_mss', 'lete_sand'])
+@pytest.mark.parametrize('name', [pytest.param('dlr_mss', marks=pytest.mark.slow), 'lete_sand'])
 def test_a_soil_is_found_again_without_its_file(name, monkeypatch):
     """The start may be any other shipped soil; what one wheel width tells is kc/b + kphi."""
     others = [other for other in api.Soil.available() if other != name]

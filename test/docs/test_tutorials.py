@@ -33,7 +33,7 @@ def tutorials():
     for page in sorted(FOLDER.glob('*.md')):
         text = page.read_text(encoding='utf-8')
         if BLOCK.search(text):
-            slow = '<!-- slow' in text or page.stem == 'diagnose_table'  # 7 s
+            slow = '<!-- slow' in text or page.stem in ('diagnose_table', 'corrected_model')  # 10 s
             marks = [pytest.mark.slow] * slow
             yield pytest.param(page, id=page.stem, marks=marks)
 

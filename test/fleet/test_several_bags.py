@@ -129,6 +129,7 @@ def test_what_cannot_be_done_is_said_first(
     assert not (tmp_path / 'o').exists()
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_whole_outputs_and_the_next_run_goes_on(
     make_bag, make_drive, config, tmp_path
 ):
