@@ -136,6 +136,7 @@ def test_drive_is_the_same_for_the_same_seed_and_measurements_are_of_the_rover(c
     assert np.linalg.norm(force, axis=1).mean() == pytest.approx(gravity, rel=0.02)
 
 
+@pytest.mark.slow
 def test_orientation_is_nose_up_on_a_climb(climb):
     last = [m for _, m in climb.arrivals if isinstance(m, InertialReading)][-1]
     x, y, z, w = last.orientation

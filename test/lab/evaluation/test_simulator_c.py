@@ -288,14 +288,6 @@ def entrapments_of(drive):
     return entrapments(drive.truth.stamp * 1e-9, drive.truth.slip)
 
 
-@pytest.mark.slow
-def test_firm_ground_slips_little(firm):
-    check(firm)
-    moving = np.abs(firm.truth.wheel_rate * firm.configuration.wheels.slip_radius) > 0.02
-    assert np.nanmax(np.abs(firm.truth.slip[moving])) < 0.05
-    assert not entrapments_of(firm).there.size
-
-
 @pytest.fixture(scope='module')
 def trap():
     return simulator.simulate('entrapment_fast', 6)
@@ -320,15 +312,6 @@ def test_sensors_read_the_truth_with_their_errors(trap):
     torque = np.array([m.torque for m in odometry]).mean(axis=0)
     usual = found.rover.mean_load * found.rover.rims.radius
     assert torque == pytest.approx(course.torque.mean(axis=0), abs=0.25 * usual.max())
-
-
-@pytest.mark.slow
-def test_an_entrapment_entraps(trap):
-    check(trap)
-    begun = entrapments_of(trap).begins[0]
-    time = (trap.truth.stamp - trap.truth.stamp[begun]) * 1e-9
-    second = (time >= 0.0) & (time <= 1.0)
-    assert np.median(trap.truth.slip[second], axis=1).min() > 0.88
 
 
 @pytest.mark.slow
