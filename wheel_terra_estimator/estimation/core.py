@@ -41,7 +41,7 @@ from wheel_terra_estimator.estimation.timing.input_checks import (
     InputChecks,
 )
 from wheel_terra_estimator.estimation.timing.input_log import Estimator, InputLog, Stepped
-from wheel_terra_estimator.estimation.timing.lag import LagLearner
+from wheel_terra_estimator.estimation.timing.lag import LONGEST_HOLD, LagLearner
 from wheel_terra_estimator.estimation.timing.step_grid import StepGrid
 from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline, TimeSettings
 
@@ -121,7 +121,7 @@ ReferenceVelocity
         checked = self._checks.check(channel, self._errors.corrected(measurement))
         if checked is None:
             return []
-        return self._follow(self._watch.judge(channel, checked))
+        return self._follow(self._watch.judge(channel, checked, self._lags.present))
 
     def process_pending(self) -> None:
         """Make the steps that the next set would have to make, while nobody waits for it.
@@ -135,7 +135,7 @@ ReferenceVelocity
     def flush(self) -> list[EstimateSet]:
         """Return the sets that were held back for late inputs: no more will come."""
         sets = self._follow(self._watch.finish())
-        return sets + [self._published(due) for due in self._timeline.flush()]
+        return sets + self._flushed()
 
     def reset(self) -> None:
         """Forget the state, keep the parameters; the next measurement begins a new run."""
@@ -228,7 +228,7 @@ ReferenceVelocity
                 self._checks.refuse(arrival.channel, 'stamp far ahead of all others')
         if judgement.stepped_back:
             self._clock_steps += 1
-            sets += [self._published(due) for due in self._timeline.flush()]
+            sets += self._flushed()
             self.warning.begin_anew()
             self._end_run(keep_soil=self._ran_on())
             self._clock_stepped = True
@@ -244,6 +244,11 @@ ReferenceVelocity
             overdue = max(self._lags.learned[WHEEL_ODOMETRY] - hold, 0)
             sets += [self._published(due) for due in self._timeline.advance(present, hold, overdue)]
         return sets
+
+    def _flushed(self) -> list[EstimateSet]:
+        """Return the sets that were held back, not those of a clock that is ahead."""
+        end = (self._lags.present or 0) + LONGEST_HOLD
+        return [self._published(due) for due in self._timeline.flush(end)]
 
     def _ran_on(self) -> bool:
         """Run to the last input, so that what is kept is the same whatever was run before."""

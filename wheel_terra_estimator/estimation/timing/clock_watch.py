@@ -77,18 +77,20 @@ class ClockWatch:
         self._held: list[Arrival] = []
         self._suspicion = Suspicion.BEHIND
         self._odometry_astray = 0
-        self.newest: int | None = None
 
     def retune(self, clock_step: int, max_lag: int, history: int) -> None:
         """Go on with other limits."""
         self._clock_step = max(clock_step, max_lag)
         self._reach = max(history + max_lag, clock_step)
 
-    def judge(self, channel: int, measurement: Measurement) -> Judgement:
-        """Return what to do with a message, and with those held before it."""
+    def judge(self, channel: int, measurement: Measurement, present: int | None) -> Judgement:
+        """Return what to do with a message, and with those held before it.
+
+        `present` is the time of the run [ns], None before it begins.
+        """
         stamp = measurement.stamp
         arrival = Arrival(channel, measurement)
-        suspicion = self._suspect(channel, stamp)
+        suspicion = self._suspect(channel, stamp, present)
         if suspicion is None:
             strays = self._drop_held() if self._held else ()
             self._accept(arrival)
@@ -114,7 +116,6 @@ class ClockWatch:
         accepted, self._held = self._held, []
         if accepted and self._suspicion is Suspicion.BEHIND:
             self._newest_of = [None] * len(self._newest_of)
-            self.newest = None
         for arrival in accepted:
             self._accept(arrival)
         return accepted
@@ -125,16 +126,16 @@ class ClockWatch:
             return Judgement(self.release())
         return Judgement([], strays=self._drop_held())
 
-    def _suspect(self, channel: int, stamp: int) -> Suspicion | None:
-        if self.newest is None:
+    def _suspect(self, channel: int, stamp: int, present: int | None) -> Suspicion | None:
+        if present is None:
             return None
         own = self._newest_of[channel]
         if own is None:
-            if stamp < self.newest - self._reach:
+            if stamp < present - self._reach:
                 return Suspicion.BEHIND
         elif stamp < own - self._clock_step:
             return Suspicion.BEHIND
-        if stamp > self.newest + self._reach and any(
+        if stamp > present + self._reach and any(
             other is not None for i, other in enumerate(self._newest_of) if i != channel
         ):
             return Suspicion.AHEAD
@@ -161,8 +162,6 @@ class ClockWatch:
         own = self._newest_of[channel]
         if own is None or stamp > own:
             self._newest_of[channel] = stamp
-        if self.newest is None or stamp > self.newest:
-            self.newest = stamp
 
     def _drop_held(self) -> tuple[tuple[Suspicion, Arrival], ...]:
         strays = tuple((self._suspicion, arrival) for arrival in self._held)

@@ -7,13 +7,13 @@ messages, and no set is lost. A lag of a few milliseconds is not waited for: one
 again, and a message at 10 Hz that is held for the next one is a tenth of a second old. Where wheel
 odometry of one stamp comes in several messages, a later stamp is waited for.
 
-The time of the run is theirs, too: other topics may be stamped by a clock that is ahead, and only
-carry it on, by what they gain, while both are silent.
+The time of the run is theirs, too: other topics, less the lead that their clock has before these
+two, only carry it on while both are silent.
 """
 
 from __future__ import annotations
 
-from collections import deque
+from collections import defaultdict, deque
 
 from wheel_terra_estimator.estimation.timing.input_checks import INERTIAL, WHEEL_ODOMETRY
 
@@ -26,6 +26,8 @@ _MEMORY = 64  # messages of a channel
 _SHARE = 0.95  # of them that are waited for
 _LEARN_EVERY = 8  # messages, once the memory is half full
 _ROOM = 1.05  # over the lag that was seen
+_LEADS = 4  # messages of another topic, the least lead of which is that of its clock
+_CLOCKS_AGREE = 200_000_000  # within this lead [ns]; wheels are silent after 0.5 s
 _IN_PARTS = 0.25
 """Share of repeated stamps above which a stamp comes in parts (half of them in two, and so on)."""
 
@@ -44,7 +46,8 @@ class LagLearner:
         self._repeats = deque[bool](maxlen=_MEMORY)
         self._odometry: int | None = None  # last stamp of it
         self._newest: int | None = None  # stamp of either channel
-        self._others: dict[int, int] = {}  # first stamps of other channels since then
+        self._leads = defaultdict[int, deque[int]](lambda: deque(maxlen=_LEADS))
+        self._led: set[int] = set()  # other channels that were heard since then
         self.present: int | None = None
         self._first: int | None = None
         self._odometry_heard = False
@@ -58,7 +61,7 @@ class LagLearner:
     def begin_run(self) -> None:
         """Forget the time, not the lags: they belong to the transport."""
         self._newest = self._first = self.present = None
-        self._others.clear()
+        self._led.clear()
         self._odometry_heard = False
 
     def note(self, channel: int, stamp: int, *, whole: bool = True) -> None:
@@ -67,11 +70,16 @@ class LagLearner:
             self._first = stamp
         lags = self._lags.get(channel)
         if lags is None:
-            ahead = self._others.setdefault(channel, stamp) - (self._newest or stamp)
-            self._advance(stamp - max(ahead, 0))
+            leads = self._leads[channel]
+            if self._newest is not None and channel not in self._led:
+                self._led.add(channel)
+                leads.append(stamp - self._newest)
+            # Who states the lag has stamps at their word until a second message.
+            known = len(leads) > (self.fixed >= 0) and min(leads) > _CLOCKS_AGREE
+            self._advance(stamp - min(leads) if known else stamp)
             return
         self._advance(stamp)
-        self._others.clear()
+        self._led.clear()
         if channel == WHEEL_ODOMETRY:
             self._odometry_heard = True
             self._repeats.append(stamp == self._odometry and not whole)

@@ -129,11 +129,10 @@ class Timeline:
             yield from self._insert_deferred()
         yield from self._release(newest - hold)
 
-    def flush(self) -> Iterator[Due]:
-        """Release everything."""
+    def flush(self, end: int) -> Iterator[Due]:
+        """Release everything up to a stamp [ns]."""
         yield from self._insert_deferred(at_any_cost=True)
-        if self._log.stamps:
-            yield from self._release(self._log.stamps[-1])
+        yield from self._release(end)
 
     def begin_after(self, due: Due) -> None:
         """Forget the state and all inputs up to a set: the estimator failed there."""
