@@ -132,6 +132,16 @@ def test_steered_wheels_roll_where_they_point(change, faults):
     assert report.figures['rover.effective_over_stated_track'] == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.parametrize('order', [(2, 1, 0, 3), (0, 3, 2, 1)])
+def test_front_and_rear_joints_of_a_side_that_are_exchanged(order):
+    """They are steered alike, one to the left and one to the right: as two that are negated."""
+    (finding,) = steered(lambda angle: angle[:, list(order)]).findings
+    assert finding.fault == 'steering_sign' and finding.confidence <= 0.5
+    assert 'names of one another' in finding.words
+    (finding,) = steered(lambda angle: angle * [-1.0, 1.0, 1.0, 1.0]).findings
+    assert finding.confidence > 0.9
+
+
 def test_a_gyro_that_turns_against_wheels_and_steering_is_reversed():
     """Curves tell nothing: the accelerometer has no y."""
     flat, back = WHOLE.imu.force * [1.0, 0.0, 1.0], WHOLE.imu.rate * [1.0, 1.0, -1.0]

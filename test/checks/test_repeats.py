@@ -125,6 +125,17 @@ def test_rates_that_are_sent_more_often_than_measured(times):
     assert told.words.startswith(f'each value comes {times} times')
 
 
+@pytest.mark.parametrize('ratio', [0.4, 0.2])
+def test_velocities_that_are_sent_more_often_than_measured(ratio):
+    """Ten times a second from a source of four, each two or three times, or of two."""
+    sent = np.arange(0.0, WHOLE.reference.seconds[-1], 0.5 * ratio)
+    rows = np.searchsorted(WHOLE.reference.seconds, sent, side='right') - 1
+    often = rows_of(WHOLE.reference, rows)
+    stamp = WHOLE.reference.stamp[0] + np.round(1e9 * sent).astype(np.int64)
+    often = replace(often, stamp=stamp, log_time=stamp + 300_000_000)
+    assert [f.fault for f in found(reference=often)] == ['reference_held']
+
+
 # Steps of a coarse encoder: counted from angles, told with their size, apart from noise.
 
 

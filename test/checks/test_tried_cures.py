@@ -9,7 +9,6 @@ import pytest
 import rolling_rover as rolling
 
 from wheel_terra_estimator.checks.calibration import calibrate
-from wheel_terra_estimator.checks.clocks import CHANNELS
 from wheel_terra_estimator.checks.statistics import Trial, halves, tried
 
 SKID = {'wheels.x': [0.3, 0.3, -0.3, -0.3]}  # wheels in two rows: its turns need skid
@@ -114,7 +113,8 @@ def test_stamps_that_are_off_are_mended_by_a_parameter(channel, offset):
     series = getattr(whole, channel)
     off = replace(whole, **{channel: replace(series, stamp=series.stamp + round(offset * 1e9))})
     (finding,) = rolling.checked(whole=off).findings
-    key = f'sensors.{CHANNELS[channel]}_stamp_offset'
+    key = 'wheel_odometry' if channel == 'joints' else channel
+    key = f'sensors.{key}_stamp_offset'
     assert (finding.kind, finding.parameter) == ('delay', key)
     assert finding.value == pytest.approx(offset, abs=max(2.0 * finding.std, 0.05))
     change = {c.key: c for c in calibrate(off, rolling.rover()).changes}[key]

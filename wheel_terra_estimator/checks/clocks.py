@@ -74,7 +74,7 @@ class Lag(NamedTuple):
         reference = _channel(evidence, name) if name == 'reference' else None
         between = BETWEEN * reference.period if reference is not None else 0.0
         between *= SIGMAS if reference is not None and reference.stamp.size < MANY else 2.0
-        clear = max(LEAST_OFFSET, 1.5 * evidence.period, between, SIGMAS * self.std)
+        clear = max(LEAST_OFFSET, evidence.period, between, SIGMAS * self.std)
         sharp = abs(self.value) > SHARP_SIGMAS * self.std  # what else is unlike, no stamp mends
         falls = self.trial.after < (1.0 if sharp else FALLS[self.by]) * self.trial.before
         return abs(self.value) > clear and falls
@@ -84,21 +84,15 @@ class Lag(NamedTuple):
         return self._replace(value=-self.value, halves=(-self.halves[0], -self.halves[1]))
 
 
-CHANNELS = {
-    'joints': 'wheel_odometry',
-    'wheel_odometry': 'wheel_odometry',
-    'imu': 'imu',
-    'reference': 'reference',
-    'sinkage': 'sinkage',
-}
-"""Channel of a recording -> its name in ``sensors.*_stamp_offset``."""
+STAMPED = ('joints', 'wheel_odometry', 'imu', 'reference', 'sinkage')
+"""Channels of a recording whose stamps have an offset."""
 
 
 def corrected(recording: Recording, facts: RoverFacts) -> Recording:
     """Return the recording with the stamp offsets of the rover file taken off."""
     changes: dict[str, Any] = {}
-    for name, key in CHANNELS.items():
-        channel = getattr(recording, name)
+    for name in STAMPED:
+        channel, key = getattr(recording, name), 'wheel_odometry' if name == 'joints' else name
         offset = round(float(getattr(facts.sensors, f'{key}_stamp_offset')) * 1e9)
         if channel is not None and offset:
             changes[name] = shifted(channel, offset)
@@ -181,6 +175,8 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
 def _by_arrival(evidence: Evidence, name: str, late: float) -> bool:
     """Return whether the wheels' stamps lie off their arrival, not those of one ``late`` [s]."""
     own, others = _late(evidence, 'joints'), _late(evidence, name)
+    if others > 0.0 and others + late < FUTURE:  # it would come before it was measured
+        return True
     if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
         return abs(own - late) < abs(own) - 0.5 * abs(late) or own < FUTURE < others
     return abs(others) + abs(own - late) < abs(own) + abs(others + late)
@@ -377,7 +373,8 @@ FUTURE = -0.1  # arrival less stamp that no message has [s]
 MOST_OFFSET = 1e4  # offset that a rover file may state, either way [s]
 ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
 MOST_LATE = 40.0  # beyond which a history is no cure [s]
-QUARTERS, UNEVEN = 4, 0.5  # parts of a drive; unlike gains of a drift over their mean, at most [-]
+QUARTERS = 4  # parts of a drive
+LEAST_SHIFT = 0.3  # of log time less stamp of wheels or IMU over a drive, which no way takes [s]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
 LONGEST_WAY = 10.0  # of a message into the log [s]
 
@@ -391,7 +388,7 @@ def check_transport(
     outcomes += read
     late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
     mended: dict[str, Any] = {}
-    quarters = dict[str, list[float]]()  # usual log time less stamp in parts of the drive [s]
+    begun = dict[str, float]()  # usual log time less stamp in the first quarter of the drive [s]
     for name in CHECKED:
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
@@ -409,20 +406,8 @@ def check_transport(
             outcomes += _drop_outs(name, one, figures)
         if channel.late.size and not step:
             parts = np.array_split(channel.late, min(QUARTERS, channel.late.size))
-            by_time = [float(np.median(part)) for part in parts]
-            late[name], shifts[name] = float(np.median(channel.late)), by_time[0] - by_time[-1]
-            quarters[name] = by_time
-    for name, by_time in quarters.items():
-        if name not in ('joints', 'imu') and min(by_time) > FUTURE:
-            continue  # its age is honest
-        others = [one for other, one in quarters.items() if other != name]
-        if drift := _drift(by_time, others):
-            channel = getattr(recording, name)
-            how = f'its stamps drift by {drift:+.2g} s over the drive against their arrival'
-            outcomes.append(found('order', channel.topic, 0.97, how=how))
-            share = np.linspace(0.0, 1.0, channel.stamp.size)
-            mended[name] = shifted(channel, np.round(1e9 * drift * share).astype(np.int64))
-            late[name], shifts[name] = by_time[0], 0.0
+            begun[name], end = (float(np.median(part)) for part in (parts[0], parts[-1]))
+            late[name], shifts[name] = float(np.median(channel.late)), begun[name] - end
     if steps:  # of one clock, whatever it stamps
         topic, *rest = steps
         how = f'they step by {steps[topic]:+.3g} s against their arrival'
@@ -431,11 +416,20 @@ def check_transport(
     if 'joints' not in late:
         return outcomes, replace(recording, **mended)
     assert recording.joints is not None
-    if max(shifts.values()) - min(shifts.values()) > CLOCK_DIFFERENCE:  # no offset mends that
-        name = max(shifts, key=lambda one: abs(shifts[one]))
-        how = f'its stamps shift by {shifts[name]:.2g} s against log time: a clock set, or drifting'
-        topic = getattr(recording, name).topic
-        return [*outcomes, found('order', topic, 0.97, how=how)], replace(recording, **mended)
+    # The age of what is fused late is honest, unless it is in the future.
+    least = {name: begun[name] - max(shift, 0.0) for name, shift in shifts.items()}
+    kept = [name for name in late if name in ('joints', 'imu') or least[name] < FUTURE]
+    for names, most in ((kept, LEAST_SHIFT), (list(late), CLOCK_DIFFERENCE)):
+        some = {name: shifts[name] for name in names}
+        if max(some.values()) - min(some.values()) > most:  # no offset mends that
+            name = max(some, key=lambda one: abs(shifts[one]))
+            how = f'its stamps shift by {shifts[name]:.2g} s against log time: a clock set'
+            channel = getattr(recording, name)
+            outcomes.append(found('order', channel.topic, 0.97, how=f'{how}, or drifting'))
+            if names is kept:
+                sent = channel.log_time - round(1e9 * begun[name])
+                mended[name] = replace(channel, stamp=sent)
+            return outcomes, replace(recording, **mended)
     off, recording = _clocks(replace(recording, **mended), late, facts)
     return outcomes + off, recording
 
@@ -511,21 +505,6 @@ def _bursts(stamp: IntArray) -> IntArray | None:
     regular = robust_std(period) < OFF_PERIOD * np.median(period)
     regular &= np.median(step) < min(READ_AT_ONCE, READ_SHARE * float(np.median(period)))
     return ends if regular and np.median(count) >= LEAST_IN_A_BURST else None
-
-
-def _drift(late: list[float], others: list[list[float]]) -> float:
-    """Return by how much stamps gain evenly on their arrival over a drive [s]; 0 for not at all.
-
-    ``late``, ``others``: log time less stamp [s] of each quarter. Where all gain alike the logger's
-    clock does.
-    """
-    compared = [one for one in others if len(one) == QUARTERS]
-    if len(late) < QUARTERS or not compared:
-        return 0.0
-    gain, beside = -np.diff(late), -np.diff(np.median(compared, axis=0))
-    drift, apart = (float(one.sum()) * QUARTERS / (QUARTERS - 1) for one in (gain, gain - beside))
-    even = np.ptp(gain) < UNEVEN * abs(float(gain.mean()))
-    return drift if even and min(abs(drift), abs(apart)) > LEAST_OFFSET else 0.0
 
 
 def _steps(channel: Channel) -> FloatArray:

@@ -92,7 +92,6 @@ RATE_UNITS = {
     'revolutions per minute': 2.0 * math.pi / 60.0,
     'degrees per second': math.pi / 180.0,
     'revolutions per second': 2.0 * math.pi,
-    'thousandths of rad/s': 1e-3,
 }
 """Units that wheel rates come in by mistake: factor to rad/s."""
 SKID_TRACKS = (0.7, 6.0)  # effective over geometric track of rovers, skidding or not [-]

@@ -136,7 +136,8 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
         1.0,
         speeds.rim**2,
     )
-    return Told(_referred_to_slip_radius(evidence, ratio), trial)
+    ratio = _referred_to_slip_radius(evidence, ratio)
+    return Told(Estimate(ratio.value, math.hypot(ratio.std, min(0.5 * trial.after, 1.0))), trial)
 
 
 def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estimate | NotChecked:

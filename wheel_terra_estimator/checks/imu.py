@@ -396,7 +396,9 @@ def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
     if rest.sum() * evidence.period < LEAST_STANDSTILL:
         return None
     spread = np.array([robust_std(column) for column in gyro[rest].T])
-    return np.median(gyro[rest], axis=0), spread / math.sqrt(max(rest.sum() / 4.0, 1.0))
+    first, second = (np.median(part, axis=0) for part in np.array_split(gyro[rest], 2))
+    std = np.hypot(spread / math.sqrt(max(rest.sum() / 4.0, 1.0)), 0.5 * (second - first))
+    return np.median(gyro[rest], axis=0), std
 
 
 def small_tilt(evidence: Evidence) -> Mounting | None:
@@ -486,7 +488,8 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     seen = Estimate(seen.value, math.hypot(seen.std, 0.5 * apart, YAW_MODEL_STD))
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
-        return [], evidence
+        unclear = untold('mounting', 'yaw_open', least=math.degrees(YAW_SIGMAS * seen.std))
+        return [unclear] if YAW_SIGMAS * seen.std > LEAST_YAW else [], evidence
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)
     words: dict[str, Any] = {'angle': -math.degrees(seen.value), 'off': math.degrees(seen.std)}
     sure, aside = 0.97, math.sin(seen.value)

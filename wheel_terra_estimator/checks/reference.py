@@ -31,7 +31,6 @@ SHARES_NOISE = 0.3  # of the rates: what differs by less from the wheels has the
 JUMP_FACTOR = 8.0  # a jump over the usual change [-]
 JUMP_SHARE = 0.005  # share of jumps that is a fault of the source, not a single wild reading
 LEAST_JUMPS = 3
-LEAST_NEW = 0.5  # share of readings that differ from the one before: fewer are held values
 BEYOND = 2.0  # speed over the fastest of the rims that is a jump whatever the wheels do [-]
 LEAST_JUMP = 0.3  # A jump is also larger than this share of the speed
 COVARIANCE_FACTOR = 6.0  # seen over stated deviation of a placeholder [-]
@@ -286,20 +285,15 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     forward = reference.velocity[:, 0]
     if reference.stamp.size < LEAST_REFERENCES or not np.ptp(forward):
         return []  # no reading of a speed
-    # A log at a higher rate holds each value until the next: only new ones scatter.
-    new = np.append(True, np.diff(forward) != 0.0)
-    if np.mean(new) >= LEAST_NEW or new.sum() < LEAST_REFERENCES:
-        new[:] = True
-    forward = forward[new]
-    rim = np.nan_to_num(evidence.rim_at(reference.stamp[new], evidence.rim))
-    if evidence.facts.known and np.median(np.abs(forward)) > BEYOND * np.abs(rim).max():
+    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
+    if evidence.facts.known and np.quantile(np.abs(forward), 0.8) > BEYOND * np.abs(rim).max():
         return []  # in another unit
     noise = min(bend_noise(forward), bend_noise(forward - rim))  # wheels start and stop as well
     evidence.figures['reference.noise_m_s'] = float(f'{noise:.3g}')
     stated = reference.variance[np.isfinite(reference.variance)]
     usual = math.sqrt(max(float(np.median(stated)), 0.0)) if stated.size else 0.0
     evidence.figures['reference.stated_std_m_s'] = float(f'{usual:.3g}')
-    if stated.size and np.ptp(stated):
+    if stated.size and np.ptp(stated) and noise < COVARIANCE_FACTOR * usual:
         return []  # what changes is no placeholder
     own = evidence.facts.sensors.reference_std if evidence.facts.known else 0.0
     expected = usual or float(own)  # what the estimator goes by

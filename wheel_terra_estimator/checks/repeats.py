@@ -50,20 +50,36 @@ def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
                 outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
                 evidence = replace(evidence, **{name: None})  # type: ignore[arg-type]
     torques, evidence = _torques(evidence)
-    return [*outcomes, *torques, *deep, *_held(evidence)], evidence
+    held, evidence = _held(evidence)
+    return [*outcomes, *torques, *deep, *held], evidence
 
 
-def _held(evidence: Evidence) -> list[Outcome]:
-    """Return rates and torques that change with every so many messages only: sent on a timer."""
-    readings = np.nan_to_num(np.hstack([evidence.rate, evidence.torque]))
-    changes = np.any(np.diff(readings, axis=0) != 0.0, axis=1) & evidence.moving[1:]
+def _held(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return rates and torques, or velocities, that are sent on a timer, and these once each."""
+    outcomes, reference = list[Outcome](), evidence.recording.reference
+    times = _times_sent(np.hstack([evidence.rate, evidence.torque]), evidence.moving)
+    if times > 1.0:
+        told = {'times': times, 'period': times * evidence.period}
+        outcomes.append(evidence.found('rates_held', 0.95, **told))
+    if reference is None:
+        return outcomes, evidence
+    driven = np.interp(evidence.seconds(reference), evidence.time, evidence.moving) > 0.5
+    times = _times_sent(reference.velocity, driven)
+    if times > 1.0:
+        told = {'times': times, 'period': times * reference.period}
+        outcomes.append(evidence.found('reference_held', 0.95, **told))
+        new = np.append(True, np.diff(reference.velocity[:, 0]) != 0.0)
+        recording = replace(evidence.recording, reference=rows_of(reference, new))
+        evidence = replace(evidence, recording=recording)
+    return outcomes, evidence
+
+
+def _times_sent(values: FloatArray, driven: Mask) -> float:
+    """Return how many messages in a row hold the same (k, p) values; 1: one, or no such number."""
+    changes = np.any(np.diff(np.nan_to_num(values), axis=0) != 0.0, axis=1) & driven[1:]
     steps = np.diff(np.flatnonzero(changes))
-    if steps.size < LEAST_CHANGES:
-        return []
-    times = float(np.median(steps))
-    if times < 2.0 or np.mean(steps == times) < AT_ONCE:
-        return []
-    return [evidence.found('rates_held', 0.95, times=times, period=times * evidence.period)]
+    times = float(np.median(steps)) if steps.size >= LEAST_CHANGES else 1.0
+    return times if times >= 2.0 and np.mean(np.abs(steps - times) <= 1.0) >= AT_ONCE else 1.0
 
 
 def _reference(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

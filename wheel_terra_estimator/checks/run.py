@@ -50,6 +50,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 
 LEAST_LOST = 0.01  # share of messages that are lost, or with nan, that is told [-]
 LEAST_RIM_SPEED = 0.005  # rim speed that no drive stays below [m/s]
+LEAST_GOING = 0.05  # mean velocity that no wander of a satellite's position makes [m/s]
 ORIENTATION = 'the orientation'  # what a gyro is said to turn against
 _LOGGER = logging.getLogger(__name__)
 Result = TypeVar('Result')
@@ -151,18 +152,20 @@ def _examined(
     evidence = against_each_other(recording, facts, checks, mended)
     if evidence is None:
         report.not_checked.append(untold('sign', 'no_rates'))
-    if not report.findings and not _drives(evidence):
-        report.take([found('no_drive', topic, 0.99)])
+    if not report.findings:
+        report.take(_standing(evidence) if evidence else [found('no_drive', topic, 0.99)])
     return evidence
 
 
-def _drives(evidence: Evidence | None) -> bool:
-    """Return whether a wheel turns; by means over a second, since noise turns none."""
-    if evidence is None:
-        return False
+def _standing(evidence: Evidence) -> list[Outcome]:
+    """Return what to say where no wheel turns; by means over a second, since noise turns none."""
     width = evidence.rows_in(1.0)
     means = [np.abs(moving_mean(np.nan_to_num(speed), width)) for speed in evidence.speed.T]
-    return bool(np.quantile(np.max(means, axis=0), 0.99) >= LEAST_RIM_SPEED)
+    if np.quantile(np.max(means, axis=0), 0.99) >= LEAST_RIM_SPEED:
+        return []
+    velocity = evidence.recording.reference
+    goes = velocity is not None and abs(velocity.velocity[:, 0].mean()) > LEAST_GOING
+    return [evidence.found('no_drive', 0.99) if goes else untold('sign', 'hardly_moves')]
 
 
 class Mended:

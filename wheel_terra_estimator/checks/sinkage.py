@@ -92,16 +92,17 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
     noise = _reading_noise(table)
     level = float(np.nanmedian(np.abs(table)))
     off = {}
-    for unit, factor in (('millimetres', 1e-3), ('centimetres', 1e-2)):
+    for unit, factor in (('millimetres', 1e-3), ('centimetres', 1e-2), ('inches', 0.0254)):
         # Both the depth and the noise have to fit the unit.
         ratio = noise * factor / max(stated, 1e-4)
         if level > DEEPEST * radius and 0.1 < ratio < 10.0 and level * factor < 0.8 * radius:
             off[unit, factor] = abs(math.log(ratio))
     if off:
-        unit, factor = min(off, key=lambda entry: off[entry])
+        (unit, factor), *others = sorted(off, key=lambda entry: off[entry])
         told = {'level': level, 'noise': noise, 'radius': radius, 'unit': unit}
-        sure = 0.97 if len(off) == 1 else 0.8
-        return [evidence.found('sinkage_unit', sure, value=factor, **told)], table * factor
+        told['rival'] = ''.join(f', or in {other}' for other, _ in others)
+        finding = evidence.found('sinkage_unit', 0.97 / len(off), value=factor, **told)
+        return [finding], table * factor
     if float(np.nanquantile(table, 0.02)) > BURIED * radius:
         told = {'level': level, 'radius': radius, 'height': float(np.nanquantile(table, 0.98))}
         return [evidence.found('sinkage_height', 0.8, **told)], table

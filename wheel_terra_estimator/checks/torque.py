@@ -263,8 +263,10 @@ def torque_gain(evidence: Evidence) -> Slopes | NotChecked:
     fit = slope_fit(evidence)
     if isinstance(fit, NotChecked):
         return fit
+    if fit.gain.value <= 0.0:
+        return untold('gain', 'unlike_slopes')
     traction = evidence.figures.get('torque.level_traction', 1.0)
-    traction = max(traction, traction / max(fit.gain.value, 1e-3))  # with this scale as well
+    traction = max(traction, traction / fit.gain.value)  # with this scale as well
     if traction > SOFT_TRACTION:
         return untold('gain', 'soft', traction=traction)
     if abs(fit.gain.value - 1.0) > LEAST_GAIN_ERROR and not fit.trial.falls:
@@ -283,7 +285,7 @@ def _gain(evidence: Evidence) -> list[Outcome]:
     gain, std = fit.gain
     evidence.figures['torque.gain'] = round(gain, 4)
     evidence.figures['torque.gain_std'] = round(std, 4)
-    if abs(gain - 1.0) < LEAST_GAIN_ERROR or gain <= 0.0:
+    if abs(gain - 1.0) < LEAST_GAIN_ERROR:
         return []
     open_yet = facts.sensors.torque_gain_std  # by the rover file
     sigmas = Estimate(gain, math.hypot(std, open_yet)).sigmas_from(1.0)

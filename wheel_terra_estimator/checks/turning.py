@@ -264,13 +264,13 @@ def check_steering_sign(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     wrong, right = fits < -LEAST_CORRELATION, fits > LEAST_CORRELATION
     if track is None or track < 0.0 or not wrong.any():
         return [], evidence
-    order = [facts.names.index(name) for name in _sides_exchanged(facts)]
-    exchanged = _steered_as_turned(evidence, steering[:, order])[wrong]  # on the spot
     sure, rival = 0.95, ''
-    if (exchanged > LEAST_CORRELATION).all():
-        sure, rival = 0.5, ', or left and right joints are exchanged'
-    elif not right.any():
+    if not right.any():
         sure, rival = 0.75, ', or wheels.x has the wrong sign (positive ahead)'
+    columns = (np.repeat(one[:, None], wrong.size, axis=1) for one in steering.T[wrong])
+    by_one_another = [_steered_as_turned(evidence, column)[wrong] for column in columns]
+    if (np.max(by_one_another, axis=0) > LEAST_CORRELATION).all():
+        sure, rival = 0.5, f'{rival}, or these joints go by the names of one another'
     told = {'wheel': facts.named(wrong), 'value': -1.0, 'rival': rival}
     separate = '; turn one joint to the left by hand first and look at what is published'
     finding = evidence.found('steering_sign', sure, **told, separate=separate if rival else '')
@@ -430,13 +430,11 @@ def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         order = [facts.names.index(name) for name in names]
         both = mended, replace(mended, steering=mended.steering[:, order])
         mended = min(both, key=left_in_turns)
-    mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
     sides = evidence.found(
         'swapped_sides',
         0.97 if sense else 0.5,
         rival='' if sense else ', or the gyro counts yaw to the right',
         names=', '.join(names),
-        mirrored=f', or wheels.y: [{mirrored}]' if facts.known else '',
     )
     if sense:
         return [sides], mended
@@ -504,7 +502,8 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     imu = evidence.recording.imu
     if imu is None or evidence.gyro is None:
         return [], evidence
-    gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
+    axes = (*evidence.gyro[:, :2].T, evidence.yaw)
+    aside, across, gyro = (_turns(evidence, integrated(evidence.time, axis)) for axis in axes)
     headings = {
         'orientation': _heading(evidence, imu),
         'twist.angular': _heading_of_reference(evidence),
@@ -515,15 +514,15 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         seen = _turns(evidence, other)
         if _most(seen) < LEAST_TURNED or correlation(gyro, seen) < SAME_TURNS:
             continue
-        # Noise of either flattens the fit to it: the scale lies between both.
+        # Noise of either flattens the fit to it; a tilted one has a part of the turns on x and y.
         one = np.ones(seen.size)
-        cure = block_fit(np.column_stack([gyro, one]), seen)[0]
-        other_way = 1.0 / block_fit(np.column_stack([seen, one]), gyro)[0].value
-        off = min((cure.value - 1.0, other_way - 1.0), key=abs)
+        cure, both = block_fit(np.column_stack([gyro, one]), seen)[0], np.column_stack([seen, one])
+        parts = [block_fit(both, turns)[0].value for turns in (aside, across, gyro)]
+        off = min((cure.value - 1.0, 1.0 / math.hypot(*parts) - 1.0), key=abs)
         if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
             told = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
             finding = evidence.found('gyro_scale', 0.9, std=cure.std, **told)
-            return [finding], replace(evidence, gyro=evidence.gyro * cure.value)
+            return [finding], replace(evidence, gyro=evidence.gyro * [1.0, 1.0, cure.value])
     return [], evidence
 
 

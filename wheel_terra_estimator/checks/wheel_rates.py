@@ -24,7 +24,6 @@ from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import correlation, lonely, robust_std, runs, step_of
 
 MOST_COUNT = 0.07  # speed over rim speed of counts (90 in a turn), at most [-]
-ONLY_BY_SPEED = ('thousandths of rad/s',)  # turns of a skidding rover do not tell it
 UNIT_BAND = (0.7, 1.25)  # ratio of speeds over its unit's factor; slip makes it smaller [-]
 LEAST_BAND, OUTRUN = 0.4, 1.05  # the same of units that may be counts [-]
 TELLING = 0.15  # difference of two units' distances from a ratio that tells them apart [ln]
@@ -236,7 +235,6 @@ def _fitting_units(
     units = {}
     for unit, factor in known.items():
         by_turn = track is not None and turning.ordinary_track(track * factor)
-        by_turn &= unit not in ONLY_BY_SPEED
         told = by_turn and not usual
         if ratio is not None:
             least = LEAST_BAND if factor < MOST_COUNT else UNIT_BAND[0]
