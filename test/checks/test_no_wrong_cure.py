@@ -739,13 +739,12 @@ def test_what_would_come_before_it_is_measured_is_not_early():
     assert 0.4 < told[0].value < 0.9
 
 
-def test_a_reference_that_is_made_smooth_is_no_radius():
-    """After each start it is too slow for as long as the straights last."""
-    slow = replace(
-        WHOLE.reference, velocity=lagged(WHOLE.reference.velocity, 8.0, rolling.RATE / 5.0)
-    )
-    told = {f.fault for f in checked(reference=slow).findings}
-    assert not {'radius', 'reference_scale'} & told
+def test_a_scale_that_halves_of_a_drive_see_otherwise_is_no_number():
+    """By what they differ the number may be off."""
+    times = np.where(WHOLE.reference.seconds < 105.0, 1.1, 1.165)
+    velocity = WHOLE.reference.velocity * times[:, None]
+    told = faults(checked(reference=replace(WHOLE.reference, velocity=velocity)))
+    assert not {'radius', 'reference_scale'} & {*told}
 
 
 def test_a_clock_that_steps_by_half_a_second_has_no_offset():
@@ -774,8 +773,9 @@ def test_a_tilted_gyro_has_no_other_scale():
 
 
 def test_a_bias_that_wanders_from_stop_to_stop_is_none():
-    wander = np.linspace(0.0, 0.05, WHOLE.imu.stamp.size)[:, None] * [0.0, 0.0, 1.0]
-    assert 'gyro_bias' not in faults(checked(imu=replace(WHOLE.imu, rate=WHOLE.imu.rate + wander)))
+    """Nor do the sides turn otherwise by it."""
+    wander = np.where(WHOLE.imu.seconds < 12.0, 0.05, 0.0)[:, None] * [0.0, 0.0, 1.0]
+    assert not faults(checked(imu=replace(WHOLE.imu, rate=WHOLE.imu.rate + wander)))
 
 
 def test_inches_of_sinkage_are_not_surely_centimetres():
@@ -792,11 +792,9 @@ def test_a_covariance_that_changes_and_is_far_too_small():
 
 
 def test_a_yaw_that_a_shaky_imu_leaves_open_is_said_to_be_open():
-    shaken = WHOLE.imu.force + 3.0 * np.random.default_rng(8).standard_normal(WHOLE.imu.force.shape)
-    report = checked(
-        rolling.rover(**{'sensors.specific_force_std': 3.0}), imu=replace(WHOLE.imu, force=shaken)
-    )
-    assert any(e.reason.startswith('yaw of the IMU') for e in report.not_checked)
+    noise = 0.4 * np.random.default_rng(8).standard_normal(WHOLE.imu.force.shape)
+    report = checked(imu=replace(WHOLE.imu, force=WHOLE.imu.force + noise))
+    assert any(e.reason.startswith('yaw of the IMU below') for e in report.not_checked)
 
 
 def test_sides_that_are_swapped_have_one_cure():

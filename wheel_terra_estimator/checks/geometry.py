@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks import turning
+from wheel_terra_estimator.checks import imu, turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask
 from wheel_terra_estimator.checks.finding import (
     LEAST_TURN_RATE,
@@ -320,7 +320,9 @@ def _of_sides(evidence: Evidence) -> Estimate:
     apart = (evidence.side_difference - track * evidence.yaw)[rows]
     rim = evidence.rim[rows]
     trial = tried(lambda part: block_fit(rim[part, None], apart[part])[0].value, 0.0, rim**2)
-    told = block_fit(rim[:, None], apart)[0]
+    told, bias = block_fit(rim[:, None], apart)[0], imu.gyro_bias(evidence)
+    open_to = 0.0 if bias is None else track * float(bias[1][2] / np.median(np.abs(rim)))
+    told = Estimate(told.value, math.hypot(told.std, open_to))
     alike = _unlike(evidence) < 0.5 * abs(told.value)  # else it is one wheel
     return told if trial.falls and alike else Estimate(0.0, math.inf)
 
