@@ -739,12 +739,13 @@ def test_what_would_come_before_it_is_measured_is_not_early():
     assert 0.4 < told[0].value < 0.9
 
 
-def test_a_scale_that_halves_of_a_drive_see_otherwise_is_no_number():
-    """By what they differ the number may be off."""
-    times = np.where(WHOLE.reference.seconds < 105.0, 1.1, 1.165)
-    velocity = WHOLE.reference.velocity * times[:, None]
-    told = faults(checked(reference=replace(WHOLE.reference, velocity=velocity)))
-    assert not {'radius', 'reference_scale'} & {*told}
+def test_a_reference_that_is_made_smooth_has_no_other_scale():
+    """Stops of 2.5 s after 7.5 s of driving: it never comes to rest, nor to its speed."""
+    drive = rolling.ten_minute_drive()
+    whole = rolling.recording(replace(drive, speed=drive.speed * (drive.time % 10.0 < 7.5)))
+    slow = lagged(whole.reference.velocity, 2.0, rolling.RATE / 5.0)
+    told = faults(checked(whole=whole, reference=replace(whole.reference, velocity=slow)))
+    assert told == ['reference_offset']
 
 
 def test_a_clock_that_steps_by_half_a_second_has_no_offset():

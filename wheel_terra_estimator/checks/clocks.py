@@ -38,6 +38,8 @@ IN_A_DRIVE = 15.0  # length of a drive over the greatest lag that it tells [-]
 LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
 BY_LOG = 'log time'
+SMOOTHED_BY = 'reference.smoothed_s'  # figure: such a velocity tells no scale
+SMOOTH = 0.02  # unlike part that a lag leaves of speeds that are made smooth [-]
 FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part, at most
 LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
 """Deviation of a lag by chassis and filters; log time leaves the age of a velocity open [s]."""
@@ -117,6 +119,8 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         left = reference.value + _moved(evidence, 'joints')
         stamp = shifted(velocity, round(left * 1e9)).stamp
         evidence = evidence.with_channel('reference', stamp=stamp)
+        if not reference.steady or reference.trial.after > SMOOTH:
+            evidence.figures[SMOOTHED_BY] = round(reference.value, 2)
     return outcomes, evidence
 
 
@@ -417,8 +421,7 @@ def check_transport(
         return outcomes, replace(recording, **mended)
     assert recording.joints is not None
     # The age of what is fused late is honest, unless it is in the future.
-    least = {name: begun[name] - max(shift, 0.0) for name, shift in shifts.items()}
-    kept = [name for name in late if name in ('joints', 'imu') or least[name] < FUTURE]
+    kept = [n for n in late if n in ('joints', 'imu') or begun[n] - max(shifts[n], 0.0) < FUTURE]
     for names, most in ((kept, LEAST_SHIFT), (list(late), CLOCK_DIFFERENCE)):
         some = {name: shifts[name] for name in names}
         if max(some.values()) - min(some.values()) > most:  # no offset mends that
@@ -427,8 +430,7 @@ def check_transport(
             channel = getattr(recording, name)
             outcomes.append(found('order', channel.topic, 0.97, how=f'{how}, or drifting'))
             if names is kept:
-                sent = channel.log_time - round(1e9 * begun[name])
-                mended[name] = replace(channel, stamp=sent)
+                mended[name] = replace(channel, stamp=channel.log_time - round(1e9 * begun[name]))
             return outcomes, replace(recording, **mended)
     off, recording = _clocks(replace(recording, **mended), late, facts)
     return outcomes + off, recording

@@ -12,6 +12,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import imu, turning
+from wheel_terra_estimator.checks.clocks import SMOOTHED_BY
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask
 from wheel_terra_estimator.checks.finding import (
     LEAST_TURN_RATE,
@@ -136,8 +137,7 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
         1.0,
         speeds.rim**2,
     )
-    ratio = _referred_to_slip_radius(evidence, ratio)
-    return Told(Estimate(ratio.value, math.hypot(ratio.std, min(0.5 * trial.after, 1.0))), trial)
+    return Told(_referred_to_slip_radius(evidence, ratio), trial)
 
 
 def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estimate | NotChecked:
@@ -247,7 +247,7 @@ def _depth(evidence: Evidence) -> Estimate:
 
 def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return a radius or a reference of another scale, and the evidence with that mended."""
-    if ASIDE in evidence.figures:
+    if {ASIDE, SMOOTHED_BY} & {*evidence.figures}:
         return [], evidence
     told = radius_ratio(evidence)
     if isinstance(told, NotChecked):
