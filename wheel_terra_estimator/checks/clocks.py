@@ -377,7 +377,7 @@ FUTURE = -0.1  # arrival less stamp that no message has [s]
 MOST_OFFSET = 1e4  # offset that a rover file may state, either way [s]
 ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
 MOST_LATE = 40.0  # beyond which a history is no cure [s]
-QUARTERS = 4  # parts of a drive
+PARTS = 20  # of a drive, whose first and last tell how its stamps shift
 LEAST_SHIFT = 0.3  # of log time less stamp of wheels or IMU over a drive, which no way takes [s]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
 LONGEST_WAY = 10.0  # of a message into the log [s]
@@ -392,7 +392,7 @@ def check_transport(
     outcomes += read
     late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
     mended: dict[str, Any] = {}
-    begun = dict[str, float]()  # usual log time less stamp in the first quarter of the drive [s]
+    begun = dict[str, float]()  # usual log time less stamp in the first part of the drive [s]
     for name in CHECKED:
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
@@ -409,7 +409,7 @@ def check_transport(
         elif not order:
             outcomes += _drop_outs(name, one, figures)
         if channel.late.size and not step:
-            parts = np.array_split(channel.late, min(QUARTERS, channel.late.size))
+            parts = np.array_split(channel.late, min(PARTS, channel.late.size))
             begun[name], end = (float(np.median(part)) for part in (parts[0], parts[-1]))
             late[name], shifts[name] = float(np.median(channel.late)), begun[name] - end
     if steps:  # of one clock, whatever it stamps
