@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables that cannot be used end in one line with file, row and cure; good ones are read."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -246,10 +248,15 @@ def test_readings_that_look_odd_are_said_and_used():
 
 def test_wheel_of_the_table_against_that_of_the_model_file():
     table = check_table('x.csv', rows(wheel_radius=np.full(8, 0.25)))
-    check_wheel_of_model(table, (), ())
-    check_wheel_of_model(table, (0.11, 0.2), (0.1,))
+
+    def of_model(stated, radius, width):
+        return SimpleNamespace(wheels=SimpleNamespace(radius=radius, width=width), stated=stated)
+
+    check_wheel_of_model(table, of_model((), (0.125,), ()))
+    both = ('wheels.radius', 'wheels.width')
+    check_wheel_of_model(table, of_model(both, (0.11, 0.2), (0.1,)))
     with pytest.raises(UserError, match=r'line 2, column wheel_radius: 0.25 m.*wheels.radius'):
-        check_wheel_of_model(table, (0.125,), ())
+        check_wheel_of_model(table, of_model(both, (0.125,), ()))
 
 
 def test_many_rows_are_averaged_over_neighbouring_inputs():

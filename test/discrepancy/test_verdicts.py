@@ -15,7 +15,7 @@ from test_workflow import FEW, make, noisy, run
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy import decision
+from wheel_terra_estimator.discrepancy import decision, workflow
 from wheel_terra_estimator.discrepancy.proposal import find
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.tables.averaging import together
@@ -309,6 +309,47 @@ def test_a_wrong_unit_is_said_before_any_effect(column, factor, units):
     assert not found.proposal
     assert list(found.misread) == [column]
     assert f'The unit of {column.replace("_", " ")} looks wrong ({units})' in found.sentence
+
+
+@pytest.mark.parametrize(('gain', 'unit'), [(0.73, 'lbf ft in place of N m'), (0.78, '')])
+def test_a_gain_that_a_unit_explains_as_well_is_no_surer_than_that(unproposed, gain, unit):
+    table, values, *_ = make('sweep40')
+    found = run({**table, 'torque': gain * table['torque']}, values)
+    (effect,) = found.effects
+    assert effect.name == 'torque_gain'
+    assert effect.parameters['gain'].value == pytest.approx(gain - 1.0, abs=0.03)
+    assert (effect.confidence <= 0.5) == bool(unit)
+    assert any('another unit of the column' in note for note in found.notes) == bool(unit)
+    assert any(unit in note for note in found.notes)
+
+
+@pytest.mark.parametrize('wrong', ['a.csv', 'b.csv'])
+def test_a_unit_of_one_of_two_tables_is_asked_for(wrong):
+    table, values, soil, rows = make('sweep40')
+    again = noisy(rows, solve(rows, soil), solve(rows, soil), np.random.default_rng(3))
+    tables = {'a.csv': table, 'b.csv': again}
+    tables[wrong] = {**tables[wrong], 'torque': 0.1 * tables[wrong]['torque']}
+    reference, table = (check_table(name, rows) for name, rows in tables.items())
+    configuration = reader.from_parameters(values, complete=False)
+    found = diagnose(table, configuration, reference, FEW)
+    assert found.misread == {'torque': pytest.approx(10.0)}
+    assert found.sentence.startswith(f'{wrong}: The unit of torque looks wrong')
+    assert not found.effects
+
+
+def test_no_explanation_has_less_than_no_cohesion(monkeypatch):
+    """A friction that is a tenth too small asks for less cohesion than there is."""
+    search, kept = workflow.search, []
+    monkeypatch.setattr(workflow, 'search', lambda *given: kept.append(search(*given)) or kept[0])
+    table, values, soil, rows = make('basic16')
+    less = replace(soil, cohesion=0.0, friction_angle=0.9 * soil.friction_angle)
+    table = noisy(rows, solve(rows, soil), solve(rows, less), np.random.default_rng(3))
+    run(table, values, options=Options(effects=('cohesion',)))
+    selection = kept[0].selection
+    fitted = selection.explanations[selection.index(('cohesion',))].fitted
+    numbers = {c.key: float(c.value(u)) for c, u in zip(fitted.coordinates, fitted.u, strict=True)}
+    assert numbers['cohesion.delta'] < 0.0
+    assert numbers['soil.cohesion'] + numbers['cohesion.delta'] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_column_of_zeros_may_be_what_a_law_is_proposed_for():

@@ -26,6 +26,7 @@ from wheel_terra_estimator.discrepancy.proposal.find import Gap, effects_said, g
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
+from wheel_terra_estimator.discrepancy.selection.readings import units_apart
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import (
     Verdict,
@@ -53,6 +54,8 @@ _SEVERAL = 3
 # names are wrong, and a law outside the catalogue is as likely beforehand as three effects at once.
 _OF_SEVERAL = 0.75
 _CLEARLY = 0.05  # of the gap: so much more a law must close than a doubtful name, or the name
+# Relative changes of one reading, as another unit of its column is.
+_GAINS = ('sinkage_gain', 'pull_gain', 'torque_gain', 'drivetrain_friction')
 # Odds for several names that close more than any law and leave noise alone, or for those that a law
 # says as well (chosen on seeds 3200 to 3209).
 _BEATS_LAW = 4.0
@@ -88,10 +91,9 @@ class Decision:
     beds_differ: float = 0.0  # probability that only the beds of the sweeps differ, where notable
 
     def unless(self, apart: Decision, probability: float) -> Decision:
-        """Return the decision where the beds of the sweeps may differ.
+        """Return ``apart``, the decision where beds differ, if that is the more probable one.
 
-        ``apart`` is the one if they do: it stands where it is the more probable one. Else the names
-        are less sure, and no law is proposed.
+        Else the names are less sure, and no law is proposed.
         """
         if not apart.verdict.left.accounted_for:
             return self  # nor do beds
@@ -116,8 +118,7 @@ class Decider:
     allowed_error: float  # model error that is no reason for doubt [share of the range]
     misread: Mapping[str, float | str] = field(default_factory=dict)  # as in the decision
     beds_differ: bool = False  # from sweep to sweep: unseen rows may be off by more than noise
-    # The best law beside each floor, soil held or not: it competes with doubtful names, or is
-    # proposed
+    # Best law beside each floor, soil held or not: it competes with names, or is proposed
     laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
 
     def decision(self) -> Decision:
@@ -186,8 +187,7 @@ class Decider:
     def _left_open(self, decision: Decision) -> Decision:
         """Return an open decision with a law, where one helps, and the soil plainly refitted.
 
-        A floor that stands for what is missing keeps the soil from following the rows: at operating
-        points that they do not have, the refit without one is nearer to the truth.
+        Without a floor, which keeps the soil from the rows, it is nearer to the truth elsewhere.
         """
         if decision.verdict.status not in OPEN:
             return decision
@@ -237,10 +237,7 @@ def _as_sure(names: tuple[Naming, ...], share: float) -> tuple[Naming, ...]:
 
 
 def _least(names: tuple[Naming, ...], odds: float = 1.0) -> float:
-    """Return the confidence of the least likely set of names.
-
-    What was not tried on purpose makes a name less sure, and is no reason to give none.
-    """
+    """Return the confidence of the least likely set of names, among what was tried."""
     return min(confidences.confidence(name.features, odds=odds).of_set for name in names)
 
 
@@ -255,7 +252,7 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
     for place, key in enumerate(fitted.names):
         values = confidences.features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
-        alike = known_alike(key, findings, known)
+        alike = known_alike(key, decision, known)
         values['alike'] = float(len(alike))
         alone = float(np.logaddexp.reduce(selection.log_joint[selection.index((key,))]))
         competitors = decision.verdict.ambiguity_groups[place]
@@ -264,14 +261,21 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
     return tuple(naming for _, naming in sorted(found, key=lambda item: -item[0]))
 
 
-def known_alike(name: str, findings: Findings, known: Mapping[str, Effect]) -> tuple[str, ...]:
-    """Return effects that are known to look like a name, might be named, and were not tried."""
+def known_alike(name: str, decision: Decision, known: Mapping[str, Effect]) -> tuple[str, ...]:
+    """Return what looks like a name and was not tried: effects, of a gain another unit."""
+    findings, fitted = decision.findings, decision.after
+    units = [
+        units_apart(min(known[c.owner].touches), 1.0 / (1.0 + float(c.value(u))))
+        for c, u in zip(fitted.coordinates, fitted.u, strict=True)
+        if c.unit == '-' and effect_of(c.owner) == effect_of(name) in _GAINS
+    ]
     on = set(findings.setting.forward.base_effects)
     own = known[effect_of(name)].confounded_with
     others = (o.base_name for o in known.values() if effect_of(name) in o.confounded_with)
     aside = {n for n, o in known.items() if not o.candidate or o.incompatible_with & on}
     names = dict.fromkeys((*own, *others))
-    return tuple(name for name in names if name not in aside and name not in findings.tried)
+    untried = [name for name in names if name not in aside and name not in findings.tried]
+    return (*untried, *(f'another unit of the column ({text})' for text in units if text))
 
 
 def _what_rows_show(

@@ -56,11 +56,11 @@ def render(
     proposal = _proposal(decision)
     gap_p_value = chi_square_p_value(decision.findings.nothing, decision.variance)
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
-    soil = _shifts(findings, after, variance, 'soil')
+    soil = _shifts(findings, after, 'soil')
     bed = words.another_bed(after)
     fresh = words.fresh_bed(decision.beds_differ, table)
     beds_first = decision.beds_differ > 0.5  # more likely than not
-    moved = (*soil, *_shifts(findings, after, variance, *setting.forward.base_effects))
+    moved = (*soil, *_shifts(findings, after, *setting.forward.base_effects))
     return Diagnosis(
         verdict=decision.verdict.status,
         sentence=words.sentence(decision, effects, gap_p_value, stretch, nearest),
@@ -96,9 +96,9 @@ def render(
             *words.own_beds(decision.beds_differ, table),
             *([bed] if bed else []),
             *words.alone(decision.gap),
-            *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
+            *words.untried({e.name: known_alike(e.name, decision, known) for e in effects}),
         ),
-        bed=_beds(findings, after, variance),
+        bed=_beds(findings, after),
         base_effects=tuple(configuration.effects),
         refitted=_parameters(after, base=True),
         along_rows=tuple(along),
@@ -155,8 +155,6 @@ def _parameters(
                 float(c.value(u)),
                 c.deviation(u, std),
                 c.unit,
-                float(c.value(c.lower)),
-                float(c.value(c.upper)),
                 c.meaning,
             )
     return found
@@ -170,8 +168,8 @@ def _proposal(decision: Decision) -> Proposal | None:
     base = _parameters(found.fit, base=True)
     return replace(
         found,
-        soil=_shifts(findings, found.fit, decision.variance, 'soil'),
-        bed=_beds(findings, found.fit, decision.variance),
+        soil=_shifts(findings, found.fit, 'soil'),
+        bed=_beds(findings, found.fit),
         refitted={key: value for key, value in base.items() if not key.startswith(f'{NAME}.')},
     )
 
@@ -250,12 +248,9 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
     return next_measurement.propose(findings.setting, after, competitors, noise)
 
 
-def _shifts(
-    findings: Findings, after: Fit, variance: FloatArray, *owners: str
-) -> tuple[SoilShift, ...]:
+def _shifts(findings: Findings, after: Fit, *owners: str) -> tuple[SoilShift, ...]:
     """Return the configured numbers of the soil, or of effects that were on, before and after."""
-    covariance = _covariance(after, variance)
-    found = []
+    covariance, found = after.covariance(), []
     for index, c in enumerate(after.coordinates):
         if c.owner not in owners or c.role != 'believed':
             continue
@@ -276,9 +271,9 @@ def _shifts(
     return tuple(found)
 
 
-def _beds(findings: Findings, after: Fit, variance: FloatArray) -> tuple[SoilShift, ...]:
+def _beds(findings: Findings, after: Fit) -> tuple[SoilShift, ...]:
     """Return soil numbers of the bed under diagnosis, ``before`` on that of the reference."""
-    covariance = _covariance(after, variance)
+    covariance = after.covariance()
     place = {c.key: k for k, c in enumerate(after.coordinates)}
     found = []
     for index, c in enumerate(after.coordinates):
@@ -300,8 +295,3 @@ def _beds(findings: Findings, after: Fit, variance: FloatArray) -> tuple[SoilShi
             )
         )  # fmt: skip
     return tuple(found)
-
-
-def _covariance(after: Fit, variance: FloatArray) -> FloatArray:
-    weighted = after.jacobian / variance[:, None]
-    return np.asarray(np.linalg.inv(weighted.T @ after.jacobian + np.diag(after.prior)))

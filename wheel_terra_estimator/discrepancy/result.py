@@ -28,13 +28,11 @@ OPEN = ('unexplained', 'undecided')  # verdicts for which a law may be proposed
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """A fitted parameter: ``value`` and ``std`` in ``unit``, with the bounds of the fit."""
+    """A fitted parameter: ``value`` and ``std`` in ``unit``."""
 
     value: float
     std: float
     unit: str
-    lower: float = field(default=-math.inf, metadata=_ASIDE)
-    upper: float = field(default=math.inf, metadata=_ASIDE)
     meaning: str = field(default='', metadata=_ASIDE)
 
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration, Readings
-from wheel_terra_estimator.discrepancy.decision import Decider, Decision
+from wheel_terra_estimator.discrepancy.decision import Decider
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
+    BED,
     base_coordinates,
     bed_coordinates,
     soil_coordinates,
@@ -23,7 +24,7 @@ from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
 from wheel_terra_estimator.discrepancy.selection.readings import Columns
-from wheel_terra_estimator.discrepancy.selection.search import search
+from wheel_terra_estimator.discrepancy.selection.search import apart, search
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
 from wheel_terra_estimator.discrepancy.tables.averaging import join
 from wheel_terra_estimator.discrepancy.tables.checks import (
@@ -74,12 +75,7 @@ def diagnose(
     if reference is not None:
         table, both, active = join(table, reference)
     points = operating_points(both.columns, configuration, both.name)
-    wheels, stated = configuration.wheels, configuration.stated
-    check_wheel_of_model(
-        both,
-        wheels.radius if 'wheels.radius' in stated else (),
-        wheels.width if 'wheels.width' in stated else (),
-    )
+    check_wheel_of_model(both, configuration)
     check_against_wheel(both, np.broadcast_to(points.wheel.radius, (len(both),)))
     known = catalogue()
     effects, not_tried = _effects_to_try(configuration, chosen, known)
@@ -99,22 +95,35 @@ def diagnose(
     floors = default_floors() if reference is None else shared_floors()
 
     findings = search(both, forward, nuisance, effects, floors)
-    misread: Mapping[str, float | str] = {}
-    if reference is None:  # its floors take any reading
-        columns = Columns(both, forward, nuisance, effects, findings, configured)
-        misread = columns.tens_off()
-        if chosen.effects is None:
-            misread = columns.misread() or misread
+    misread_in, tens_alone = '', chosen.effects is not None
+    columns = Columns(both, forward, nuisance, effects, findings, configured)
+    misread = columns.asked(tens_alone) if reference is None else {}
+    asked: dict[str, Mapping[str, float | str]] = {}
+    for part in (reference, table) if reference is not None else ():
+        # Each by itself: floors that both share take any reading.
+        points = operating_points(part.columns, configuration, part.name)
+        readings = Readings.of(configuration).true_on(part.true_rows)
+        rows = replace(forward, points=points, active=None, readings=readings)
+        size, believed = (
+            _check_soil_carries(part, rows),
+            tuple(c for c in nuisance if c.owner != BED),
+        )
+        for tried in ({}, effects):  # most are done with before any effect
+            own = search(part, rows, believed, tried, default_floors())
+            columns = Columns(part, rows, believed, tried, own, size, strictly=True)
+            asked[part.name] = columns.asked(tens_alone)
+            if not asked[part.name]:
+                break
+    if len(set(map(str, asked.values()))) > 1:  # what both show may be an error that they share
+        misread_in, misread = next((f'{name}: ', said) for name, said in asked.items() if said)
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
     if sweeps is not None and decision.verdict.status != 'agrees':
-        known_noise = replace(table, stated_std=findings.noise.std)
-        apart = search(known_noise, forward, nuisance, effects, floors, sweeps)
-        odds = math.exp(min(apart.selection.best - findings.selection.best, _MOST_ODDS))
+        parted = apart(findings, sweeps)
+        odds = math.exp(min(parted.selection.best - findings.selection.best, _MOST_ODDS))
         odds *= _BEDS_DIFFER / (1.0 - _BEDS_DIFFER)
         if odds > _UNLIKELY:
-            apart = replace(apart, noise=findings.noise)
-            other = Decider(table, both, apart, chosen.allowed_error, beds_differ=True).decision()
+            other = Decider(table, both, parted, chosen.allowed_error, beds_differ=True).decision()
             decision = decision.unless(other, odds / (1.0 + odds))
     notes: tuple[str, ...] = ()
     if decision.verdict.status in OPEN and reference is None and not misread:
@@ -131,12 +140,15 @@ def diagnose(
             # Its own form, free as well, is a competitor: what both explain is no other form.
             if len(again.names) == 1 and new and effect_of(new[0]) == name:
                 notes = (f'{name} is on in another form; the form named here takes its place',)
-                decision = _measured_from(again, decision)
+                before = {q: decision.gap[q].before for q in again.gap}  # as configured
+                gap = {q: replace(g, before=before[q]) for q, g in again.gap.items()}
+                curves = replace(again.curves, before=decision.curves.before)
+                decision = replace(again, gap=gap, curves=curves)
                 break
     diagnosis = render(table, both, configuration, decision)
     seconds = time.perf_counter() - started
-    notes = (*notes, *diagnosis.notes)
-    return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
+    notes, said = (*notes, *diagnosis.notes), f'{misread_in}{diagnosis.sentence}'
+    return replace(diagnosis, sentence=said, not_tried=not_tried, notes=notes, seconds=seconds)
 
 
 def _effects_to_try(
@@ -189,13 +201,6 @@ def _other_forms(forward: Forward, options: Options) -> dict[str, dict[str, Effe
         if len(forms) > 1 and name in (options.effects or (name,)):
             found[name] = forms
     return found
-
-
-def _measured_from(decision: Decision, configured: Decision) -> Decision:
-    """Return a decision whose gaps start from the model as configured in another one."""
-    gap = {q: replace(g, before=configured.gap[q].before) for q, g in decision.gap.items()}
-    curves = replace(decision.curves, before=configured.curves.before)
-    return replace(decision, gap=gap, curves=curves)
 
 
 def _check_soil_carries(table: SteadyTable, forward: Forward) -> FloatArray:

@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What changes along the rows: the soil of a drive, or residuals in the order of the rows.
 
-A stretch of a drive is weighed with a soil of its own. What changes with time, trial or direction
-of the sweep (a bed that compacts, a sensor that warms up) is no effect of any input, and is seen by
-nothing else; each test permutes the rows, so that it needs no law of the noise.
+What changes with time, trial or direction is no effect of any input; each test permutes the rows.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,26 +31,14 @@ _LEAST_ROWS = 4  # in a stretch and outside it
 _SURE = 5.0  # nats, the choice of the stretch paid for
 
 
-@dataclass(frozen=True)
-class Stretch:
-    """A stretch whose soil differs: times [s], factors there over elsewhere, nats gained."""
+class Stretch(NamedTuple):
+    """A stretch whose soil differs: in words, times [s], factor on stiffness, nats gained."""
 
+    text: str
     start: float
     end: float
     stiffness: float
-    friction: float
     gain: float
-
-    @property
-    def text(self) -> str:
-        """In words."""
-        grip = ''
-        if abs(self.friction - 1.0) > 0.05:
-            grip = f' and has {number(self.friction, 2)} times the friction coefficient'
-        return (
-            f'the soil changes along the way: from {self.start:.0f} to {self.end:.0f} s it is '
-            f'about {number(self.stiffness, 2)} times as stiff{grip} as on the rest of the drive'
-        )
 
 
 def changed_stretch(
@@ -78,8 +65,7 @@ def changed_stretch(
     pairs = np.einsum('mp,mn,nq->mnpq', columns, inverse, columns)
     mass = np.einsum('am,mnpq,bn->abpq', member, pairs, member, optimize=True)  # (T, T, 2, 2)
     rows = np.bincount(np.searchsorted(times, time), minlength=len(times))
-    best: Stretch | None = None
-    tried = 0
+    best, where, tried = -np.inf, (0, 0, np.zeros(2)), 0
     for first in range(len(times)):
         for last in range(first, len(times)):
             inside = int(rows[first : last + 1].sum())
@@ -92,15 +78,22 @@ def changed_stretch(
             change = np.linalg.solve(precision, force)
             gain = 0.5 * float(force @ change) - 0.5 * float(np.linalg.slogdet(precision)[1])
             gain -= 2.0 * np.log(_WIDTH)
-            if best is None or gain > best.gain:
-                stiffness, friction = (
-                    float(np.exp(fitted.coordinates[place[name]].scale * x))
-                    for name, x in zip(_FIELDS, change, strict=True)
-                )
-                best = Stretch(float(times[first]), float(times[last]), stiffness, friction, gain)
-    if best is None or best.gain - np.log(tried) < _SURE:
+            if gain > best:
+                best, where = gain, (first, last, change)
+    if not tried or best - np.log(tried) < _SURE:
         return None
-    return best
+    first, last, change = where
+    stiffness, friction = (
+        float(np.exp(fitted.coordinates[place[name]].scale * x))
+        for name, x in zip(_FIELDS, change, strict=True)
+    )
+    grip = f' and has {number(friction, 2)} times the friction coefficient'
+    text = (
+        f'the soil changes along the way: from {times[first]:.0f} to {times[last]:.0f} s it is '
+        f'about {number(stiffness, 2)} times as stiff{grip if abs(friction - 1.0) > 0.05 else ""} '
+        'as on the rest of the drive'
+    )
+    return Stretch(text, float(times[first]), float(times[last]), stiffness, best)
 
 
 _DRAWS = 2000

@@ -9,15 +9,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
-from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Descent, Fit
-from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
 from wheel_terra_estimator.discrepancy.result import Curves, QuantityGap
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.weights import Setting
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 
 GROUPS = 8
-_REFITS = 6  # steps of a fit without a group; it starts at the fit to all rows
+_REFITS = 7  # iterations of a fit without a group; it starts at the fit to all rows
 
 
 def slip_groups(table: SteadyTable) -> IndexArray:
@@ -33,57 +32,34 @@ def hold_out(
 ) -> list[FloatArray]:
     """Return the (N, 4) predictions of every fit, each row by parameters found without its group.
 
-    Rows of a negative group (a reference) always stay in. The parameters without a group are
-    fitted anew from those of all rows: soil numbers that few rows tell apart lie in a bent valley,
-    and some at a bound, where one linear step ends far from the best. What a reference shows of a
-    structural error is part of a prediction.
+    Rows of a negative group (a reference) always stay in; what they show of a structural error is
+    part of a prediction. Parameters are fitted anew: where soil numbers lie in a bent valley or at
+    a bound, one linear step ends far from the best.
     """
     problem = setting.problem
     inverse = (problem.rotation.T / variance) @ problem.rotation  # (m, m), without free parameters
     labels = np.unique(groups[groups >= 0])
     weights = [_without(inverse, np.flatnonzero(groups[problem.row] == k)) for k in labels]
-    tasks = [_Refit(problem, fitted, kept) for fitted in fits for kept in weights]
-    for _ in range(_REFITS):
-        going = [task for task in tasks if task.way.going]
-        if not going:
-            break
-        state = setting.forward.solve(
-            [task.fitted.coordinates for task in going],
-            [task.way.trial for task in going],
-            np.array([task.fitted.angle for task in going]),
-        )
-        for k, task in enumerate(going):
-            task.look(state.outputs[k], problem.flat(state.jacobian[k]))
+    tasks = [(fitted, kept) for fitted in fits for kept in weights]
+    ends = fit(
+        setting.forward,
+        problem,
+        [(fitted.names, fitted.coordinates) for fitted, _ in tasks],
+        [fitted.u for fitted, _ in tasks],
+        variance,
+        np.array([fitted.angle for fitted, _ in tasks]),
+        _REFITS,
+        [kept for _, kept in tasks],
+    )
     results = []
     for index, fitted in enumerate(fits):
         outputs = fitted.outputs.copy()
-        mine = tasks[index * len(labels) : (index + 1) * len(labels)]
-        unseen = setting.predicted([task.outputs for task in mine], variance)
+        mine = ends[index * len(labels) : (index + 1) * len(labels)]
+        unseen = setting.predicted([end.outputs for end in mine], variance)
         for label, values in zip(labels, unseen, strict=True):
             outputs[groups == label] = values[groups == label]
         results.append(outputs)
     return results
-
-
-class _Refit:
-    """One hypothesis fitted to the cells that are kept."""
-
-    def __init__(self, problem: Problem, fitted: Fit, kept: FloatArray) -> None:
-        self.fitted = fitted
-        self.way = Descent(fitted.coordinates, fitted.u)
-        self._problem = problem
-        self._kept = kept  # (m, m) inverse covariance of the kept cells, 0 at the others
-        self.look(fitted.outputs, fitted.sensitivity)
-
-    def look(self, outputs: FloatArray, sensitivity: FloatArray) -> None:
-        """Take the model at the trial point, if it is better, and choose the next one."""
-        residual = self._problem.wanted - self._problem.flat(outputs)
-        weighted = self._kept @ residual
-        if self.way.is_better(float(residual @ weighted)):
-            self.outputs = outputs
-            self._gradient = sensitivity.T @ weighted
-            self._precision = sensitivity.T @ self._kept @ sensitivity + np.diag(self.way.prior)
-        self.way.step(self._precision, self._gradient)
 
 
 def _without(inverse: FloatArray, out: IndexArray) -> FloatArray:

@@ -2,16 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Free parameters in coordinates whose prior is a standard normal.
 
-Soil parameters move under a prior that is wide on purpose: a soil number which is wrong by more
-than stated must not come out as a missing effect.
-
-How well each soil number is known: as stated, as the user says, or by the class of its source.
-
-A soil that somebody measured beside the wheel is known better than one out of a table of another
-laboratory, and that better than a proxy. The deviations of the classes of published numbers are the
-scatter between such numbers and the soils of ``config/soils/*_fit.yaml``, which were fitted to
-wheels (docs/diagnose.md); few fits, so that they are rounded and shared by numbers of one kind of
-test.
+Soil numbers move under a prior that is wide on purpose: one that is wrong by more than stated must
+not come out as a missing effect. How well each is known: as stated, as the user says, or by the
+class of its source, from the scatter of published numbers and fitted soils (docs/diagnose.md).
 """
 
 from __future__ import annotations

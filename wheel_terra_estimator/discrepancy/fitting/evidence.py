@@ -66,11 +66,8 @@ def evidence(
 ) -> Posterior:
     """Return the evidence of a fit for every floor.
 
-    Soil as good as stated or worse, and effects small or large, are weighed alike: each floor's
-    evidence is the mean over these scales of the priors.
-
-    ``believed_widths``: widths of the priors of configured numbers in units of their coordinates,
-    with their probabilities.
+    It is the mean over soil as good as stated or worse (``believed_widths``: widths of the priors
+    in units of their coordinates, with their probabilities), and effects small or large.
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u

@@ -106,13 +106,14 @@ def fit(
     variance: FloatArray,
     angles: FloatArray | None = None,
     iterations: int = 10,
+    kept: Sequence[FloatArray] | None = None,  # of each: inverse covariance (m, m) of what counts
 ) -> list[Fit]:
     """Fit all hypotheses to the cells; the variance is (m,), of the rotated axes.
 
     Each of the B hypotheses, (names, coordinates), has a start (P,), and entrance angles (N,) near
     its end.
     """
-    best: dict[int, Fit] = {}
+    best, pulls = dict[int, Fit](), dict[int, FloatArray]()
     ways = [Descent(h[1], start) for h, start in zip(hypotheses, starts, strict=True)]
     angle = None if angles is None else np.array(angles, dtype=float)
     for _ in range(iterations):
@@ -129,7 +130,11 @@ def fit(
         for index, b in enumerate(active):
             way, angle[b] = ways[b], state.angle[index]
             residual = problem.residual(state.outputs[index])
-            better = way.is_better(float(residual @ (residual / variance)))
+            weighted = residual / variance
+            if kept is not None:
+                residual = problem.wanted - problem.flat(state.outputs[index])
+                weighted = kept[b] @ residual
+            better = way.is_better(float(residual @ weighted))
             if better:
                 sensitivity = problem.flat(state.jacobian[index])
                 best[b] = Fit(
@@ -144,8 +149,13 @@ def fit(
                     way.objective,
                     way.prior,
                 )
-            gradient = best[b].jacobian.T @ (best[b].residual / variance)
-            step = way.step(best[b].precision(), gradient)
+                pulls[b] = weighted
+            here = best[b]
+            if kept is None:
+                step = way.step(here.precision(), here.jacobian.T @ pulls[b])
+            else:
+                precision = here.sensitivity.T @ kept[b] @ here.sensitivity + np.diag(here.prior)
+                step = way.step(precision, here.sensitivity.T @ pulls[b])
             if better and way.going:
                 slope = state.angle_slope[index] @ step
                 angle[b] = np.clip(state.angle[index] + slope, 2e-3, 1.5)
@@ -162,8 +172,7 @@ def _bounded_step(
 ) -> tuple[FloatArray, float]:
     """Return a damped step that stays inside the limits, and the fall that it should bring.
 
-    ``gradient`` points where the objective falls; ``prior`` is the part of the precision that is
-    known beforehand.
+    ``gradient`` points where the objective falls; ``prior`` is the prior's part of the precision.
     """
     lower, upper = limit
     damped = precision + damping * np.diag(np.diag(precision))

@@ -45,8 +45,7 @@ def stated_noise(
 ) -> Noise:
     """Return the stated deviations, those of repeats that scatter by more, a guess for the rest.
 
-    ``apart``: (N,) rows of other numbers do not repeat one another (another bed). Rows of a
-    ``reference`` (N,) have a scatter of their own.
+    ``apart``: (N,) rows of other numbers do not repeat one another; a ``reference`` has its own.
     """
     std, origin = table.stated_std.copy(), dict[str, str]()
     repeatability, scatter = dict[str, tuple[float, int]](), dict[str, tuple[float, int]]()
@@ -122,8 +121,8 @@ def estimate_noise(
 ) -> Noise:
     """Estimate what was neither stated nor repeated, beside soil and a smooth misfit.
 
-    The marginal likelihood of a Gaussian process (any amplitude) plus the soil's tangent space plus
-    white noise is maximised over the noise of each quantity, so that effects do not pass for noise.
+    The marginal likelihood of a smooth process, the soil's tangent space and white noise is
+    maximised over the noise of each quantity, so that effects do not pass for noise.
     """
     unknown = [q for q in range(len(QUANTITIES)) if noise.origin.get(QUANTITIES[q]) == 'estimated']
     best, std = dict.fromkeys(unknown, -np.inf), noise.std.copy()
@@ -191,9 +190,8 @@ def find_outliers(
 ) -> list[tuple[int, int, float]]:
     """Return (row, quantity, deviation) of the cells to be rejected, worst first.
 
-    Each cell is predicted from all others (soil, effects and a smooth error free); one at a time,
-    the cell that gains most from a twelve times larger noise is rejected. A hump or a ripple in
-    slip that all loads share competes with outliers: the evidence says which of the two it is.
+    One at a time, the cell that gains most from a twelve times larger noise is rejected, predicted
+    from all others. A hump or a ripple in slip that all loads share competes with outliers.
 
     ``problem`` has no cell rejected. Beside a small structural error one of ``amplitude`` is tried,
     (4,) per quantity [share of the range]; ``narrow`` (N, N) comes from `slip_features`.

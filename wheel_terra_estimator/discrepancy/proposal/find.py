@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Find a sparse law in the closures of the model, and judge it on what it was not fitted to.
 
-Terms (a target changed by a feature, see ``learned_closure``) are added one at a time, those with
-the greatest evidence beyond the length of their description first, soil and all terms refitted;
-then each is left out again. A product of two features says two of them. The law is
-proposed only where it predicts whole levels of an input (loads, lug heights, wheels, ...) that
-were left out better than the soil refit does.
+Terms (a target changed by a feature, see ``learned_closure``) are added one at a time, by evidence
+beyond the length of their description, soil and all terms refitted; then each is left out again.
+The law is proposed only where it predicts whole levels of an input that were left out better than
+the soil refit does.
 """
 
 from __future__ import annotations
@@ -252,9 +251,8 @@ def gain_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
     """Return the nats that the best term of an unlisted law promises on top of a fit.
 
     Near zero where the fit leaves noise alone; several nats where what is left has the shape of
-    some closure, so that the named effect is not the whole truth, or not the truth. Bands of slip,
-    products and a bent reading are left out: the confidence that this is a feature of was fitted
-    without.
+    some closure. The confidence that this is a feature of was fitted without bands of slip,
+    products and a bent reading.
     """
     late = {*BANDS, *BENT_READING, *PRODUCTS}
     found = {name: term for name, term in _terms(table).items() if pair_of(name)[1] not in late}

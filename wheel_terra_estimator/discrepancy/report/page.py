@@ -125,10 +125,7 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _parameter(name: str, item: FittedParameter) -> str:
-    value = with_unit(f'{number(item.value)} ± {number(item.std, 2)}', item.unit)
-    reach = item.upper - item.lower
-    end = np.isfinite(reach) and min(item.value - item.lower, item.upper - item.value)
-    return f'{name} = {value}{" (at its bound)" if end is not False and end < 1e-3 * reach else ""}'
+    return with_unit(f'{name} = {number(item.value)} ± {number(item.std, 2)}', item.unit)
 
 
 def _proposed(item: NextMeasurement) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
+from wheel_terra_estimator.arrays import BoolArray, IndexArray
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, axis_label, plain, with_unit
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
@@ -17,7 +17,6 @@ from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.reporting.style import INK, LINE_COLOURS, NOISE_COLOUR, picture_style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -29,7 +28,6 @@ SHOWN_INPUT = {
     'leaving_angle': (180.0 / np.pi, 'deg'),
 }
 RED = LINE_COLOURS[1]
-COLOUR_MAP = 'viridis'
 # Levels differ in brightness and in shape as well, for the colour-blind and for grey prints.
 _DISCRETE = ('#E69F00', '#009E73', '#0072B2', '#7B4FA3', '#111111', '#D55E00')
 _SHAPES = 'os^Dv<'
@@ -119,6 +117,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
         stages.append((_last(diagnosis), curves.after))
     factor, unit = shown_input(colour_by)
     slip, colour = table.columns['slip'], factor * table.columns[colour_by]
+    order = np.argsort(slip)
     few = np.unique(np.round(colour[np.isfinite(colour)], 9))
     discrete = len(few) <= 5
     texts = [with_unit(f'{plain(colour_by)} {value:.3g}', unit) for value in few]
@@ -131,7 +130,10 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
             error = [scale * (table.measured[:, q] - values[:, q]) for _, values in stages]
             reach = 1.12 * max(float(np.nanmax(np.abs(e[~outside]))) for e in error)
             for axis, (title, _), residual in zip(row, stages, error, strict=True):
-                _band(axis, slip, 2 * scale * curves.band[:, q])
+                half = 2 * scale * curves.band[order, q]
+                known, bare = np.isfinite(half), {'color': NOISE_COLOUR, 'lw': 0, 'zorder': 0}
+                axis.fill_between(slip[order][known], -half[known], half[known], **bare)
+                axis.axhline(0.0, color=INK, lw=0.8)
                 if discrete:
                     for value, shade, shape in zip(few, _DISCRETE, _SHAPES, strict=False):
                         chosen = ~outside & np.isclose(colour, value)
@@ -142,7 +144,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
                         residual[~outside],
                         c=colour[~outside],
                         s=17,
-                        cmap=COLOUR_MAP,
+                        cmap='viridis',
                         vmin=np.nanmin(colour),
                         vmax=np.nanmax(colour),
                     )
@@ -206,14 +208,6 @@ def _legend(figure: Figure, handles: Any, labels: Any, place: Any = 'upper left'
     bottom += share if place == 'lower left' else 0.0
     engine.set(rect=(left, bottom, width, height - share))
     figure.legend(handles, labels, loc=place, ncols=columns, columnspacing=1.4, handletextpad=0.4)
-
-
-def _band(axis: Axes, slip: FloatArray, half: FloatArray) -> None:
-    """Shade plus and minus ``half`` around zero."""
-    order = np.argsort(slip)
-    order = order[np.isfinite(half[order])]
-    axis.fill_between(slip[order], -half[order], half[order], color=NOISE_COLOUR, lw=0, zorder=0)
-    axis.axhline(0.0, color=INK, lw=0.8)
 
 
 def _last(diagnosis: Diagnosis) -> str:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Mapping
 
@@ -12,7 +11,6 @@ import numpy as np
 from scipy.special import chdtrc
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.configuration.column_map import UNITS
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
@@ -38,7 +36,7 @@ from wheel_terra_estimator.discrepancy.result import (
     QuantityGap,
     SoilShift,
 )
-from wheel_terra_estimator.discrepancy.selection.readings import BY_RIM, BY_SPEED
+from wheel_terra_estimator.discrepancy.selection.readings import BY_RIM, BY_SPEED, units_apart
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import (
     IMPROBABLE,
@@ -52,7 +50,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     QUANTITIES,
     SteadyTable,
 )
-from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
@@ -64,7 +61,6 @@ FACTORS = {
 }
 # Inputs that tell effects apart, in the order of how easily a rig varies them.
 _WORTH_VARYING = ('normal_load', 'lug_height')
-_SAME_FACTOR = 0.03  # between two units: a factor of ten, or that of a kilopond
 _SURE = 2.0  # deviations, after the fit
 _SHARED = 1.5  # times the error on unseen rows: more on seen ones is not in the model
 _USUAL_OF_BEDS = 3.0  # deviations of ``BED_SCATTER``
@@ -178,8 +174,6 @@ def why_not(
     behind = float(totals[verdict.index] - totals[index])
     if {effect_of(key) for key in names} == {effect_of(key) for key in chosen}:
         return f'another form of the same: {behind:.1f} nats behind'
-    if not names:
-        return f'leaves a gap: {behind:.1f} nats behind {joined(sorted(chosen))}'
     open_names = {name for competitors in verdict.ambiguity_groups for name in competitors}
     if len(names) == len(chosen) and set(names) - chosen <= open_names:
         return f'cannot be told apart on these rows ({behind:.1f} nats behind)'
@@ -344,10 +338,10 @@ def _swept(table: SteadyTable) -> str:
 
 
 def untried(alike: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Return remarks on effects that look like a named one and were not tried."""
+    """Return remarks on what looks like a named effect and was not tried."""
     return tuple(
-        f'{", ".join(others)} {"looks" if len(others) == 1 else "look"} like {name} and '
-        f'{"was" if len(others) == 1 else "were"} not tried: the confidence leaves room for that'
+        f'{name} may be {" or ".join(others)} as well, which was not tried: the confidence leaves '
+        'room for that'
         for name, others in alike.items()
         if others
     )
@@ -369,16 +363,10 @@ def wrong_columns(misread: Mapping[str, float | str]) -> str:
             looks, remedy = _SLIPS[times]
             parts.append(f'the {name} looks as if it {looks} ({remedy})')
             continue
-        units = UNITS[unit_of(name)]
-        usual = ' (of one wheel or of a pair?)' if name == 'normal_load' else ''
-        alike = (
-            f' ({found} in place of {said})'
-            for said, found in itertools.product(units, units)
-            if abs(math.log(units[found] / units[said] / times)) < _SAME_FACTOR
-        )
-        parts.append(
-            f'the unit of {plain(name)} looks wrong{next(alike, usual)}, times {times:.4g}'
-        )
+        usual = 'of one wheel or of a pair?' if name == 'normal_load' else ''
+        which = units_apart(name, times) or usual
+        aside = f' ({which})' if which else ''
+        parts.append(f'the unit of {plain(name)} looks wrong{aside}, times {times:.4g}')
     text = ' and '.join(parts)
     return (
         f'{text[0].upper()}{text[1:]}: so the rows are explained far better than by any effect. '

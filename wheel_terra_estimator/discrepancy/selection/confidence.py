@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How sure the name is: a map from posterior weights to frequencies, fitted on campaigns.
 
-The posterior of a model family that is never quite right is too sure of itself. A logistic map of
-few features, fitted on synthetic campaigns that include other formulas, structural error, outliers,
-unknown noise and unlisted effects, brings it to the frequency with which such names are right.
+The posterior of a model family that is never quite right is too sure of itself. A logistic map,
+fitted on campaigns with other formulas, structural error, outliers, unknown noise and unlisted
+effects, brings it to the frequency with which such names are right.
 """
 
 from __future__ import annotations

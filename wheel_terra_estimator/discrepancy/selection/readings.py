@@ -8,6 +8,7 @@ likelier, a column is asked for and nothing is named.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -31,10 +32,27 @@ _FLOOR_NEEDED = 0.8  # probability of a structural error from which soil alone d
 _FORCES = [times for f in (9.80665, 4.4482216) for times in (f, 1.0 / f)]  # kgf, lbf; or N as these
 _LOADS = (0.5, 2.0, *_FORCES)  # of a pair of wheels, or one of it
 _LIKE_MODEL = math.log(3.0)  # a reading must come so near to the size that the model gives
+_NEAR = math.log(
+    2.0
+)  # a unit so near to the usual one is a gain as well (``decision.known_alike``)
 _ROUGH = 0.03  # floor beside which readings are ranked [share of the range]
 _TRIED = 2  # best of them that are weighed
 _LEAST_CHANGE = 4e-4  # of a slip by another rule [-]: that of a slip of 2 %
+_SAME = 0.03  # between two units: a factor of ten, or that of a kilopond
 BY_SPEED, BY_RIM = 'r w/v - 1', '1 - v/(r w)'
+
+
+def units_apart(column: str, times: float) -> str:
+    """Return which unit in place of which would be so many times as large; empty: none."""
+    units = UNITS[unit_of(column)]
+    pairs = itertools.permutations(units, 2)
+    alike = (
+        f'{found} in place of {said}'
+        for said, found in pairs
+        if abs(math.log(units[found] / units[said] / times)) < _SAME
+        if units[found] != units[said]
+    )
+    return next(alike, '')
 
 
 @dataclass(frozen=True)
@@ -57,16 +75,20 @@ class Columns:
     effects: Mapping[str, Effect]
     findings: Findings
     configured: FloatArray  # (N, 4) values of the configured model
+    strictly: bool = False  # only what leaves a soil that can be believed
+
+    def asked(self, tens_alone: bool) -> Mapping[str, float | str]:
+        """Return what to ask for: other readings, else (or alone) powers of ten."""
+        tens = self.tens_off()
+        return tens if tens_alone else self.misread() or tens
 
     def tens_off(self) -> dict[str, float | str]:
         """Return quantity -> power of ten that it lacks, where the rows are then far likelier.
 
         Only those more than half a decade off the model's size. Where all are, it is no unit.
         """
-        found: dict[str, float] = {}
-        for quantity, size, due in self._sizes():
-            if decades := round(math.log10(due / size)):
-                found[quantity] = 10.0**decades
+        decades = {quantity: round(math.log10(due / size)) for quantity, size, due in self._sizes()}
+        found = {quantity: 10.0**power for quantity, power in decades.items() if power}
         if len(found) == len(self.table.quantities):
             return {}
         said: dict[str, float | str] = {}
@@ -86,14 +108,18 @@ class Columns:
         """
         setting, selection = self.findings.setting, self.findings.selection
         as_they_are = remainder(selection, selection.nothing, setting.problem)
-        far = as_they_are.probability_of_any > _FLOOR_NEEDED or not (
-            as_they_are.only_far or as_they_are.accounted_for
+        far = not self.strictly and (
+            as_they_are.probability_of_any > _FLOOR_NEEDED
+            or not (as_they_are.only_far or as_they_are.accounted_for)
         )
         count = len(selection.explanations[0].names)
         for reading in self._likeliest():
-            density = self._density(reading)
+            density, alone = self._density(reading), -math.inf
             for tried in ({}, self.effects)[: 2 if density or count > 1 else 1]:
+                if tried and alone + density < selection.best_single:
+                    break  # what is read wrongly says more than any one effect
                 found = self._explained(reading, tried)
+                alone = found.selection.best
                 verdict = choose(found.selection, found.setting.problem)
                 fits = verdict.status == 'agrees' or (far and verdict.left.only_far)
                 if tried:  # effects beside it: fewer than without it, and nothing is left
@@ -147,7 +173,10 @@ class Columns:
     def _readings(self) -> Iterator[Reading]:
         """Yield what the columns may hold."""
         table, points, one = self.table, self.forward.points, np.ones(len(QUANTITIES))
+        torque = {q: due / size for q, size, due in self._sizes()}.get('torque')
         for times in _LOADS:
+            if torque and abs(math.log(times * torque)) > _LIKE_MODEL:
+                continue  # it grows in proportion
             other = replace(points, normal_load=times * points.normal_load)
             yield Reading({'normal_load': times}, table, other, one)
             if times in _FORCES and 'drawbar_pull' in table.quantities:
@@ -156,7 +185,8 @@ class Columns:
         for quantity, size, due in self._sizes():
             units = UNITS[unit_of(quantity)].values()
             for times in {*units, *(1.0 / f for f in units)}:
-                if times != 1.0 and abs(math.log(times * size / due)) < _LIKE_MODEL:
+                near = abs(math.log(times)) < _NEAR
+                if not near and abs(math.log(times * size / due)) < _LIKE_MODEL:
                     yield _scaled({quantity: times}, table, points)
         if table.true_rows.any():
             return  # slips of a drive are our own

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -55,6 +56,7 @@ _CELLS = 8  # measured cells for each effect of a set, at least
 _FIRST_SEEDS = 4  # best single effects to which a second one is added
 _SEEDS = 3  # sets of each size to which one effect more is added
 _BEHIND = 3.0  # nats behind the best of all, up to which that is done
+_KEPT = 30  # best sets that are weighed again, where beds differ
 _ROUNDS = 2  # of adding and swapping
 _NEAR = 2.0  # nats behind the best one, up to which that is done
 _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
@@ -71,6 +73,7 @@ class Findings:
     not_visible: Mapping[str, str]  # effect -> reason
     noise: Noise
     outliers: Outliers
+    builder: _Builder
     # Effects that might have been named, seen or not, and those that were on already
     tried: frozenset[str] = frozenset()
 
@@ -81,16 +84,11 @@ def search(
     nuisance: tuple[Coordinate, ...],
     effects: Mapping[str, Effect],
     floors: tuple[Floor, ...],
-    # (N,) bed of each row, where beds differ as they usually do: an error that their rows share
-    beds: IndexArray | None = None,
 ) -> Findings:
     """Find noise, outliers and the weights of all explanations by effects that may be named."""
     builder = _Builder(table, forward, nuisance)
     noise = noises.stated_noise(table, builder.scale, builder.trials, builder.reference)
     problem, nothing = builder.fit_nothing(noise.std, (), None)
-    for each in () if beds is None else (beds, beds):  # one bed may end far from where several do
-        builder.part_beds(each, problem, nothing)
-        problem, nothing = builder.fit_nothing(noise.std, (), nothing)
     if (table.slip_std > 0.0).any():
         builder.linearise(nothing, noise.std)
         problem, nothing = builder.fit_nothing(noise.std, (), nothing)
@@ -137,8 +135,30 @@ def search(
         _not_visible(reasons, found, selection),
         noise,
         tuple(outliers),
+        builder,
         frozenset(map(effect_of, (*effects, *forward.base_effects))),
     )
+
+
+def apart(findings: Findings, beds: IndexArray) -> Findings:
+    """Weigh the best explanations once more, where beds differ as they usually do.
+
+    ``beds``: (N,) bed of each row, an error that its rows share.
+    """
+    builder, setting = copy(findings.builder), findings.setting
+    nothing, std = findings.nothing, findings.noise.std
+    for _ in range(2):  # one bed may end far from where several do
+        builder.part_beds(beds, setting.problem, nothing)
+        setting = replace(setting, problem=builder.build(std, findings.outliers))
+        nothing = setting.fit([()], [nothing.u], nothing.angle)[0]
+    ranked = enumerate(e.fitted for e in findings.selection.explanations)
+    best = [f for place, f in ranked if len(f.names) == 1 or (f.names and place < _KEPT)]
+    fits = setting.fit(
+        [f.names for f in best], [f.u for f in best], np.array([f.angle for f in best])
+    )
+    explanations = [setting.explain(f) for f in (nothing, *fits)]
+    selection = weigh(explanations, setting.floors, setting.effects)
+    return replace(findings, setting=setting, nothing=nothing, selection=selection)
 
 
 def _not_visible(
@@ -170,8 +190,7 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
 
     A set that costs more than it gains may lead to one that gains, so that sets some nats behind
     are gone on from as well. Then each effect of the best set is left out, and others are put in
-    its place; where that changes it, once more from there. The best sets are those that would be
-    if no misfit asked for a name, though none of them may be good enough yet.
+    its place; where that changes it, once more. The best are those if no misfit asked for a name.
     """
     starts = [start for _, start in linear_starts(setting, nothing, tuple(setting.effects))]
     singles = [setting.explain(nothing), *explained(setting, starts)]
@@ -185,7 +204,8 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
             extended |= {e.names for e in seeds}
             selection = _joined_by(setting, selection, explain_more(setting, seeds))
             single = len(selection.explanations[0].names) < 2
-            if single and selection.misfit < MISFIT and not _seeds(selection, 2):
+            misfit = float(selection.probability[:, selection.unexplained].sum())
+            if single and misfit < MISFIT and not _seeds(selection, 2):
                 return selection  # one effect or none is enough, and no two come near it
             seeds = [e for e in _seeds(selection, size + 1) if e.names not in extended]
         before = selection.without_misfit(1)[0][1].names

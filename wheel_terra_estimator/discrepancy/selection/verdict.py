@@ -84,8 +84,8 @@ def remainder(selection: Selection, index: int, problem: Problem) -> Remainder:
 def chi_square_p_value(fitted: Fit, variance: FloatArray) -> float:
     """P-value of the whole misfit, parameters and their priors integrated out.
 
-    Under the hypothesis, residual and the soil's prior pull together are chi-square with one degree
-    of freedom per cell, however many soil parameters were fitted; an effect's strength takes one.
+    Residual and the soil's prior pull together are chi-square with one degree of freedom per cell,
+    however many soil parameters were fitted; an effect's strength takes one.
     """
     target = fitted.residual + fitted.jacobian @ fitted.u
     weighted = fitted.jacobian / variance[:, None]
@@ -100,8 +100,7 @@ def largest_z_score(fitted: Fit) -> float:
     """Return the largest shift of a configured number in its stated deviations; 0 if none is free.
 
     Soil numbers and parameters of effects that are on: a fit may hide what is missing in either. A
-    sum over all numbers would dilute one huge shift, by which an effect outside the catalogue that
-    works like another soil (friction that softens with slip) shows itself.
+    sum would dilute one huge shift, by which an unlisted effect that works like another soil shows.
     """
     believed = zip(fitted.coordinates, fitted.u, strict=True)
     return max((abs(c.stated * float(u)) for c, u in believed if c.role == 'believed'), default=0.0)

@@ -12,7 +12,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -87,7 +87,7 @@ class Setting:
             return []
         weights = self.problem.variance(FIT_FLOOR) if variance is None else variance
         angles = None if angle is None else np.broadcast_to(angle, (len(sets), angle.shape[-1]))
-        return fit(
+        fits = fit(
             self.forward,
             self.problem,
             [(names, self.coordinates(names)) for names in sets],
@@ -96,6 +96,9 @@ class Setting:
             angles,
             iterations,
         )
+        for fitted in fits:
+            _end_at_no_cohesion(fitted)
+        return fits
 
     def predicted(self, outputs: Sequence[FloatArray], variance: FloatArray) -> FloatArray:
         """(K, N, 4) outputs with the structural error that a reference shows beside each."""
@@ -111,6 +114,19 @@ class Setting:
         """Weigh a fit."""
         posterior = evidence(self.problem, fitted, self.floors, self.believed_widths)
         return Explanation(fitted, posterior, float(log_sum(posterior.log_joint)))
+
+
+def _end_at_no_cohesion(fitted: Fit) -> None:
+    """Raise a ``cohesion.delta`` that takes more than there is to what there is: all the same."""
+    place = {c.key: k for k, c in enumerate(fitted.coordinates)}
+    if 'cohesion.delta' in place and 'soil.cohesion' in place:
+        soil, change = place['soil.cohesion'], place['cohesion.delta']
+        left = float(fitted.coordinates[soil].value(fitted.u[soil]))
+        own = fitted.coordinates[change]
+        if fitted.u[change] < (end := own.coordinate(-left)):
+            fitted.u[change], bounded = end, list(fitted.coordinates)
+            bounded[change] = replace(own, lower=end)
+            fitted.coordinates = tuple(bounded)
 
 
 Start: TypeAlias = tuple[tuple[str, ...], FloatArray, FloatArray]
@@ -169,8 +185,7 @@ def _strength_responses(
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Return outputs (N, 4) and their derivative (N, 4, 1) by strength of each.
 
-    Terms of a sparse law have nothing but a strength, so that all of them stand in one model side
-    by side.
+    Terms of a sparse law have nothing but a strength: all stand in one model side by side.
     """
     fixed = len(base.u)
     if all(setting.effects[name].sparse for name, _, _ in trials):
@@ -253,6 +268,12 @@ class Selection:
         return float(log_sum(self.log_joint[0]))
 
     @property
+    def best_single(self) -> float:
+        """The same of the best one of at most one effect."""
+        few = [len(e.names) < 2 for e in self.explanations]
+        return float(log_sum(self.log_joint[few], axis=1).max())
+
+    @property
     def nothing(self) -> int:
         """Place of the explanation without an effect."""
         return self.index(())
@@ -260,11 +281,6 @@ class Selection:
     def quiet_floor(self, index: int) -> int:
         """Return the place of an explanation's best floor among those that ask for no name."""
         return int(np.argmax(np.where(self.unexplained, -np.inf, self.log_joint[index])))
-
-    @property
-    def misfit(self) -> float:
-        """Posterior probability that a misfit is left that asks for a name."""
-        return float(self.probability[:, self.unexplained].sum())
 
     def without_misfit(self, count: int) -> list[tuple[float, Explanation]]:
         """Return the best explanations, were there no such misfit, with their log weights."""

@@ -1,10 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Long tables averaged over neighbouring inputs; several tables, or one and a reference, as one.
-
-In a reference the effect in question is absent: both tables are fitted as one. Soil and structural
-error are shared by all rows, candidate effects act on the rows under diagnosis only.
-"""
+"""Long tables averaged over neighbouring inputs; several tables, or one and a reference, as one."""
 
 from __future__ import annotations
 
@@ -34,9 +30,8 @@ def averaged(table: SteadyTable, most: int) -> SteadyTable:
     """Return the table averaged over cells of neighbouring inputs, at most ``most`` of them.
 
     The cells halve the widest input of the fullest cell over and over, between two of its values
-    (k-d tree), so levels of a design stay apart as long as there are cells for them. Rows that
-    lack different columns are not mixed. Readings further from the median of their cell than
-    `_FAR` robust deviations, pooled over the cells, are left out; a deviation is that of the mean.
+    (k-d tree): levels stay apart as long as there are cells. Rows that lack different columns are
+    not mixed; readings further than `_FAR` from the median of their cell are left out.
     """
     names = list(table.columns)
     inputs = np.column_stack([table.columns[name] for name in names])

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
+from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.tables.averaging import MINIMUM_ROWS, MOST_ROWS, averaged
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_COLUMNS,
@@ -21,8 +22,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
 )
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
-
-Mask = BoolArray
 
 MINIMUM_SLIP_SPAN = 0.1
 MINIMUM_LOAD_RATIO = 1.5
@@ -144,7 +143,7 @@ def _refuse(
     lines: IndexArray,
     column: str,
     values: FloatArray,
-    bad: Mask,
+    bad: BoolArray,
     why: str | Callable[[int], str],
 ) -> None:
     """Raise where rows are bad: the first of them, its value, and why (of that row)."""
@@ -158,7 +157,7 @@ def _refuse(
 def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray) -> None:
     """Raise where a value is impossible, with the unit that it looks like."""
 
-    def refuse(bad: Mask, column: str, why: str) -> None:
+    def refuse(bad: BoolArray, column: str, why: str) -> None:
         _refuse(name, lines, column, arrays[column], bad, why)
 
     if not arrays['slip'].size:
@@ -196,7 +195,11 @@ def _check_signs(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray)
     """Raise where torque works against the slip, or where most sinkages are negative."""
 
     def refuse_most(
-        column: str, wrong: Mask, clear: Mask, why: str | Callable[[int], str], least: int = 1
+        column: str,
+        wrong: BoolArray,
+        clear: BoolArray,
+        why: str | Callable[[int], str],
+        least: int = 1,
     ) -> None:
         """Refuse what is wrong in most of the rows that are clear."""
         if wrong.sum() >= least and wrong.sum() > 0.8 * clear.sum():
@@ -271,23 +274,19 @@ def _check_dead_columns(table: SteadyTable, remarks: list[str]) -> None:
         )
 
 
-def check_wheel_of_model(
-    table: SteadyTable, radius: Sequence[float] | FloatArray, width: Sequence[float] | FloatArray
-) -> None:
-    """Raise where the table names another wheel than the model file.
-
-    ``radius`` and ``width`` are what that file states of its wheels [m]; empty = nothing.
-    """
-    for column, stated in (('wheel_radius', radius), ('wheel_width', width)):
-        if column not in table.columns or not len(stated):
+def check_wheel_of_model(table: SteadyTable, configuration: Configuration) -> None:
+    """Raise where the table names another wheel than the model file does."""
+    for column in ('wheel_radius', 'wheel_width'):
+        key = column.removeprefix('wheel_')
+        stated = getattr(configuration.wheels, key)
+        if column not in table.columns or f'wheels.{key}' not in configuration.stated:
             continue
         values = table.columns[column]
         ratio = np.abs(np.log(values[:, None] / np.asarray(stated, dtype=float)[None, :]))
         if not (ratio < np.log(LIKE_WHEEL)).any():
-            key = f'wheels.{column.removeprefix("wheel_")}'
             other = (
-                f'm, but the model file states {stated[0]:g} m ({key}); give the --config of this '
-                'wheel, or mend the column'
+                f'm, but the model file states {stated[0]:g} m (wheels.{key}); give the --config '
+                'of this wheel, or mend the column'
             )
             _refuse(table.name, table.lines, column, values, np.isfinite(values), other)
 
