@@ -7,12 +7,11 @@ import json
 import os
 import resource
 import signal
-import time
 from pathlib import Path
 
 import pytest
 import ros_types as ros
-from test_estimator_node import ROVER, hear, wheel_message
+from test_estimator_node import ROVER, hear
 
 from wheel_terra_estimator import output_folder
 from wheel_terra_estimator.configuration import reader
@@ -168,27 +167,6 @@ def test_a_place_that_takes_no_file_is_told_at_the_start(start, parameters, list
     process = start('estimator_node', *ROVER, parameters, '-p', f'soil_file:={path}')
     until(lambda: any(f'soil_file: {path}: ' in m.status[0].message for m in said))
     process.stop(signal.SIGINT)
-
-
-def test_the_soil_is_saved_though_messages_keep_the_timers_waiting(listener, parameters, path):
-    """An executor that is short of processor time may leave the timers out for minutes."""
-    from rclpy.serialization import serialize_message
-
-    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
-
-    arguments = [*ROVER, parameters, '-p', f'soil_file:={path}']
-    estimator = EstimatorNode(context=listener[0].context, cli_args=arguments)
-    try:
-        start = estimator._started
-        for i in range(240):
-            estimator._seconds = lambda now=start + 0.05 * i: now
-            message = wheel_message(reader.load(['pathfinder']).wheels.names, 100.0 + 0.05 * i)
-            came = {'received_timestamp': time.time_ns() - 1_000_000_000, 'source_timestamp': 0}
-            estimator._arrive('joint_states', serialize_message(message), came)
-            assert not (path.exists() and i < 200), f'{0.05 * i} s'
-        assert path.exists()
-    finally:
-        estimator.destroy_node()
 
 
 @pytest.mark.parametrize('name', ['soil_file', 'record_arrival'])

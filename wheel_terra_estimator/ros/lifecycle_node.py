@@ -63,6 +63,7 @@ MESSAGE_TYPES = {topic: _message_class(name) for topic, name in INPUT_TYPES.item
 
 WATCH_PERIOD = 0.25  # [s]
 BEHIND = 500_000_000  # [ns] that a message waited, from which on this process is behind
+OVERLOADED = 'left out: this process cannot keep up'
 DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
 SILENCE = 1.5  # [s] of the steady clock without a set
 START = 1.0  # [s] in which the node says what it waits for, and not what is missing
@@ -219,6 +220,7 @@ class EstimatorNode(LifecycleNode):
         self._started = self._seconds()
         self._set_at = self._diagnostics_at = -math.inf
         self._saved_at = self._started
+        self._overloaded = False
         self._rejected: Counter[tuple[str, str]] = Counter()  # while sets still flowed
         self._incompatible: dict[str, str] = {}
         self._numbered: set[str] = set()
@@ -292,18 +294,32 @@ class EstimatorNode(LifecycleNode):
             self._hear(topic, data, info)
 
     def _catch_up(self, *taken_before: _Message) -> None:
-        """Take all that waits in the queues in the order in which it came: no topic runs ahead."""
-        taken = list(taken_before)
+        """Take all that waits in the queues in the order in which it came: no topic runs ahead.
+
+        A process that took longer for the last of it than it came in cannot keep up, and estimates
+        of long ago help nobody: of the frequent topics it takes what came last.
+        """
+        taken = [(self._came(info), topic, data, info) for topic, data, info in taken_before]
         for topic, subscription in self._subscriptions_made.items():
             with subscription.handle:
                 while found := subscription.handle.take_message(subscription.msg_type, True):
-                    taken.append((topic, *found))
-        # When a message came to this process [ns], or where that is unknown when it was sent.
-        taken.sort(key=lambda each: each[2]['received_timestamp'] or each[2]['source_timestamp'])
-        for topic, data, info in taken:
-            self._hear(topic, data, info)
+                    taken.append((self._came(found[1]), topic, *found))
+        if not taken:
+            return
+        taken.sort(key=lambda each: each[0])
+        begun, first, last = self._seconds(), taken[0][0], taken[-1][0]
+        for came, topic, data, info in taken:
+            left_out = self._overloaded and topic in FREQUENT and came < last - BEHIND
+            self._hear(topic, data, info, OVERLOADED if left_out else '')
+        waited = min(last - first, BEHIND) if self._overloaded else last - first
+        self._overloaded = waited > 0 and (self._seconds() - begun) * _SECOND > waited
 
-    def _hear(self, topic: str, data: bytes, info: dict[str, Any]) -> None:
+    @staticmethod
+    def _came(info: dict[str, Any]) -> int:
+        """Return when a message came here [ns], or where that is unknown when it was sent."""
+        return int(info['received_timestamp'] or info['source_timestamp'])
+
+    def _hear(self, topic: str, data: bytes, info: dict[str, Any], refused: str = '') -> None:
         pipeline = self._pipeline
         if pipeline is None:
             return  # was in the queue when the node was cleaned up
@@ -312,13 +328,16 @@ class EstimatorNode(LifecycleNode):
         except DamagedMessageError:
             pipeline.refuse(topic, DAMAGED)
             return
-        self._arrival.write(f'{topic} {message.stamp}')
         now = self._seconds()
         number = info.get('publication_sequence_number') if topic in self._numbered else None
         clock = self._nanoseconds()  # 0: none has come yet
         self._watch_inputs.heard(
             topic, now, (clock - message.stamp) / _SECOND if clock else 0.0, number
         )
+        if refused:
+            pipeline.refuse(topic, refused)
+            return
+        self._arrival.write(f'{topic} {message.stamp}')
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)
         if topic not in FREQUENT:  # often late: run through now, the next set is there sooner
