@@ -304,6 +304,18 @@ def test_a_sign_that_is_there_keeps_the_warning():
     assert 30 <= next(i for i, a in enumerate(free) if not a.stuck) <= 32
 
 
+def test_an_entrapment_is_in_sight_for_as_long_as_the_warning_expects_it():
+    """Slip of 0.95, then 0.7 on the same slope: the warning stands; then the rover backs out."""
+    monitor = StuckMonitor(SETTINGS)
+    held(monitor, [wheel(0.95)] * 4, 15.0, speed=0.0025, speed_known=True)
+    stands = held(monitor, [wheel(0.7)] * 4, 5.0, start=15.0, speed=0.015, speed_known=True)
+    for ahead in stands[-1].wheels:
+        assert ahead.travel <= 0.05 * SETTINGS.horizon and ahead.time <= SETTINGS.horizon
+    back = [wheel(0.1, rim=-0.05)] * 4
+    backs = held(monitor, back, 0.5, start=20.0, speed=-0.045, speed_known=True)
+    assert stands[-1].stuck and backs[-1].stuck and backs[-1].wheels[0].travel == 10.0
+
+
 def test_a_wheel_whose_slip_is_not_known_or_brakes_has_no_entrapment_in_sight():
     rows = [[wheel(0.95), wheel(0.95, known=False), wheel(-0.3), wheel(0.1)]] * 30
     chances = [wheel.probability for wheel in course(rows)[-1].wheels]

@@ -123,7 +123,7 @@ class StuckMonitor(Component[StuckState]):
         return StuckAssessment(
             state.stuck,
             state.reason,
-            ahead.wheels,
+            ahead.no_farther(situation, settings.reach(situation)) if holds else ahead.wheels,
             situation.stalled,
             state.direction,
             situation.digging,
