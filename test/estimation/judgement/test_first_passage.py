@@ -138,7 +138,7 @@ def test_the_first_axle_of_two_that_enters_loose_soil_is_no_entrapment():
 
 @pytest.mark.parametrize('slip', [0.3, 0.7, 0.9])
 def test_the_travel_left_is_that_within_which_it_is_as_likely_as_not(slip):
-    (wheel, *_), _ = outlook(sinking(slip, 0.08, radius=1.0), DEFAULTS)
+    (wheel, *_), *_ = outlook(sinking(slip, 0.08, radius=1.0), DEFAULTS)
     course = passage_probability([slip], [0.03], 0.08)[0]
     assert np.interp(wheel.travel, TRAVELS, course) == pytest.approx(0.5, abs=0.04)
     assert wheel.time == pytest.approx(wheel.travel / RIM)
@@ -148,7 +148,7 @@ def test_the_travel_left_is_that_within_which_it_is_as_likely_as_not(slip):
 
 def test_the_travel_left_ends_where_a_wheel_is_in_too_deep_to_climb_out():
     growth, seconds = 0.03, 20.0
-    (wheel, *_), _ = outlook(sinking(0.35, growth, seconds=seconds), DEFAULTS)
+    (wheel, *_), *_ = outlook(sinking(0.35, growth, seconds=seconds), DEFAULTS)
     left = (0.4 * 0.12 - growth * RIM * seconds) / growth
     assert wheel.travel == pytest.approx(left, rel=0.05)
     assert wheel.time == pytest.approx(wheel.travel / RIM)

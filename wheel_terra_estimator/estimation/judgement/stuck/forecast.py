@@ -111,10 +111,6 @@ class StuckSettings(NamedTuple):
             **{name: float(getattr(configuration.filter, f'stuck_{name}')) for name in cls._fields}
         )
 
-    def reach(self, s: Situation) -> float:
-        """Return the rim travel within which a warning expects an entrapment [m]."""
-        return max(self.horizon * s.fastest, self.travel)
-
 
 class WheelForecast(NamedTuple):
     """Outlook of one wheel.
@@ -133,13 +129,14 @@ class Outlook(NamedTuple):
 
     wheels: tuple[WheelForecast, ...]
     probability: float  # median of the wheels that tell [-]
+    reach: float  # rim travel within which a warning expects an entrapment [m]
 
-    def no_farther(self, s: Situation, reach: float) -> tuple[WheelForecast, ...]:
-        """Return what lies ahead of the wheels where an entrapment comes within a travel [m]."""
+    def under_warning(self, s: Situation) -> tuple[WheelForecast, ...]:
+        """Return what lies ahead of the wheels while a warning stands."""
         return tuple(
             [
-                ahead._replace(time=reach / abs(wheel.rim_speed), travel=reach)
-                if wheel.known and ahead.travel > reach
+                ahead._replace(time=self.reach / abs(wheel.rim_speed), travel=self.reach)
+                if wheel.known and ahead.travel > self.reach
                 else ahead
                 for ahead, wheel in zip(self.wheels, s.motion.wheels, strict=True)
             ]
@@ -150,7 +147,8 @@ def outlook(s: Situation, settings: StuckSettings) -> Outlook:
     """Return what lies ahead in a situation; before a start is over only what is under way."""
     wheels = s.motion.wheels
     within = passage_probability([w.slip for w in wheels], [w.slip_std for w in wheels], s.digging)
-    travel = settings.reach(s) if s.settled else 0.0
+    reach = max(settings.horizon * s.fastest, settings.travel)
+    travel = reach if s.settled else 0.0
     place = min(travel / TRAVELS[1], len(TRAVELS) - 1.0)
     before = min(int(place), len(TRAVELS) - 2)
     chances = within[:, before] + (place - before) * (within[:, before + 1] - within[:, before])
@@ -175,4 +173,4 @@ def outlook(s: Situation, settings: StuckSettings) -> Outlook:
         for ahead, wheel, stands in zip(found, wheels, s.stalled, strict=True)
         if wheel.known or stands
     ]
-    return Outlook(tuple(found), median(telling) if telling else 0.0)
+    return Outlook(tuple(found), median(telling) if telling else 0.0, reach)

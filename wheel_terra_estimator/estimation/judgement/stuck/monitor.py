@@ -101,6 +101,7 @@ class StuckMonitor(Component[StuckState]):
         border = _BORDER_RADII * situation.radius / max(situation.rim, 1e-9)
         times = zip(since, (slip_hold, STANDING_HOLD, max(HOLD, border)), strict=True)
         held = [time - begun > hold for begun, hold in times]
+        stays = any(there) or situation.sunk
         state = old._replace(memory=situation.memory, since=since, clear_since=NAN)
         if any(held) and not old.stuck:
             memory = situation.memory
@@ -109,11 +110,7 @@ class StuckMonitor(Component[StuckState]):
             state = state._replace(
                 stuck=True, reason=reason, direction=direction, demand=motion.demand
             )
-        elif (
-            old.stuck
-            and not (any(there) or situation.sunk)
-            and situation.slip_magnitude < settings.clear_slip
-        ):
+        elif old.stuck and not stays and situation.slip_magnitude < settings.clear_slip:
             clear = time if isnan(old.clear_since) else old.clear_since
             free = time - clear >= settings.clear_time
             state = StuckState(situation.memory) if free else state._replace(clear_since=clear)
@@ -123,7 +120,7 @@ class StuckMonitor(Component[StuckState]):
         return StuckAssessment(
             state.stuck,
             state.reason,
-            ahead.no_farther(situation, settings.reach(situation)) if holds else ahead.wheels,
+            ahead.under_warning(situation) if holds else ahead.wheels,
             situation.stalled,
             state.direction,
             situation.digging,
