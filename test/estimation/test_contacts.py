@@ -11,6 +11,7 @@ from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.contact_age import DECAY, START_VARIANCE, ContactAge
+from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation, turning_wheels
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
@@ -86,22 +87,37 @@ def test_ground_that_curves_upwards_turns_the_nose_up(parts):
 # -- Starts and reversals ---------------------------------------------------------------------
 
 
+def rolling(rim):
+    return RimSpeeds((rim,) * 6, rim)
+
+
 def test_a_reversal_begins_a_new_contact(parts):
     age = ContactAge(parts.rover)
-    assert not age.update(NAN)
-    assert not age.update(0.0)
-    assert not age.update(0.05)  # the first drive reverses none
+    assert not age.update(rolling(NAN))
+    assert not age.update(rolling(0.0))
+    assert not age.update(rolling(0.05))  # the first drive reverses none
     age.advance(1.0)
     assert age.settled
-    assert not age.update(0.05)
-    assert age.update(-0.05)
+    assert not age.update(rolling(0.05))
+    assert age.update(rolling(-0.05))
     assert not age.settled
     age.advance(1.0)
     late = age.shear_variance
     age.stop()
     assert age.state.travel == 0.0
-    assert not age.update(-0.05)
+    assert not age.update(rolling(-0.05))
     assert age.shear_variance > 100.0 * late
+
+
+def test_behind_a_turn_on_the_spot_begins_a_new_contact(parts):
+    """In it soil is sheared sideways and by one side against the other; it reverses nothing."""
+    age, spin = ContactAge(parts.rover), RimSpeeds((0.05, -0.05) * 3, 0.0)
+    age.update(rolling(0.05))
+    age.advance(1.0)
+    assert not age.update(spin) and age.settled
+    assert not age.update(rolling(0.05)) and not age.settled
+    age.advance(1.0)
+    assert not age.update(rolling(0.05)) and age.settled
 
 
 # -- Steering -----------------------------------------------------------------------------------
@@ -552,6 +568,15 @@ def test_in_a_steady_turn_the_moments_of_pulls_and_lateral_forces_cancel(parts):
     assert published_pull(parts, 0.0, aside=aside)[0] == pytest.approx(pull)
     doubted = replace(aside, force_std=(1e6,) * 6)
     assert published_pull(parts, 0.0, aside=doubted)[0] == pytest.approx(plain, abs=1e-6)
+
+
+def test_contacts_form_from_half_of_their_length_to_all_of_it(parts):
+    age = ContactAge(parts.rover)
+    told = []
+    for _ in range(4):
+        told.append(age.forming)
+        age.advance(0.4 * parts.rover.contact_length)
+    assert told == [False, False, True, False]
 
 
 def test_the_doubt_of_the_shear_model_is_the_stated_one_at_a_contact_length(parts):

@@ -286,7 +286,7 @@ class WheelSoilEstimator:
             self._torque_over_load(cycle), cycle.dt, settled=self._contact_age.settled
         )
         self._predict(cycle)
-        if not cycle.reference_known and not self._contact_age.settled:
+        if not cycle.reference_known and self._contact_age.forming:
             self._speed.remove_start_transient(ekf, cycle)
 
         if reference is not None:
@@ -372,7 +372,7 @@ class WheelSoilEstimator:
         )
         yaw_compensated = RimSpeeds.of(rims, turning.yaw_rate, headings)
         reference_known = self._reference.known(time)
-        reverses = self._contact_age.update(yaw_compensated.typical)
+        reverses = self._contact_age.update(yaw_compensated)
         demand = (
             self._contact_age.state.direction * loads.slope_share if window.tells_force else NAN
         )

@@ -8,6 +8,7 @@ import math
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
 from wheel_terra_estimator.estimation.rover import Rover
 
 # Doubt of the shear model behind a start; tuned on simulated drives, seeds 1000 to 1019.
@@ -20,6 +21,7 @@ class ContactAgeState(NamedTuple):
 
     travel: float = 0.0  # [m] since the start or the last change of direction
     direction: float = 0.0  # of the drive: 1, -1, 0 = none yet
+    spun: bool = False  # on the spot since then
 
 
 class ContactAge(Component[ContactAgeState]):
@@ -29,17 +31,19 @@ class ContactAge(Component[ContactAgeState]):
         super().__init__(ContactAgeState())
         self._rover = rover
 
-    def update(self, rim_speed: float) -> bool:
-        """Take the typical rim speed of a cycle [m/s], nan = unknown.
+    def update(self, rims: RimSpeeds) -> bool:
+        """Take the rim speeds of a cycle; behind a turn on the spot the contacts form anew.
 
         Return whether the direction became the opposite one of a drive before.
         """
-        if not abs(rim_speed) >= self._rover.low_rim:
+        low = self._rover.low_rim
+        if not rims.along(low):
+            self.state = self.state._replace(spun=self.state.spun or rims.magnitude >= low)
             return False
-        travel, before = self.state
-        direction = 1.0 if rim_speed > 0.0 else -1.0
+        travel, before, spun = self.state
+        direction = 1.0 if rims.typical > 0.0 else -1.0
         turned = direction != before
-        self.state = ContactAgeState(0.0 if turned else travel, direction)
+        self.state = ContactAgeState(0.0 if turned or spun else travel, direction)
         return turned and before != 0.0
 
     def advance(self, travel: float) -> None:
@@ -54,6 +58,11 @@ class ContactAge(Component[ContactAgeState]):
     def settled(self) -> bool:
         """Whether the contacts are new no more."""
         return self.state.travel > self._rover.contact_length
+
+    @property
+    def forming(self) -> bool:
+        """Whether they are half formed: before that even a rover that will roll spins."""
+        return 0.5 < self.state.travel / self._rover.contact_length <= 1.0
 
     @property
     def shear_variance(self) -> float:
