@@ -53,7 +53,7 @@ def step(speed, before=0.05, now=0.05, inflation=0.0, window=None):
 
 def noise(parts_keys=()):
     made = process([0.0] * 6, keys=parts_keys)
-    return made.acceleration_noise(StatedNoise()).noise_density ** 0.5
+    return made.acceleration_noise(StatedNoise())[0] ** 0.5
 
 
 def test_slow_rover_follows_its_wheels_through_a_ramp():

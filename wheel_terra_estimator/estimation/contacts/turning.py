@@ -34,7 +34,6 @@ _SKID_YAW_DOUBT = 0.4  # of that yaw rate
 _ROLL_YAW_DOUBT = 0.15  # of a rover that does not skid
 _LEAST_WHEEL_YAW_STD = 0.005  # [rad/s]
 
-
 _OPPOSED = 0.5
 """Slower side over the faster one from which rims of opposite signs are a spin on the spot [-]."""
 

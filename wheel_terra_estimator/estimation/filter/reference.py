@@ -23,7 +23,6 @@ _RISE = 1.76
 """By which a limit of chi square (one degree of freedom) rises for each e-th part of what exceeds
 it by chance, from 5 to 0.05 % [-]."""
 
-
 # Tuned on simulated drives, seeds 1000 to 1019, and the nine snow immobilisations.
 _KNOWN_TIME = 5.0
 """Age [s] up to which a reference tells slip and soil apart; after that the soil is held."""
@@ -131,10 +130,6 @@ class ReferenceUpdate(Component[ReferenceState]):
         excess = square * _RUN_EXCESS / (_RUN_EXCESS - _RISE * math.log(gap))
         return clipped(excess**2, 1.0, _MOST_VARIANCE_FACTOR)
 
-    def believes(self, agreeing: int, *, beyond: bool) -> bool:
-        """Say whether so many references in a row that disagree by the same amount are right."""
-        return agreeing >= (_COUNT_BEYOND if beyond else _COUNT)
-
     def update(
         self,
         ekf: GatedFilter,
@@ -150,7 +145,11 @@ class ReferenceUpdate(Component[ReferenceState]):
         `still`: all wheels stand; `fastest_rim` is the greatest rim speed [m/s], `variance` that of
         the reading as stated, or more where more is seen [(m/s)^2].
         """
-        self._note_time(time)
+        state = self.state
+        if state.time > -math.inf:
+            gap = state.gap + _GAP_GAIN * (min(time - state.time, _LONGEST_GAP) - state.gap)
+            state = state._replace(gap=gap)
+        self.state = state._replace(time=time)
         if still:
             self._note_slide(ekf, time, reference.forward, variance)
         residual, prior = self.innovation(ekf, reference)
@@ -171,7 +170,7 @@ class ReferenceUpdate(Component[ReferenceState]):
             apart = abs(residual - state.last_rejected)
             same = apart < _SAME_STD * math.sqrt(2.0 * variance + total)
             agreeing = state.rejected_in_a_row + 1
-            opened = same and self.believes(agreeing, beyond=beyond)
+            opened = same and agreeing >= (_COUNT_BEYOND if beyond else _COUNT)
             if opened:
                 ekf.inflate(SPEED, residual * residual)
             else:
@@ -197,13 +196,6 @@ class ReferenceUpdate(Component[ReferenceState]):
         stated = reference.variance
         variance = stated if stated > 0.0 else sensors.reference_std**2
         return max(variance, sensors.reference_std_floor**2)
-
-    def _note_time(self, time: float) -> None:
-        state = self.state
-        gap = state.gap
-        if state.time > -math.inf:
-            gap += _GAP_GAIN * (min(time - state.time, _LONGEST_GAP) - gap)
-        self.state = state._replace(time=time, gap=gap)
 
     def _note_slide(self, ekf: GatedFilter, time: float, forward: float, variance: float) -> None:
         """Wheels that stand: the references agree with rest, or the rover slides on them.

@@ -10,8 +10,6 @@ their inverse variances:
   restarts of a slow rover; poor where a fast rover's wheels spin up.
 * with the accelerometer: dv = (f_x - g_x - bias) dt. Good for fractions of a second; its error per
   second is nothing to 1 m/s and everything to 5 cm/s.
-
-So the accelerometer's role follows from its noise and the speed; no switch is needed.
 """
 
 from __future__ import annotations
@@ -52,7 +50,6 @@ LEAST_SLIP_STD = 0.02
 """Of a speed over the rim speed [-]: no set of soil models is better than that."""
 _LEAST_WHEELS = 3
 """Wheels that can disagree."""
-
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _FIRST_RATIO = 0.95  # v / rim speed before anything is known: level, loose soil
@@ -150,14 +147,6 @@ class SpeedState(NamedTuple):
     """Running mean of the NIS of wheels against accelerometer; None = never compared."""
 
 
-class AccelerationNoise(NamedTuple):
-    """Noise of the specific force less gravity, as stated."""
-
-    noise_density: float  # of white noise, squared [(m/s^2)^2 s]
-    bias_walk: float
-    """What the bias changes per second, with gravity by errors of the attitude [(m/s^2)^2/s]."""
-
-
 class SpeedProcess(Component[SpeedState]):
     """Predicts the body speed."""
 
@@ -174,15 +163,17 @@ class SpeedProcess(Component[SpeedState]):
         self._equilibrium_slip = UsualSlip(configuration, rover)
         self._rim_noise = _RATE_NOISE * sensors.wheel_rate_std * max(rover.slip_radius)
 
-    def acceleration_noise(self, stated: StatedNoise) -> AccelerationNoise:
-        """Return the noise of the specific force less gravity; what is not stated by default."""
+    def acceleration_noise(self, stated: StatedNoise) -> tuple[float, float]:
+        """Return what is stated of the noise of specific force less gravity, else the defaults.
+
+        White noise [(m/s^2)^2 s], and how fast the bias walks, with gravity by errors of the
+        attitude [(m/s^2)^2/s], both squared.
+        """
         sensors = self._sensors
         force = stated.specific_force_std or sensors.specific_force_std
         attitude = self._rover.gravity * (stated.orientation_std or sensors.orientation_std)
-        return AccelerationNoise(
-            force**2 / max(sensors.imu_rate, 1.0),
-            _BIAS_WALK**2 + 2.0 * attitude**2 / _ATTITUDE_TIME,
-        )
+        walk = _BIAS_WALK**2 + 2.0 * attitude**2 / _ATTITUDE_TIME
+        return force**2 / max(sensors.imu_rate, 1.0), walk
 
     # -- What other parts tell -------------------------------------------------------------------
 
@@ -285,7 +276,7 @@ class SpeedProcess(Component[SpeedState]):
         F[SPEED, SPEED] = step.speed_gain
         F[SPEED, GRAVITY_BIAS] = step.bias_gain
         Q[SPEED, SPEED] = step.variance
-        Q[GRAVITY_BIAS, GRAVITY_BIAS] = self.acceleration_noise(cycle.window.stated).bias_walk * dt
+        Q[GRAVITY_BIAS, GRAVITY_BIAS] = self.acceleration_noise(cycle.window.stated)[1] * dt
         if demand_change and not isnan(rim):
             # v = (1 - s) rim, and ds = slip_per_demand times the change of the demand.
             gain = -step.wheel_weight * rim * demand_change
@@ -329,7 +320,7 @@ class SpeedProcess(Component[SpeedState]):
         if covered < _LEAST_COVERED * dt or dt <= 0.0:
             return None
         # A vibrating rover is as noisy as it is seen to be, whatever its file states.
-        stated = self.acceleration_noise(window.stated).noise_density
+        stated, _ = self.acceleration_noise(window.stated)
         noise = max(stated, window.noise_density) * excess(self.state.felt_nis) ** 2
         # A stretch that the IMU left out is filled with its mean.
         return window.speed_change * dt / covered, noise * dt
@@ -438,17 +429,15 @@ class SpeedProcess(Component[SpeedState]):
     def remove_start_transient(self, ekf: GatedFilter, cycle: Cycle) -> None:
         """Let a rover that starts without a reference velocity roll as it did before.
 
-        A start-up transient of the accelerometer weighs much while the wheels turn slowly, and from
-        a speed of zero the wheels' prediction, v' = v rim'/rim, stays zero. A rover that slides, or
-        wheels that spin up at once, differ by more than such a transient makes.
+        A transient of the accelerometer weighs much while the wheels turn slowly; a rover that
+        slides, or wheels that spin up at once, differ by more than it makes.
         """
-        state = self.state
         rim = cycle.yaw_compensated.typical
-        usual = state.ratio * rim
+        usual = self.state.ratio * rim
         off = abs(float(ekf.mean[SPEED]) - usual)
         transient = _START_SHARE * abs(usual) < off < _START_TRANSIENT
         if transient and abs(rim) > self._rover.low_rim:
-            ekf.set(SPEED, usual, (state.ratio_std * rim) ** 2)
+            ekf.set(SPEED, usual, (self.state.ratio_std * rim) ** 2)
 
     def keep_with_rims(self, ekf: GatedFilter, rims: RimSpeeds) -> None:
         """Let a rover without a reference velocity stand where it would move against its wheels.
