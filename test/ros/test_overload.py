@@ -40,8 +40,12 @@ def test_the_soil_is_saved_though_messages_keep_the_timers_waiting(estimator):
     assert soil.exists()
 
 
-@pytest.mark.parametrize(('speed', 'left_out'), [(2.0, 0), (0.4, 29 + 29)])
-def test_who_cannot_keep_up_takes_what_came_last(estimator, speed, left_out):
+@pytest.mark.parametrize(
+    ('speed', 'first', 'left_out'),
+    [(2.0, 40, 0), (0.4, 40, 29 + 29), (0.4, 2, 29)],
+    ids=['stood', 'overloaded', 'stood after two slow ones'],
+)
+def test_who_cannot_keep_up_takes_what_came_last(estimator, speed, first, left_out):
     """Three batches of 2 s: all of the first, of the others the last half second, or all."""
     node, _ = estimator
     usual, clock = node._hear, [node._started]
@@ -54,6 +58,10 @@ def test_who_cannot_keep_up_takes_what_came_last(estimator, speed, left_out):
     node._hear = hear
     for batch in range(3):
         node._catch_up(
-            *[arrived(t, t * 1e9) for i in range(40) for t in [2.0 * batch + 0.05 * i + 1.0]]
+            *[
+                arrived(t, t * 1e9)
+                for i in range(40 if batch else first)
+                for t in [2.0 * batch + 0.05 * i + 1.0]
+            ]
         )
     assert node._pipeline.rejected['joint_states', OVERLOADED] == left_out

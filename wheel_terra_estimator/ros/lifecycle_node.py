@@ -311,8 +311,9 @@ class EstimatorNode(LifecycleNode):
         for came, topic, data, info in taken:
             left_out = self._overloaded and topic in FREQUENT and came < last - BEHIND
             self._hear(topic, data, info, OVERLOADED if left_out else '')
-        waited = min(last - first, BEHIND) if self._overloaded else last - first
-        self._overloaded = waited > 0 and (self._seconds() - begun) * _SECOND > waited
+        span = last - first
+        heard = min(span, BEHIND) if self._overloaded else span
+        self._overloaded = span > BEHIND and (self._seconds() - begun) * _SECOND > heard
 
     @staticmethod
     def _came(info: dict[str, Any]) -> int:
