@@ -15,7 +15,7 @@ from test_workflow import FEW, make, noisy, run
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy import decision, workflow
+from wheel_terra_estimator.discrepancy import decision
 from wheel_terra_estimator.discrepancy.proposal import find
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.tables.averaging import together
@@ -335,21 +335,6 @@ def test_a_unit_of_one_of_two_tables_is_asked_for(wrong):
     assert found.misread == {'torque': pytest.approx(10.0)}
     assert found.sentence.startswith(f'{wrong}: The unit of torque looks wrong')
     assert not found.effects
-
-
-def test_no_explanation_has_less_than_no_cohesion(monkeypatch):
-    """A friction that is a tenth too small asks for less cohesion than there is."""
-    search, kept = workflow.search, []
-    monkeypatch.setattr(workflow, 'search', lambda *given: kept.append(search(*given)) or kept[0])
-    table, values, soil, rows = make('basic16')
-    less = replace(soil, cohesion=0.0, friction_angle=0.9 * soil.friction_angle)
-    table = noisy(rows, solve(rows, soil), solve(rows, less), np.random.default_rng(3))
-    run(table, values, options=Options(effects=('cohesion',)))
-    selection = kept[0].selection
-    fitted = selection.explanations[selection.index(('cohesion',))].fitted
-    numbers = {c.key: float(c.value(u)) for c, u in zip(fitted.coordinates, fitted.u, strict=True)}
-    assert numbers['cohesion.delta'] < 0.0
-    assert numbers['soil.cohesion'] + numbers['cohesion.delta'] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_column_of_zeros_may_be_what_a_law_is_proposed_for():

@@ -12,7 +12,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -87,7 +87,7 @@ class Setting:
             return []
         weights = self.problem.variance(FIT_FLOOR) if variance is None else variance
         angles = None if angle is None else np.broadcast_to(angle, (len(sets), angle.shape[-1]))
-        fits = fit(
+        return fit(
             self.forward,
             self.problem,
             [(names, self.coordinates(names)) for names in sets],
@@ -96,9 +96,6 @@ class Setting:
             angles,
             iterations,
         )
-        for fitted in fits:
-            _end_at_no_cohesion(fitted)
-        return fits
 
     def predicted(self, outputs: Sequence[FloatArray], variance: FloatArray) -> FloatArray:
         """(K, N, 4) outputs with the structural error that a reference shows beside each."""
@@ -114,19 +111,6 @@ class Setting:
         """Weigh a fit."""
         posterior = evidence(self.problem, fitted, self.floors, self.believed_widths)
         return Explanation(fitted, posterior, float(log_sum(posterior.log_joint)))
-
-
-def _end_at_no_cohesion(fitted: Fit) -> None:
-    """Raise a ``cohesion.delta`` that takes more than there is to what there is: all the same."""
-    place = {c.key: k for k, c in enumerate(fitted.coordinates)}
-    if 'cohesion.delta' in place and 'soil.cohesion' in place:
-        soil, change = place['soil.cohesion'], place['cohesion.delta']
-        left = float(fitted.coordinates[soil].value(fitted.u[soil]))
-        own = fitted.coordinates[change]
-        if fitted.u[change] < (end := own.coordinate(-left)):
-            fitted.u[change], bounded = end, list(fitted.coordinates)
-            bounded[change] = replace(own, lower=end)
-            fitted.coordinates = tuple(bounded)
 
 
 Start: TypeAlias = tuple[tuple[str, ...], FloatArray, FloatArray]

@@ -21,7 +21,7 @@ from wheel_terra_estimator.terramechanics.effects.base import (
 
 
 def _cohesion(contact: Contact[Quantity], p: SimpleNamespace) -> None:
-    contact.cohesion = np.maximum(contact.cohesion + p.delta, 0.0)
+    contact.cohesion = contact.cohesion + p.delta
 
 
 COHESION = Effect(
