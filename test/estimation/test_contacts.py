@@ -11,7 +11,6 @@ from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.contact_age import DECAY, START_VARIANCE, ContactAge
-from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation, turning_wheels
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
@@ -87,37 +86,22 @@ def test_ground_that_curves_upwards_turns_the_nose_up(parts):
 # -- Starts and reversals ---------------------------------------------------------------------
 
 
-def rolling(rim):
-    return RimSpeeds((rim,) * 6, rim)
-
-
 def test_a_reversal_begins_a_new_contact(parts):
     age = ContactAge(parts.rover)
-    assert not age.update(rolling(NAN))
-    assert not age.update(rolling(0.0))
-    assert not age.update(rolling(0.05))  # the first drive reverses none
+    assert not age.update(NAN)
+    assert not age.update(0.0)
+    assert not age.update(0.05)  # the first drive reverses none
     age.advance(1.0)
     assert age.settled
-    assert not age.update(rolling(0.05))
-    assert age.update(rolling(-0.05))
+    assert not age.update(0.05)
+    assert age.update(-0.05)
     assert not age.settled
     age.advance(1.0)
     late = age.shear_variance
     age.stop()
     assert age.state.travel == 0.0
-    assert not age.update(rolling(-0.05))
+    assert not age.update(-0.05)
     assert age.shear_variance > 100.0 * late
-
-
-def test_behind_a_turn_on_the_spot_begins_a_new_contact(parts):
-    """In it soil is sheared sideways and by one side against the other; it reverses nothing."""
-    age, spin = ContactAge(parts.rover), RimSpeeds((0.05, -0.05) * 3, 0.0)
-    age.update(rolling(0.05))
-    age.advance(1.0)
-    assert not age.update(spin) and age.settled
-    assert not age.update(rolling(0.05)) and not age.settled
-    age.advance(1.0)
-    assert not age.update(rolling(0.05)) and age.settled
 
 
 # -- Steering -----------------------------------------------------------------------------------

@@ -7,9 +7,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from fake_estimator import (
     SECOND,
     arriving,
+    configuration,
     essence,
     imu,
     make_core,
@@ -23,6 +25,7 @@ from fake_estimator import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wheel_terra_estimator.estimation import core as core_module
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -169,7 +172,7 @@ def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(data):
 @settings(max_examples=settings.default.max_examples // 4, deadline=None)
 @given(st.data())
 def test_steps_made_before_a_set_asks_for_them_change_no_number(data):
-    """Nor what is kept where the clock goes back, as the second time that the drive comes."""
+    """Nor what is kept where tuning changes or the clock goes back: the drive comes twice."""
     stream = drive(1.5)
     chosen = {
         'output_rate': data.draw(st.sampled_from([0.0, 4.0, 20.0])),
@@ -178,15 +181,23 @@ def test_steps_made_before_a_set_asks_for_them_change_no_number(data):
     }
     delays = [data.draw(st.sampled_from([0.0, 0.0, 0.004, 0.03, 0.25, 0.7])) for _ in stream]
     messages = 2 * list(arriving(stream, delays))
-    plain, _ = make_core(**chosen)
-    expected = essence(play(plain, messages))
-    core, _ = make_core(**chosen)
-    sets = []
-    for measurement in messages:
-        sets += core.add(measurement)
-        if data.draw(st.booleans()):
-            core.process_pending()
-    assert essence(sets + core.flush()) == expected
+    settled = [data.draw(st.booleans()) for _ in messages]
+    retuned = data.draw(st.integers(0, len(messages) - 1))
+    other = configuration(**{**chosen, 'output_rate': 10.0})
+    told = []
+    for settles in ([False] * len(messages), settled):
+        core, fake = make_core(**chosen)
+        sets = []
+        for i, (measurement, settle) in enumerate(zip(messages, settles, strict=True)):
+            if i == retuned:
+                with pytest.MonkeyPatch.context() as patch:
+                    patch.setattr(core_module, '_estimator', lambda _, fake=fake: fake)
+                    core.retune(other)
+            sets += core.add(measurement)
+            if settle:
+                core.process_pending()
+        told.append(essence(sets + core.flush()))
+    assert told[0] == told[1]
     assert core.health()['clock_steps_back'] >= 1
 
 

@@ -150,6 +150,7 @@ ReferenceVelocity
 
         What is held back is released first. Wheels, sensors and soil must be the same.
         """
+        self._ran_on()  # the state is the same whatever was run before
         self._estimator = _estimator(configuration)
         if self._judge is not None:
             self._judge.retune(configuration)

@@ -49,7 +49,7 @@ class LimiterTuning:
     )
     slow_rim_travel: float = _parameter(1.4, 10.0, 'the share falls below this rim travel left [m]')
     stale_after: float = _parameter(
-        1.0, 10.0, 'an estimate older than this, by its stamp, is not trusted [s]'
+        1.0, 10.0, 'an estimate older than this, by its stamp, is not trusted [s]', 0.1
     )
     stale_scale: float = _parameter(
         0.3, 1.0, 'greatest share of the command that passes without a fresh estimate [-]'

@@ -372,7 +372,7 @@ class WheelSoilEstimator:
         )
         yaw_compensated = RimSpeeds.of(rims, turning.yaw_rate, headings)
         reference_known = self._reference.known(time)
-        reverses = self._contact_age.update(yaw_compensated)
+        reverses = self._contact_age.update(yaw_compensated.typical)
         demand = (
             self._contact_age.state.direction * loads.slope_share if window.tells_force else NAN
         )

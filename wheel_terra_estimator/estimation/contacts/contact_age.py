@@ -8,7 +8,6 @@ import math
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
 from wheel_terra_estimator.estimation.rover import Rover
 
 # Doubt of the shear model behind a start; tuned on simulated drives, seeds 1000 to 1019.
@@ -21,7 +20,6 @@ class ContactAgeState(NamedTuple):
 
     travel: float = 0.0  # [m] since the start or the last change of direction
     direction: float = 0.0  # of the drive: 1, -1, 0 = none yet
-    spun: bool = False  # on the spot since then
 
 
 class ContactAge(Component[ContactAgeState]):
@@ -31,19 +29,17 @@ class ContactAge(Component[ContactAgeState]):
         super().__init__(ContactAgeState())
         self._rover = rover
 
-    def update(self, rims: RimSpeeds) -> bool:
-        """Take the rim speeds of a cycle; behind a turn on the spot the contacts form anew.
+    def update(self, rim_speed: float) -> bool:
+        """Take the typical rim speed of a cycle [m/s], nan = unknown.
 
         Return whether the direction became the opposite one of a drive before.
         """
-        low = self._rover.low_rim
-        if not rims.along(low):
-            self.state = self.state._replace(spun=self.state.spun or rims.magnitude >= low)
+        if not abs(rim_speed) >= self._rover.low_rim:
             return False
-        travel, before, spun = self.state
-        direction = 1.0 if rims.typical > 0.0 else -1.0
+        travel, before = self.state
+        direction = 1.0 if rim_speed > 0.0 else -1.0
         turned = direction != before
-        self.state = ContactAgeState(0.0 if turned or spun else travel, direction)
+        self.state = ContactAgeState(0.0 if turned else travel, direction)
         return turned and before != 0.0
 
     def advance(self, travel: float) -> None:
