@@ -751,8 +751,7 @@ def test_a_reference_that_is_made_smooth_has_no_other_scale():
 def test_a_clock_that_steps_by_half_a_second_has_no_offset():
     half = WHOLE.imu.stamp.size // 2
     step = 0.5 * (np.arange(WHOLE.imu.stamp.size) > half)
-    assert 'imu_offset' not in faults(report := checked(**later('imu', -step, stamp=step)))
-    assert 'order' in faults(report)
+    assert 'imu_offset' not in faults(checked(**later('imu', -step, stamp=step)))
 
 
 def test_wheels_told_five_times_a_second_a_quarter_of_a_second_late():

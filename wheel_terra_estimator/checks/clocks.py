@@ -377,8 +377,7 @@ FUTURE = -0.1  # arrival less stamp that no message has [s]
 MOST_OFFSET = 1e4  # offset that a rover file may state, either way [s]
 ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
 MOST_LATE = 40.0  # beyond which a history is no cure [s]
-PARTS = 20  # of a drive, whose first and last tell how its stamps shift
-LEAST_SHIFT = 0.3  # of log time less stamp of wheels or IMU over a drive, which no way takes [s]
+QUARTERS, UNEVEN = 4, 0.5  # parts of a drive; unlike gains of a drift over their mean, at most [-]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
 LONGEST_WAY = 10.0  # of a message into the log [s]
 
@@ -392,7 +391,7 @@ def check_transport(
     outcomes += read
     late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
     mended: dict[str, Any] = {}
-    begun = dict[str, float]()  # usual log time less stamp in the first part of the drive [s]
+    quarters = dict[str, list[float]]()  # usual log time less stamp in parts of the drive [s]
     for name in CHECKED:
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
@@ -409,9 +408,21 @@ def check_transport(
         elif not order:
             outcomes += _drop_outs(name, one, figures)
         if channel.late.size and not step:
-            parts = np.array_split(channel.late, min(PARTS, channel.late.size))
-            begun[name], end = (float(np.median(part)) for part in (parts[0], parts[-1]))
-            late[name], shifts[name] = float(np.median(channel.late)), begun[name] - end
+            parts = np.array_split(channel.late, min(QUARTERS, channel.late.size))
+            by_time = [float(np.median(part)) for part in parts]
+            late[name], shifts[name] = float(np.median(channel.late)), by_time[0] - by_time[-1]
+            quarters[name] = by_time
+    for name, by_time in quarters.items():
+        if name not in ('joints', 'imu') and min(by_time) > FUTURE:
+            continue  # its age is honest
+        others = [one for other, one in quarters.items() if other != name]
+        if drift := _drift(by_time, others):
+            channel = getattr(recording, name)
+            how = f'its stamps drift by {drift:+.2g} s over the drive against their arrival'
+            outcomes.append(found('order', channel.topic, 0.97, how=how))
+            share = np.linspace(0.0, 1.0, channel.stamp.size)
+            mended[name] = shifted(channel, np.round(1e9 * drift * share).astype(np.int64))
+            late[name], shifts[name] = by_time[0], 0.0
     if steps:  # of one clock, whatever it stamps
         topic, *rest = steps
         how = f'they step by {steps[topic]:+.3g} s against their arrival'
@@ -420,18 +431,11 @@ def check_transport(
     if 'joints' not in late:
         return outcomes, replace(recording, **mended)
     assert recording.joints is not None
-    # The age of what is fused late is honest, unless it is in the future.
-    kept = [n for n in late if n in ('joints', 'imu') or begun[n] - max(shifts[n], 0.0) < FUTURE]
-    for names, most in ((kept, LEAST_SHIFT), (list(late), CLOCK_DIFFERENCE)):
-        some = {name: shifts[name] for name in names}
-        if max(some.values()) - min(some.values()) > most:  # no offset mends that
-            name = max(some, key=lambda one: abs(shifts[one]))
-            how = f'its stamps shift by {shifts[name]:.2g} s against log time: a clock set'
-            channel = getattr(recording, name)
-            outcomes.append(found('order', channel.topic, 0.97, how=f'{how}, or drifting'))
-            if names is kept:
-                mended[name] = replace(channel, stamp=channel.log_time - round(1e9 * begun[name]))
-            return outcomes, replace(recording, **mended)
+    if max(shifts.values()) - min(shifts.values()) > CLOCK_DIFFERENCE:  # no offset mends that
+        name = max(shifts, key=lambda one: abs(shifts[one]))
+        how = f'its stamps shift by {shifts[name]:.2g} s against log time: a clock set, or drifting'
+        topic = getattr(recording, name).topic
+        return [*outcomes, found('order', topic, 0.97, how=how)], replace(recording, **mended)
     off, recording = _clocks(replace(recording, **mended), late, facts)
     return outcomes + off, recording
 
@@ -507,6 +511,21 @@ def _bursts(stamp: IntArray) -> IntArray | None:
     regular = robust_std(period) < OFF_PERIOD * np.median(period)
     regular &= np.median(step) < min(READ_AT_ONCE, READ_SHARE * float(np.median(period)))
     return ends if regular and np.median(count) >= LEAST_IN_A_BURST else None
+
+
+def _drift(late: list[float], others: list[list[float]]) -> float:
+    """Return by how much stamps gain evenly on their arrival over a drive [s]; 0 for not at all.
+
+    ``late``, ``others``: log time less stamp [s] of each quarter. Where all gain alike the logger's
+    clock does.
+    """
+    compared = [one for one in others if len(one) == QUARTERS]
+    if len(late) < QUARTERS or not compared:
+        return 0.0
+    gain, beside = -np.diff(late), -np.diff(np.median(compared, axis=0))
+    drift, apart = (float(one.sum()) * QUARTERS / (QUARTERS - 1) for one in (gain, gain - beside))
+    even = np.ptp(gain) < UNEVEN * abs(float(gain.mean()))
+    return drift if even and min(abs(drift), abs(apart)) > LEAST_OFFSET else 0.0
 
 
 def _steps(channel: Channel) -> FloatArray:

@@ -50,7 +50,8 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 
 LEAST_LOST = 0.01  # share of messages that are lost, or with nan, that is told [-]
 LEAST_RIM_SPEED = 0.005  # rim speed that no drive stays below [m/s]
-LEAST_GOING = 0.05  # mean velocity that no wander of a satellite's position makes [m/s]
+LEAST_GOING = 0.02  # mean of half a minute that no wander of a satellite's position makes [m/s]
+LEAST_TURNING = 0.05  # mean of a second that no gyro of a standing rover shows [rad/s]
 ORIENTATION = 'the orientation'  # what a gyro is said to turn against
 _LOGGER = logging.getLogger(__name__)
 Result = TypeVar('Result')
@@ -163,9 +164,17 @@ def _standing(evidence: Evidence) -> list[Outcome]:
     means = [np.abs(moving_mean(np.nan_to_num(speed), width)) for speed in evidence.speed.T]
     if np.quantile(np.max(means, axis=0), 0.99) >= LEAST_RIM_SPEED:
         return []
-    velocity = evidence.recording.reference
-    goes = velocity is not None and abs(velocity.velocity[:, 0].mean()) > LEAST_GOING
-    return [evidence.found('no_drive', 0.99) if goes else untold('sign', 'hardly_moves')]
+    velocity, gyro = evidence.recording.reference, evidence.gyro
+    goes = turns = 0.0
+    if velocity is not None:
+        forward = np.nan_to_num(velocity.velocity[:, 0])
+        goes = float(np.abs(moving_mean(forward, round(30.0 / velocity.period))).max())
+    if gyro is not None:
+        yaw_rate = np.nan_to_num(gyro[:, 2])
+        turns = float(np.quantile(np.abs(moving_mean(yaw_rate - np.median(yaw_rate), width)), 0.99))
+    if goes > LEAST_GOING or turns > LEAST_TURNING:
+        return [evidence.found('no_drive', 0.99)]
+    return [untold('sign', 'hardly_moves')]
 
 
 class Mended:
