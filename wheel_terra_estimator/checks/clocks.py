@@ -39,7 +39,7 @@ LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
 BY_LOG = 'log time'
 SMOOTHED_BY = 'reference.smoothed_s'  # figure: such a velocity tells no scale
-SMOOTH = 0.02  # unlike part that a lag leaves of speeds that are made smooth [-]
+SMOOTH = 0.02  # unlike part that a lag leaves of speeds that are made smooth, beside noise [-]
 FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part, at most
 LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
 """Deviation of a lag by chassis and filters; log time leaves the age of a velocity open [s]."""
@@ -119,7 +119,9 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         left = reference.value + _moved(evidence, 'joints')
         stamp = shifted(velocity, round(left * 1e9)).stamp
         evidence = evidence.with_channel('reference', stamp=stamp)
-        if not reference.steady or reference.trial.after > SMOOTH:
+        forward = velocity.velocity[:, 0]
+        noise = 0.5 * robust_std(np.diff(forward)) ** 2 / max(float(np.var(forward)), 1e-12)
+        if not reference.steady or reference.trial.after - noise > SMOOTH:
             evidence.figures[SMOOTHED_BY] = round(reference.value, 2)
     return outcomes, evidence
 
@@ -170,16 +172,17 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
         if other is not None and other.steady:
             wheels = abs(other.value - told.value) < abs(other.value)
         else:
-            wheels = _by_arrival(evidence, name, told.value)
+            wheels = _by_arrival(evidence, name, told)
         if wheels:
             return {'wheel_odometry': told.of_the_first()}
     return late
 
 
-def _by_arrival(evidence: Evidence, name: str, late: float) -> bool:
-    """Return whether the wheels' stamps lie off their arrival, not those of one ``late`` [s]."""
-    own, others = _late(evidence, 'joints'), _late(evidence, name)
-    if others > 0.0 and others + late < FUTURE:  # it would come before it was measured
+def _by_arrival(evidence: Evidence, name: str, told: Lag) -> bool:
+    """Return whether the wheels' stamps lie off their arrival, not those of another channel."""
+    own, others, late = _late(evidence, 'joints'), _late(evidence, name), told.value
+    # It would surely come before it was measured.
+    if others > 0.0 and others + late < FUTURE - SIGMAS * told.std:
         return True
     if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
         return abs(own - late) < abs(own) - 0.5 * abs(late) or own < FUTURE < others

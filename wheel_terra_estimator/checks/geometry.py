@@ -247,8 +247,10 @@ def _depth(evidence: Evidence) -> Estimate:
 
 def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return a radius or a reference of another scale, and the evidence with that mended."""
-    if {ASIDE, SMOOTHED_BY} & {*evidence.figures}:
+    if ASIDE in evidence.figures:
         return [], evidence
+    if late := evidence.figures.get(SMOOTHED_BY):
+        return [untold('gain', 'smooth', late=late)], evidence
     told = radius_ratio(evidence)
     if isinstance(told, NotChecked):
         return [told], evidence

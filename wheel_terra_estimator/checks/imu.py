@@ -387,8 +387,11 @@ def gross_tilt(evidence: Evidence) -> FloatArray | None:
     return np.asarray(Rotation.from_rotvec(turn).as_matrix())
 
 
-def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
-    """Return the gyro's bias at rest (3,) [rad/s] and its deviation; None without a standstill."""
+def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return the gyro's bias at rest (3,) [rad/s], its deviation, and what of that is noise.
+
+    The rest is what the bias changes by. None without a standstill.
+    """
     imu, gyro = evidence.recording.imu, evidence.gyro
     if imu is None or gyro is None:
         return None
@@ -396,9 +399,9 @@ def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
     if rest.sum() * evidence.period < LEAST_STANDSTILL:
         return None
     spread = np.array([robust_std(column) for column in gyro[rest].T])
+    noise = spread / math.sqrt(max(rest.sum() / 4.0, 1.0))
     first, second = (np.median(part, axis=0) for part in np.array_split(gyro[rest], 2))
-    std = np.hypot(spread / math.sqrt(max(rest.sum() / 4.0, 1.0)), 0.5 * (second - first))
-    return np.median(gyro[rest], axis=0), std
+    return np.median(gyro[rest], axis=0), np.hypot(noise, 0.5 * (second - first)), noise
 
 
 def small_tilt(evidence: Evidence) -> Mounting | None:
@@ -631,11 +634,12 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
     seen = gyro_bias(evidence)
     if seen is None:
         return [*outcomes, untold('zero', 'no_rest', least=LEAST_STANDSTILL)]
-    bias, std = seen
+    bias, std, noise_std = seen
     evidence.figures['imu.gyro_bias_rad_s'] = [float(f'{b:.3g}') for b in bias]
     worst = int(np.argmax(np.abs(bias)))
     least = max(BIAS_FACTOR * sensors.angular_rate_bias_std, LEAST_GYRO_BIAS)
-    if abs(bias[worst]) > max(least, BIAS_SIGMAS * std[worst]):
+    # One that changes evenly keeps its sign where it is more than two such deviations.
+    if abs(bias[worst]) > max(least, BIAS_SIGMAS * noise_std[worst], 2.0 * std[worst]):
         whole = bias + sensors.angular_rate_bias
         told = {'axis': 'xyz'[worst], 'bias': float(bias[worst]), 'biases': listed(whole, '.5f')}
         told |= {'value': float(f'{whole[worst]:.4g}'), 'std': float(std[worst])}

@@ -7,8 +7,8 @@ messages, and no set is lost. A lag of a few milliseconds is not waited for: one
 again, and a message at 10 Hz that is held for the next one is a tenth of a second old. Where wheel
 odometry of one stamp comes in several messages, a later stamp is waited for.
 
-The time of the run is theirs, too: other topics, less the lead that their clock has before these
-two, only carry it on while both are silent.
+The time of the run is theirs, too: other topics carry it on while both are silent, less the lead
+that their clock has before these two.
 """
 
 from __future__ import annotations
