@@ -181,8 +181,8 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
 def _by_arrival(evidence: Evidence, name: str, told: Lag) -> bool:
     """Return whether the wheels' stamps lie off their arrival, not those of another channel."""
     own, others, late = _late(evidence, 'joints'), _late(evidence, name), told.value
-    # It would surely come before it was measured.
-    if others > 0.0 and others + late < FUTURE - SIGMAS * told.std:
+    # It would come before it was measured.
+    if others > 0.0 and others + late < FUTURE - math.hypot(told.std, LEAST_STD[told.by]):
         return True
     if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
         return abs(own - late) < abs(own) - 0.5 * abs(late) or own < FUTURE < others
