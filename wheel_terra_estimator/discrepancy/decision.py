@@ -264,10 +264,12 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
 def known_alike(name: str, decision: Decision, known: Mapping[str, Effect]) -> tuple[str, ...]:
     """Return what looks like a name and was not tried: effects, of a gain another unit."""
     findings, fitted = decision.findings, decision.after
+    deviations = np.sqrt(np.diag(fitted.covariance()))
     units = [
-        units_apart(min(known[c.owner].touches), 1.0 / (1.0 + float(c.value(u))))
-        for c, u in zip(fitted.coordinates, fitted.u, strict=True)
+        units_apart(min(known[c.owner].touches), 1.0 / gain, c.deviation(u, std) / gain)
+        for c, u, std in zip(fitted.coordinates, fitted.u, deviations, strict=True)
         if c.unit == '-' and effect_of(c.owner) == effect_of(name) in _GAINS
+        for gain in [1.0 + float(c.value(u))]
     ]
     on = set(findings.setting.forward.base_effects)
     own = known[effect_of(name)].confounded_with

@@ -32,24 +32,26 @@ _FLOOR_NEEDED = 0.8  # probability of a structural error from which soil alone d
 _FORCES = [times for f in (9.80665, 4.4482216) for times in (f, 1.0 / f)]  # kgf, lbf; or N as these
 _LOADS = (0.5, 2.0, *_FORCES)  # of a pair of wheels, or one of it
 _LIKE_MODEL = math.log(3.0)  # a reading must come so near to the size that the model gives
-_NEAR = math.log(
-    2.0
-)  # a unit so near to the usual one is a gain as well (``decision.known_alike``)
+_NEAR = math.log(2.0)  # a unit so near is a gain as well (``decision.known_alike``)
 _ROUGH = 0.03  # floor beside which readings are ranked [share of the range]
 _TRIED = 2  # best of them that are weighed
 _LEAST_CHANGE = 4e-4  # of a slip by another rule [-]: that of a slip of 2 %
-_SAME = 0.03  # between two units: a factor of ten, or that of a kilopond
+_SAME, _MOST_ALIKE = 0.03, 0.15  # between two units: a factor of ten, or that of a kilopond
 BY_SPEED, BY_RIM = 'r w/v - 1', '1 - v/(r w)'
 
 
-def units_apart(column: str, times: float) -> str:
-    """Return which unit in place of which would be so many times as large; empty: none."""
+def units_apart(column: str, times: float, std: float = 0.0) -> str:
+    """Return which unit in place of which would be so many times as large; empty: none.
+
+    ``std`` is the deviation of ``times`` over it [-].
+    """
+    near = min(max(_SAME, 2.0 * std), _MOST_ALIKE)
     units = UNITS[unit_of(column)]
     pairs = itertools.permutations(units, 2)
     alike = (
         f'{found} in place of {said}'
         for said, found in pairs
-        if abs(math.log(units[found] / units[said] / times)) < _SAME
+        if abs(math.log(units[found] / units[said] / times)) < near
         if units[found] != units[said]
     )
     return next(alike, '')

@@ -116,7 +116,7 @@ class WheelForecast(NamedTuple):
     """Outlook of one wheel.
 
     Time and travel are those within which an entrapment is as likely as not, or the wheel is in
-    too deep to climb out, if that comes first.
+    too deep to climb out, if that comes first; while a warning stands no more than it expects.
     """
 
     probability: float  # of an entrapment within the horizon [-]
@@ -131,12 +131,12 @@ class Outlook(NamedTuple):
     probability: float  # median of the wheels that tell [-]
     reach: float  # rim travel within which a warning expects an entrapment [m]
 
-    def under_warning(self, s: Situation) -> tuple[WheelForecast, ...]:
-        """Return what lies ahead of the wheels while a warning stands."""
+    def under_warning(self, s: Situation, horizon: float) -> tuple[WheelForecast, ...]:
+        """Return what lies ahead of the wheels while a warning of a horizon [s] stands."""
         return tuple(
             [
-                ahead._replace(time=self.reach / abs(wheel.rim_speed), travel=self.reach)
-                if wheel.known and ahead.travel > self.reach
+                ahead._replace(time=min(ahead.time, horizon), travel=min(ahead.travel, self.reach))
+                if wheel.known
                 else ahead
                 for ahead, wheel in zip(self.wheels, s.motion.wheels, strict=True)
             ]

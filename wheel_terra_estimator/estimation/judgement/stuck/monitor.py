@@ -120,7 +120,7 @@ class StuckMonitor(Component[StuckState]):
         return StuckAssessment(
             state.stuck,
             state.reason,
-            ahead.under_warning(situation) if holds else ahead.wheels,
+            ahead.under_warning(situation, settings.horizon) if holds else ahead.wheels,
             situation.stalled,
             state.direction,
             situation.digging,
