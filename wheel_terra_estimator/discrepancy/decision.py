@@ -47,6 +47,7 @@ _MOST_TRIED = 3  # doubtful names, after which none is given
 # A name is given where it, or one of those that the rows cannot tell from it, is more likely right
 # than not; below the second figure a law has to do worse than the name.
 _LIKELY = 0.5
+_OPEN_TO_BEDS = 0.2  # probability of beds that differ from which no law is proposed
 _BEYOND_DOUBT = 0.85
 # So many can imitate any smooth rows: they are named where they predict unseen levels.
 _SEVERAL = 3
@@ -93,14 +94,15 @@ class Decision:
     def unless(self, apart: Decision, probability: float) -> Decision:
         """Return ``apart``, the decision where beds differ, if that is the more probable one.
 
-        Else the names are less sure, and no law is proposed.
+        Else the names are less sure, and no law is proposed unless beds are improbable.
         """
         if not apart.verdict.left.accounted_for:
             return self  # nor do beds
         if probability > _LIKELY:
             return replace(apart, beds_differ=probability)
         names = _as_sure(self.names, 1.0 - probability)
-        return replace(self, names=names, proposal=None, beds_differ=probability)
+        law = self.proposal if probability < _OPEN_TO_BEDS else None
+        return replace(self, names=names, proposal=law, beds_differ=probability)
 
     @property
     def floor(self) -> float:
