@@ -18,6 +18,7 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision
 from wheel_terra_estimator.discrepancy.proposal import find
 from wheel_terra_estimator.discrepancy.report import words
+from wheel_terra_estimator.discrepancy.selection.readings import units_apart
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
@@ -321,6 +322,12 @@ def test_a_gain_that_a_unit_explains_as_well_is_no_surer_than_that(unproposed, g
     assert (effect.confidence <= 0.5) == bool(unit)
     assert any('another unit of the column' in note for note in found.notes) == bool(unit)
     assert any(unit in note for note in found.notes)
+
+
+def test_a_unit_is_alike_within_the_deviation_of_a_gain():
+    assert not units_apart('torque', 1.41)
+    assert units_apart('torque', 1.41, 0.03) == 'lbf ft in place of N m'
+    assert not units_apart('torque', 1.6, 0.5)
 
 
 @pytest.mark.parametrize('wrong', ['a.csv', 'b.csv'])

@@ -308,7 +308,8 @@ def test_an_entrapment_is_in_sight_for_as_long_as_the_warning_expects_it():
     """Slip of 0.95, then 0.7 on the same slope: the warning stands; then the rover backs out."""
     monitor = StuckMonitor(SETTINGS)
     held(monitor, [wheel(0.95)] * 4, 15.0, speed=0.0025, speed_known=True)
-    stands = held(monitor, [wheel(0.7)] * 4, 5.0, start=15.0, speed=0.015, speed_known=True)
+    slow = [wheel(0.7, rim=0.003), *[wheel(0.7)] * 3]
+    stands = held(monitor, slow, 5.0, start=15.0, speed=0.015, speed_known=True)
     for ahead in stands[-1].wheels:
         assert ahead.travel <= 0.05 * SETTINGS.horizon and ahead.time <= SETTINGS.horizon
     back = [wheel(0.1, rim=-0.05)] * 4
