@@ -319,9 +319,22 @@ def test_a_recording_without_a_drive_is_said_to_be_one(rows, told):
     assert bool(told) or any('hardly moves' in entry.reason for entry in report.not_checked)
 
 
-def test_encoders_that_read_nought_all_along_break_no_check():
-    report = checked(joints=replace(WHOLE.joints, rate=np.zeros_like(WHOLE.joints.rate)))
-    assert faults(report) == ['no_drive']
+@pytest.mark.parametrize('other', ['both', 'to and fro', 'gyro alone', 'one velocity'])
+def test_encoders_that_read_nought_all_along_are_told_and_break_no_check(other):
+    """By a velocity whose mean is nothing, or by the gyro."""
+    velocity, changes = WHOLE.reference, {}
+    if other == 'to and fro':
+        sign = np.where(np.arange(len(velocity.stamp)) % 600 < 300, 1.0, -1.0)[:, None]
+        still = np.random.default_rng(5).normal(0.0, 0.004, WHOLE.imu.rate.shape)
+        changes = {'reference': replace(velocity, velocity=sign * abs(velocity.velocity))}
+        changes['imu'] = replace(WHOLE.imu, rate=still)
+    elif other == 'gyro alone':
+        changes = {'reference': None}
+    elif other == 'one velocity':
+        changes = {'reference': rows_of(velocity, np.arange(1))}
+    rate = np.zeros_like(WHOLE.joints.rate)
+    report = checked(joints=replace(WHOLE.joints, rate=rate), **changes)
+    assert faults(report)[-1] == ('silent' if other == 'one velocity' else 'no_drive')
     assert not any('internal error' in entry.reason for entry in report.not_checked)
 
 

@@ -166,7 +166,7 @@ def _standing(evidence: Evidence) -> list[Outcome]:
         return []
     velocity, gyro = evidence.recording.reference, evidence.gyro
     goes = turns = 0.0
-    if velocity is not None:
+    if velocity is not None and velocity.period > 0.0:
         forward = np.nan_to_num(velocity.velocity[:, 0])
         goes = float(np.abs(moving_mean(forward, round(30.0 / velocity.period))).max())
     if gyro is not None:
