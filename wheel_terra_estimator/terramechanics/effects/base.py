@@ -62,6 +62,7 @@ class EffectParameter:
 
 def _of_prior(
     prior: str,
+    about_default: bool,
     name: str,
     unit: str,
     default: float,
@@ -72,15 +73,17 @@ def _of_prior(
     *,
     free: bool = True,
 ) -> EffectParameter:
-    """Return a parameter with a normal prior about its default, or a half-normal one from 0."""
-    centre = default if prior == 'normal' else 0.0
+    """Return a parameter whose prior has its centre at the default, or at 0."""
+    centre = default if about_default else 0.0
     limits = default, lower, upper, scale
     return EffectParameter(name, unit, *limits, prior, meaning, centre, free=free)
 
 
-magnitude = partial(_of_prior, 'half_normal')
+magnitude = partial(_of_prior, 'half_normal', False)
 """A parameter that is the size of a term, with the sign of its default."""
-shape = partial(_of_prior, 'normal')
+signed = partial(_of_prior, 'normal', False)
+"""A parameter that is the size of a term, of either sign."""
+shape = partial(_of_prior, 'normal', True)
 """A parameter that shapes a term (an onset, a depth)."""
 
 

@@ -12,11 +12,11 @@ from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
-    EffectParameter,
     Form,
     magnitude,
     relative_pressure,
     shape,
+    signed,
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 
@@ -177,14 +177,13 @@ SLIP_SINKAGE_EXPONENT = Effect(
     'u = max(r w, |(v, v_y)|), and k *= 1 - side q^2, q = r |v_y|/(r |v_y| + b |v|)',
     parameters=(
         _N1,
-        EffectParameter(
+        signed(
             'n2',
             '-',
             0.0,
             -2.0,
             3.0,
             0.5,
-            'normal',
             'what the coefficient of a skidding wheel has beyond n1',
             free=False,
         ),
@@ -228,9 +227,7 @@ SLIP_SINKAGE_EXPONENT = Effect(
             claim='the exponent grows with the pressure under the wheel, and with |slip|',
             symbol='N = n0 + nw ln(W/(b r 3 kPa)) + n1 |s|',
             parameters=(
-                EffectParameter(
-                    'nw', '-', 0.1, -0.5, 0.5, 0.1, 'normal', 'growth with ln of the mean pressure'
-                ),
+                signed('nw', '-', 0.1, -0.5, 0.5, 0.1, 'growth with ln of the mean pressure'),
                 _N1,
             ),
             needs=('normal_load',),

@@ -12,10 +12,10 @@ from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
-    EffectParameter,
     Form,
     magnitude,
     shape,
+    signed,
 )
 
 SMALLEST_ROOM = 1e-12
@@ -114,14 +114,13 @@ STRESS_PEAK_SHIFT = Effect(
     symbol='t_m = (c1 + c2 s) t_1 (+ skid |s| t_1 where s < 0)',
     parameters=(
         magnitude('c2', '-', 0.2, -0.5, 0.8, 0.2, 'shift at s = 1'),
-        EffectParameter(
+        signed(
             'skid',
             '-',
             0.0,
             -1.0,
             1.0,
             0.2,
-            'normal',
             'shift forward of a skidding wheel, beyond c2',
             free=False,
         ),

@@ -13,10 +13,10 @@ from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
-    EffectParameter,
     Form,
     magnitude,
     shape,
+    signed,
 )
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio, speed_ratio
 
@@ -40,11 +40,7 @@ def _gain_of(
         name=f'{reading}_gain',
         claim=f'gain error of the {reading} reading; positive: it reads too much',
         symbol=f'{symbol} *= 1 + gain',
-        parameters=(
-            EffectParameter(
-                'gain', '-', 0.1, -0.8, 2.0, 0.1, 'normal', 'gain of the reading less one'
-            ),
-        ),
+        parameters=(signed('gain', '-', 0.1, -0.8, 2.0, 0.1, 'gain of the reading less one'),),
         touches=frozenset({quantity}),
         instrument=True,
         confounded_with=confounded_with,
@@ -89,7 +85,7 @@ EFFECTS = (
         name='pull_zero',
         claim='zero error of the pull reading; positive: it reads too much',
         symbol='F += offset',
-        parameters=(EffectParameter('offset', 'N', 2.0, -1e4, 1e4, 3.0, 'normal', 'zero error'),),
+        parameters=(signed('offset', 'N', 2.0, -1e4, 1e4, 3.0, 'zero error'),),
         touches=frozenset({'drawbar_pull'}),
         instrument=True,
         confounded_with={
@@ -104,9 +100,7 @@ EFFECTS = (
         name='sinkage_offset',
         claim='zero error of the sinkage sensor; positive: it reads too deep',
         symbol='z += offset',
-        parameters=(
-            EffectParameter('offset', 'm', 0.002, -0.05, 0.05, 0.002, 'normal', 'zero error'),
-        ),
+        parameters=(signed('offset', 'm', 0.002, -0.05, 0.05, 0.002, 'zero error'),),
         touches=frozenset({'sinkage'}),
         instrument=True,
         confounded_with={
@@ -121,9 +115,7 @@ EFFECTS = (
         name='pitch_bias',
         claim='attitude error; positive: it reads too nose-up, pull reads W sin(bias) too high',
         symbol='F += W sin(bias)',
-        parameters=(
-            EffectParameter('bias', 'rad', 0.02, -0.3, 0.3, 0.03, 'normal', 'attitude error'),
-        ),
+        parameters=(signed('bias', 'rad', 0.02, -0.3, 0.3, 0.03, 'attitude error'),),
         touches=frozenset({'drawbar_pull'}),
         instrument=True,
         confounded_with={
@@ -204,16 +196,7 @@ WHEEL_RADIUS_BIAS = Effect(
     claim='the effective rolling radius differs from the configured one, so slip is misread',
     symbol='1 - s_true = (1 - s_recorded)/(1 + bias)',
     parameters=(
-        EffectParameter(
-            'bias',
-            '-',
-            0.03,
-            -0.3,
-            0.3,
-            0.04,
-            'normal',
-            'effective over configured radius, minus one',
-        ),
+        signed('bias', '-', 0.03, -0.3, 0.3, 0.04, 'effective over configured radius, minus one'),
     ),
     instrument=True,
     needs=('slip',),

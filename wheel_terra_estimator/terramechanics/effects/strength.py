@@ -12,11 +12,11 @@ from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
-    EffectParameter,
     Form,
     magnitude,
     relative_pressure,
     shape,
+    signed,
 )
 
 
@@ -29,16 +29,7 @@ COHESION = Effect(
     claim='more or less soil cohesion than configured',
     symbol='tau = (c + delta + sigma tan(phi)) (1 - exp(-j/K))',
     parameters=(
-        EffectParameter(
-            'delta',
-            'Pa',
-            300.0,
-            -5000.0,
-            10000.0,
-            500.0,
-            'normal',
-            'cohesion added to soil.cohesion',
-        ),
+        signed('delta', 'Pa', 300.0, -5000.0, 10000.0, 500.0, 'cohesion added to soil.cohesion'),
     ),
     confounded_with={
         'bulldozing': 'a load series',
@@ -70,12 +61,8 @@ RATE_DEPENDENCE = Effect(
     claim='bearing or shear strength depends on the rim speed',
     symbol='k *= (v_rim/0.05 m/s)^bearing;  c, tan(phi) *= (v_rim/0.05 m/s)^shear',
     parameters=(
-        EffectParameter(
-            'bearing', '-', 0.1, -0.6, 0.6, 0.15, 'normal', 'exponent of the bearing strength'
-        ),
-        EffectParameter(
-            'shear', '-', 0.0, -0.4, 0.4, 0.05, 'normal', 'exponent of the shear strength'
-        ),
+        signed('bearing', '-', 0.1, -0.6, 0.6, 0.15, 'exponent of the bearing strength'),
+        signed('shear', '-', 0.0, -0.4, 0.4, 0.05, 'exponent of the shear strength'),
     ),
     needs=('angular_velocity',),
     confounded_with={'multipass': 'the same speed on virgin soil and in the rut'},
@@ -133,11 +120,7 @@ SHEAR_DEFORMATION = Effect(
     claim='more or less shear deformation modulus K than configured',
     form='constant',
     symbol='K *= exp(log_factor)',
-    parameters=(
-        EffectParameter(
-            'log_factor', '-', 0.3, -3.0, 3.0, 0.3, 'normal', 'logarithm of the factor on K'
-        ),
-    ),
+    parameters=(signed('log_factor', '-', 0.3, -3.0, 3.0, 0.3, 'logarithm of the factor on K'),),
     needs=('slip',),
     confounded_with={
         'wheel_radius_bias': 'sinkage; visual odometry on hard ground',
@@ -154,9 +137,7 @@ SHEAR_DEFORMATION = Effect(
             claim='the shear deformation modulus K grows with the pressure under the wheel',
             symbol='K *= (W/(b r 3 kPa))^growth',
             parameters=(
-                EffectParameter(
-                    'growth', '-', 0.4, -1.5, 1.5, 0.4, 'normal', 'exponent of the mean pressure'
-                ),
+                signed('growth', '-', 0.4, -1.5, 1.5, 0.4, 'exponent of the mean pressure'),
             ),
             needs=('normal_load',),
             candidate=True,
