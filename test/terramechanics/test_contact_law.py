@@ -16,7 +16,7 @@ from wheel_terra_estimator.terramechanics.contact_law import (
     stress_maps,
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
-from wheel_terra_estimator.terramechanics.model import OUTSIDE_VALIDITY, WheelSoilModel
+from wheel_terra_estimator.terramechanics.model import OUTSIDE_VALIDITY, OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
@@ -132,8 +132,8 @@ def test_what_resistive_force_refuses():
         law.steady_state(OperatingPoints(0.2, 20.0, WHEEL, slip_angle=0.1))
     with pytest.raises(ValueError, match='shear radius'):
         law.steady_state(OperatingPoints(0.2, 20.0, WHEEL, slip_radius='shear'))
-    with pytest.raises(ValueError, match='too much'):
-        law.steady_state(OperatingPoints(0.2, 1e6, WHEEL))
+    buried = law.steady_state(OperatingPoints(0.2, 1e6, WHEEL))
+    assert (buried.flags[0], buried.sinkage[0]) == (OVERLOADED, WHEEL.radius)
     lugged = law.steady_state(OperatingPoints(0.2, 20.0, replace(WHEEL, lug_height=0.01)))
     assert lugged.flags[0] == OUTSIDE_VALIDITY
 

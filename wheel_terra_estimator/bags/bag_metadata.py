@@ -27,12 +27,11 @@ Kind = TypeVar('Kind')
 
 @dataclass(frozen=True)
 class Metadata:
-    """Files and messages per topic, notes of the writer, what is wrong with the file in words."""
+    """Files and messages per topic, what is wrong with the file in words."""
 
     files: tuple[str, ...] = ()
     counts: Mapping[str, int] = field(default_factory=dict)
     fault: str = ''
-    notes: Mapping[str, str] = field(default_factory=dict)
 
 
 def read(folder: Path) -> Metadata:
@@ -53,21 +52,13 @@ def read(folder: Path) -> Metadata:
             counts[_a(str, name)] += int(number)
         files = _a(list, information['relative_file_paths'])
         names = tuple(PurePath(_a(str, file)).name for file in files)
-        return Metadata(names, dict(counts), notes=_notes(information))
+        return Metadata(names, dict(counts))
     except KeyError as error:
         return Metadata(fault=f'{NAME} was set aside (it has no {error.args[0]})')
     except UserError as error:
         return Metadata(fault=f'{NAME} was set aside ({str(error).removeprefix(f"{path}: ")})')
     except (YAMLError, ValueError, TypeError, RecursionError):
         return Metadata(fault=f'{NAME} was set aside (it cannot be understood)')
-
-
-def _notes(information: Any) -> dict[str, str]:
-    """Return key -> value of the custom data; what is no text is left out."""
-    custom = information.get('custom_data')
-    if not isinstance(custom, Mapping):
-        return {}
-    return {k: v for k, v in custom.items() if isinstance(k, str) and isinstance(v, str)}
 
 
 def _a(kind: type[Kind], value: Any) -> Kind:

@@ -105,8 +105,10 @@ def replay(
     most = None if options.every_set else MOST_ROWS
     of_order: list[str] = []
     messages = _in_order_of(arrival, reader, of_order, smooth) if arrival else reader.messages()
-    if options.progress:
-        messages = _progress(messages, reader)
+    if options.progress and reader.message_count >= LONG_DRIVE and sys.stderr.isatty():
+        from tqdm import tqdm
+
+        messages = tqdm(messages, total=reader.message_count, unit=' messages', unit_scale=True)
     with ExitStack() as stack:
         writer = None
         if output is not None:
@@ -275,15 +277,6 @@ def _tuning(line: str, arrival: Path) -> dict[str, Any]:
         return dict(json.loads(line.removeprefix(TUNE)))
     except (ValueError, TypeError):  # cut off where the node was killed
         raise UserError(f'{arrival}: no parameters in "{line}": remove the line') from None
-
-
-def _progress(messages: Iterator[Any], reader: MeasurementReader) -> Iterator[Any]:
-    if reader.message_count < LONG_DRIVE or not sys.stderr.isatty():
-        yield from messages
-        return
-    from tqdm import tqdm
-
-    yield from tqdm(messages, total=reader.message_count, unit=' messages', unit_scale=True)
 
 
 @contextmanager

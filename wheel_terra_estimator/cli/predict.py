@@ -164,8 +164,7 @@ def _model(arguments: argparse.Namespace, configuration: Configuration, width: f
         raise UserError(f'the law {law} says how the contact is integrated; leave --method')
     if 'wheels.width' in configuration.stated:
         width = float(configuration.wheels.width[_wheel_index(arguments, configuration)])
-    gravity = float(rover.gravity)
-    return contact_law(law, soil, effects, width, gravity=gravity, strict=False)
+    return contact_law(law, soil, effects, width, float(rover.gravity))
 
 
 def _write(

@@ -67,7 +67,6 @@ class Drive:
             return float(np.exp(deviation * np.clip(variation.standard_normal(), -2.5, 2.5)))
 
         soil = {name: factor(getattr(draw, name)) for name in SOIL_QUANTITIES}
-        self.soil_factors = soil  # on the base soil, as drawn, by name of `SOIL_QUANTITIES` [-]
         patches = [
             Patch(
                 p.start,

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -61,20 +61,19 @@ class ResistiveForce:
     validity: thirty plates summed as the theory has it, each in the wake of the last, pull more
     than the load (HIT wheel, lugs of 10 mm).
 
-    ``scale``: stress over that of the generic medium [-]. ``strict``: True: a soil that cannot
-    carry the load raises ``ValueError``; False: the point is clamped at a sinkage of one radius and
-    flagged.
+    ``scale``: stress over that of the generic medium [-].
     """
 
-    def __init__(self, scale: float, *, strict: bool = True) -> None:
+    def __init__(self, scale: float) -> None:
         check_range('scale of the resistive stress', scale, 0.0, open_lower=True)
-        self.scale, self.strict = scale, strict
+        self.scale = scale
 
     def steady_state(self, points: OperatingPoints) -> SteadyState:
         """Solve the load balance and return sinkage, drawbar pull and torque.
 
-        Raises ValueError where a wheel slides sideways, the slip refers to a shear radius (this law
-        has none), or `strict` and the soil cannot carry a load.
+        Where the soil cannot carry the load, they are those at a sinkage of one radius, flagged.
+        Raises ValueError where a wheel slides sideways, or the slip refers to a shear radius (this
+        law has none).
         """
         if np.any(points.slip_angle) or np.nan_to_num(points.lateral_speed_ratio).any():
             raise ValueError(
@@ -86,9 +85,6 @@ class ResistiveForce:
         angle, carries = solve_entrance_angle(
             lambda angles: self.forces(points, angles)[0], load, np.full(len(points), _START)
         )
-        if self.strict and not carries.all():
-            worst = int(np.flatnonzero(~carries)[0])
-            raise ValueError(f'normal load is {load[worst]:g} N (entry {worst}): too much to carry')
         _, pull, torque = self.forces(points, angle)
         direction = np.where(points.angular_velocity < 0.0, -1.0, 1.0)
         none = np.zeros(len(points))
@@ -141,23 +137,15 @@ def rim_integrals(motion: FloatArray, entrance_angle: FloatArray) -> FloatArray:
     return np.stack([part.sum(-1) for part in parts], -1)
 
 
-BEKKER_WONG_JANOSI, WONG_REECE, RESISTIVE_FORCE = (
-    'bekker_wong_janosi',
-    'wong_reece',
-    'resistive_force',
-)
-LAWS = (BEKKER_WONG_JANOSI, WONG_REECE, RESISTIVE_FORCE)
+LAWS = 'bekker_wong_janosi', 'wong_reece', 'resistive_force'
+BEKKER_WONG_JANOSI, WONG_REECE, RESISTIVE_FORCE = LAWS
 # Shift of the peak stress with slip where none is configured; loose sand: Wong and Reece 1967,
 # J. Terramechanics 4(1), 81-98 (doi 10.1016/0022-4898(67)90105-X).
 PEAK_SHIFT = 0.32
 PLATE_DEPTH = 0.02  # at which the resistive stress is that of the soil's plate test [m]
 
 
-class ContactLaw(Protocol):
-    """A law of the contact; ``WheelSoilModel`` and ``ResistiveForce`` are two."""
-
-    def steady_state(self, points: OperatingPoints) -> SteadyState:
-        """Solve the load balance and return sinkage, drawbar pull, lateral force and torque."""
+ContactLaw: TypeAlias = WheelSoilModel | ResistiveForce
 
 
 def contact_law(
@@ -168,21 +156,19 @@ def contact_law(
     # Width at which the laws have the same pressure [m]: where ``wong_reece`` takes over Bekker's
     # moduli, and of the plate that ``resistive_force`` takes its scale from
     width: float,
-    *,
     gravity: float = STANDARD_GRAVITY,  # at which the soil's numbers hold [m/s^2]
-    strict: bool = True,
 ) -> ContactLaw:
-    """Return a law for the soil as configured.
+    """Return a law for the soil as configured; it flags loads that the soil cannot carry.
 
     Raises ValueError for an unknown name.
     """
     if name == BEKKER_WONG_JANOSI:
-        return WheelSoilModel(soil, effects, 'closed_form', strict=strict)
+        return WheelSoilModel(soil, effects, 'closed_form', strict=False)
     if name == WONG_REECE:
         reece = reece_soil(soil, width, gravity)
-        return WheelSoilModel(reece, reece_effects(effects), 'quadrature', strict=strict)
+        return WheelSoilModel(reece, reece_effects(effects), 'quadrature', strict=False)
     if name == RESISTIVE_FORCE:
-        return ResistiveForce(plate_scale(soil, width, gravity), strict=strict)
+        return ResistiveForce(plate_scale(soil, width, gravity))
     raise ValueError(f'contact law is {name!r}; allowed is one of {LAWS}')
 
 
@@ -193,7 +179,7 @@ def reece_effects(effects: EffectSettings) -> EffectSettings:
     return {**effects, 'stress_peak_shift': {'c2': PEAK_SHIFT, 'skid': 0.0}}
 
 
-def reece_soil(soil: Soil, width: float, gravity: float = STANDARD_GRAVITY) -> Soil:
+def reece_soil(soil: Soil, width: float, gravity: float) -> Soil:
     """Return the soil with Reece's pressure c kc' + rho g b kphi', the same at this width [m]."""
     if soil.pressure_law == 'reece':
         return soil

@@ -83,10 +83,7 @@ class WheelSoilModel:
         self.method = method
         self.strict = strict
         self._soil = {name: getattr(soil, name) for name in SOIL_NUMBERS}
-
-    @property
-    def _law(self) -> Any:
-        return _FORCES[self.method]
+        self._law = _FORCES[method]
 
     def steady_state(self, points: OperatingPoints) -> SteadyState:
         """Solve the load balance and return sinkage, drawbar pull and torque.
@@ -149,14 +146,12 @@ class WheelSoilModel:
     def _entrance_angle(
         self, contact: Contact[Quantity], load: FloatArray, points: OperatingPoints, terms: Terms
     ) -> tuple[FloatArray, BoolArray]:
-        start = explicit_entrance_angle(contact)
-
         def carried(angle: FloatArray) -> FloatArray:
             set_angles(contact, angle, points.leaving_angle, terms)
             load: FloatArray = self._law.forces(contact, terms)[0]
             return load
 
-        return solve_entrance_angle(carried, load, start)
+        return solve_entrance_angle(carried, load, explicit_entrance_angle(contact))
 
 
 def _answer(

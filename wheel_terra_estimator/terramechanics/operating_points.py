@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -45,19 +45,13 @@ class OperatingPoints:
     def __post_init__(self) -> None:
         if self.slip_radius not in SLIP_RADII:
             raise ValueError(f'slip radius is {self.slip_radius!r}; allowed is one of {SLIP_RADII}')
-        wheel = self.wheel
-        names = ('slip', 'normal_load', 'slope', 'gravity', 'angular_velocity', 'pass_number')
-        columns = {
-            name.replace('_', ' '): numbers(name.replace('_', ' '), getattr(self, name))
-            for name in (*names, 'leaving_angle', 'slip_angle', 'lateral_speed_ratio')
-        }
-        wheels = {
-            name.replace('_', ' '): getattr(wheel, name)
-            for name in ('radius', 'width', 'lug_height', 'lug_count', 'lug_thickness')
-        }
-        count = common_length({**columns, **wheels})
-        for name, column in columns.items():
-            object.__setattr__(self, name.replace(' ', '_'), np.broadcast_to(column, (count,)))
+        columns = {f.name: f.name.replace('_', ' ') for f in fields(self)}
+        del columns['wheel'], columns['slip_radius']
+        own = {words: numbers(words, getattr(self, name)) for name, words in columns.items()}
+        wheel = {f.name.replace('_', ' '): getattr(self.wheel, f.name) for f in fields(self.wheel)}
+        count = common_length({**own, **wheel})
+        for name, words in columns.items():
+            object.__setattr__(self, name, np.broadcast_to(own[words], (count,)))
         check_range('slip', self.slip, -1.0, 1.0)
         check_range('normal load', self.normal_load, 0.0, unit='N', open_lower=True)
         check_range('slope', self.slope, -np.pi / 2, np.pi / 2, unit='rad')

@@ -391,16 +391,10 @@ class McapFile:
         else:  # at second try, the times in the head may be what is damaged
             possible = [mcap.Possible(_IN_CHUNK, known, head.start, head.end)]
             possible.append(mcap.Possible(_IN_CHUNK, known))
-        data = content.data
         found: list[Reading] = []
-        if head is not None:
-            records = mcap.straight_records(data, possible[0])
-            straight = self._pass(piece.begin, data, records, wanted, allowed)
-            found = [] if straight.lost_bytes else [straight]
         for each in possible:
             if not found or found[-1].lost_bytes:
-                records = mcap.records(data, 0, len(data), each)
-                found.append(self._pass(piece.begin, data, records, wanted, allowed))
+                found.append(self._pass(piece.begin, content.data, each, wanted, allowed))
         self._add_work(_ROW_SIZE * sum(reading.counts.total() for reading in found))
         best = min(found, key=lambda reading: reading.lost_bytes)
         if best is not found[0] and 2 * found[0].counts.total() > best.counts.total():
@@ -412,7 +406,7 @@ class McapFile:
         self,
         place: int,
         data: bytes,
-        records: Iterator[mcap.Record | mcap.Gap],
+        possible: mcap.Possible,
         wanted: Collection[int],
         allowed: int,
     ) -> Reading:
@@ -422,7 +416,7 @@ class McapFile:
         start, last = found.start, found.last
         time: int | None = None
         gap_after: tuple[int | None] | None = None
-        for item in records:
+        for item in mcap.records(data, 0, len(data), possible):
             if isinstance(item, mcap.Gap):
                 found.lost_bytes += item.end - item.begin
                 self._add_work(_GAP_WORK)

@@ -146,37 +146,6 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
         yield before
 
 
-def straight_records(content: Buffer, possible: Possible) -> Iterator[Record | Gap]:
-    """Yield the records of a chunk, each where the last one ends; what does not fit is one gap.
-
-    It gives what `records` gives of an undamaged chunk, and saves its doubts.
-    """
-    at, end = 0, len(content)
-    unpack = _MESSAGE.unpack_from
-    channels, start, last = possible.channels, possible.start, possible.end
-    any_channel = not channels
-    while at < end:
-        if content[at] == MESSAGE and at + HEAD + MESSAGE_HEAD <= end:
-            _, length, channel, _, log_time, _ = unpack(content, at)
-            after = at + HEAD + length
-            if (
-                after > end
-                or length < MESSAGE_HEAD
-                or not start <= log_time <= last
-                or not (any_channel or channel in channels)
-            ):
-                break
-            yield Record(MESSAGE, at + HEAD, after, channel, log_time)
-        elif content[at] in (SCHEMA, CHANNEL) and _fits(content, at, end, possible):
-            after = at + HEAD + _RECORD.unpack_from(content, at)[1]
-            yield Record(content[at], at + HEAD, after)
-        else:
-            break
-        at = after
-    if at < end:
-        yield Gap(at, end)
-
-
 def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | None:
     """Return the record at a place if one can be there."""
     if not _fits(content, at, end, possible):
