@@ -294,7 +294,11 @@ class RoverPlant:
     def _balance(self, dt: float) -> None:
         """Bring specific force, attitude and wheel loads up to the forces of this step."""
         self._carried = self._load
-        force = self._contact_force()
+        up = self._gravity * np.sqrt(max(1.0 - float(self._sine @ self._sine), 0.01))
+        on_wheels = np.stack([self._forces.pull, self._forces.side_force])
+        on_body = np.einsum('ijn,in->j', self._lever, on_wheels)
+        push = on_body[0] - (self._load * self._tilt).sum()
+        force = np.array([push / self._mass, on_body[1] / self._mass, up])  # along the ground
         loads = self._static_loads(force)
         self._load = self._load + (loads - self._load) * -np.expm1(-dt / LOAD_TIME)
         chassis = self._plane @ (self._surface - self._memory.sinkage)
@@ -307,14 +311,6 @@ class RoverPlant:
         self._specific_force = force + np.array(
             [force[2] * pitch, force[2] * roll, -force[0] * pitch - force[1] * roll]
         )
-
-    def _contact_force(self) -> FloatArray:
-        """Return the sum of all soil forces over the mass, along the ground below the rover."""
-        up = self._gravity * np.sqrt(max(1.0 - float(self._sine @ self._sine), 0.01))
-        on_wheels = np.stack([self._forces.pull, self._forces.side_force])
-        on_body = np.einsum('ijn,in->j', self._lever, on_wheels)
-        push = on_body[0] - (self._load * self._tilt).sum()
-        return np.array([push / self._mass, on_body[1] / self._mass, up])
 
     def _static_loads(self, force: FloatArray) -> FloatArray:
         cosine = self._lever[0, 0]  # of the steering angle

@@ -178,19 +178,21 @@ def _columns(
     return columns
 
 
+def _knots(name: str, checked: Mapping[str, Any], lead: str, *others: str) -> dict[str, list[Any]]:
+    """Return lists over the one that leads, which must not decrease."""
+    columns = _columns(name, checked, lead, (lead, *others))
+    if (np.diff(columns[lead]) < 0.0).any():
+        raise UserError(f'{name}: {lead}: {lead.partition(".")[2]}s must not decrease')
+    return columns
+
+
 def _profile(name: str, checked: Mapping[str, Any]) -> DriveProfile:
-    keys = ('drive.time', 'drive.forward', 'drive.turn_rate')
-    columns = [np.array(c, float) for c in _columns(name, checked, keys[0], keys).values()]
-    if (np.diff(columns[0]) < 0.0).any():
-        raise UserError(f'{name}: drive.time: times must not decrease')
-    return DriveProfile(*columns)
+    columns = _knots(name, checked, 'drive.time', 'drive.forward', 'drive.turn_rate')
+    return DriveProfile(*(np.array(column, float) for column in columns.values()))
 
 
 def _slope(name: str, checked: Mapping[str, Any]) -> Section:
-    keys = ('slope.position', 'slope.angle_deg')
-    columns = _columns(name, checked, keys[0], keys)
-    if (np.diff(columns[keys[0]]) < 0.0).any():
-        raise UserError(f'{name}: slope.position: positions must not decrease')
+    columns = _knots(name, checked, 'slope.position', 'slope.angle_deg')
     return Section({**checked, **columns}, 'slope.')
 
 

@@ -108,18 +108,16 @@ class SensorSuite:
         arrivals: list[Arrival] = []
         for time, name in sorted(found):
             part = min(max((time - before.time) / span, 0.0), 1.0)
-            for measurement in getattr(self, f'_{name}')(before, truth, part, time):
+            now = _between(before, truth, part)
+            for measurement in getattr(self, f'_{name}')(now, time):
                 arrivals.append(self._sent(self._errors.as_read(measurement), name, time))
         return arrivals
 
-    # One sensor each; part: position between two truths ------------------------------------------
+    # One sensor each, at a time [s] of which this is the truth ------------------------------------
 
-    def _odometry(
-        self, before: Truth, truth: Truth, part: float, time: float
-    ) -> Iterator[Measurement]:
-        angle = _between(before.wheel_angle, truth.wheel_angle, part)
-        counts = self._there.encoder_counts
-        if counts:
+    def _odometry(self, truth: Truth, time: float) -> Iterator[Measurement]:
+        angle = truth.wheel_angle
+        if counts := self._there.encoder_counts:
             step = 2.0 * math.pi / counts
             angle = np.floor(angle / step) * step
         counted, self._counted = self._counted, angle
@@ -130,75 +128,63 @@ class SensorSuite:
         rate = (angle - counted) / self.odometry_period
         # The mean rate of the period is that of its middle; drives report a filtered value too.
         rate = rate + self._scale * self._figures.wheel_rate_std * noise[0]
-        torque = _between(before.torque, truth.torque, part)
-        torque = self._torque_gain * torque + self.torque_zero
+        torque = self._torque_gain * truth.torque + self.torque_zero
         torque += self._scale * self._figures.torque_std * noise[1]
         if (wheels := self._failed('torque_spikes', time)) is not None:
             spikes = wheels & (self._random.uniform(size=n) < 0.1)
             torque = np.where(spikes, torque + 50.0 * self._figures.torque_std, torque)
-        missing = self._failed('no_torque', time)
         if not self._there.torque:
             torque = np.full(n, np.nan)
-        elif missing is not None:
+        elif (missing := self._failed('no_torque', time)) is not None:
             torque = np.where(missing, np.nan, torque)
         if (wheels := self._failed('nan_values', time)) is not None:
             rate = np.where(wheels & (self._random.uniform(size=n) < 0.2), np.nan, rate)
         steering = None
         if self._steered.any():
-            steering = _between(before.steering, truth.steering, part)
-            steering = np.where(self._steered, steering, np.nan)
+            steering = np.where(self._steered, truth.steering, np.nan)
         yield WheelOdometry(self._stamp(time), rate, torque, steering)
 
-    def _imu(self, before: Truth, truth: Truth, part: float, time: float) -> Iterator[Measurement]:
+    def _imu(self, truth: Truth, time: float) -> Iterator[Measurement]:
         if not self._there.imu or self._failed('no_imu', time) is not None:
             return
         figures, scale = self._figures, self._scale
         noise = self._random.standard_normal((2, 3))
-        force = _between(before.specific_force, truth.specific_force, part) + self._force_bias
+        force = truth.specific_force + self._force_bias
         force = force + scale * figures.specific_force_std * noise[0]
         if self._failed('imu_bias', time) is not None:
             force = force + np.array([0.3, 0.0, 0.0])
-        rate = _between(before.angular_rate, truth.angular_rate, part) + self._rate_bias
+        rate = truth.angular_rate + self._rate_bias
         rate = rate + scale * figures.angular_rate_std * noise[1]
         orientation = None
         if self._there.orientation and self._failed('no_orientation', time) is None:
             small = 0.2 * scale * figures.orientation_std * self._random.standard_normal(2)
             error = self._attitude_error + small
-            roll = before.roll + part * (truth.roll - before.roll) + error[0]
-            pitch = before.pitch + part * (truth.pitch - before.pitch) + error[1]
-            heading = _between(before.position, truth.position, part)[2]
-            orientation = Rotation.from_euler('xyz', [roll, -pitch, float(heading)]).as_quat()
+            roll, pitch = truth.roll + error[0], truth.pitch + error[1]
+            heading = float(truth.position[2])
+            orientation = Rotation.from_euler('xyz', [roll, -pitch, heading]).as_quat()
         yield InertialReading(self._stamp(time), force, rate, orientation)
 
-    def _sinkage(
-        self, before: Truth, truth: Truth, part: float, time: float
-    ) -> Iterator[Measurement]:
-        sinkage = _between(before.sinkage, truth.sinkage, part)
-        leaving = _between(before.leaving_angle, truth.leaving_angle, part)
-        n = sinkage.size
+    def _sinkage(self, truth: Truth, time: float) -> Iterator[Measurement]:
+        n = truth.sinkage.size
         if self._there.leaving_angle:
             error = self._scale * self._figures.leaving_angle_std * self._random.standard_normal(n)
-            yield LeavingAngleReading(self._stamp(time), leaving + error)
+            yield LeavingAngleReading(self._stamp(time), truth.leaving_angle + error)
         if not self._there.sinkage:
             return
-        reading = sinkage + self._sinkage_zero
+        reading = truth.sinkage + self._sinkage_zero
         reading += self._scale * self._figures.sinkage_std * self._random.standard_normal(n)
         chance = self._random.uniform(size=(2, n))
         wild = self._random.uniform(-0.5, 1.0, size=n) * self._configuration.wheels.radius
         reading = np.where(chance[0] < self._there.sinkage_outliers, wild, reading)
         reading = np.where(chance[1] < self._there.sinkage_dropouts, np.nan, reading)
-        missing = self._failed('no_sinkage', time)
-        if missing is not None:
+        if (missing := self._failed('no_sinkage', time)) is not None:
             reading = np.where(missing, np.nan, reading)
-        held = self._failed('sinkage_stuck', time)
-        if held is not None:
+        if (held := self._failed('sinkage_stuck', time)) is not None:
             reading = np.where(held, self._held_sinkage, reading)
         self._held_sinkage = reading
         yield SinkageReading(self._stamp(time), reading)
 
-    def _reference(
-        self, before: Truth, truth: Truth, part: float, time: float
-    ) -> Iterator[Measurement]:
+    def _reference(self, truth: Truth, time: float) -> Iterator[Measurement]:
         chance = self._random.uniform(size=2)
         std = self._figures.reference_std
         error = self._scale * std * self._random.standard_normal()
@@ -206,13 +192,10 @@ class SensorSuite:
             return
         if chance[0] < self._there.reference_dropouts:
             return
-        forward = before.forward_velocity + part * (
-            truth.forward_velocity - before.forward_velocity
-        )
         wild = chance[1] < self._there.reference_outliers
         if wild or (self._failed('reference_wild', time) is not None and chance[1] < 0.3):
             error += 10.0 * std * (1.0 if self._random.uniform() < 0.5 else -1.0)
-        yield ReferenceVelocity(self._stamp(time), forward + error, std**2)
+        yield ReferenceVelocity(self._stamp(time), truth.forward_velocity + error, std**2)
 
     # Faults and transport -----------------------------------------------------------------------
 
@@ -246,5 +229,7 @@ class SensorSuite:
         return Arrival(arrival, measurement)
 
 
-def _between(before: FloatArray, after: FloatArray, part: float) -> FloatArray:
-    return before + part * (after - before)
+def _between(before: Truth, after: Truth, part: float) -> Truth:
+    """Return what is true between two times, linear in all."""
+    ends = zip(vars(before).values(), vars(after).values(), strict=True)
+    return Truth(*(first + part * (last - first) for first, last in ends))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,14 @@ LEAST_LOAD_SHARE = 0.02
 """Least load of a wheel as a share of the mean: a lifted wheel still touches the ground."""
 
 
+class Pivots(NamedTuple):
+    """Joints of rockers and bogies: x and height above the ground [m]."""
+
+    rocker: tuple[float, float]  # to which chassis and differential are fixed
+    bogie: tuple[float, float]  # between rocker and bogie
+    on_bogie: BoolArray  # (n,) wheels on a bogie
+
+
 @dataclass(frozen=True)
 class Suspension:
     """Geometry that decides the wheel loads; frame: ``base_link`` shifted down to the ground."""
@@ -28,11 +37,7 @@ class Suspension:
     x: FloatArray
     y: FloatArray
     centre_of_gravity: FloatArray  # (3,) x, y and height above the ground [m]
-    # x and height above the ground [m] of the pivots to which chassis and differential are fixed
-    rocker_pivot: tuple[float, float] | None = None
-    # x and height above the ground [m] of the pivots between rocker and bogie
-    bogie_pivot: tuple[float, float] | None = None
-    bogie_wheels: BoolArray | None = None  # (n,) bool: wheels on a bogie
+    pivots: Pivots | None = None
     shares: FloatArray | None = None  # (n,) given shares of the total load, in place of statics
 
     @cached_property
@@ -44,12 +49,11 @@ class Suspension:
         """Loads by the balances: the inverse of the coefficients of the loads, one row each."""
         left, right = self._sides
         rows = [np.ones_like(self.x), self.x, self.y]
-        if self.rocker_pivot is not None:
+        if self.pivots is not None:
             # The differential gives both rockers the same moment about their pivots.
-            rows.append((left - right) * (self.x - self.rocker_pivot[0]))
-        if self.bogie_pivot is not None and self.bogie_wheels is not None:
-            on_bogie = self.bogie_wheels * (self.x - self.bogie_pivot[0])
-            rows += [left * on_bogie, right * on_bogie]
+            rows.append((left - right) * (self.x - self.pivots.rocker[0]))
+            arms = self.pivots.on_bogie * (self.x - self.pivots.bogie[0])
+            rows += [left * arms, right * arms]
         return np.asarray(np.linalg.pinv(np.array(rows)), dtype=np.float64)
 
     def normal_loads(
@@ -76,11 +80,10 @@ class Suspension:
             total * cg_y - mass * left * cg_z,
         ]
         on_left, on_right = self._sides
-        if self.rocker_pivot is not None:
-            height = self.rocker_pivot[1]
-            balance.append(-((on_left - on_right) * (pull * height + load_moment)).sum())
-        if self.bogie_pivot is not None and self.bogie_wheels is not None:
-            moment = self.bogie_wheels * (pull * self.bogie_pivot[1] + load_moment)
+        if self.pivots is not None:
+            moment = pull * self.pivots.rocker[1] + load_moment
+            balance.append(-((on_left - on_right) * moment).sum())
+            moment = self.pivots.on_bogie * (pull * self.pivots.bogie[1] + load_moment)
             balance += [-(on_left * moment).sum(), -(on_right * moment).sum()]
         loads = self._solution @ np.array(balance)
         least = LEAST_LOAD_SHARE * total / loads.size
@@ -95,7 +98,7 @@ def suspension_of(configuration: Configuration) -> Suspension:
     wheels, rover = configuration.wheels, configuration.rover
     ground = float(np.mean(wheels.z - wheels.radius))
     cg_x, cg_y, cg_z = rover.centre_of_gravity
-    rocker = bogie = on_bogie = shares = None
+    pivots = shares = None
     if rover.suspension == 'rocker_bogie':
         rocker = (float(rover.rocker_pivot[0]), float(rover.rocker_pivot[1]) - ground)
         bogie = (float(rover.bogie_pivot[0]), float(rover.bogie_pivot[1]) - ground)
@@ -104,6 +107,7 @@ def suspension_of(configuration: Configuration) -> Suspension:
         for side in (wheels.y > 0.0, wheels.y <= 0.0):
             members = np.flatnonzero(side)
             on_bogie[members[np.argsort(order * wheels.x[members])[:2]]] = True
+        pivots = Pivots(rocker, bogie, on_bogie)
     elif rover.suspension == 'shares':
         shares = rover.load_shares
         shares = shares / shares.sum() if shares.any() else np.full(wheels.count, 1 / wheels.count)
@@ -111,8 +115,6 @@ def suspension_of(configuration: Configuration) -> Suspension:
         x=wheels.x,
         y=wheels.y,
         centre_of_gravity=np.array([cg_x, cg_y, cg_z - ground]),
-        rocker_pivot=rocker,
-        bogie_pivot=bogie,
-        bogie_wheels=on_bogie,
+        pivots=pivots,
         shares=shares,
     )
