@@ -34,7 +34,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path, PurePosixPath
-from types import MappingProxyType
 from typing import Any
 
 from wheel_terra_estimator import __version__
@@ -160,8 +159,8 @@ def new_file(
             _sync(beside / path.name)
             (beside / path.name).replace(path)
             _sync(path.parent)
-            if (path.parent / MARKER).is_file():
-                _write_marker(path.parent, {*_listed(path.parent), path.name})
+            if is_ours(path.parent):
+                mark(path.parent, [path.name])
     except OSError as error:
         raise cannot_write(path, error) from None
 
@@ -240,8 +239,20 @@ def mark(
     """List files in the marker of a folder."""
     if entries is None:
         entries = (name for name in _files(folder) if name != MARKER)
-    earlier = _listed(folder) if (folder / MARKER).is_file() else ()
-    _write_marker(folder, {*earlier, *entries}, facts or {})
+    listed, noted = _marked(folder) if is_ours(folder) else ((), {})
+    content: dict[str, Any] = {
+        'program': f'wheel-terra {__version__}',
+        'files': sorted({*listed, *entries}),
+    }
+    if known := {**noted, **(facts or {})}:
+        content['facts'] = known
+    part = folder / f'{MARKER}.part'
+    try:
+        part.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
+        part.replace(folder / MARKER)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def facts_of(folder: Path) -> dict[str, Any]:
@@ -249,11 +260,11 @@ def facts_of(folder: Path) -> dict[str, Any]:
     if not is_ours(folder):
         return {}
     try:
-        listed = _listed(folder)
+        listed, facts = _marked(folder)
     except UserError:
         return {}
     whole = all(name.endswith('/') or (folder / name).is_file() for name in listed)
-    return _noted(folder / MARKER) if whole else {}
+    return facts if whole else {}
 
 
 def _remove_leftovers(folder: Path) -> None:
@@ -332,12 +343,17 @@ def _absolute(path: Path) -> Path:
 
 
 def _listed(folder: Path) -> set[str]:
-    """Return what the marker of a folder lists."""
+    return _marked(folder)[0]
+
+
+def _marked(folder: Path) -> tuple[set[str], dict[str, Any]]:
+    """Return what the marker of a folder lists, and the facts in it."""
     marker = folder / MARKER
     try:
         if marker.is_symlink() or marker.stat().st_size > LARGEST_MARKER:
             raise ValueError
-        names = json.loads(marker.read_text(encoding='utf-8'))['files']
+        content = json.loads(marker.read_text(encoding='utf-8'))
+        names, facts = content['files'], content.get('facts')
         inside = (PurePosixPath(name).parts for name in names)
         if not all(parts and not {'/', '//', '..'} & {*parts} for parts in inside):
             raise ValueError
@@ -346,15 +362,7 @@ def _listed(folder: Path) -> set[str]:
             f'{marker}: is not a list of files of this program, so {folder} is not overwritten; '
             'choose another path'
         ) from None
-    return set(names)
-
-
-def _noted(marker: Path) -> dict[str, Any]:
-    """Return the facts in a marker that has been looked at, or is not there yet."""
-    if not marker.is_file():
-        return {}
-    facts = json.loads(marker.read_text(encoding='utf-8')).get('facts')
-    return facts if isinstance(facts, dict) else {}
+    return set(names), facts if isinstance(facts, dict) else {}
 
 
 def _files(folder: Path, prefix: str = '') -> Iterator[str]:
@@ -411,20 +419,4 @@ def _put_in_place(fresh: Path, path: Path, beside: Path) -> None:
         fresh.rename(path)
     except OSError:
         earlier.rename(path)
-        raise
-
-
-def _write_marker(
-    folder: Path, names: Iterable[str], facts: Mapping[str, Any] = MappingProxyType({})
-) -> None:
-    marker = folder / MARKER
-    part = folder / f'{MARKER}.part'
-    content: dict[str, Any] = {'program': f'wheel-terra {__version__}', 'files': sorted(names)}
-    if known := {**_noted(marker), **facts}:
-        content['facts'] = known
-    try:
-        part.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
-        part.replace(marker)
-    except OSError:
-        part.unlink(missing_ok=True)
         raise

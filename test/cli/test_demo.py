@@ -4,6 +4,7 @@
 
 import importlib.util
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
 
@@ -16,10 +17,10 @@ def test_a_node_that_is_not_found_does_not_end_the_demo(monkeypatch, tmp_path, c
     def run(command, environment):
         if command[1] == 'diagnose':
             assert all(Path(command[i]).is_file() for i in (3, 5))
-            return demo.Part(0, 'table\n')
+            return CompletedProcess([], 0, 'table\n')
         live = command[0].endswith('live_drive')
         ran.append((Path(command[1 if live else 2]).name, live, environment['ROS_DOMAIN_ID']))
-        return demo.Part(demo.NODE_NOT_FOUND if live else 0, f'{ran[-1][0]} ran\n')
+        return CompletedProcess([], demo.NODE_NOT_FOUND if live else 0, f'{ran[-1][0]} ran\n')
 
     monkeypatch.setattr(importlib.util, 'find_spec', lambda name: name)
     monkeypatch.setattr(demo, '_run', run)

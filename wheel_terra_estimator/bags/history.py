@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
 from wheel_terra_estimator.bags.storage import Bag, messages_of
-from wheel_terra_estimator.bags.writer import DIAGNOSTICS
+from wheel_terra_estimator.bags.writer import DIAGNOSTICS, TOPICS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, SlipOnSlope
 from wheel_terra_estimator.messages.diagnostics import NODE
-from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS, OUTPUT_TYPES
+from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS
 from wheel_terra_estimator.messages.unpack import Message
 
 MOST_ROWS = 20_000
@@ -277,15 +277,13 @@ def read_estimates(bag: Bag) -> EstimateHistory:
 
     Raises UserError where the bag holds no estimates.
     """
-    types = {f'/{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
-    types[DIAGNOSTICS] = 'diagnostic_msgs/msg/DiagnosticArray'
     if f'/{NODE}/slip' not in bag.topics:
         raise UserError(
             f'{bag.path}: no /{NODE}/slip in it, so no estimates; there are: '
             + ', '.join(bag.topics)
         )
     found = _EstimateMessages()
-    for log_time, topic, message in messages_of(bag, types):
+    for log_time, topic, message in messages_of(bag, TOPICS):
         found.add(topic.removeprefix(f'/{NODE}/'), message, log_time)
     return found.history()
 

@@ -21,7 +21,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from wheel_terra_estimator.cli.outputs import add_output
 from wheel_terra_estimator.configuration.shipped import demo_recording
@@ -37,14 +37,8 @@ AT_ONCE = 2
 DOMAINS = 101
 """ROS domains that every system has."""
 ONE_THREAD = {'OMP_NUM_THREADS': '1', 'OPENBLAS_NUM_THREADS': '1'}
+Ended: TypeAlias = 'subprocess.CompletedProcess[str]'
 EXAMPLES = ('wheel-terra demo', 'wheel-terra demo --no-node -o /tmp/demo --overwrite')
-
-
-class Part(NamedTuple):
-    """A part that has ended: its exit status and what it said."""
-
-    status: int
-    said: str
 
 
 class DemoDrive(NamedTuple):
@@ -128,17 +122,17 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
     return 0
 
 
-def _told(title: str, part: Future[Part]) -> int:
+def _told(title: str, part: Future[Ended]) -> int:
     """Print the title, then what a part said once it has ended; return its status."""
     print(f'\n=== {title}\n', flush=True)
-    status, said = part.result()
-    print(said, end='', flush=True)
-    return status
+    done = part.result()
+    print(done.stdout, end='', flush=True)
+    return done.returncode
 
 
-def _run(command: Sequence[str], environment: Mapping[str, str]) -> Part:
+def _run(command: Sequence[str], environment: Mapping[str, str]) -> Ended:
     """Run a command of the package; return its status and what it said."""
-    done = subprocess.run(
+    return subprocess.run(
         [sys.executable, '-m', *command],
         env={**os.environ, **environment},
         stdout=subprocess.PIPE,
@@ -146,16 +140,16 @@ def _run(command: Sequence[str], environment: Mapping[str, str]) -> Part:
         text=True,
         check=False,
     )
-    return Part(done.returncode, done.stdout)
 
 
-def _trial(folder: Path) -> Part:
+def _trial(folder: Path) -> Ended:
     """Diagnose the shipped table blind."""
     shipped = demo_recording('trial')
     command = ['wheel_terra_estimator.cli.main', 'diagnose', '--overwrite']
     command += [str(shipped / 'blind.csv'), '--config', str(shipped / 'rig.yaml')]
-    status, said = _run([*command, '-o', str(folder / 'diagnosis')], ONE_THREAD)
-    return Part(status, f'blind table, truth withheld (SHA-256 {SEAL_SHA256[:16]}...)\n{said}')
+    done = _run([*command, '-o', str(folder / 'diagnosis')], ONE_THREAD)
+    done.stdout = f'blind table, truth withheld (SHA-256 {SEAL_SHA256[:16]}...)\n{done.stdout}'
+    return done
 
 
 def _named(folder: Path) -> str:
@@ -171,14 +165,14 @@ def _named(folder: Path) -> str:
     return f'truth revealed: {hidden} was hidden; named: {said}: {judged}'
 
 
-def _drive(number: int, output: Path, live: bool) -> Part:
+def _drive(number: int, output: Path, live: bool) -> Ended:
     """Run a drive; where DDS does not connect it with the node, replay it."""
-    part = _run(_command(DRIVES[number], output, live), _environment(number))
-    if live and part.status == NODE_NOT_FOUND:
+    done = _run(_command(DRIVES[number], output, live), _environment(number))
+    if live and done.returncode == NODE_NOT_FOUND:
         said = 'DDS has no way to the node on this machine: `wheel-terra replay` instead.\n'
-        status, replayed = _run(_command(DRIVES[number], output, False), _environment(number))
-        return Part(status, said + replayed)
-    return part
+        done = _run(_command(DRIVES[number], output, False), _environment(number))
+        done.stdout = said + done.stdout
+    return done
 
 
 def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:

@@ -8,7 +8,7 @@ import difflib
 import functools
 import importlib.metadata
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from wheel_terra_estimator.errors import UserError
@@ -103,20 +103,16 @@ def find(name: str | Path, kind: str = '', folder: Path | None = None) -> Path:
         raise UserError(f'{text}: is a folder, not a configuration file')
     if path.exists():
         check_regular(path)
-    near = nearest_names(wanted, shipped)
+    bare = wanted.rsplit('/', 1)[-1]
+
+    def likeness(key: str) -> float:
+        return difflib.SequenceMatcher(None, bare, key.rsplit('/', 1)[-1]).ratio()
+
+    near = sorted(shipped, key=likeness, reverse=True)[:3]
     first = near[0].rsplit('/', 1)[-1] if near else ''
-    alike = difflib.get_close_matches(wanted.rsplit('/', 1)[-1], [first])
+    alike = difflib.get_close_matches(bare, [first])
     hint = f"did you mean '{first}'? " if alike else ''
     raise UserError(
         f'{text}: no such file, and no shipped file of this name; {hint}the nearest are '
         f'{", ".join(near)}' + ('' if folder else ' (all: wheel-terra config list)')
     )
-
-
-def nearest_names(wanted: str, shipped: Iterable[str]) -> list[str]:
-    """Return the three shipped names that are most like a word, the likest first."""
-    bare = wanted.rsplit('/', 1)[-1]
-    return sorted(
-        shipped,
-        key=lambda key: -difflib.SequenceMatcher(None, bare, key.rsplit('/', 1)[-1]).ratio(),
-    )[:3]

@@ -350,7 +350,11 @@ class EstimatorNode(LifecycleNode):
         self._set_at = now
         if self._pipeline.core.warning.state is not self._warned:
             self._warned = self._pipeline.core.warning.state
-            self._log_stuck()
+            said = self.get_logger()
+            if self._warned.stuck:
+                said.error(f'stuck: {self._warned.reason}')
+            else:
+                said.info(f'no longer stuck: {self._warned.reason}')
             self._save_quietly(soil=False)
         if not (self._active and self._enabled):
             self._pipeline.diagnostics.follow(estimates)
@@ -443,12 +447,6 @@ class EstimatorNode(LifecycleNode):
     def _say_stuck(self) -> None:
         if self._publisher is not None and self._active and self._enabled:
             self._publisher.publish_stuck(self._warned.stuck, self._warned.direction)
-
-    def _log_stuck(self) -> None:
-        if self._warned.stuck:
-            self.get_logger().error(f'stuck: {self._warned.reason}')
-        else:
-            self.get_logger().info(f'no longer stuck: {self._warned.reason}')
 
     def _say(
         self, stamp: int, statuses: list[Status], now: float, *, expected: bool = False

@@ -30,11 +30,9 @@ _TAKE_OVER_AT, _TAKE_OVER = 0.07, 0.1
 # Lateral speed v_y/(w R) over which they do where the wheel slides sideways.
 _SIDEWAYS_TAKE_OVER = 0.03
 _NO_DISPLACEMENT = 1e-300  # over K [-]; keeps the direction of none finite
-# Gauss-Legendre nodes and weights on (0, 1), squared towards 0, where the stress starts like v^N.
-_NODES = tuple(
-    (0.25 * (x + 1.0) ** 2, 0.5 * w * (x + 1.0))
-    for x, w in zip(*(part.tolist() for part in np.polynomial.legendre.leggauss(4)), strict=True)
-)
+_RULE = stresses.gauss_rule(4)
+# Nodes and weights on (0, 1), squared towards 0, where the stress starts like v^N.
+_NODES = tuple((place * place, 2.0 * weight * place) for place, weight in _RULE)
 
 
 def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Any, Any, Any]:
@@ -294,13 +292,6 @@ class BranchForces:
         return (load / unit) ** (1.0 / (2.0 * n + 1.0))
 
 
-# Stress that effects add (a hard layer) is integrated with Gauss's four points per side.
-_POINTS, _WEIGHTS = (
-    (0.5 * (nodes + 1.0)).tolist() if k == 0 else (0.5 * nodes).tolist()
-    for k, nodes in enumerate(np.polynomial.legendre.leggauss(4))
-)
-
-
 def coefficients(
     entrance_angle: Quantity, peak_angle: Quantity, leaving_angle: Quantity
 ) -> tuple[Any, Any, Any]:
@@ -366,7 +357,7 @@ def _added_stress_forces(contact: Contact[Quantity], terms: Terms) -> tuple[Any,
     R = contact.shear_radius
     load = pull = torque = lateral = 0.0
     for low, high, behind in ((tm, t1, False), (t2, tm, True)):
-        for point, weight in zip(_POINTS, _WEIGHTS, strict=True):
+        for point, weight in _RULE:
             angle = low + (high - low) * point
             mirror = t1 - (t1 - tm) * (point if behind else 1.0 - point)
             stress = stresses.front_stress(contact, mirror)

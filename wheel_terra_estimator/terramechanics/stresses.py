@@ -15,6 +15,13 @@ from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
 
+
+def gauss_rule(nodes: int) -> list[tuple[float, float]]:
+    """Return nodes and weights of Gauss and Legendre on (0, 1)."""
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    return list(zip((0.5 * (x + 1.0)).tolist(), (0.5 * w).tolist(), strict=True))
+
+
 _NO_DISPLACEMENT = 1e-300  # [m]; keeps the direction of none finite
 
 

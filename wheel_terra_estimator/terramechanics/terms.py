@@ -15,7 +15,7 @@ from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import by_variant, catalogue
-from wheel_terra_estimator.terramechanics.effects.base import STAGES, Effect, EffectSettings, Term
+from wheel_terra_estimator.terramechanics.effects.base import STAGES, EffectSettings, Term
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -34,19 +34,16 @@ class Terms:
     """
 
     def __init__(self, settings: EffectSettings) -> None:
-        known = catalogue()
-        soil: list[tuple[Effect, SimpleNamespace]] = []
-        instruments: list[tuple[Effect, SimpleNamespace]] = []
-        for key, values in sorted(by_variant(settings).items()):
-            effect = known[key]
-            kind = instruments if effect.instrument else soil
-            kind.append((effect, SimpleNamespace(**values)))
+        known, variants = catalogue(), sorted(by_variant(settings).items())
+        effects = [(known[key], SimpleNamespace(**values)) for key, values in variants]
         self.stages: dict[str, list[tuple[Term, SimpleNamespace]]] = {}
         for stage in STAGES:
-            order = instruments + soil if stage == 'on_inputs' else soil + instruments
+            instruments_first = stage == 'on_inputs'
             self.stages[stage] = [
                 (term, values)
-                for effect, values in order
+                for effect, values in sorted(
+                    effects, key=lambda each: each[0].instrument != instruments_first
+                )
                 if (term := getattr(effect, stage)) is not None
             ]
 

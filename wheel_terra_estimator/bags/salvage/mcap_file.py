@@ -351,17 +351,14 @@ class McapFile:
                 row = heapq.heappop(heap)
                 held -= _size(row)
                 yield row
-            for row in self._rows(piece, wanted, held):
+            content = self._content(piece)
+            reading = self._read(piece, content, wanted, limits.HELD - held)
+            self._note_damage(piece, content, reading)
+            for row in reading.rows:
                 heapq.heappush(heap, row)
                 held += _size(row)
         while heap:
             yield heapq.heappop(heap)
-
-    def _rows(self, piece: Piece, wanted: frozenset[int], held: int) -> list[Row]:
-        content = self._content(piece)
-        reading = self._read(piece, content, wanted, limits.HELD - held)
-        self._note_damage(piece, content, reading)
-        return reading.rows
 
     def _content(self, piece: Piece) -> Content:
         """Return the bytes of a piece; a copy, so that nothing of the file stays in memory."""

@@ -11,7 +11,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, Form, magnitude
-from wheel_terra_estimator.terramechanics.stresses import mobilised_share
+from wheel_terra_estimator.terramechanics.stresses import gauss_rule, mobilised_share
 
 _LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it
 
@@ -98,11 +98,7 @@ BULLDOZING = Effect(
 )
 
 
-# Gauss's nodes and weights on (0, 1), over the flank in the soil.
-_NODES = tuple(
-    (0.5 * (x + 1.0), 0.5 * w)
-    for x, w in zip(*(part.tolist() for part in np.polynomial.legendre.leggauss(8)), strict=True)
-)
+_NODES = gauss_rule(8)  # over the flank in the soil
 _CENTRE = 2.0 / 3.0  # distance from the hub at which soil rubs on the flank, share of the radius
 
 
