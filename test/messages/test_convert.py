@@ -10,7 +10,7 @@ from estimate_sets import STAMP
 from recordings import Converter
 from scipy.spatial.transform import Rotation
 
-from wheel_terra_estimator.messages.convert import input_layout, stamp_of
+from wheel_terra_estimator.messages.convert import imu_mounting, stamp_of
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 NONE = 'none of the configured wheels in it'
@@ -21,7 +21,7 @@ LENGTHS = 'velocity and name differ in length'
 def make_converter(rover):
     """Make a converter for the cart, with other parameters."""
     return lambda **changes: Converter(
-        input_layout(rover.replace({key.replace('__', '.'): v for key, v in changes.items()}))
+        rover.replace({key.replace('__', '.'): v for key, v in changes.items()})
     )
 
 
@@ -266,7 +266,7 @@ def test_roll_pitch_yaw_are_about_fixed_axes(rover):
     turned = rover.replace(
         {f'sensors.imu_mounting_{name}_deg': math.degrees(a) for name, a in angles.items()}
     )
-    found = input_layout(turned).imu_mounting.as_matrix()
+    found = imu_mounting(turned).as_matrix()
     np.testing.assert_allclose(found, z @ y @ x, atol=1e-15)
 
 

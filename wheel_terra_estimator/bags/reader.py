@@ -24,7 +24,6 @@ from wheel_terra_estimator.messages.convert import (
     DAMAGED,
     INPUT_TYPES,
     InputConverter,
-    input_layout,
     names_in_words,
 )
 from wheel_terra_estimator.messages.unpack import DamagedMessageError, Message, unpack
@@ -52,14 +51,14 @@ class MeasurementReader:
 
     def __init__(self, bag: Bag, remaps: Mapping[str, str], configuration: Configuration) -> None:
         self.bag = bag
-        self.converter = InputConverter(input_layout(configuration))
+        self.converter = InputConverter(configuration)
         # Estimator's topic to the bag's, for the topics that are there
         self.topics: dict[str, str] = {}
         # Topics that the estimator could use and that are not in the bag
         self.absent: list[str] = []
-        for name in self.converter.layout.topics:
+        for name in self.converter.topics:
             self._find(name, remaps)
-        if self.converter.layout.wheel_odometry == 'joint_states':
+        if self.converter.wheel_odometry == 'joint_states':
             self._check_wheel_names()
 
     @property
@@ -113,7 +112,7 @@ class MeasurementReader:
         """Find an input topic in the bag."""
         topic = remaps.get(name, f'/{name}')
         found = self.bag.topics.get(topic)
-        required = name == self.converter.layout.wheel_odometry
+        required = name == self.converter.wheel_odometry
         if found is None or not found.message_count:
             if not required and name not in remaps:
                 self.absent.append(name)
@@ -143,7 +142,7 @@ class MeasurementReader:
     def _check_wheel_names(self) -> None:
         """Make sure that some joint message holds a wheel, before anything is written."""
         heard: dict[str, None] = {}
-        wanted = self.converter.layout.names
+        wanted = self.converter.wheels.names
         for _, _, data in self.bag.messages((self.topics['joint_states'],)):
             message = self.unpack(data, 'joint_states')
             if message is not None:

@@ -227,7 +227,7 @@ def _notes(
     if unknown:
         count = sum(topic.message_count for topic in unknown)
         yield f'{count} messages not used, on {", ".join(topic.name for topic in unknown)}'
-    wheels = pipeline.converter.layout.wheel_odometry
+    wheels = pipeline.converter.wheel_odometry
     if history.whole and history.whole.sets > 2 * pipeline.received[wheels] > 0:
         yield (
             f'{wheels} comes so seldom that wheels are mostly unknown: filter.silence '

@@ -21,7 +21,7 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.messages import pack
-from wheel_terra_estimator.messages.convert import INPUT_TYPES, input_layout
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, imu_mounting
 from wheel_terra_estimator.messages.pack import BASE_FRAME, OUTPUT_TYPES
 from wheel_terra_estimator.simulation.drive import SimulatedDrive
 
@@ -59,7 +59,7 @@ class _Sender:
         self._bag = bag
         self._wheels = configuration.wheels
         self._figures = configuration.sensors
-        self._mounting = input_layout(configuration).imu_mounting
+        self._mounting = imu_mounting(configuration)
         self._into_sensor = self._mounting.inv().as_matrix()
         self._mounted = self._mounting.magnitude() > 0.0
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -49,62 +48,39 @@ _GONE = 1_000_000_000  # other joints alone for so long [ns] are told
 _MOST_LETTERS = 300  # of the names of joints in one line of words
 
 
-@dataclass(frozen=True)
-class InputLayout:
-    """What of the configuration is needed to read messages; arrays are (n,), one per wheel."""
-
-    names: tuple[str, ...]
-    steering: dict[str, list[int]]  # joint that steers -> wheels that it steers
-    directions: FloatArray  # +1, or -1 where the joint counts negative forward
-    lateral_positions: FloatArray  # y of the wheels in base_link [m]
-    slip_radius: FloatArray  # [m]
-    imu_mounting: Rotation  # turns the sensor into base_link
-    wheel_odometry: str  # 'joint_states' or 'odom'
-
-    @property
-    def topics(self) -> tuple[str, ...]:
-        """Input topics that are listened to."""
-        other = 'odom' if self.wheel_odometry == 'joint_states' else 'joint_states'
-        return tuple(name for name in INPUT_TYPES if name != other)
-
-
-def input_layout(configuration: Configuration) -> InputLayout:
-    """Return what of the configuration is needed to read messages."""
-    wheels, sensors = configuration.wheels, configuration.sensors
-    steering: dict[str, list[int]] = {}
-    for i, joint in enumerate(wheels.steering_joints):
-        if joint:
-            steering.setdefault(joint, []).append(i)
-    return InputLayout(
-        names=wheels.names,
-        steering=steering,
-        directions=wheels.direction,
-        lateral_positions=wheels.y,
-        slip_radius=wheels.slip_radius,
-        imu_mounting=Rotation.from_euler(  # about fixed x, then y, then z, as in URDF
-            'xyz', [sensors.imu_mounting_roll, sensors.imu_mounting_pitch, sensors.imu_mounting_yaw]
-        ),
-        wheel_odometry=configuration.wheel_odometry,
-    )
+def imu_mounting(configuration: Configuration) -> Rotation:
+    """Return what turns the IMU into ``base_link``."""
+    sensors = configuration.sensors
+    angles = [getattr(sensors, f'imu_mounting_{name}') for name in ('roll', 'pitch', 'yaw')]
+    return Rotation.from_euler('xyz', angles)  # about fixed x, then y, then z, as in URDF
 
 
 class InputConverter:
     """Messages to measurements."""
 
-    def __init__(self, layout: InputLayout) -> None:
-        self.layout = layout
+    def __init__(self, configuration: Configuration) -> None:
+        self.wheels = wheels = configuration.wheels
+        self.wheel_odometry = configuration.wheel_odometry  # 'joint_states' or 'odom'
+        other = 'odom' if self.wheel_odometry == 'joint_states' else 'joint_states'
+        # Input topics that are listened to
+        self.topics = tuple(name for name in INPUT_TYPES if name != other)
+        self._steered_by: dict[str, list[int]] = {}  # joint -> wheels that it steers
+        for i, joint in enumerate(wheels.steering_joints):
+            if joint:
+                self._steered_by.setdefault(joint, []).append(i)
         # Messages that did not fit, by (topic, reason in words)
         self.rejected: Counter[tuple[str, str]] = Counter()
         self._unknown_names: dict[str, Sequence[str]] = {}  # topic -> names in a message
         # topic -> stamp of its last message with a wheel: other joints beside it are no fault
         self._with_wheels: dict[str, int] = {}
         self._columns: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}
-        self._index = {name: i for i, name in enumerate(layout.names)}
-        self._all = list(range(len(layout.names)))
-        self._reversed = bool(np.any(layout.directions != 1.0))
+        self._index = {name: i for i, name in enumerate(wheels.names)}
+        self._all = list(range(wheels.count))
+        self._reversed = bool(np.any(wheels.direction != 1.0))
         self._place: list[float] | None = None  # of the last reference velocity [m]
-        self._mounted = layout.imu_mounting.magnitude() > 0.0
-        self._rotation = layout.imu_mounting.as_matrix()
+        self._mounting = imu_mounting(configuration)
+        self._mounted = self._mounting.magnitude() > 0.0
+        self._rotation = self._mounting.as_matrix()
         squares = np.square(self._rotation)
         self._shares = squares[0].tolist(), squares[2].tolist()
         """Of the variances along the sensor's axes in those along x and z of ``base_link``."""
@@ -126,41 +102,40 @@ class InputConverter:
         if reason != _NO_WHEEL:
             return reason
         there = names_in_words(self._unknown_names[topic])
-        return f'{reason} but {there}; wheels.names: {", ".join(self.layout.names)}'
+        return f'{reason} but {there}; wheels.names: {", ".join(self.wheels.names)}'
 
     def _joint_states(self, message: Message) -> WheelOdometry | None:
         """Wheel rates, torques and steering angles; what the message does not hold is nan."""
         _, velocity, effort = message.numbers
-        steering = self._steering(message) if self.layout.steering else None
+        steering = self._steering(message) if self._steered_by else None
         if steering is not None and not self._columns_of(message.names)[0]:
-            blank = np.full(len(self.layout.names), math.nan)
+            blank = np.full(self.wheels.count, math.nan)
             return WheelOdometry(message.stamp, blank, blank, steering)
         values = self._wheel_values('joint_states', message, velocity, 'velocity')
         if values is None:
             return None
-        torque = None
-        if len(effort):
-            torque = self._wheel_values('joint_states', message, effort, 'effort')
+        told = len(effort) > 0
+        torque = self._wheel_values('joint_states', message, effort, 'effort') if told else None
         if torque is None:
-            torque = np.full(len(self.layout.names), math.nan)
+            torque = np.full(self.wheels.count, math.nan)
         unknown = np.count_nonzero(np.isnan(values))
         if unknown and unknown > len(values) - len(set(self._columns_of(message.names)[1])):
             self.rejected['joint_states', 'velocity of a wheel is nan (taken as unknown)'] += 1
         if self._reversed:
             with np.errstate(invalid='ignore'):  # a damaged nan may be a signalling one
-                values, torque = values * self.layout.directions, torque * self.layout.directions
+                values, torque = values * self.wheels.direction, torque * self.wheels.direction
         return WheelOdometry(message.stamp, values, torque, steering)
 
     def _steering(self, message: Message) -> FloatArray | None:
         """Return the steering angles of the wheels [rad], nan where there is none; None: none."""
-        joints, position = self.layout.steering, message.numbers[0]
+        joints, position = self._steered_by, message.numbers[0]
         there = [k for k, name in enumerate(message.names) if name in joints]
         if not there:
             return None
         if len(position) != len(message.names):
             self.rejected['joint_states', 'position of steering joints missing'] += 1
             return None
-        angles = np.full(len(self.layout.names), math.nan)
+        angles = np.full(self.wheels.count, math.nan)
         for k in there:
             angles[joints[message.names[k]]] = position[k]
         return angles
@@ -169,8 +144,8 @@ class InputConverter:
         """Wheel rates of a rover that publishes no joint states, from its wheel odometry."""
         forward, _, _, _, _, turn = message.numbers[0][:6].tolist()
         with np.errstate(all='ignore'):  # absurd values are judged later, number by number
-            rim_speed = forward - turn * self.layout.lateral_positions
-            rate = rim_speed / self.layout.slip_radius
+            rim_speed = forward - turn * self.wheels.y
+            rate = rim_speed / self.wheels.slip_radius
         if np.isnan(rim_speed).any():
             self.rejected['odom', 'velocity is nan (taken as unknown)'] += 1
         return WheelOdometry(message.stamp, rate, np.full_like(rim_speed, math.nan))
@@ -284,7 +259,7 @@ class InputConverter:
         sensor = np.array(quaternion) / norm
         if not self._mounted:
             return sensor
-        return (Rotation.from_quat(sensor) * self.layout.imu_mounting.inv()).as_quat()
+        return (Rotation.from_quat(sensor) * self._mounting.inv()).as_quat()
 
 
 def names_in_words(names: Iterable[str]) -> str:

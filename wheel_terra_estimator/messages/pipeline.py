@@ -18,7 +18,7 @@ from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.timing.input_checks import REMEDIES
 from wheel_terra_estimator.estimation.timing.input_log import Estimator
-from wheel_terra_estimator.messages.convert import InputConverter, input_layout
+from wheel_terra_estimator.messages.convert import InputConverter
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
 
 RESET = 'reset'  # line of an arrival log for a call of ``~/reset``
@@ -40,7 +40,7 @@ class Pipeline:
     ) -> None:
         self.configuration = configuration
         self.names = configuration.wheels.names
-        self.converter = InputConverter(input_layout(configuration))
+        self.converter = InputConverter(configuration)
         self.core = EstimatorCore(configuration, estimator, judged_by=InputJudge)
         self.received: Counter[str] = Counter()  # messages heard, by input topic
         self.diagnostics = Diagnostics(self.names, self.counters, self._faults, node_name)

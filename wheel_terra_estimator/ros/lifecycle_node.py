@@ -271,7 +271,7 @@ class EstimatorNode(LifecycleNode):
 
     def _listen(self) -> None:
         assert self._pipeline is not None
-        for topic in self._pipeline.converter.layout.topics:
+        for topic in self._pipeline.converter.topics:
             self._subscriptions_made[topic] = self.create_subscription(
                 MESSAGE_TYPES[topic],
                 topic,
@@ -523,7 +523,7 @@ class EstimatorNode(LifecycleNode):
             name = self.resolve_topic_name(topic)
             cure = f'; set qos_overrides.{name}.subscription.* to what it offers'
             faults += [(name, words + cure)] if words else []
-        wheels = self._pipeline.converter.layout.wheel_odometry if self._pipeline else ''
+        wheels = self._pipeline.converter.wheel_odometry if self._pipeline else ''
         if wheels and self._watch_inputs.age(wheels, now) is None and self._latest is not None:
             words = f'never received ({self._publishers_in_words(wheels)})'
             faults.append((self.resolve_topic_name(wheels), words))
@@ -544,7 +544,7 @@ class EstimatorNode(LifecycleNode):
         names = [f'{space.rstrip("/")}/{name}' for name, space in namespaces]
         self._same_name = names.count(f'/{self._full_name}') > 1
         assert self._pipeline is not None
-        topics: Iterable[str] = self._pipeline.converter.layout.topics
+        topics: Iterable[str] = self._pipeline.converter.topics
         found = {topic: self.get_publishers_info_by_topic(topic) for topic in topics}
         self._incompatible = {
             topic: other_quality(publishers, self._subscriptions_made[topic].qos_profile)
@@ -560,7 +560,7 @@ class EstimatorNode(LifecycleNode):
 
     def _silence_in_words(self, now: float) -> str:
         assert self._pipeline is not None
-        topics = self._pipeline.converter.layout.topics
+        topics = self._pipeline.converter.topics
         if self._latest is None and now - self._started < START:
             return f'waiting for {", ".join(map(self.resolve_topic_name, topics))}'
         words = []
