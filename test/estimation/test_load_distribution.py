@@ -8,7 +8,7 @@ import pytest
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.load_distribution import load_distribution
 from wheel_terra_estimator.estimation.rover import Rover
-from wheel_terra_estimator.simulation.suspension import suspension_of
+from wheel_terra_estimator.simulation.suspension import Suspension
 
 THREE = np.array([[1.0, 0.5], [1.0, -0.5], [-1.0, 0.0]])
 SIX = np.array([[x, y] for x in (0.6, 0.0, -0.6) for y in (0.4, -0.4)])
@@ -55,7 +55,7 @@ def test_shares_are_kept_and_checked():
 def test_rocker_bogie_agrees_with_the_simulators_statics():
     configuration = reader.load(['generic_six_wheel'])
     ours = Rover.from_configuration(configuration).load
-    theirs = suspension_of(configuration)
+    theirs = Suspension(configuration)
     rng = np.random.default_rng(0)
     mass = configuration.rover.mass
     for _ in range(50):

@@ -12,7 +12,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation import plant as plant_module
 from wheel_terra_estimator.simulation.drives import Command
 from wheel_terra_estimator.simulation.plant import RoverPlant
-from wheel_terra_estimator.simulation.suspension import LEAST_LOAD_SHARE, suspension_of
+from wheel_terra_estimator.simulation.suspension import LEAST_LOAD_SHARE, Suspension
 from wheel_terra_estimator.simulation.terrain import GRID, Patch, smooth_noise
 from wheel_terra_estimator.simulation.truth import Truth
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -291,7 +291,7 @@ def test_noise_has_the_stated_spread_and_length():
 
 def test_moments_balance_for_any_force():
     configuration = rover()
-    suspension = suspension_of(configuration)
+    suspension = Suspension(configuration)
     x, y = configuration.wheels.x, configuration.wheels.y
     random = np.random.default_rng(1)
     for _ in range(50):
@@ -309,7 +309,7 @@ def test_moments_balance_for_any_force():
 
 
 def test_no_wheel_pulls_on_the_ground():
-    suspension = suspension_of(rover('rover.suspension:=rigid'))
+    suspension = Suspension(rover('rover.suspension:=rigid'))
     loads = suspension.normal_loads(180.0, np.array([9.0, 0.0, 4.0]), np.zeros(6), np.zeros(6))
     assert loads.min() >= LEAST_LOAD_SHARE * 180.0 * 4.0 / 6.0 * 0.5
     assert loads.sum() == pytest.approx(720.0)
@@ -319,7 +319,7 @@ def test_given_shares():
     configuration = rover(
         'rover.suspension:=shares', 'rover.load_shares:=[0.1, 0.1, 0.2, 0.2, 0.2, 0.2]'
     )
-    loads = suspension_of(configuration).normal_loads(
+    loads = Suspension(configuration).normal_loads(
         180.0, np.array([1.0, 0.0, 5.0]), np.zeros(6), np.zeros(6)
     )
     np.testing.assert_allclose(loads, 900.0 * np.array([0.1, 0.1, 0.2, 0.2, 0.2, 0.2]))

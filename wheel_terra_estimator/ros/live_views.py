@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Sequence
 
+import numpy as np
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Point, WrenchStamped
 from rclpy.node import Node
@@ -77,9 +78,11 @@ class LiveViews:
         self._markers: Publisher | None = None
         if configuration.flat()['publish_markers']:
             self._markers = make_publisher(node, MarkerArray, '~/markers')
-        self._hubs = list(zip(*(a.tolist() for a in (wheels.x, wheels.y, wheels.z)), strict=True))
-        self._radius, self._width = wheels.radius.tolist(), wheels.width.tolist()
-        self._wheels = [_WheelMarkers(i, *self._shape(i)) for i in range(wheels.count)]
+        columns = np.stack([wheels.x, wheels.y, wheels.z, wheels.radius, wheels.width])
+        self._wheels = [
+            _WheelMarkers(i, (x, y, z), *size)
+            for i, (x, y, z, *size) in enumerate(columns.T.tolist())
+        ]
         self._shown = -MARKER_PERIOD
 
     def destroy(self) -> None:
@@ -110,9 +113,6 @@ class LiveViews:
                 marker.header.stamp = stamp
                 message.markers.append(marker)
         self._markers.publish(message)
-
-    def _shape(self, i: int) -> tuple[tuple[float, float, float], float, float]:
-        return self._hubs[i], self._radius[i], self._width[i]
 
 
 class _WheelMarkers:

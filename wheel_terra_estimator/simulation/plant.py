@@ -19,7 +19,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation.contact import SoilForces, contact_of
 from wheel_terra_estimator.simulation.contact_memory import ContactMemory, Shear
 from wheel_terra_estimator.simulation.drives import Command, Drives, SteeringDrives
-from wheel_terra_estimator.simulation.suspension import Suspension, suspension_of
+from wheel_terra_estimator.simulation.suspension import Suspension
 from wheel_terra_estimator.simulation.terrain import Terrain
 from wheel_terra_estimator.simulation.truth import Truth
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
@@ -72,7 +72,7 @@ class RoverPlant:
         self._rest_speed = configuration.rest_speed
         self._contact = contact_of(configuration)
         self._memory = ContactMemory(wheels.wheel, wheels.slip_radius, dig_efficiency)
-        self._suspension: Suspension = suspension_of(configuration)
+        self._suspension = Suspension(configuration)
         length = float(np.ptp(wheels.x)) + 2.0 * float(wheels.radius.max())
         breadth = float(np.ptp(wheels.y)) + float(wheels.width.max())
         yaw_inertia = rover.mass * (length**2 + breadth**2) / 12.0

@@ -8,10 +8,6 @@ the contact stress acts ahead of the hub, and the body accelerates.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
-
 import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
@@ -21,40 +17,37 @@ LEAST_LOAD_SHARE = 0.02
 """Least load of a wheel as a share of the mean: a lifted wheel still touches the ground."""
 
 
-class Pivots(NamedTuple):
-    """Joints of rockers and bogies: x and height above the ground [m]."""
-
-    rocker: tuple[float, float]  # to which chassis and differential are fixed
-    bogie: tuple[float, float]  # between rocker and bogie
-    on_bogie: BoolArray  # (n,) wheels on a bogie
-
-
-@dataclass(frozen=True)
 class Suspension:
-    """Geometry that decides the wheel loads; frame: ``base_link`` shifted down to the ground."""
+    """The suspension that a configuration describes; heights are those above the ground [m]."""
 
-    # ``x``, ``y``: (n,) wheel hubs [m]
-    x: FloatArray
-    y: FloatArray
-    centre_of_gravity: FloatArray  # (3,) x, y and height above the ground [m]
-    pivots: Pivots | None = None
-    shares: FloatArray | None = None  # (n,) given shares of the total load, in place of statics
-
-    @cached_property
-    def _sides(self) -> tuple[FloatArray, FloatArray]:
-        return (self.y > 0).astype(float), (self.y <= 0).astype(float)
-
-    @cached_property
-    def _solution(self) -> FloatArray:
-        """Loads by the balances: the inverse of the coefficients of the loads, one row each."""
-        left, right = self._sides
-        rows = [np.ones_like(self.x), self.x, self.y]
-        if self.pivots is not None:
+    def __init__(self, configuration: Configuration) -> None:
+        wheels, rover = configuration.wheels, configuration.rover
+        x, y = wheels.x, wheels.y
+        ground = float(np.mean(wheels.z - wheels.radius))
+        cg_x, cg_y, cg_z = rover.centre_of_gravity
+        self._centre_of_gravity = cg_x, cg_y, cg_z - ground
+        self._left, self._right = (y > 0.0).astype(float), (y <= 0.0).astype(float)
+        self._shares: FloatArray | None = None  # (n,) given ones of the total load, no statics
+        self._on_bogie: BoolArray | None = None  # (n,) wheels on a bogie
+        rows = [np.ones_like(x), x, y]  # of the balances: coefficients of the loads
+        if rover.suspension == 'rocker_bogie':
+            rocker_x, rocker_z = rover.rocker_pivot  # of rocker, chassis and differential
+            bogie_x, bogie_z = rover.bogie_pivot  # between rocker and bogie
+            self._rocker_height, self._bogie_height = rocker_z - ground, bogie_z - ground
+            order = -1.0 if rover.bogie_wheels == 'front' else 1.0
+            self._on_bogie = np.zeros(wheels.count, dtype=bool)
+            for side in (y > 0.0, y <= 0.0):
+                members = np.flatnonzero(side)
+                self._on_bogie[members[np.argsort(order * x[members])[:2]]] = True
             # The differential gives both rockers the same moment about their pivots.
-            rows.append((left - right) * (self.x - self.pivots.rocker[0]))
-            arms = self.pivots.on_bogie * (self.x - self.pivots.bogie[0])
-            rows += [left * arms, right * arms]
-        return np.asarray(np.linalg.pinv(np.array(rows)), dtype=np.float64)
+            rows.append((self._left - self._right) * (x - rocker_x))
+            arms = self._on_bogie * (x - bogie_x)
+            rows += [self._left * arms, self._right * arms]
+        elif rover.suspension == 'shares':
+            shares = rover.load_shares
+            even = np.full(wheels.count, 1 / wheels.count)
+            self._shares = shares / shares.sum() if shares.any() else even
+        self._solution = np.asarray(np.linalg.pinv(np.array(rows)), dtype=np.float64)
 
     def normal_loads(
         self, mass: float, specific_force: FloatArray, pull: FloatArray, load_moment: FloatArray
@@ -71,50 +64,22 @@ class Suspension:
         """
         forward, left, up = specific_force
         total = mass * up
-        if self.shares is not None:
-            return self.shares * total
-        cg_x, cg_y, cg_z = self.centre_of_gravity
+        if self._shares is not None:
+            return self._shares * total
+        cg_x, cg_y, cg_z = self._centre_of_gravity
         balance = [
             total,
             total * cg_x - mass * forward * cg_z - load_moment.sum(),
             total * cg_y - mass * left * cg_z,
         ]
-        on_left, on_right = self._sides
-        if self.pivots is not None:
-            moment = pull * self.pivots.rocker[1] + load_moment
-            balance.append(-((on_left - on_right) * moment).sum())
-            moment = self.pivots.on_bogie * (pull * self.pivots.bogie[1] + load_moment)
-            balance += [-(on_left * moment).sum(), -(on_right * moment).sum()]
+        if self._on_bogie is not None:
+            moment = pull * self._rocker_height + load_moment
+            balance.append(-((self._left - self._right) * moment).sum())
+            moment = self._on_bogie * (pull * self._bogie_height + load_moment)
+            balance += [-(self._left * moment).sum(), -(self._right * moment).sum()]
         loads = self._solution @ np.array(balance)
         least = LEAST_LOAD_SHARE * total / loads.size
         if (loads < least).any():
             loads = np.maximum(loads, least)
             loads *= total / loads.sum()
         return loads
-
-
-def suspension_of(configuration: Configuration) -> Suspension:
-    """Return the suspension that a configuration describes, heights taken from the wheel rims."""
-    wheels, rover = configuration.wheels, configuration.rover
-    ground = float(np.mean(wheels.z - wheels.radius))
-    cg_x, cg_y, cg_z = rover.centre_of_gravity
-    pivots = shares = None
-    if rover.suspension == 'rocker_bogie':
-        rocker = (float(rover.rocker_pivot[0]), float(rover.rocker_pivot[1]) - ground)
-        bogie = (float(rover.bogie_pivot[0]), float(rover.bogie_pivot[1]) - ground)
-        order = -1.0 if rover.bogie_wheels == 'front' else 1.0
-        on_bogie = np.zeros(wheels.count, dtype=bool)
-        for side in (wheels.y > 0.0, wheels.y <= 0.0):
-            members = np.flatnonzero(side)
-            on_bogie[members[np.argsort(order * wheels.x[members])[:2]]] = True
-        pivots = Pivots(rocker, bogie, on_bogie)
-    elif rover.suspension == 'shares':
-        shares = rover.load_shares
-        shares = shares / shares.sum() if shares.any() else np.full(wheels.count, 1 / wheels.count)
-    return Suspension(
-        x=wheels.x,
-        y=wheels.y,
-        centre_of_gravity=np.array([cg_x, cg_y, cg_z - ground]),
-        pivots=pivots,
-        shares=shares,
-    )
