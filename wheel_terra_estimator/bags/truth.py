@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,14 +24,22 @@ from wheel_terra_estimator.messages.unpack import JOINT_STATE, ODOMETRY, TWIST, 
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 BODY_VELOCITY = '/truth/odometry'
-_TYPES = {
-    '/ground_truth/slip': JOINT_STATE,
-    '/ground_truth/sinkage': JOINT_STATE,
-    '/ground_truth/slip_angle': JOINT_STATE,
-    '/ground_truth/slip_class': OUTPUT_TYPES['slip_class'],
-    '/ground_truth/twist': TWIST,
-    BODY_VELOCITY: ODOMETRY,
+_SIMULATED_VELOCITY = '/ground_truth/twist'
+_CLASSES = '/ground_truth/slip_class'
+_OF_WHEELS = {
+    'slip': ('/ground_truth/slip', 0),
+    'drawbar_pull': ('/ground_truth/slip', 2),
+    'sinkage': ('/ground_truth/sinkage', 0),
+    'slip_angle': ('/ground_truth/slip_angle', 0),
+    'lateral_force': ('/ground_truth/slip_angle', 2),
 }
+"""Field of a `Truth` -> topic, and which of its lists of numbers it is."""
+_SIMULATED = {
+    **{topic: JOINT_STATE for topic, _ in _OF_WHEELS.values()},
+    _CLASSES: OUTPUT_TYPES['slip_class'],
+    _SIMULATED_VELOCITY: TWIST,
+}
+"""Topics of a simulator and their types."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +68,6 @@ class Truth:
     lateral_force: WheelTruth | None = None
 
 
-class _Values(NamedTuple):
-    """What is taken of the messages of a topic: a function, and how many numbers it gives."""
-
-    of: Callable[[Any], list[float]]
-    width: int
-
-
 def read_truth(bag: Bag, remaps: Mapping[str, str], configuration: Configuration) -> Truth | None:
     """Return the truth in a bag: a simulator's ``/ground_truth/*``, or a true body velocity.
 
@@ -83,41 +83,27 @@ def read_truth(bag: Bag, remaps: Mapping[str, str], configuration: Configuration
 
 def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
     """Return the truth that needs no rover file: a simulator's, or a true body velocity alone."""
-    if '/ground_truth/twist' in bag.topics:
-        wheels = len(names)
-        both = _Values(lambda m: [*_ordered(m, 0, names), *_ordered(m, 2, names)], 2 * wheels)
-        depth = _Values(lambda m: _ordered(m, 0, names), wheels)
-        found = _thinned(
-            bag,
-            {
-                '/ground_truth/slip': both,
-                '/ground_truth/sinkage': depth,
-                '/ground_truth/slip_angle': both,
-                '/ground_truth/slip_class': _Values(lambda m: [float(c) for c in m.data], wheels),
-                '/ground_truth/twist': _Values(_forward, 1),
-            },
-        )
-        slips, aside = found['/ground_truth/slip'], found['/ground_truth/slip_angle']
-        angle = np.unwrap(aside.value[:, :wheels], axis=0)  # to be interpolated
-        truth = Truth(
-            source='/ground_truth',
-            velocity=found['/ground_truth/twist'].known(),
-            slip=_told(
-                _of_turning_wheels(
-                    WheelTruth(slips.stamp, slips.value[:, :wheels]),
-                    found['/ground_truth/slip_class'],
-                )
-            ),
-            sinkage=_told(found['/ground_truth/sinkage']),
-            drawbar_pull=_told(WheelTruth(slips.stamp, slips.value[:, wheels:])),
-            slip_angle=_told(WheelTruth(aside.stamp, angle)),
-            lateral_force=_told(WheelTruth(aside.stamp, aside.value[:, wheels:])),
-        )
-        return truth if truth.velocity.stamp.size else None
-    if BODY_VELOCITY in bag.topics:
-        velocity = _thinned(bag, {BODY_VELOCITY: _Values(_forward, 1)})[BODY_VELOCITY].known()
-        return Truth(BODY_VELOCITY, velocity, None, None, None) if velocity.stamp.size else None
-    return None
+    simulated = _SIMULATED_VELOCITY in bag.topics
+    types = _SIMULATED if simulated else {BODY_VELOCITY: ODOMETRY}
+    there = {t: k for t, k in types.items() if t in bag.topics and bag.topics[t].type == k}
+    rows = {name: ThinnedRows() for name in (*_OF_WHEELS, 'slip_class', 'velocity')}
+    for time, topic, message in messages_of(bag, there):
+        if topic in (_SIMULATED_VELOCITY, BODY_VELOCITY):
+            rows['velocity'].add(message.stamp, message.numbers[0][:1])
+        elif topic == _CLASSES:  # it has no header, and was logged at the stamp that it belongs to
+            rows['slip_class'].add(time, list(message.data))
+        for name, (of, field) in _OF_WHEELS.items():
+            if topic == of:
+                rows[name].add(message.stamp, _ordered(message, field, names))
+    velocity = _sorted(rows['velocity'], 1).known()
+    if not velocity.stamp.size:
+        return None
+    found = {name: _sorted(rows[name], len(names)) for name in (*_OF_WHEELS, 'slip_class')}
+    found['slip'] = _of_turning_wheels(found['slip'], found.pop('slip_class'))
+    angle = found['slip_angle']  # to be interpolated
+    found['slip_angle'] = replace(angle, value=np.unwrap(angle.value, axis=0))
+    source = '/ground_truth' if simulated else BODY_VELOCITY
+    return Truth(source, velocity, **{name: _told(series) for name, series in found.items()})
 
 
 def _told(series: WheelTruth) -> WheelTruth | None:
@@ -187,22 +173,7 @@ def _ordered(message: Message, field: int, names: tuple[str, ...]) -> list[float
     return [float(found.get(name, np.nan)) for name in names]
 
 
-def _thinned(bag: Bag, wanted: Mapping[str, _Values]) -> dict[str, WheelTruth]:
-    """Return what the messages of some topics say, sorted by stamp; one pass over the bag."""
-    rows = {topic: ThinnedRows() for topic in wanted}
-    there = {t: _TYPES[t] for t in wanted if t in bag.topics and bag.topics[t].type == _TYPES[t]}
-    for time, topic, message in messages_of(bag, there):
-        # A message without a header was logged at the stamp that it belongs to.
-        stamp = message.stamp if isinstance(message, Message) else time
-        rows[topic].add(stamp, wanted[topic].of(message))
-    return {topic: _sorted(rows[topic], values.width) for topic, values in wanted.items()}
-
-
 def _sorted(rows: ThinnedRows, width: int) -> WheelTruth:
     stamps, values = rows.stamps(), rows.values(width)
     order = np.argsort(stamps, kind='stable')
     return WheelTruth(stamps[order], credible(values[order]))
-
-
-def _forward(message: Message) -> list[float]:
-    return [float(message.numbers[0][0])]

@@ -187,11 +187,7 @@ def _lists(prefix: str) -> dict[str, Parameter]:
 
 def by_spelling(table: Mapping[str, Parameter]) -> dict[str, Parameter]:
     """Return the parameters by every spelling that is accepted, aliases included."""
-    spellings = dict(table)
-    for item in table.values():
-        for alias in item.aliases:
-            spellings[alias] = item
-    return spellings
+    return {**table, **{alias: item for item in table.values() for alias in item.aliases}}
 
 
 def nearest(key: str, known: Iterable[str]) -> str:

@@ -80,10 +80,6 @@ class _RosLoader(_SafeLoader):
     yaml_implicit_resolvers: dict[str, list[Any]] = {}  # noqa: RUF012  (PyYAML's attribute)
 
 
-def _construct_scalar(loader: _RosLoader, node: yaml.ScalarNode) -> Any:
-    return node.value if node.style else plain_scalar(node.value)
-
-
 def _construct_mapping(loader: _RosLoader, node: yaml.MappingNode) -> dict[str, Any]:
     mapping: dict[str, Any] = {}
     for key_node, value_node in node.value:
@@ -97,7 +93,10 @@ def _construct_mapping(loader: _RosLoader, node: yaml.MappingNode) -> dict[str, 
     return mapping
 
 
-_RosLoader.add_constructor('tag:yaml.org,2002:str', _construct_scalar)
+_RosLoader.add_constructor(
+    'tag:yaml.org,2002:str',
+    lambda loader, node: node.value if node.style else plain_scalar(node.value),
+)
 _RosLoader.add_constructor('tag:yaml.org,2002:map', _construct_mapping)
 
 

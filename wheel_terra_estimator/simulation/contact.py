@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,8 +48,7 @@ LEAST_ANGLE = 0.01
 """Least entrance angle [rad]; the balance is singular at 0."""
 
 
-@dataclass(frozen=True)
-class SoilForces:
+class SoilForces(NamedTuple):
     """What the soil does to the wheels; shape of the points, in the direction of travel."""
 
     # ``pull``, ``side_force``: net longitudinal and lateral force on the wheel [N]
@@ -65,7 +64,7 @@ class SoilForces:
 
     def first(self) -> SoilForces:
         """Return the entry 0 of the first axis of every field."""
-        return SoilForces(*(getattr(self, name)[0] for name in self.__dataclass_fields__))
+        return SoilForces(*(values[0] for values in self))
 
 
 class ContactModel:

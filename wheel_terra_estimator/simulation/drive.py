@@ -14,7 +14,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.simulation.drives import Command, Drives
 from wheel_terra_estimator.simulation.plant import RoverPlant
-from wheel_terra_estimator.simulation.scenario import SENSOR_FAULTS, Fault, Scenario
+from wheel_terra_estimator.simulation.scenario import SENSOR_FAULTS, WHEEL_FAULTS, Fault, Scenario
 from wheel_terra_estimator.simulation.sensors import START, Arrival, SensorSuite
 from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Patch, Terrain
 from wheel_terra_estimator.simulation.truth import Truth, TruthTable
@@ -176,19 +176,10 @@ class Drive:
         for array in (faults.rate_factor, faults.torque_factor, faults.load_factor):
             array[:] = 1.0
         for fault in self.faults:
-            if not fault.active(self.plant.time):
+            if fault.kind not in WHEEL_FAULTS or not fault.active(self.plant.time):
                 continue
-            wheel = slice(None) if fault.wheel is None else fault.wheel
-            if fault.kind == 'overspeed':
-                faults.rate_factor[wheel] = 4.0
-            elif fault.kind == 'locked':
-                faults.rate_factor[wheel] = 0.0
-            elif fault.kind == 'coasting':
-                faults.torque_factor[wheel] = 0.0
-            elif fault.kind == 'weak':
-                faults.torque_factor[wheel] = 0.25
-            elif fault.kind == 'lifted':
-                faults.load_factor[wheel] = 0.02
+            factor, value = WHEEL_FAULTS[fault.kind]
+            getattr(faults, factor)[slice(None) if fault.wheel is None else fault.wheel] = value
 
 
 def simulate(scenario: Scenario, seed: int = 0, duration: float | None = None) -> SimulatedDrive:

@@ -175,12 +175,8 @@ class RoverPlant:
         front = self._soil_forces(shear, np.ones_like(sense))
         back = self._soil_forces(shear, -np.ones_like(sense))
         ahead = 0.5 * (1.0 + sense)
-        mixed = SoilForces(
-            *(
-                ahead * getattr(front, name) + (1.0 - ahead) * getattr(back, name)
-                for name in SoilForces.__dataclass_fields__
-            )
-        )
+        sides = zip(front, back, strict=True)
+        mixed = SoilForces(*(ahead * f + (1.0 - ahead) * b for f, b in sides))
         return WheelForces(
             ahead * front.pull - (1.0 - ahead) * back.pull,
             mixed.side_force,

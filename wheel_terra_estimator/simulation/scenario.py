@@ -30,7 +30,14 @@ DECLARED = {
 }
 """What a scenario may state, by key."""
 
-WHEEL_FAULTS = ('overspeed', 'locked', 'coasting', 'weak', 'lifted')
+WHEEL_FAULTS = {
+    'overspeed': ('rate_factor', 4.0),
+    'locked': ('rate_factor', 0.0),
+    'coasting': ('torque_factor', 0.0),
+    'weak': ('torque_factor', 0.25),
+    'lifted': ('load_factor', 0.02),
+}
+"""Faults of wheels -> field of ``plant.WheelFaults`` and its value."""
 SENSOR_FAULTS = tuple(k for k in DECLARED['faults.kind'].choices if k not in WHEEL_FAULTS)
 
 
