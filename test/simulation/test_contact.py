@@ -7,7 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.simulation.contact import ContactModel, SoilForces, contact_of
+from wheel_terra_estimator.simulation.contact import (
+    ContactModel,
+    SoilForces,
+    SunkWheels,
+    contact_of,
+)
 from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES
 from wheel_terra_estimator.terramechanics.contact_law import LAWS, contact_law
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -33,9 +38,9 @@ def wheels(random: np.random.Generator, count: int) -> Wheel:
 def answer(model, depth, slip, load, side_slip=0.0, passes=1.0, **factors: float) -> SoilForces:
     one = np.ones_like(depth)
     given = {name: one * factors.get(name, 1.0) for name in SOIL_QUANTITIES}
-    return model.forces(
-        given, depth, slip, side_slip + 0.0 * one, load, 0.05 * one, 0.0 * one, passes + 0.0 * one
-    )
+    side_slip, passes = side_slip + 0.0 * one, passes + 0.0 * one
+    sunk = SunkWheels(given, depth, slip, side_slip, load, 0.05 * one, 0.0 * one, passes)
+    return model.forces(sunk)
 
 
 @pytest.mark.parametrize('effects', [{}, {name: {} for name in EFFECTS}], ids=['plain', 'effects'])

@@ -48,6 +48,20 @@ LEAST_ANGLE = 0.01
 """Least entrance angle [rad]; the balance is singular at 0."""
 
 
+class SunkWheels(NamedTuple):
+    """Wheels in the soil, seen in the direction of travel; (n,) where nothing else is said."""
+
+    # Name of ``terrain.SOIL_QUANTITIES`` -> factor on the base soil below the wheels
+    factors: Mapping[str, FloatArray]
+    depth: FloatArray  # of the stressed contact, r (1 - cos t1) [m]
+    slip: FloatArray  # (..., n) slip ratio, positive when driving [-]
+    side_slip: FloatArray  # (..., n) lateral slip velocity over the larger of rim and ground speed
+    load: FloatArray  # [N]
+    rim_speed: FloatArray  # [m/s]
+    slope: FloatArray  # [rad]
+    pass_number: FloatArray  # 1 on virgin soil, more where other wheels ran before
+
+
 class SoilForces(NamedTuple):
     """What the soil does to the wheels; shape of the points, in the direction of travel."""
 
@@ -84,29 +98,15 @@ class ContactModel:
         self._slip_radius = slip_radius
         self._terms = Terms(effect_catalogue.check_settings(effects))
 
-    def forces(
-        self,
-        # Name of ``terrain.SOIL_QUANTITIES`` -> (n,) factor on the base soil below the wheels
-        factors: Mapping[str, FloatArray],
-        depth: FloatArray,  # (n,) depth of the stressed contact r (1 - cos t1) [m]
-        # (..., n) slip ratio, positive when driving in the direction of travel [-]
-        slip: FloatArray,
-        # (..., n) lateral slip velocity over the larger of rim and ground speed [-]
-        side_slip: FloatArray,
-        # ``load``, ``rim_speed``, ``slope``, ``pass_number``: (n,) load [N], rim speed [m/s], slope
-        # in the direction of travel [rad], 1 on virgin soil and more where other wheels ran before
-        load: FloatArray,
-        rim_speed: FloatArray,
-        slope: FloatArray,
-        pass_number: FloatArray,
-    ) -> SoilForces:
+    def forces(self, sunk: SunkWheels) -> SoilForces:
         """Return the forces, seen in the direction of travel."""
         soil, contact = self._soil, copy(self._as_built)
+        factors, slip, depth = sunk.factors, sunk.slip, sunk.depth
         ratio = speed_ratio(np.maximum(slip, -0.999))
         contact.slip, contact.velocity_ratio = slip, ratio * self._slip_radius
-        contact.normal_load = contact.stated_load = load
-        contact.rim_speed, contact.slope, contact.direction = rim_speed, slope, 1.0
-        contact.pass_number = pass_number
+        contact.normal_load = contact.stated_load = sunk.load
+        contact.rim_speed, contact.slope, contact.direction = sunk.rim_speed, sunk.slope, 1.0
+        contact.pass_number = sunk.pass_number
         contact.bearing_modulus = contact.bearing_modulus * factors['stiffness']
         contact.cohesion = soil.cohesion * factors['cohesion']
         contact.tan_friction = self._tan_friction * factors['friction']
@@ -124,7 +124,7 @@ class ContactModel:
         shear_radius = contact.shear_radius
         along = shear_displacement(angle, t1, shear_radius, contact.velocity_ratio)
         # The rim turns by (t1 - t) while the hub moves sideways.
-        across = side_slip * np.maximum(ratio, 1.0) * self._slip_radius * (t1 - angle)
+        across = sunk.side_slip * np.maximum(ratio, 1.0) * self._slip_radius * (t1 - angle)
         sheared = np.sqrt(along * along + across * across) + 1e-12
         mobilised = weights * -np.expm1(-sheared / contact.shear_modulus) / sheared
         mobilised_along = mobilised * along
@@ -191,33 +191,24 @@ class ResistiveContact:
         scale = np.array([plate_scale(soil, float(b), gravity) for b in width])
         self._unit = scale * PER_CUBIC_METRE * width * self._radius**2
 
-    def forces(
-        self,
-        factors: Mapping[str, FloatArray],
-        depth: FloatArray,
-        slip: FloatArray,
-        side_slip: FloatArray,
-        load: FloatArray,
-        rim_speed: FloatArray,
-        slope: FloatArray,
-        pass_number: FloatArray,
-    ) -> SoilForces:
+    def forces(self, sunk: SunkWheels) -> SoilForces:
         """Return the forces; see `ContactModel.forces`."""
-        cosine = np.clip(1.0 - depth / self._radius, -0.5, np.cos(LEAST_ANGLE))
+        slip, load = sunk.slip, sunk.load
+        cosine = np.clip(1.0 - sunk.depth / self._radius, -0.5, np.cos(LEAST_ANGLE))
         beyond = speed_ratio(np.maximum(slip, -0.999)) * self._lead - 1.0
         entrance = np.broadcast_to(np.arccos(cosine), np.shape(beyond))
         lift, back, rub_up, rub_ahead, turn = np.moveaxis(
             rim_integrals(np.arctan2(beyond, entrance), entrance), -1, 0
         )
-        unit, friction = self._unit * factors['stiffness'], factors['friction']
+        unit, friction = self._unit * sunk.factors['stiffness'], sunk.factors['friction']
         carried = unit * np.maximum(lift + friction * rub_up, LEAST_SUPPORT * lift)
         support = np.maximum(load / carried, LEAST_SUPPORT)
         unit = unit * support
-        slid = np.hypot(slip, side_slip) + _SIDE_SLIP
+        slid = np.hypot(slip, sunk.side_slip) + _SIDE_SLIP
         zero = np.zeros(np.shape(beyond))
         return SoilForces(
             pull=unit * (friction * rub_ahead - back),
-            side_force=_SIDE_FRICTION * friction * load * side_slip / slid,
+            side_force=_SIDE_FRICTION * friction * load * sunk.side_slip / slid,
             torque=unit * self._radius * friction * turn,
             support_ratio=support,
             sinkage_exponent=zero + 1.0,

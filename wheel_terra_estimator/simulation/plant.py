@@ -16,7 +16,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.simulation.contact import SoilForces, contact_of
+from wheel_terra_estimator.simulation.contact import SoilForces, SunkWheels, contact_of
 from wheel_terra_estimator.simulation.contact_memory import ContactMemory, Shear
 from wheel_terra_estimator.simulation.drives import Command, Drives, SteeringDrives
 from wheel_terra_estimator.simulation.suspension import Suspension
@@ -186,7 +186,7 @@ class RoverPlant:
 
     def _soil_forces(self, shear: Shear, sense: FloatArray) -> SoilForces:
         """Return the soil's answer in the frame of a wheel that travels with ``sense``."""
-        return self._contact.forces(
+        sunk = SunkWheels(
             self._factors,
             self._memory.depth,
             shear.slip * sense,
@@ -196,6 +196,7 @@ class RoverPlant:
             self._local_slope * sense,
             self._passes,
         )
+        return self._contact.forces(sunk)
 
     # One step -----------------------------------------------------------------------------------
 
