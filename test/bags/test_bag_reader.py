@@ -53,6 +53,14 @@ def test_remapped_topics(make_bag, rover, drive):
     assert found['WheelOdometry'] == 4
 
 
+def test_a_topic_that_is_named_for_two_inputs_is_checked_as_both(make_bag):
+    """Odometry of the wheels named as the reference must not hide from the checks."""
+    with open_bag(make_bag()) as bag:
+        told = read_series(bag, {'odom': '/reference_odom', 'sinkage': '/joint_states'}, 'bag')
+    assert len(told.reference.log_time) == len(told.wheel_odometry.log_time) == 4
+    assert len(told.joints.log_time) == len(told.sinkage.log_time) == 40
+
+
 def test_missing_wheel_odometry_says_which_and_what_is_there(make_bag, rover, drive):
     others = [row for row in drive if row[0] != '/joint_states']
     sinkage = [('/sinkage', *row[1:]) for row in drive if row[0] == '/joint_states']

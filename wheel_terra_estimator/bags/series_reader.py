@@ -40,7 +40,6 @@ def read_series(
     ``remaps`` are the estimator's topics to the bag's.
     """
     chosen = choose_topics(bag, remaps)
-    by_topic = {topic: own for own, topic in chosen.items()}
     collectors: dict[str, _Collector] = {
         own: _COLLECTORS[own](topic, INPUT_TYPES[own])
         for own, topic in chosen.items()
@@ -49,11 +48,14 @@ def read_series(
     first = end = None  # log times
     heard: dict[str, int] = {}
     for log_time, topic, data in bag.messages([chosen[own] for own in collectors]):
-        collector, first = collectors[by_topic[topic]], first or log_time
-        if len(collector.arrivals) >= most:
-            end = end or log_time
-        if not end and len(data) <= limits.MESSAGE:
-            collector.add(log_time, data)
+        first = first or log_time
+        for collector in collectors.values():
+            if collector.topic != topic:
+                continue
+            if len(collector.arrivals) >= most:
+                end = end or log_time
+            if not end and len(data) <= limits.MESSAGE:
+                collector.add(log_time, data)
         heard[topic] = log_time
     garbage = Counter({c.topic: len(c.arrivals) - len(c.stamps) for c in collectors.values()})
     if garbage.total() or bag.damaged:
