@@ -194,20 +194,14 @@ class Effect:
 
     def in_form(self, form: str) -> Effect:
         """Return the effect in one form alone; ``ValueError`` if it has no such form."""
-        for variant in self.forms:
-            if variant.form == form:
-                return variant
-        raise ValueError(
-            f'effect {self.name} has no form {form!r}; it has '
-            f'{", ".join(variant.form for variant in self.forms)}'
-        )
+        forms = {variant.form: variant for variant in self.forms}
+        if form not in forms:
+            raise ValueError(f'effect {self.name} has no form {form!r}; it has {", ".join(forms)}')
+        return forms[form]
 
     def parameter(self, name: str) -> EffectParameter:
         """Return the parameter of that name; ``KeyError`` if there is none."""
-        for parameter in self.parameters:
-            if parameter.name == name:
-                return parameter
-        raise KeyError(name)
+        return {parameter.name: parameter for parameter in self.parameters}[name]
 
     def defaults(self) -> dict[str, float]:
         """Return the default value of each parameter; none of a sparse effect."""
