@@ -100,18 +100,18 @@ class Drive:
             slope.angle + np.where(slope.angle != 0.0, slope_shift, 0.0),
             slope.side,
             patches,
-            scenario.border,
+            scenario.values['patches.border'],
             soil,
             slope.undulation,
             slope.undulation_length,
-            scenario.patchiness,
-            scenario.patchiness_length,
+            scenario.values['patchiness'],
+            scenario.values['patchiness_length'],
             (-reach, reach),
             ground,
         )
-        self.plant = RoverPlant(
-            self.configuration, terrain, self._drives(max(fastest, 0.01)), scenario.dig_efficiency
-        )
+        drives = self._drives(max(fastest, 0.01))
+        efficiency = scenario.values['dig_efficiency']
+        self.plant = RoverPlant(self.configuration, terrain, drives, efficiency)
         self.faults = (*scenario.faults, *_random_faults(scenario, noise))
         self.sensors = SensorSuite(scenario, noise, self.faults)
         period = self.sensors.odometry_period
@@ -189,7 +189,8 @@ def simulate(scenario: Scenario, seed: int = 0, duration: float | None = None) -
 
 def _random_faults(scenario: Scenario, random: np.random.Generator) -> list[Fault]:
     """Draw sensor faults: when, which, which wheel, for 2 to 20 s."""
-    count = random.poisson(scenario.random_fault_rate * scenario.duration / 3600.0)
+    rate = scenario.values['faults.random_rate']  # per hour
+    count = random.poisson(rate * scenario.duration / 3600.0)
     faults = []
     for _ in range(count):
         start = random.uniform(0.0, scenario.duration)

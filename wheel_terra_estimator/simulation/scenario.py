@@ -77,11 +77,7 @@ class Scenario:
     slope: Section
     variation: Section
     sensors: Section
-    border: float
-    patchiness: float
-    patchiness_length: float
-    dig_efficiency: float
-    random_fault_rate: float
+    values: Mapping[str, Any]  # of all declared keys
 
 
 def load(
@@ -126,11 +122,7 @@ def load(
         slope=_slope(name, checked),
         variation=Section(checked, 'variation.'),
         sensors=Section(checked, 'sensors.'),
-        border=checked['patches.border'],
-        patchiness=checked['patchiness'],
-        patchiness_length=checked['patchiness_length'],
-        dig_efficiency=checked['dig_efficiency'],
-        random_fault_rate=checked['faults.random_rate'],
+        values=checked,
     )
 
 
