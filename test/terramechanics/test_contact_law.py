@@ -133,7 +133,8 @@ def test_what_resistive_force_refuses():
     with pytest.raises(ValueError, match='shear radius'):
         law.steady_state(OperatingPoints(0.2, 20.0, WHEEL, slip_radius='shear'))
     buried = law.steady_state(OperatingPoints(0.2, 1e6, WHEEL))
-    assert (buried.flags[0], buried.sinkage[0]) == (OVERLOADED, WHEEL.radius)
+    assert buried.flags[0] == OVERLOADED
+    assert buried.sinkage[0] == pytest.approx(WHEEL.radius)
     lugged = law.steady_state(OperatingPoints(0.2, 20.0, replace(WHEEL, lug_height=0.01)))
     assert lugged.flags[0] == OUTSIDE_VALIDITY
 

@@ -83,7 +83,10 @@ class WheelSoilModel:
         self.method = method
         self.strict = strict
         self._soil = {name: getattr(soil, name) for name in SOIL_NUMBERS}
-        self._law = _FORCES[method]
+
+    @property
+    def _law(self) -> Any:
+        return _FORCES[self.method]  # no attribute: a module cannot be pickled
 
     def steady_state(self, points: OperatingPoints) -> SteadyState:
         """Solve the load balance and return sinkage, drawbar pull and torque.

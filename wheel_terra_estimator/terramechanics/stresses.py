@@ -16,7 +16,7 @@ from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
 
 
-def gauss_rule(nodes: int) -> list[tuple[float, float]]:
+def gauss_rule(nodes: int) -> list[tuple[Any, Any]]:
     """Return nodes and weights of Gauss and Legendre on (0, 1)."""
     x, w = np.polynomial.legendre.leggauss(nodes)
     return list(zip((0.5 * (x + 1.0)).tolist(), (0.5 * w).tolist(), strict=True))
