@@ -392,6 +392,50 @@ def test_wheel_odometry_keeps_the_time_where_clocks_differ_for_good():
     assert core.health()['imu/data_rejected: stamp far ahead of all others'] > 100
 
 
+def _always(offset):
+    return lambda t: offset
+
+
+@pytest.mark.parametrize(
+    ('clocks', 'heard'),
+    [
+        ({odometry: _always(-3.0)}, lambda t: True),
+        ({odometry: lambda t: -3.0 if t > 5.0 else 0.0}, lambda t: True),
+        ({imu: lambda t: 40.0 if t > 4.0 else 0.0}, lambda t: not 5.0 < t < 11.0),
+        ({odometry: lambda t: -40.0 if t > 4.0 else 0.0}, lambda t: not 5.0 < t < 11.0),
+        ({imu: _always(40.0), sinkage: _always(80.0)}, lambda t: True),
+    ],
+)
+def test_topics_of_other_clocks_never_carry_the_time_away_from_the_wheels(clocks, heard):
+    """From two seconds behind the last event each wheel odometry makes its set."""
+    rates = {odometry: 20, imu: 100, sinkage: 10, reference: 2}
+    arrivals = sorted(
+        (n / rate + 0.0003 * i, i)
+        for i, rate in enumerate(rates.values())
+        for n in range(16 * rate)
+    )
+    core, _ = make_core(max_lag=-1.0)
+    sets = []
+    for t, i in arrivals:
+        kind = list(rates)[i]
+        if kind is not odometry or heard(t):
+            found = core.add(kind(t + clocks.get(kind, _always(0.0))(t)))
+            sets += [s for s in found if t > 13.0 and 'wheel_odometry' not in s.faults]
+    assert len(sets) == pytest.approx(3 * rates[odometry], abs=2)
+    assert core.health()['runs'] <= 3
+
+
+def test_wheel_odometry_that_comes_late_in_a_burst_ends_no_run():
+    core, _ = make_core(max_lag=-1.0)
+    stream = [(0.01 * n, imu(0.01 * n)) for n in range(2000)]
+    for n in range(1000):
+        t = 0.02 * n
+        stream.append((max(t, 16.0 + 0.01 * t) if t > 8.0 else t, odometry(t)))
+    sets = play(core, [m for _, m in sorted(stream, key=lambda pair: pair[0])])
+    assert core.health()['clock_steps_back'] == 0
+    assert 'wheel_odometry' not in sets[-1].faults
+
+
 # -- Reference ------------------------------------------------------------------------------------
 
 
@@ -446,12 +490,18 @@ def test_stamps_strictly_increase_within_a_run_whatever_comes(stream, max_lag, h
     assert sum(b <= a for a, b in pairwise(stamps)) <= core.health()['clock_steps_back']
 
 
-def test_a_second_topic_bears_out_a_step_of_the_clock():
+@pytest.mark.parametrize(
+    ('others', 'stepped'),
+    [([reference(10.01)], False), ([reference(10.01), odometry(10.02)], True)],
+)
+def test_a_second_topic_bears_out_a_step_of_the_clock_with_the_wheels(others, stepped):
     watch = ClockWatch(channels=len(CHANNELS), clock_step=SECOND, max_lag=0, history=2 * SECOND)
     for channel, first in ((WHEEL_ODOMETRY, odometry(60.0)), (INERTIAL, imu(60.01))):
         assert watch.judge(channel, first, None).accepted
     assert watch.judge(REFERENCE, reference(60.02), stamp_at(60.0)).accepted
     assert watch.judge(INERTIAL, imu(10.0), stamp_at(60.0)).accepted == []  # maybe a stray
-    borne_out = watch.judge(REFERENCE, reference(10.01), stamp_at(60.0))
-    assert borne_out.stepped_back
-    assert [channel for channel, _ in borne_out.accepted] == [INERTIAL, REFERENCE]
+    for other in others:
+        last = watch.judge(CHANNELS[type(other)], other, stamp_at(60.0))
+    assert last.stepped_back is stepped
+    known = [INERTIAL, REFERENCE, WHEEL_ODOMETRY] if stepped else []
+    assert [channel for channel, _ in last.accepted] == known

@@ -5,7 +5,8 @@
 A slow topic is late, a message is resent, a driver stamps one message wrongly: none of these may
 end a run, or every loop over a late camera would. A step of the clock (a looped bag, a simulation
 that was reset, a corrected system clock) takes all topics with it. So a message far off its time
-line is held until a second one bears it out, or the old line goes on.
+line is held until a second one bears it out, or the old line goes on. Wheel odometry keeps the
+time: other topics carry it away only where that is silent, and it takes it back when it returns.
 """
 
 from __future__ import annotations
@@ -77,11 +78,14 @@ class ClockWatch:
         self._held: list[Arrival] = []
         self._suspicion = Suspicion.BEHIND
         self._odometry_astray = 0
+        self._odometry_suspicion: Suspicion | None = None
+        self._astray_from = 0, 0  # stamp of the first of them, and the time of the run then
 
     def retune(self, clock_step: int, max_lag: int, history: int) -> None:
         """Go on with other limits."""
         self._clock_step = max(clock_step, max_lag)
-        self._reach = max(history + max_lag, clock_step)
+        self._reach = max(history, clock_step)
+        self._reach_back = max(history + max_lag, clock_step)
 
     def judge(self, channel: int, measurement: Measurement, present: int | None) -> Judgement:
         """Return what to do with a message, and with those held before it.
@@ -98,15 +102,18 @@ class ClockWatch:
         strays = ()
         held = self._held
         if held and (
-            suspicion is not self._suspicion or stamp < held[-1].measurement.stamp - self._reach
+            suspicion is not self._suspicion
+            or abs(stamp - held[-1].measurement.stamp) > self._reach_back
         ):
             strays = self._drop_held()
-        if suspicion is not self._suspicion:
-            self._odometry_astray = 0
         self._held.append(arrival)
         self._suspicion = suspicion
-        self._odometry_astray += channel == WHEEL_ODOMETRY
-        if not self._borne_out():
+        if channel == WHEEL_ODOMETRY:
+            if suspicion is not self._odometry_suspicion:
+                self._odometry_suspicion = suspicion
+                self._odometry_astray, self._astray_from = 0, (stamp, present or 0)
+            self._odometry_astray += 1
+        if not self._borne_out(present or 0):
             return Judgement([], strays=strays)
         accepted = self.release()
         return Judgement(accepted, suspicion is Suspicion.BEHIND, strays)
@@ -130,10 +137,10 @@ class ClockWatch:
         if present is None:
             return None
         own = self._newest_of[channel]
-        if own is None:
-            if stamp < present - self._reach:
-                return Suspicion.BEHIND
-        elif stamp < own - self._clock_step:
+        if own is not None and stamp < own - self._clock_step:
+            return Suspicion.BEHIND
+        reach = self._reach if channel == WHEEL_ODOMETRY else self._reach_back
+        if (own is None or channel == WHEEL_ODOMETRY) and stamp < present - reach:
             return Suspicion.BEHIND
         if stamp > present + self._reach and any(
             other is not None for i, other in enumerate(self._newest_of) if i != channel
@@ -141,24 +148,28 @@ class ClockWatch:
             return Suspicion.AHEAD
         return None
 
-    def _borne_out(self) -> bool:
+    def _borne_out(self, present: int) -> bool:
         channels = [arrival.channel for arrival in self._held]
-        stamps = [arrival.measurement.stamp for arrival in self._held]
+        odometry, own = WHEEL_ODOMETRY in channels, self._newest_of[WHEEL_ODOMETRY]
+        stamps = [a.measurement.stamp for a in self._held if a.channel == channels[-1]]
+        first, then = self._astray_from
+        # Not where it has only fallen behind: what came late in a burst catches up.
+        late = self._suspicion is Suspicion.BEHIND and own is not None and first >= own
+        astray = self._odometry_astray >= PROVING_MESSAGES
         return (
-            len(set(channels)) > 1
-            or channels.count(WHEEL_ODOMETRY) > 1
-            # One topic alone for so long that the others would have been heard.
-            or max(stamps) - min(stamps) > self._clock_step
-            or len(stamps) >= MOST_HELD
+            (odometry and len(channels) > 1 and not late)
+            # One topic alone for so long that wheel odometry would have been heard.
+            or stamps[-1] - stamps[0] > 3 * self._clock_step
+            or len(channels) >= MOST_HELD
             # Wheel odometry keeps the time: where it and another topic have different clocks
             # for good, the other one gives way.
-            or self._odometry_astray >= PROVING_MESSAGES
+            or (astray and (not late or 2 * (present - then) > stamps[-1] - first))
         )
 
     def _accept(self, arrival: Arrival) -> None:
         channel, stamp = arrival.channel, arrival.measurement.stamp
         if channel == WHEEL_ODOMETRY:
-            self._odometry_astray = 0
+            self._odometry_astray, self._odometry_suspicion = 0, None
         own = self._newest_of[channel]
         if own is None or stamp > own:
             self._newest_of[channel] = stamp
