@@ -479,7 +479,8 @@ class EstimatorNode(LifecycleNode):
 
         `taken` is what was taken already and not heard.
         """
-        assert self._pipeline is not None
+        if self._pipeline is None:
+            return  # was due when the node was cleaned up
         self._say_ready()
         self._catch_up(*taken)  # what waits to be taken is not silent
         now = self._seconds()
@@ -540,10 +541,11 @@ class EstimatorNode(LifecycleNode):
 
     def _watch_names(self) -> None:
         """Look for a node of the same name, and for topics with more than one publisher."""
+        if self._pipeline is None:
+            return  # was due when the node was cleaned up
         namespaces = self.get_node_names_and_namespaces()
         names = [f'{space.rstrip("/")}/{name}' for name, space in namespaces]
         self._same_name = names.count(f'/{self._full_name}') > 1
-        assert self._pipeline is not None
         topics: Iterable[str] = self._pipeline.converter.topics
         found = {topic: self.get_publishers_info_by_topic(topic) for topic in topics}
         self._incompatible = {
