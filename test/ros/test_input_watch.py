@@ -53,6 +53,34 @@ def test_two_publishers_between_two_looks_are_no_loss():
     assert watch.values(6.0)['joint_states_lost'] == 0
 
 
+@pytest.mark.parametrize(
+    ('sources', 'told'),
+    [
+        ({'a': ['left', 'right'], 'b': ['left', 'right']}, True),  # a driver and a simulation
+        ({'a': ['left', 'right'], 'b': ['right']}, True),
+        ({'a': ['left'], 'b': ['right'], 'c': []}, False),  # a controller per wheel, and an arm
+    ],
+)
+def test_two_publishers_of_one_wheel_are_told_and_those_of_other_wheels_are_not(sources, told):
+    watch = InputWatch()
+    first = {'a': 900, 'b': 1, 'c': 50}
+    for second in range(3):
+        for i in range(20):
+            now = second + 0.05 * i
+            watch.heard('joint_states', now, 0.0, None)
+            for source, wheels in sources.items():
+                watch.mixed('joint_states', wheels, first[source] + 20 * second + i)
+        watch.believe_gaps(())
+        found = watch.faults(now)
+        assert any('two publishers' in words for _, words in found) is told
+    for number in (*range(1990, 2020), *range(1, 20)):  # one is left, and begins anew
+        watch.mixed('joint_states', ['left', 'right'], number)
+        if number in (1990, 2010):
+            watch.believe_gaps(())
+    watch.believe_gaps(())
+    assert watch.faults(now) == []
+
+
 def test_a_process_that_is_late_calls_no_topic_silent_and_says_by_how_much():
     watch = InputWatch()
     for number in range(41):

@@ -8,8 +8,8 @@ Times are of a steady clock, so that silence is seen when nothing comes any more
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 PERIODS_TO_SILENCE = 3.0
@@ -19,6 +19,7 @@ UNKNOWN_PERIOD = 5.0  # [s] of silence until then
 BEHIND = 0.5  # [s] of which it is told, and beyond which no topic is called silent
 AHEAD = 1.0  # [s] of stamps before the clock here, of which it is told
 START = 1.0  # [s] in which the process may be late
+RESTARTS = 2  # of publishers in a row of looks at them, at most
 _SMOOTHING = 0.1
 
 
@@ -37,6 +38,10 @@ class _Topic:
     mixed: bool = False  # a number from before: another publisher's, and so are the gaps
     lost: int = 0
     told: int = 0  # of these
+    numbers: dict[str, int] = field(default_factory=dict)  # of the last message with a wheel
+    back: int = 0  # times that these went back since the last look at the publishers
+    backs: int = 0  # the same since one look without any
+    twice: bool = False  # two publishers tell of one wheel
 
 
 class InputWatch:
@@ -77,12 +82,23 @@ class InputWatch:
             state.mixed |= number <= state.number
         state.number = number
 
+    def mixed(self, topic: str, wheels: Iterable[str], number: int) -> None:
+        """Note the publisher's count in a message about `wheels`, where several publish.
+
+        For each wheel it only grows, unless two publishers tell of it.
+        """
+        state = self._topics.setdefault(topic, _Topic())
+        state.back += any(number <= state.numbers.get(wheel, 0) for wheel in wheels)
+        state.numbers.update(dict.fromkeys(wheels, number))
+
     def believe_gaps(self, topics: Collection[str]) -> None:
         """Count the gaps in the numbers of these topics as lost, and forget all others."""
         for topic, state in self._topics.items():
             if topic in topics and not state.mixed:
                 state.lost += state.gaps
             state.gaps, state.mixed = 0, False
+            state.backs = state.backs + state.back if state.back else 0
+            state.twice, state.back = state.backs > RESTARTS, 0
 
     def lost(self, topic: str, count: int) -> None:
         """Note messages that were sent and not heard."""
@@ -114,6 +130,8 @@ class InputWatch:
             if state.lost != state.told:
                 found.append((topic, f'{state.lost} messages lost on the way so far'))
                 state.told = state.lost
+            if state.twice:
+                found.append((topic, 'two publishers send the same: end one (see ros2 topic info)'))
             if self.is_silent(topic, now):
                 found.append((topic, f'silent for {now - state.heard:.1f} s'))
         return found

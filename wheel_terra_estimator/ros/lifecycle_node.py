@@ -47,7 +47,13 @@ from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.outputs import EstimatePublisher
 from wheel_terra_estimator.ros.publishers import other_quality, other_type
-from wheel_terra_estimator.ros.qos import FREQUENT, OVERRIDABLE, check_overrides, input_profile
+from wheel_terra_estimator.ros.qos import (
+    FREQUENT,
+    NOT_NUMBERED,
+    OVERRIDABLE,
+    check_overrides,
+    input_profile,
+)
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.ros.live_views import LiveViews
@@ -224,6 +230,7 @@ class EstimatorNode(LifecycleNode):
         self._rejected: Counter[tuple[str, str]] = Counter()  # while sets still flowed
         self._incompatible: dict[str, str] = {}
         self._numbered: set[str] = set()
+        self._shared: set[str] = set()  # topics of several publishers
         self._same_name = self._said_ready = False
         self._pipeline.transport_values = self._transport_values
         self._pipeline.transport_faults = self._transport_faults
@@ -330,7 +337,13 @@ class EstimatorNode(LifecycleNode):
             pipeline.refuse(topic, DAMAGED)
             return
         now = self._seconds()
-        number = info.get('publication_sequence_number') if topic in self._numbered else None
+        number = info.get('publication_sequence_number')
+        if topic in self._shared and number and number < NOT_NUMBERED:
+            values = message.numbers[topic == 'joint_states']  # nan: this one does not tell of it
+            told = [name for name, v in zip(message.names, values, strict=False) if v == v]
+            wheels = [name for name in told if name in pipeline.names] if message.names else ['']
+            self._watch_inputs.mixed(topic, wheels, number)
+        number = number if topic in self._numbered else None
         clock = self._nanoseconds()  # 0: none has come yet
         self._watch_inputs.heard(
             topic, now, (clock - message.stamp) / _SECOND if clock else 0.0, number
@@ -556,6 +569,7 @@ class EstimatorNode(LifecycleNode):
         single = {topic for topic, publishers in found.items() if len(publishers) == 1}
         self._watch_inputs.believe_gaps(self._numbered & single)
         self._numbered = single
+        self._shared = {topic for topic, publishers in found.items() if len(publishers) > 1}
 
     def _transport_values(self) -> dict[str, Any]:
         return dict(self._watch_inputs.values(self._seconds()))

@@ -45,10 +45,9 @@ from wheel_terra_estimator.messages.pack import diagnostic_array
 from wheel_terra_estimator.output_folder import cannot_write, check_file
 from wheel_terra_estimator.ros.parameters import descriptor
 from wheel_terra_estimator.ros.publishers import name_of, other_quality, other_type
-from wheel_terra_estimator.ros.qos import input_profile, output_profile
+from wheel_terra_estimator.ros.qos import NOT_NUMBERED, input_profile, output_profile
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
-NOT_NUMBERED = 2**64 - 1  # number of a message where the middleware does not count them
 AS_THE_SOIL_GIVES = {'slowed', 'command passes'}
 """States that come and go as the rover drives: no line in the log for each."""
 UNLIMITED = ('zero', 'starting', 'command passes')  # states of which nothing is to be said

@@ -25,6 +25,9 @@ OVERRIDABLE = QoSOverridingOptions(
 FAST_DEPTH = 250
 """Queue of topics that may come at 1000 Hz: a quarter of a second in which the node is held up."""
 
+NOT_NUMBERED = 2**64 - 1
+"""Number of a message where the middleware does not count them."""
+
 FREQUENT = ('joint_states', 'odom', 'imu/data')
 """These topics, which come many times between two sets."""
 
