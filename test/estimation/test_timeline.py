@@ -285,6 +285,22 @@ def test_sets_go_on_at_five_hertz_while_the_wheel_odometry_is_silent():
     assert all((s.slip_class == 0).all() for s in returned)
 
 
+@pytest.mark.parametrize('period', [0.5, 1.0])
+def test_wheel_odometry_that_comes_slowly_is_told_with_what_lets_it_count(period):
+    """Its class is unknown between, for at most 2.5 periods with the number that is named."""
+    end = 20 * period
+    stream = [imu(0.02 * i) for i in range(round(1.5 * end / 0.02))]
+    stream += [odometry(period * i) for i in range(20)]
+    stream.sort(key=lambda m: m.stamp)
+    sets = play(make_core(output_rate=20.0)[0], stream)
+    told = [s.faults.get('wheel_odometry', '') for s in sets if period * 3 < s.stamp / SECOND - 100]
+    assert told[0] == f'joint_states comes every {period} s -> filter.silence: {2.5 * period:.1f}'
+    assert told[-1] == 'joint_states silent: wheel rates unknown', 'it has ended'
+    cured = play(make_core(output_rate=20.0, filter__silence=2.5 * period)[0], stream)
+    assert not any('wheel_odometry' in s.faults for s in cured if s.stamp < stamp_at(end))
+    assert 'silent' in cured[-1].faults['wheel_odometry']
+
+
 def test_sets_begin_without_any_wheel_odometry():
     core, _ = make_core()
     assert times(play(core, [imu(0.02 * i) for i in range(60)])) == [0.5, 0.7, 0.9, 1.1]

@@ -332,7 +332,11 @@ ReferenceVelocity
                 'kept (a looped recording, a clock that was set, or two sources of other clocks)'
             )
         if silent:
-            faults['wheel_odometry'] = f'{self._checks.names[0]} silent: wheel rates unknown'
+            name, every = self._checks.names[0], self._timeline.slow_odometry
+            words = f'{name} silent: wheel rates unknown'
+            if every:
+                words = f'{name} comes every {every:.1f} s -> filter.silence: {2.5 * every:.1f}'
+            faults['wheel_odometry'] = words
         return faults
 
 

@@ -157,9 +157,9 @@ class ClockWatch:
         late = self._suspicion is Suspicion.BEHIND and own is not None and first >= own
         astray = self._odometry_astray >= PROVING_MESSAGES
         return (
-            (odometry and len(channels) > 1 and not late)
-            # One topic alone for so long that wheel odometry would have been heard.
-            or stamps[-1] - stamps[0] > 3 * self._clock_step
+            (not late and odometry and len(channels) > 1)
+            # Another topic alone for so long that wheel odometry would have been heard.
+            or (not late and stamps[-1] - stamps[0] > 3 * self._clock_step)
             or len(channels) >= MOST_HELD
             # Wheel odometry keeps the time: where it and another topic have different clocks
             # for good, the other one gives way.

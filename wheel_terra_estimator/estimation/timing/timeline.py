@@ -78,6 +78,7 @@ class Timeline:
         self._state: int | None = None  # newest released stamp
         self._last_set: int | None = None
         self._odometry: int | None = None  # newest released stamp of wheel odometry
+        self._intervals = 0, 0  # the last two between such stamps [ns]
         self._heartbeats = 0  # sets of the present silence
         self._overdue = 0  # wheel odometry lags by so much more than is waited for [ns]
         self._deferred: list[tuple[int, Measurement]] = []
@@ -146,6 +147,14 @@ class Timeline:
         if state is None:
             return False
         return stamp < state - self.settings.history or not self._log.reaches(stamp)
+
+    @property
+    def slow_odometry(self) -> float:
+        """How often wheel odometry comes [s] where that is no silence; 0: it is one."""
+        every, settings = min(self._intervals), self.settings
+        silent = (self._last_set or 0) - (self._odometry or 0)
+        slow = every > 0.9 * settings.silence and silent < 2 * every
+        return every / SECOND if slow else 0.0
 
     # -- The log --------------------------------------------------------------------------------
 
@@ -217,6 +226,8 @@ class Timeline:
 
     def _hear_odometry(self, stamp: int) -> None:
         if self._odometry is None or stamp > self._odometry:
+            if self._odometry is not None:
+                self._intervals = self._intervals[1], stamp - self._odometry
             self._odometry = stamp
             self._heartbeats = 0
 
