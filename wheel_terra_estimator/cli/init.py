@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -94,6 +95,8 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
         if arguments.mass:
             guessed = sketch.guessed - {'rover.mass'}
             sketch = replace(sketch, mass=arguments.mass, guessed=guessed)
+        x, y = _apart(sketch.x, arguments.wheelbase), _apart(sketch.y, arguments.track)
+        sketch = replace(sketch, x=x, y=y)
         return replace(sketch, name=arguments.name or sketch.name)
     topic = _odometry_alone(arguments) if arguments.bag and wheels else ''
     if arguments.bag:
@@ -103,6 +106,15 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
     if topic:
         print(f'note: no joint states, so wheel_odometry: odom, with --remap odom:={topic}')
     return replace(_from_measures(arguments, wheels), wheel_odometry='odom' if topic else '')
+
+
+def _apart(places: Sequence[float], distance: float | None) -> Sequence[float]:
+    """Return places the outermost of which are a measured distance apart, if there is one [m]."""
+    low, high = min(places), max(places)
+    if distance is None or low == high:
+        return places
+    scale, middle = distance / (high - low), 0.5 * (low + high)
+    return [round(middle + scale * (place - middle), 4) for place in places]
 
 
 def _names(text: str | None) -> list[str]:
