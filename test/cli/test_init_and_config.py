@@ -77,6 +77,13 @@ def test_from_a_urdf(init):
     assert init(urdf=CART) == 2  # nothing is overwritten
 
 
+def test_a_tape_wins_over_the_places_of_a_urdf(init):
+    """The cart's hubs are at y 0.3 and -0.3; two wheels on one axle have no wheelbase."""
+    rover = init('--track', 0.5, '--wheelbase', 1.0, urdf=CART)
+    assert rover.wheels.y.tolist() == [0.25, -0.25]
+    assert np.ptp(rover.wheels.x) == 0.0
+
+
 def test_a_wheel_of_meshes_takes_the_size_that_is_given(init, capsys):
     """What the document lacks is asked for at once."""
     meshes = re.sub('<cylinder[^>]*>', '<mesh filename="wheel.stl"/>', CART)
@@ -213,6 +220,8 @@ def test_from_a_recording_then_checked_and_calibrated(init, tmp_path, capsys):
     better = tmp_path / 'calibrated.yaml'
     command = ['calibrate', str(PATHFINDER), '--config', str(output), '-o', str(better)]
     assert main(command) == 0
+    assert 'A GUESS, to be measured: centre of gravity' in better.read_text()
+    assert 'rover.centre_of_gravity is still a guess' in capsys.readouterr().out
     assert np.allclose(reader.load([better]).wheels.radius, 0.117, atol=0.001)
 
 

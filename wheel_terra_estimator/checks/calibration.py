@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -216,8 +217,13 @@ def _track(changes: _Changes, evidence: Evidence) -> None:
         changes.add('wheels.y', (lateral * told.ratio.value).round(4).tolist(), std, source)
 
 
-def as_file(calibration: Calibration, configuration: Configuration, recording: str) -> str:
-    """Return the rover file as text."""
+def as_file(
+    calibration: Calibration,
+    configuration: Configuration,
+    recording: str,
+    guessed: Mapping[str, str] = MappingProxyType({}),
+) -> str:
+    """Return the rover file as text; ``guessed``: what marks the keys that init guessed."""
     changes = {change.key: change for change in calibration.changes}
     values = configuration.flat()
     keys = [key for key in values if key in configuration.stated or key in changes]
@@ -229,7 +235,7 @@ def as_file(calibration: Calibration, configuration: Configuration, recording: s
     lines += [f'  {finding}' for finding in calibration.findings]
     after = {key: changes[key].after if key in changes else values[key] for key in keys}
     declared = {key: _as_declared(value, values.get(key)) for key, value in after.items()}
-    notes = {key: _in_words(change) for key, change in changes.items()}
+    notes = {**guessed, **{key: _in_words(change) for key, change in changes.items()}}
     return as_text(declared, '\n'.join(lines), notes)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from wheel_terra_estimator.cli.outputs import add_output, add_remaps
 from wheel_terra_estimator.configuration import reader as configuration_reader
+from wheel_terra_estimator.configuration.rover_template import GUESSED
 
 EXAMPLES = (
     'wheel-terra calibrate ten_minute_drive --config my_rover.yaml -o my_rover_calibrated.yaml',
@@ -47,13 +48,17 @@ def run(arguments: argparse.Namespace) -> int:
         check_remaps(bag, remaps)
         recording = read_series(bag, remaps, name)
         calibration = calibrate(recording, configuration, tuple(remaps))
-    text = as_file(calibration, configuration, name)
+    marks = [p.read_text('utf-8') for p in map(Path, arguments.config) if p.is_file()]
+    guessed = {key: words for text in marks for words, key in GUESSED.findall(text)}
+    text = as_file(calibration, configuration, name, guessed)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(text, encoding='utf-8')
     print(f'{name}: {len(calibration.changes)} parameters identified')
     print('\n'.join(summary(calibration)))
     for note in recording.notes:
         print(f'note: {note}')
+    for key in guessed:
+        print(f'  {key} is still a guess: measure it')
     print(f'rover file: {arguments.output}')
     words = ['wheel-terra', 'replay', str(arguments.bag), '--config', str(arguments.output)]
     for remap in arguments.remap:

@@ -172,8 +172,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             status = int(arguments.run(arguments) or 0)
             sys.stdout.flush()
             return status
-    except KeyboardInterrupt:
-        complain(f'wheel-terra {arguments.command}: interrupted')
+    except KeyboardInterrupt as interrupt:
+        complain(f'wheel-terra {arguments.command}: interrupted{interrupt}')
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output (head, less) has gone: not an error of ours.

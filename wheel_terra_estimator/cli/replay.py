@@ -206,13 +206,16 @@ def _run_several(arguments: argparse.Namespace) -> int:
         {option: _plain_name(option, path) for option, path in _files(arguments).items()},
         _options(arguments),
     )
-    rows = replay_bags(
-        arguments.bags,
-        settings,
-        overwrite=arguments.overwrite,
-        jobs=arguments.jobs,
-        scheduler=arguments.scheduler or '',
-    )
+    try:
+        rows = replay_bags(
+            arguments.bags,
+            settings,
+            overwrite=arguments.overwrite,
+            jobs=arguments.jobs,
+            scheduler=arguments.scheduler or '',
+        )
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt('; without --overwrite the same command goes on') from None
     failed = [row for row in rows if row.error]
     if arguments.json:
         print(

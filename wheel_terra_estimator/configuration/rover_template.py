@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -14,6 +15,9 @@ DEFAULT_WIDTH_SHARE = 0.6  # width over radius of a wheel whose width is not kno
 CENTRE_HEIGHT = 1.4
 """Height of a centre of gravity that is not known, over the wheel radius [-]: low four-wheel rovers
 have 1.3 to 1.4."""
+
+A_GUESS = 'A GUESS, to be measured'
+GUESSED = re.compile(rf'# ({A_GUESS}.*)\n +([\w.]+):')  # the comment, the key below it
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ def rover_file(sketch: RoverSketch) -> str:
     notes = {}
     for key in values:
         unit = table[key].unit
-        mark = 'A GUESS, to be measured: ' if key in sketch.guessed else ''
+        mark = f'{A_GUESS}: ' if key in sketch.guessed else ''
         notes[key] = f'{mark}{table[key].meaning}' + (f' [{unit}]' if unit not in ('', '-') else '')
     lines = [as_text(values, comment, notes)]
     lines += ['    # Worth stating where known (the values are the defaults):']
