@@ -135,6 +135,20 @@ def test_remap_to_a_topic_that_is_not_there_or_of_another_type(make_bag, rover, 
         list(read(bag, {'sinkage': '/imu/data'}, rover))
 
 
+def test_a_reference_of_another_type_is_told_how_to_become_one(make_bag, rover, drive, factory):
+    """A twist beside the drive is offered; commands, which come from no sensor, are not."""
+    rows = [row for row in drive if row[0] != '/reference_odom']
+    at = rows[0][2]
+    twist = factory.twist_stamped(factory.header(at), 0.1, 0.0, [0.0] * 36)
+    bag = make_bag([*rows, ('/dvl', twist, at), ('/cmd_vel', twist, at)])
+    with open_bag(bag) as opened:
+        told = MeasurementReader(opened, {}, rover).notes[-1]
+    assert '/dvl (geometry_msgs' in told and 'nav_msgs/msg/Odometry' in told
+    assert '/cmd_vel' not in told
+    with pytest.raises(UserError, match=r'/dvl.*becomes a reference as nav_msgs/msg/Odometry'):
+        list(read(bag, {'reference_odom': '/dvl'}, rover))
+
+
 def test_wheel_names_that_do_not_match_are_told_with_both_lists(make_bag, rover):
     other = rover.replace({'wheels.names': ['front_left', 'front_right']})
     with pytest.raises(UserError) as error:

@@ -14,6 +14,7 @@ from wheel_terra_estimator.bags.topic_choice import (
     WHEEL_RATES,
     as_options,
     choose_topics,
+    other_references,
     other_rovers,
 )
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -72,6 +73,7 @@ class MeasurementReader:
         notes = [f'not in the bag: {", ".join(self.absent)}'] if self.absent else []
         if 'reference_odom' in self.absent:
             notes.append('without a reference velocity slip can be wrong and overconfident')
+            notes += [others] if (others := other_references(self.bag)) else []
         return notes
 
     @property
@@ -130,7 +132,9 @@ class MeasurementReader:
         """Say what is there and how to use it."""
         there, chosen = self.bag.topics.values(), choose_topics(self.bag, {})
         remedy = f'name the right one with --remap {name}:={chosen.get(name, "/TOPIC")}'
-        if name == 'joint_states' and name not in chosen:
+        if name == 'reference_odom' and name not in chosen:
+            remedy = other_references(self.bag) or remedy
+        elif name == 'joint_states' and name not in chosen:
             odometry = [t.name for t in there if t.type == INPUT_TYPES['odom'] and t.message_count]
             if odometry:
                 remedy = f'use -p wheel_odometry:=odom --remap odom:={odometry[0]}'

@@ -31,7 +31,7 @@ from wheel_terra_estimator.messages.convert import ODOMETRY
 from wheel_terra_estimator.messages.diagnostics import Diagnostics, Status
 from wheel_terra_estimator.messages.pipeline import RESET, TUNE, Pipeline
 
-LONG_DRIVE = 20_000  # number of messages from which a progress bar is shown
+LONG_DRIVE = 3_000  # number of messages from which a progress bar is shown: ten seconds
 
 LARGEST_ARRIVAL_LOG = 256 * 2**20  # size [byte] of an arrival log of ten hours
 

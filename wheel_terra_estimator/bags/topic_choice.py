@@ -18,6 +18,27 @@ _IMU_WORDS = ('imu/data', 'imu')
 WHEEL_RATES = '/joint_states'  # a namespace that has them is a rover
 
 
+_OTHER_REFERENCES = (
+    'sensor_msgs/msg/NavSatFix',
+    'geometry_msgs/msg/PoseStamped',
+    'geometry_msgs/msg/PoseWithCovarianceStamped',
+    'geometry_msgs/msg/TwistStamped',
+    'geometry_msgs/msg/TwistWithCovarianceStamped',
+)
+"""Types that hold a velocity, or places, and are no input."""
+
+
+def other_references(bag: Bag) -> str:
+    """Return how topics of another type become a reference velocity, '' for none."""
+    inputs = [t for t in _inputs(bag) if t.type in _OTHER_REFERENCES and 'cmd' not in t.name]
+    there = ', '.join(f'{t.name} ({t.type})' for t in inputs)
+    return there and (
+        f'{there}: what does not come from the wheels becomes a reference as '
+        f'{INPUT_TYPES["reference_odom"]} with twist.twist.linear.x, of positions their change '
+        'over a second, forward positive; or log all to one table for wheel-terra convert'
+    )
+
+
 def choose_topics(bag: Bag, remaps: Mapping[str, str]) -> dict[str, str]:
     """Return {estimator's topic: topic in the bag}: as named, else the likeliest one.
 

@@ -51,7 +51,7 @@ _MEASURES = (
     ('width', 'M', 'width of the wheels [m]'),
     ('track', 'M', 'distance of left and right wheels [m]'),
     ('wheelbase', 'M', 'distance of the first and last axle [m]'),
-    ('mass', 'KG', 'mass of the rover [kg]'),
+    ('mass', 'KG', 'mass on these wheels [kg]'),
 )
 DESCRIPTION = '/robot_description'
 TEXT_AT = 8
