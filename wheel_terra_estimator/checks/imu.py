@@ -36,11 +36,13 @@ from wheel_terra_estimator.checks.finding import (
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
     DRIFT,
+    MAD_TO_STD,
     UNIFORM_STD,
     Estimate,
     block_fit,
     confidence,
     correlation,
+    in_parts,
     lonely,
     moving_mean,
     probability,
@@ -248,8 +250,9 @@ def _gravity(state: ImuState) -> Judged:
     middle = np.median(imu.force, axis=0)
     # Second by second: vibration goes, and a slope is the same while a rover turns on it.
     seconds = max(int(np.ptp(imu.stamp) * 1e-9), 1)
-    parts = np.array_split(imu.force, min(seconds, len(imu.force)))
-    size = float(np.median([np.linalg.norm(np.median(part, axis=0)) for part in parts]))
+    parts = in_parts(imu.force, min(seconds, len(imu.force)))
+    middles = np.concatenate([np.median(part, axis=1) for part in parts])
+    size = float(np.median([np.linalg.norm(one) for one in middles]))
     off = abs(size - gravity)
     if not off > max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):  # nan: an axis without a number
         clear = off > max(SLOPES * gravity, GRAVITY_BIAS)
@@ -623,7 +626,7 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         change = np.diff(values, axis=0) / math.sqrt(2.0)
         # Vibration comes and goes with driving: the root mean square of the livelier half counts.
         step = max(step_of(column) for column in values.T)
-        noise = float(np.median([_upper_rms(column) for column in change.T]))
+        noise = float(np.median(_upper_rms(change)))
         noise = math.hypot(noise, UNIFORM_STD * step)
         stated = getattr(sensors, key)
         evidence.figures[f'imu.{key}'] = float(f'{noise:.3g}')
@@ -649,8 +652,9 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
     return outcomes
 
 
-def _upper_rms(values: FloatArray) -> float:
-    """Return the noise of the livelier half of the blocks of (k,) changes."""
-    blocks = np.array_split(values, min(max(values.size // 50, 1), 200))
-    noise = sorted(robust_std(block) for block in blocks)
-    return float(np.median(noise[len(noise) // 2 :]))
+def _upper_rms(values: FloatArray) -> FloatArray:
+    """Return the noise (p,) of the livelier half of the blocks of (k, p) changes."""
+    count = min(max(len(values) // 50, 1), 200)
+    off = [np.abs(b - np.median(b, axis=1, keepdims=True)) for b in in_parts(values, count)]
+    noise = MAD_TO_STD * np.concatenate([np.median(one, axis=1) for one in off])
+    return np.median(np.sort(noise, axis=0)[count // 2 :], axis=0)

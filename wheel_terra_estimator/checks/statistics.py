@@ -74,6 +74,17 @@ def _median(values: FloatArray) -> float:
     return 0.5 * float(ordered[low] + ordered[high])
 
 
+def in_parts(values: FloatArray, count: int) -> list[FloatArray]:
+    """Return (k, ...) values in so many parts, none empty, those of a length together (n, k, ...).
+
+    One median of many parts takes a tenth of the time of as many medians.
+    """
+    least, more = divmod(len(values), count)
+    edge = more * (least + 1)
+    both = (values[:edge], more, least + 1), (values[edge:], count - more, least)
+    return [part.reshape(n, size, *values.shape[1:]) for part, n, size in both if n]
+
+
 def block_fit(
     design: FloatArray, target: FloatArray, instruments: FloatArray | None = None
 ) -> list[Estimate]:
