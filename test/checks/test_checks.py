@@ -10,7 +10,7 @@ import pytest
 import rolling_rover as rolling
 from rolling_rover import checked
 
-from wheel_terra_estimator.checks.clocks import lag
+from wheel_terra_estimator.checks.clocks import lags
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.imu import ImuState, check_imu
 from wheel_terra_estimator.checks.names import _at_places_of, _pairs, check_wheel_names
@@ -475,7 +475,7 @@ def test_starts_that_fall_alike_between_references_do_not_look_late(period, late
         ramps = [np.clip((t - start) / 1.2, 0.0, 1.0) * (-1) ** k for k, start in enumerate(starts)]
         return np.sum(ramps, axis=0)
 
-    told, _ = lag(time, speed(time), at, speed(at - late), 3.0)
+    told, _ = lags(time, speed(time), at, speed(at - late), 3.0)(slice(0, at.size))
     assert told == pytest.approx(late, abs=0.03)
 
 

@@ -10,6 +10,7 @@ that agree, or from stamps that lie after their arrival.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -301,12 +302,13 @@ def lag_of(
     """
     limit = _longest(by, time)
     at = at - log
-    whole = lag(time, first, at, second, limit)
+    lag = lags(time, first, at, second, limit)
+    whole = lag(slice(0, at.size))
     if whole is None or whole[1] < LEAST_FIT[by]:
         return None
     calm = first if by == 'starts' else np.gradient(moving_mean(first, round(SMOOTHED / STEP)))
     parts = halves(np.interp(at, time, (calm - calm.mean()) ** 2))
-    both = [lag(time, first, at[part], second[part], limit) for part in parts]
+    both = [lag(part) for part in parts]
     if both[0] is None or both[1] is None:
         return None
     late = both[0][0], both[1][0]
@@ -320,31 +322,39 @@ def lag_of(
     return Lag(log + whole[0], by, (log + late[0], log + late[1]), worst(trials))
 
 
-def lag(
+def lags(
     time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, limit: float
-) -> tuple[float, float] | None:
-    """Return how much later a series at ``at`` is than one on an even grid [s], and their fit then.
+) -> Callable[[slice], tuple[float, float] | None]:
+    """Return what tells the lag in some rows of a series at ``at`` after one on an even grid.
 
-    The first is read where the second was measured, never the second in between. None: nothing to
-    correlate, too short for lags up to ``limit`` [s], or a lag beyond it.
+    That is how much later it is [s], and their fit then. The first is read where the second was
+    measured, never the second in between. None: nothing to correlate, too short for lags up to
+    ``limit`` [s], or a lag beyond it.
     """
     if time.size < 2 or not at.size or at[-1] - at[0] < 6.0 * limit:
-        return None
+        return lambda _: None
     step = float(np.median(np.diff(time)))
     reach = max(round(limit / step), 1)
     inner = (at >= time[0] + reach * step) & (at <= time[-1] - reach * step)
-    at, second = at[inner], second[inner]
-    if at.size < 3 or not first.std() or not second.std():
-        return None
-    shifts = step * np.arange(-reach, reach + 1)
-    fits = _fits(np.interp(at - shifts[:, None], time, first), second)
-    peak = int(np.argmax(fits))
-    if not 0 < peak < fits.size - 1:
-        return None
-    left, middle, right = fits[peak - 1 : peak + 2]  # top of a parabola
-    bend = left - 2.0 * middle + right
-    offset = 0.5 * float(left - right) / float(bend) if bend else 0.0
-    return step * (peak + offset - reach), float(fits[peak])
+    known, shifts = np.flatnonzero(inner), step * np.arange(-reach, reach + 1)
+    table = np.interp(at[known] - shifts[:, None], time, first)
+
+    def lag(part: slice) -> tuple[float, float] | None:
+        there, rows = at[part], slice(*np.searchsorted(known, (part.start, part.stop)))
+        values = second[known[rows]]
+        short = not there.size or there[-1] - there[0] < 6.0 * limit
+        if short or values.size < 3 or not first.std() or not values.std():
+            return None
+        fits = _fits(table[:, rows], values)
+        peak = int(np.argmax(fits))
+        if not 0 < peak < fits.size - 1:
+            return None
+        left, middle, right = fits[peak - 1 : peak + 2]  # top of a parabola
+        bend = left - 2.0 * middle + right
+        offset = 0.5 * float(left - right) / float(bend) if bend else 0.0
+        return step * (peak + offset - reach), float(fits[peak])
+
+    return lag
 
 
 def _fits(table: FloatArray, second: FloatArray) -> FloatArray:
@@ -480,7 +490,7 @@ def _from_buffer(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome]
         if (channel := getattr(recording, name)) is None:
             continue
         one = of_one_wheel(channel, facts.names)
-        stamp = np.unique(one.stamp[one.stamp > 0])
+        stamp = one.ascending
         ends = _bursts(stamp)
         if ends is None:
             continue
@@ -593,7 +603,7 @@ def _silent(recording: Recording) -> list[Outcome]:
 
 
 def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Outcome]:
-    stamps = np.unique(channel.stamp[channel.stamp > 0]) * 1e-9
+    stamps = channel.ascending * 1e-9
     if stamps.size <= SEVERAL:
         return []
     step = np.diff(stamps)

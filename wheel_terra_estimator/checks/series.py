@@ -36,6 +36,12 @@ class Channel:
         return (self.stamp - self.stamp[:1].sum()) * 1e-9
 
     @property
+    def ascending(self) -> IntArray:
+        """Different stamps in their order, (k,) or fewer [ns]."""
+        stamp = self.stamp[self.stamp > 0]
+        return stamp if (stamp[1:] > stamp[:-1]).all() else np.unique(stamp)
+
+    @property
     def late(self) -> FloatArray:
         """Log time less stamp of the messages that have a stamp [s]."""
         late = (self.log_time - self.stamp)[self.stamp > 0]
@@ -59,7 +65,7 @@ def rows_of(series: Series, kept: BoolArray | IndexArray) -> Series:
 
 def beside(channel: Channel, other: Channel) -> BoolArray:
     """Return the messages (k,) of a channel that are not far from any of another one."""
-    stamp = np.unique(other.stamp[other.stamp > 0])
+    stamp = other.ascending
     if stamp.size < 2:
         return np.zeros(channel.stamp.size, dtype=bool)
     off = np.abs(channel.stamp - stamp[_nearest_of(stamp, channel.stamp)])
