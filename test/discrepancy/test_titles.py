@@ -120,7 +120,9 @@ def test_when_and_which_is_no_measurement(title):
 UNITS = ('', *(unit for units in header.UNITS.values() for unit in units), 'furlong', 'A', 'kg')
 TITLES = st.one_of(
     st.sampled_from([*COLUMNS, *header._SURE, *header._SHORT, *header._OPEN]),
-    st.text('aTZé0·² []()/_,%°-\n\u22c5', max_size=12),  # all of Unicode costs a second to draw from
+    st.text(
+        'aTZé0·² []()/_,%°-\n\u22c5', max_size=12
+    ),  # all of Unicode costs a second to draw from
 )
 
 

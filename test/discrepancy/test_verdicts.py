@@ -31,7 +31,6 @@ from wheel_terra_lab.studies.campaigns.scoring import diagnose as diagnose_campa
 from wheel_terra_lab.trials.campaign import Plan, make_campaign
 from wheel_terra_lab.trials.truth import solve
 
-
 TWO = Options(effects=('bulldozing', 'cohesion'))
 """Where what is found is no effect: a sixth of the time of all."""
 

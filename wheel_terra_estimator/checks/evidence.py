@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, TypeAlias
+from functools import cached_property, wraps
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,7 @@ from wheel_terra_estimator.checks.statistics import (
 )
 
 Mask = BoolArray
+Result = TypeVar('Result')
 
 REST_RATE = 0.02  # wheel rate below which a wheel stands, as a share of its working rate [-]
 SHORTEST_REST = 1.0  # A standstill counts as rest after this time [s]
@@ -335,6 +337,19 @@ def gather(
             )
         )
     return Evidence(recording, facts, time, rate, torque, force, gyro, rotation, figures, steering)
+
+
+def once(tells: Callable[[Evidence], Result]) -> Callable[[Evidence], Result]:
+    """Let what a function tells of an evidence stay with it, as a cached property does."""
+
+    @wraps(tells)
+    def told(evidence: Evidence) -> Result:
+        kept: dict[str, Any] = evidence.__dict__
+        if tells.__name__ not in kept:
+            kept[tells.__name__] = tells(evidence)
+        return kept[tells.__name__]
+
+    return told
 
 
 def _shared(values: NDArray[Any]) -> NDArray[Any]:

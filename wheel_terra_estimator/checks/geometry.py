@@ -13,7 +13,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import imu, turning
 from wheel_terra_estimator.checks.clocks import SMOOTHED_BY
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask
+from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask, once
 from wheel_terra_estimator.checks.finding import (
     LEAST_TURN_RATE,
     SKID_TRACKS,
@@ -371,6 +371,7 @@ def stated_track(evidence: Evidence) -> float:
     return float(lateral[side > 0].mean() - lateral[side < 0].mean())
 
 
+@once
 def told_track(evidence: Evidence) -> Told | NotChecked:
     """Return effective over configured track from the gyro and the difference of the sides."""
     facts, difference = evidence.facts, evidence.side_difference

@@ -61,7 +61,8 @@ def even_times(time: FloatArray, step: float) -> FloatArray:
 
 def robust_std(values: FloatArray) -> float:
     """Return the standard deviation that fits the middle half of the values; nan for none."""
-    values = values[np.isfinite(values)]
+    known = np.isfinite(values)
+    values = values if known.all() else values[known]
     if not values.size:
         return math.nan
     return MAD_TO_STD * _median(np.abs(values - _median(values)))

@@ -17,6 +17,7 @@ from wheel_terra_estimator.checks.evidence import (
     SETTLING,
     Evidence,
     felt_yaw,
+    once,
 )
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome, listed, untold
 from wheel_terra_estimator.checks.statistics import (
@@ -322,6 +323,7 @@ def like_a_pitch(evidence: Evidence, zeros: list[Estimate]) -> bool:
     return not told and float(np.ptp(seen)) < ALIKE_ZEROS * abs(float(np.mean(seen)))
 
 
+@once
 def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     """Return zero and resistance of each torque on a straight; None unless driven both ways."""
     assert evidence.force is not None
@@ -348,7 +350,7 @@ def _unsigned(evidence: Evidence) -> list[Outcome]:
     Where a rover backs down a slope they are positive: it brakes.
     """
     lowest = np.nanquantile(evidence.torque[evidence.moving], 0.02, axis=0)
-    if both_ways(evidence) is None or not (lowest >= 0.0).all():
+    if not (lowest >= 0.0).all() or both_ways(evidence) is None:
         return []
     assert evidence.force is not None
     uphill = evidence.force[:, 0] * np.sign(evidence.rim) > UPHILL_ENOUGH * evidence.facts.gravity

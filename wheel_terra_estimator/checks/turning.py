@@ -26,6 +26,7 @@ from wheel_terra_estimator.checks.evidence import (
     Evidence,
     felt_senses,
     felt_yaw,
+    once,
     row_medians,
 )
 from wheel_terra_estimator.checks.finding import (
@@ -581,6 +582,7 @@ def _as_stated(evidence: Evidence, within: Mask) -> Fit | None:
     return fits_of([Fix((1,) * there.size)], stretch_of(evidence, there, rows))[0]
 
 
+@once
 def track_ratio(evidence: Evidence) -> float | None:
     """Return effective over stated track from the turns; None without turns."""
     fit = _as_stated(evidence, evidence.moving)
