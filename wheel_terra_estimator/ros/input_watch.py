@@ -52,14 +52,16 @@ class InputWatch:
         self._first_look: float | None = None
         self._looked_at = 0.0
         self._behind = self._told = 0.0
+        self.awake = -math.inf  # since then it is not late [s]; what was sent before may yet come
 
     def looked(self, now: float, period: float) -> None:
-        """Note that all that waited was taken, which should be done once a period [s]."""
+        """Note that what the middleware had was taken, as should be done once a period [s]."""
         if self._first_look is None:
             self._first_look = now
         if now - self._first_look > START:
             self._behind = max(now - self._looked_at - period, 0.0)
             self._told = max(self._told, self._behind)
+            self.awake = now if self._behind > BEHIND else self.awake
         self._looked_at = now
 
     def heard(self, topic: str, now: float, delay: float, number: int | None) -> None:
@@ -116,7 +118,7 @@ class InputWatch:
             return False
         state = self._topics[topic]
         least = LEAST_SILENCE if state.received > MESSAGES_TO_PERIOD else UNKNOWN_PERIOD
-        return age > max(least, PERIODS_TO_SILENCE * state.period)
+        return min(age, now - self.awake) > max(least, PERIODS_TO_SILENCE * state.period)
 
     def faults(self, now: float) -> list[tuple[str, str]]:
         """Return topics that are silent, losses and delays since this was last asked, in words."""

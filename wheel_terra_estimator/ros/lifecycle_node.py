@@ -503,7 +503,7 @@ class EstimatorNode(LifecycleNode):
         self._watch_inputs.looked(now, WATCH_PERIOD)
         diagnostics = self._pipeline.diagnostics
         diagnostics.look()
-        silent = now - self._set_at > SILENCE
+        silent = now - max(self._set_at, self._watch_inputs.awake) > SILENCE
         if not silent:
             self._rejected = self._pipeline.rejected
         stopped = self._stopped_in_words()
