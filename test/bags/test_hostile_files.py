@@ -143,7 +143,7 @@ def read(path: Path, sender: Any) -> None:
 CHUNK = 2**24  # bytes
 WALKS, ONCE = 5.0, 4
 """Plain walks that a chunk may cost; chunks that a file may cost whatever it unpacks to."""
-EIGHTH = limits.HELD // 8
+PART = limits.HELD // 16
 """For small files: a bomb costs what is allowed, whatever its size."""
 LARGE = [pytest.mark.slow, pytest.mark.timeout(900)]
 ELSEWHERE = (zeros, lying_zeros)  # quick in test_input_file.py: a file costs the limit at any size
@@ -160,7 +160,7 @@ def test_no_file_costs_much(tmp_path, monkeypatch, make, size):
     path = tmp_path / 'a.mcap'
     path.write_bytes(make(size))
     if size <= 10**5:
-        monkeypatch.setattr(limits, 'HELD', EIGHTH)
+        monkeypatch.setattr(limits, 'HELD', PART)
     receiver, sender = get_context('fork').Pipe(False)
     process = get_context('fork').Process(target=read, args=(path, sender))
     process.start()

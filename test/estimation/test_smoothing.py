@@ -105,9 +105,9 @@ def pairs(drive):
 
 def test_the_tape_changes_nothing_of_the_filter(drive, pairs):
     core = EstimatorCore(drive.configuration)
-    half = drive.arrivals[: len(drive.arrivals) // 2]
-    sets = [e for a in half for e in core.add(a.measurement)]
-    assert len(sets) > 0.4 * len(pairs)
+    part = drive.arrivals[: len(drive.arrivals) // 3]
+    sets = [e for a in part for e in core.add(a.measurement)]
+    assert len(sets) > 0.25 * len(pairs)
     for plain, (_, live) in zip(sets, pairs, strict=False):
         np.testing.assert_array_equal(plain.slip, live.slip)
         np.testing.assert_array_equal(plain.drawbar_pull, live.drawbar_pull)
@@ -141,7 +141,7 @@ def test_what_was_not_judged_live_is_not_judged_later(pairs):
 
 def test_a_late_reference_is_smoothed_at_its_own_stamp(drive):
     """However late references come, within the history, the smoothed drive is nearly the same."""
-    early = [a for a in drive.arrivals if a.measurement.stamp < drive.truth.stamp[0] + 6e9]
+    early = [a for a in drive.arrivals if a.measurement.stamp < drive.truth.stamp[0] + 5e9]
 
     def delayed(seconds):
         def arrival(a):
@@ -165,14 +165,14 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
     scenario = load(
         {
             'configuration': ['generic_six_wheel', 'hit_lss1'],
-            'duration': 9.5,
+            'duration': 7.5,
             'slope.angle_deg': [6.0],
-            'drive.time': [0.0, 6.0, 7.0],
+            'drive.time': [0.0, 4.5, 5.5],
             'drive.forward': [0.05, 0.05, -0.05],
         }
     )
     drive = simulate(scenario, 1)
-    turned = drive.truth.stamp[0] + round(6.6e9)  # the commands cross zero at 6.5 s
+    turned = drive.truth.stamp[0] + round(5.1e9)  # the commands cross zero at 5 s
 
     def slips(until):
         heard = (a.measurement for a in drive.arrivals)
@@ -180,7 +180,7 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
         return {s.stamp: s.slip for s, _ in sets if s.stamp < turned - round(2e9)}
 
     whole, climb = slips(drive.truth.stamp[-1]), slips(turned)
-    assert len(whole) > 40
+    assert len(whole) > 25
     for stamp, slip in climb.items():
         np.testing.assert_allclose(whole[stamp], slip, atol=0.01)
 
