@@ -18,7 +18,7 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision, workflow
 from wheel_terra_estimator.discrepancy.proposal import find
 from wheel_terra_estimator.discrepancy.report import words
-from wheel_terra_estimator.discrepancy.selection.readings import units_apart
+from wheel_terra_estimator.discrepancy.selection.readings import Columns, units_apart
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
@@ -270,8 +270,8 @@ def test_a_name_leaves_room_for_an_effect_that_looks_like_it_and_was_not_tried()
     narrow = run(table, values, options=Options(effects=('pitch_bias',)))
     assert free.effects[0].name == narrow.effects[0].name == 'pitch_bias'
     assert narrow.effects[0].confidence <= 0.5
-    assert any('bulldozing' in note and 'not tried' in note for note in narrow.notes)
-    assert not any('not tried' in note for note in free.notes)
+    assert 'bulldozing' in narrow.sentence and 'would look alike' in narrow.sentence
+    assert 'would look alike' not in free.sentence
 
 
 @pytest.mark.slow
@@ -336,8 +336,8 @@ def test_a_gain_that_a_unit_explains_as_well_is_no_surer_than_that(
     assert effect.name == 'torque_gain'
     assert effect.parameters['gain'].value == pytest.approx(gain - 1.0, abs=0.03)
     assert (effect.confidence <= 0.5) == bool(unit)
-    assert any('another unit of the column' in note for note in found.notes) == bool(unit)
-    assert any(unit in note for note in found.notes)
+    said = f'unless it is another unit of the column ({unit}), which would look alike'
+    assert (said in found.sentence) == bool(unit)
 
 
 def test_a_unit_is_alike_within_the_deviation_of_a_gain():
@@ -372,6 +372,27 @@ def test_two_columns_in_another_unit_are_both_asked_for(unproposed):
     table |= {'sinkage': 10.0 * table['sinkage'], 'torque': 0.1 * table['torque']}
     found = run({k: v for k, v in table.items() if not k.endswith('_std')}, values, options=TWO)
     assert found.misread == {'sinkage': pytest.approx(0.1), 'torque': pytest.approx(10.0)}
+
+
+@pytest.mark.parametrize(
+    'columns', [('drawbar_pull', 'torque'), ('normal_load', 'drawbar_pull', 'torque')]
+)
+def test_forces_that_share_a_wrong_unit_are_asked_for_together(columns):
+    table, values, *_ = make('basic16', stds=False)
+    table |= {column: table[column] / 9.80665 for column in columns}
+    found = run(table, values)
+    assert not found.effects
+    assert found.misread == dict.fromkeys(columns, pytest.approx(9.80665))
+
+
+def test_no_unit_is_asked_for_that_cannot_be_beside_the_one_of_the_title(tmp_path):
+    """What is said to be in mm may be in cm, m, in or ft: metres for feet are impossible."""
+    rows = ''.join(f'{0.1 * i},60,{3 + i}\n' for i in range(7))
+    path = tmp_path / 'rows.csv'
+    path.write_text(f'slip,normal_load,sinkage [mm]\n{rows}', encoding='utf-8')
+    lacked = Columns(read_table(path), None, (), {}, None, None)._lacked()
+    factors = [said['sinkage'] for said in lacked if 'sinkage' in said]
+    assert sorted(factors) == pytest.approx([10.0, 25.4, 304.8, 1000.0])
 
 
 @pytest.mark.parametrize(
@@ -424,4 +445,5 @@ def test_a_bias_of_the_radius_as_high_as_the_lugs_asks_for_the_radius_of_the_sli
         read = {**table, 'slip': 1.0 - (1.0 - table['slip']) * times}
         found = run(read, values, options=few)
         assert found.effects[0].name == 'wheel_radius_bias'
-        assert sum('set slip_radius: rim' in note for note in found.notes) == asked
+        assert found.sentence.count('(slip_radius: rim), which would look alike') == asked
+        assert found.effects[0].confidence <= 1.0 / (3.0 + asked)  # two effects are not tried

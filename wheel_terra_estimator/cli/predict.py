@@ -283,7 +283,7 @@ def _read_points(path: Path) -> dict[str, FloatArray]:
     from wheel_terra_estimator.discrepancy.tables.header import ALL, Choice
     from wheel_terra_estimator.discrepancy.tables.parsing import read_columns
 
-    lines, columns, _ = read_columns(path, Choice(ignored=(ALL,)), INPUTS)
+    lines, columns, *_ = read_columns(path, Choice(ignored=(ALL,)), INPUTS)
     if not lines.size:
         raise UserError(f'{path}: no rows below the column names; add one per operating point')
     for needed in ('slip', 'normal_load'):

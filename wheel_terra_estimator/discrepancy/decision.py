@@ -42,6 +42,8 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME as
 
 _USUAL_Z_SCORE = 2.5  # stated deviations: a larger shift lowers the confidence of a name
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
+_SURE = 2.0  # deviations within which a bias of the radius is the height of the lugs
+_RARE = 3.0  # deviations of its prior, beyond which a gain may as well be something else
 _LONG = 40  # iterations of a fit that may have to go far
 _MOST_TRIED = 3  # doubtful names, after which none is given
 # A name is given where it, or one of those that the rows cannot tell from it, is more likely right
@@ -70,6 +72,7 @@ class Naming:
     competitors: tuple[str, ...]
     confidence: Confidence
     features: Mapping[str, float]
+    alike: tuple[str, ...] = ()  # what looks like it and was not tried
 
 
 @dataclass(frozen=True)
@@ -182,7 +185,7 @@ class Decider:
             return names, False
         ahead_of_all = same or (ahead >= _CLEARLY and len(names) > 1)
         odds = _BEATS_LAW if ahead_of_all and not decision.verdict.left.significant else 1.0
-        surer = [confidences.confidence(n.features, int(n.features['alike']), odds) for n in names]
+        surer = [confidences.confidence(n.features, len(n.alike), odds) for n in names]
         names = tuple(replace(n, confidence=c) for n, c in zip(names, surer, strict=True))
         return names, _least(names, odds) >= _LIKELY
 
@@ -254,32 +257,45 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
     for place, key in enumerate(fitted.names):
         values = confidences.features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
-        alike = known_alike(key, decision, known)
+        alike = _known_alike(key, decision, known, table.units)
         values['alike'] = float(len(alike))
         alone = float(np.logaddexp.reduce(selection.log_joint[selection.index((key,))]))
         competitors = decision.verdict.ambiguity_groups[place]
         sure = confidences.confidence(values, len(alike))
-        found.append((alone, Naming(key, competitors, sure, values)))
+        found.append((alone, Naming(key, competitors, sure, values, alike)))
     return tuple(naming for _, naming in sorted(found, key=lambda item: -item[0]))
 
 
-def known_alike(name: str, decision: Decision, known: Mapping[str, Effect]) -> tuple[str, ...]:
-    """Return what looks like a name and was not tried: effects, of a gain another unit."""
+def _known_alike(
+    name: str, decision: Decision, known: Mapping[str, Effect], units: Mapping[str, float]
+) -> tuple[str, ...]:
+    """Return what looks like a name and was not tried: effects, another unit or radius."""
     findings, fitted = decision.findings, decision.after
     deviations = np.sqrt(np.diag(fitted.covariance()))
-    units = [
-        units_apart(min(known[c.owner].touches), 1.0 / gain, c.deviation(u, std) / gain)
-        for c, u, std in zip(fitted.coordinates, fitted.u, deviations, strict=True)
-        if c.unit == '-' and effect_of(c.owner) == effect_of(name) in _GAINS
-        for gain in [1.0 + float(c.value(u))]
-    ]
+    points, found = findings.setting.forward.points, list[str]()
+    heights = points.wheel.lug_height / points.wheel.radius
+    lug = float(np.max(heights)) if np.ptp(heights) == 0.0 else 0.0
+    due = {'rim': -lug / (1.0 + lug), 'lug_tip': lug}.get(points.slip_radius, 0.0)
+    for c, u, std in zip(fitted.coordinates, fitted.u, deviations, strict=True):
+        value, scatter = float(c.value(u)), c.deviation(u, std)
+        if c.key == f'{name}.bias' == 'wheel_radius_bias.bias' and due:
+            other = 'rim' if points.slip_radius == 'lug_tip' else 'lug_tip'
+            if abs(value - due) < _SURE * scatter:
+                found.append(f'a slip that refers to the other radius (slip_radius: {other})')
+        elif c.unit == '-' and effect_of(c.owner) == effect_of(name) in _GAINS:
+            column, gain = min(known[c.owner].touches), 1.0 + value
+            text = units_apart(column, 1.0 / gain, scatter / gain, units.get(column, 1.0))
+            if text:
+                found.append(f'another unit of the column ({text})')
+            elif abs(u) > _RARE:
+                found.append('something else in that column (so large a gain is rare)')
     on = set(findings.setting.forward.base_effects)
     own = known[effect_of(name)].confounded_with
     others = (o.base_name for o in known.values() if effect_of(name) in o.confounded_with)
     aside = {n for n, o in known.items() if not o.candidate or o.incompatible_with & on}
     names = dict.fromkeys((*own, *others))
     untried = [name for name in names if name not in aside and name not in findings.tried]
-    return (*untried, *(f'another unit of the column ({text})' for text in units if text))
+    return (*untried, *found)
 
 
 def _what_rows_show(

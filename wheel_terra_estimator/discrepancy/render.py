@@ -15,7 +15,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch, changes_along_rows
 from wheel_terra_estimator.discrepancy.assessment.where import locate
-from wheel_terra_estimator.discrepancy.decision import Decision, known_alike
+from wheel_terra_estimator.discrepancy.decision import Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import BED
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.report import words
@@ -92,11 +92,9 @@ def render(
         notes=(
             *words.notes(both, findings, after, () if decision.misread else moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
-            *words.radius_of_slip(after, setting.forward.points),
             *words.own_beds(decision.beds_differ, table),
             *([bed] if bed else []),
             *words.alone(decision.gap),
-            *words.untried({e.name: known_alike(e.name, decision, known) for e in effects}),
         ),
         bed=_beds(findings, after),
         base_effects=tuple(configuration.effects),
@@ -137,6 +135,7 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
                 },
                 naming.features,
                 known[key].form if len(known[name].forms) > 1 else '',
+                naming.alike,
             )
         )
     return tuple(found)

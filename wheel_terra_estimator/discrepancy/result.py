@@ -54,6 +54,8 @@ class NamedEffect:
     # What the confidence was computed from (``confidence.FEATURES``)
     features: Mapping[str, float] = field(default_factory=dict, metadata=_ASIDE)
     form: str = ''  # which form of the effect; empty where it has one only
+    # What looks like it and was not tried
+    alike: tuple[str, ...] = field(default=(), metadata=_ASIDE)
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
-from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
 FACTORS = {
     'stiffness': 'the factor on soil.frictional_modulus and soil.cohesive_modulus',
@@ -264,23 +263,6 @@ def _repeatability(noise: Noise) -> list[str]:
     return found
 
 
-def radius_of_slip(fitted: Fit, points: OperatingPoints) -> tuple[str, ...]:
-    """Return a question where a named bias of the radius is the height of the lugs."""
-    height = float(np.median(points.wheel.lug_height / points.wheel.radius))
-    share = height / (1.0 + height)
-    other, due = {'rim': ('lug_tip', -share), 'lug_tip': ('rim', height)}.get(
-        points.slip_radius, ('', math.inf)
-    )
-    std = np.sqrt(np.diag(fitted.covariance()))
-    return tuple(
-        f'the bias of the radius is that of a slip that refers to the other radius; if it does, '
-        f'set slip_radius: {other}'
-        for c, u, s in zip(fitted.coordinates, fitted.u, std, strict=True)
-        if c.key == 'wheel_radius_bias.bias' and height > 0.0
-        if abs(float(c.value(u)) - due) < _SURE * c.deviation(float(u), float(s))
-    )
-
-
 def own_beds(probability: float, table: SteadyTable) -> tuple[str, ...]:
     """Return a remark where every sweep has a bed of its own, and the beds may differ."""
     if not probability:
@@ -335,16 +317,6 @@ def alone(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
 
 def _swept(table: SteadyTable) -> str:
     return ' and '.join(plain(name) for name in table.varying() if name not in ON_ONE_BED)
-
-
-def untried(alike: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Return remarks on what looks like a named effect and was not tried."""
-    return tuple(
-        f'{name} may be {" or ".join(others)} as well, which was not tried: the confidence leaves '
-        'room for that'
-        for name, others in alike.items()
-        if others
-    )
 
 
 _SLIPS = {
@@ -422,6 +394,7 @@ def sentence(
 ) -> str:
     """Return the verdict in words."""
     verdict, left = decision.verdict, decision.verdict.left
+    near = f'nearest: {", ".join(nearest)}' if nearest else ''
     if decision.misread:
         return wrong_columns(decision.misread)
     if verdict.status == 'undecided':
@@ -438,14 +411,13 @@ def sentence(
             'Model and measurement agree only with numbers too far from the configured ones to be '
             f'believed (one by {left.z_score:.1f} of its standard deviations, at most '
             f'{LARGEST_Z_SCORE:g} are believed): they are wrong, or something is missing that acts '
-            'like them and is none of the known effects.'
+            f'like them{f" ({near})" if near else ""}.'
         )
     if verdict.status == 'unexplained':
         size = f'a misfit of about {100 * left.amplitude:.0f} % of the range is left'
         if left.amplitude < 0.005:  # with a reference what is shared is not in it
             scatter = 'nothing smooth, but more scatter than the noise allows, is left'
             size = '' if left.shared else scatter
-        near = f'nearest: {", ".join(nearest)}' if nearest else ''
         aside = '; '.join(filter(None, (size, near)))
         return (
             'Model and measurement disagree, and none of the known effects explains it well enough '
@@ -462,6 +434,8 @@ def sentence(
         if effect.confounded_with:
             competitors = ' or '.join(effect.confounded_with)
             text += f' or {competitors} (one of them: {percent(effect.confidence_of_set)})'
+        if effect.alike:
+            text += f', unless it is {" or ".join(effect.alike)}, which would look alike'
         parts.append(text)
     result = 'Missing in the model: ' + ', and '.join(parts)
     if any(effect.remainder for effect in effects):

@@ -29,10 +29,10 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 _CLEARLY = 10.0  # nats by which another reading must explain the rows better than any effect
 _LIKELIER = 5.0  # the same, where the rows as they are do not fit the soil
 _FLOOR_NEEDED = 0.8  # probability of a structural error from which soil alone does not fit
-_FORCES = [times for f in (9.80665, 4.4482216) for times in (f, 1.0 / f)]  # kgf, lbf; or N as these
-_LOADS = (0.5, 2.0, *_FORCES)  # of a pair of wheels, or one of it
+_LOADS = (0.5, 2.0)  # of a pair of wheels, or one of it
+_TOGETHER = (('normal_load', 'drawbar_pull'), ('drawbar_pull', 'torque'))  # of one unit of force
 _LIKE_MODEL = math.log(3.0)  # a reading must come so near to the size that the model gives
-_NEAR = math.log(2.0)  # a unit so near is a gain as well (``decision.known_alike``)
+_NEAR = math.log(2.0)  # a unit so near is a gain as well (``decision``)
 _ROUGH = 0.03  # floor beside which readings are ranked [share of the range]
 _TRIED = 2  # best of them that are weighed
 _LEAST_CHANGE = 4e-4  # of a slip by another rule [-]: that of a slip of 2 %
@@ -40,10 +40,10 @@ _SAME, _MOST_ALIKE = 0.03, 0.15  # between two units: a factor of ten, or that o
 BY_SPEED, BY_RIM = 'r w/v - 1', '1 - v/(r w)'
 
 
-def units_apart(column: str, times: float, std: float = 0.0) -> str:
+def units_apart(column: str, times: float, std: float = 0.0, stated: float | None = None) -> str:
     """Return which unit in place of which would be so many times as large; empty: none.
 
-    ``std`` is the deviation of ``times`` over it [-].
+    ``std`` is the deviation of ``times`` over it [-]; ``stated``: of the unit that its title says.
     """
     near = min(max(_SAME, 2.0 * std), _MOST_ALIKE)
     units = UNITS[unit_of(column)]
@@ -52,7 +52,7 @@ def units_apart(column: str, times: float, std: float = 0.0) -> str:
         f'{found} in place of {said}'
         for said, found in pairs
         if abs(math.log(units[found] / units[said] / times)) < near
-        if units[found] != units[said]
+        if units[found] != units[said] and stated in (None, units[said])
     )
     return next(alike, '')
 
@@ -175,21 +175,13 @@ class Columns:
     def _readings(self) -> Iterator[Reading]:
         """Yield what the columns may hold."""
         table, points, one = self.table, self.forward.points, np.ones(len(QUANTITIES))
-        torque = {q: due / size for q, size, due in self._sizes()}.get('torque')
-        for times in _LOADS:
-            if torque and abs(math.log(times * torque)) > _LIKE_MODEL:
-                continue  # it grows in proportion
-            other = replace(points, normal_load=times * points.normal_load)
-            yield Reading({'normal_load': times}, table, other, one)
-            if times in _FORCES and 'drawbar_pull' in table.quantities:
-                said = {'normal_load': times, 'drawbar_pull': times}
-                yield _scaled(said, table, other)
-        for quantity, size, due in self._sizes():
-            units = UNITS[unit_of(quantity)].values()
-            for times in {*units, *(1.0 / f for f in units)}:
-                near = abs(math.log(times)) < _NEAR
-                if not near and abs(math.log(times * size / due)) < _LIKE_MODEL:
-                    yield _scaled({quantity: times}, table, points)
+        sizes = {quantity: due / size for quantity, size, due in self._sizes()}
+        for said in self._lacked():
+            load = said.get('normal_load', 1.0)  # forces grow in proportion
+            judged = said if load == 1.0 else ('torque',)
+            off = (said.get(q, 1.0) / sizes[q] / load for q in judged if q in sizes)
+            if all(abs(math.log(times)) < _LIKE_MODEL for times in off):
+                yield _scaled(said, table, replace(points, normal_load=load * points.normal_load))
         if table.true_rows.any():
             return  # slips of a drive are our own
         slip = table.columns['slip']
@@ -203,6 +195,32 @@ class Columns:
         for radius in {'rim', 'lug_tip'} - {points.slip_radius}:
             if np.max(points.wheel.lug_height) > 0.0:
                 yield Reading({'slip': radius}, table, replace(points, slip_radius=radius), one)
+
+    def _lacked(self) -> Iterator[dict[str, float]]:
+        """Yield column -> factor that it lacks, beside the unit that its title says.
+
+        In one column, or in those of one unit of force.
+        """
+        columns = ('normal_load', *self.table.quantities)
+        found = [{c: unit} for c in columns for unit in UNITS[unit_of(c)].values()]
+        for name, torque in UNITS['N m'].items():
+            force = UNITS['N'].get(name.split()[0])
+            if force:
+                units = {'normal_load': force, 'drawbar_pull': force, 'torque': torque}
+                found += [{c: units[c] for c in some} for some in (*_TOGETHER, tuple(units))]
+        said = self.table.units
+        lacked = [{c: u / said.get(c, 1.0) for c, u in some.items()} for some in found]
+        seen = list[dict[str, float]]()
+        for some in (*lacked, *({'normal_load': times} for times in _LOADS)):
+            off = {c: times for c, times in some.items() if times != 1.0}
+            gain = len(off) == 1 and 'normal_load' not in off and _is_gain(*off.values())
+            if off and off not in seen and not gain and off.keys() <= {*columns}:
+                seen.append(off)
+                yield off
+
+
+def _is_gain(times: float) -> bool:
+    return abs(math.log(times)) < _NEAR
 
 
 def _scaled(said: Mapping[str, float], table: SteadyTable, points: OperatingPoints) -> Reading:

@@ -66,6 +66,7 @@ def averaged(table: SteadyTable, most: int) -> SteadyTable:
         of_mean(table.leaving_angle_std),
         np.array([table.true_rows[cell].all() for cell in cells]),
         table.notes,
+        table.units,
     )
 
 

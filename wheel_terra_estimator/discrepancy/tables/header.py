@@ -197,6 +197,11 @@ class Header:
         """Columns that are read."""
         return [column.name for column in self.columns]
 
+    @property
+    def units(self) -> dict[str, float]:
+        """Column -> factor to SI of the unit that its title says."""
+        return {column.name: abs(column.factor) for column in self.columns}
+
     def _chosen(self, choice: Choice) -> Iterator[int]:
         """Take the columns that the user names; yield their places."""
         for name, entry in choice.entries.items():

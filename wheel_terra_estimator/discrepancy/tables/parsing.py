@@ -8,6 +8,7 @@ import math
 import re
 from array import array
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from datetime import datetime, timezone
 from itertools import chain, islice, zip_longest
 from pathlib import Path
@@ -61,14 +62,14 @@ def read_table(path: str | Path, choice: Choice | None = None) -> SteadyTable:
     which are not, where the titles do not. Raises UserError for everything that makes the table
     unusable: one line with file, row and remedy.
     """
-    lines, values, notes = read_columns(Path(path), choice or Choice(), one_of=ONE_OF)
-    return check_table(str(path), values, lines, notes)
+    lines, values, notes, units = read_columns(Path(path), choice or Choice(), one_of=ONE_OF)
+    return replace(check_table(str(path), values, lines, notes), units=units)
 
 
 def read_columns(
     path: Path, choice: Choice, wanted: Sequence[str] = COLUMNS, one_of: Sequence[str] = ()
-) -> tuple[IndexArray, dict[str, FloatArray], list[str]]:
-    """Return the lines of the rows, the wanted columns of a CSV file in SI, and notes.
+) -> tuple[IndexArray, dict[str, FloatArray], list[str], dict[str, float]]:
+    """Return the lines of the rows, the wanted columns of a CSV file in SI, notes, and units.
 
     Of the columns ``one_of`` there has to be one, beside slip and normal load; columns that are not
     wanted are passed over. Raises UserError as `read_table`, but for values that cannot be.
@@ -92,7 +93,7 @@ def read_columns(
     if file.decimal_comma:
         mark = 'tabs' if file.delimiter == '\t' else repr(file.delimiter)
         notes.append(f'cells are separated by {mark}, a comma would be read as the decimal mark')
-    return lines, values, [*notes, *header.notes]
+    return lines, values, [*notes, *header.notes], header.units
 
 
 def table_of(data: Any, name: str, choice: Choice | None = None) -> SteadyTable:
@@ -110,7 +111,7 @@ def table_of(data: Any, name: str, choice: Choice | None = None) -> SteadyTable:
     header.check(REQUIRED, ONE_OF)
     rows = enumerate(zip(*columns.values(), strict=True), start=2)
     lines, values = _read_rows(name, header, rows, decimal_comma=True)
-    return check_table(name, values, lines, header.notes)
+    return replace(check_table(name, values, lines, header.notes), units=header.units)
 
 
 def _check_layout(file: CsvFile, rows: Sequence[tuple[int, list[str]]]) -> None:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -48,6 +48,8 @@ class SteadyTable:
     # sensors (``sensors.*``) were taken off before, as of a drive's
     true_rows: BoolArray
     notes: tuple[str, ...] = ()  # what the reader found odd but usable
+    # Column -> factor to SI of the unit that its title says; 1 where it says none
+    units: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -123,6 +125,7 @@ def concatenated(name: str, parts: Sequence[SteadyTable], notes: tuple[str, ...]
         name,
         columns={key: np.concatenate([column(part, key) for part in parts]) for key in names},
         notes=notes,
+        units=parts[0].units if all(p.units == parts[0].units for p in parts) else {},
         **{key: np.concatenate([getattr(part, key) for part in parts]) for key in _BY_ROW},
     )
 
@@ -175,15 +178,15 @@ def operating_points(
         return np.where(np.isnan(given), default, given)
 
     sizes = {}
-    for name, field in WHEEL.items():
-        needed = field in ('radius', 'width') and f'wheels.{field}' not in configuration.stated
+    for name, size in WHEEL.items():
+        needed = size in ('radius', 'width') and f'wheels.{size}' not in configuration.stated
         if needed and np.isnan(columns.get(name, np.full(1, np.nan))).any():
             raise UserError(
                 f'{source}: no column {name}, and no wheel in the configuration (--config); '
-                f'add the column, or -p wheels.{field}:=[0.15] with your number [m]'
+                f'add the column, or -p wheels.{size}:=[0.15] with your number [m]'
             )
-        own = getattr(wheels, field)
-        sizes[field] = filled(name, float(own[wheel]) if len(own) else np.nan)
+        own = getattr(wheels, size)
+        sizes[size] = filled(name, float(own[wheel]) if len(own) else np.nan)
     thickness = float(wheels.lug_thickness[wheel]) if len(wheels.lug_thickness) else 0.0
     try:
         return OperatingPoints(
