@@ -15,7 +15,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.rover_template import (
@@ -164,8 +163,13 @@ def _origin(element: ElementTree.Element | None, path: Path) -> Pose:
     origin = element.find('origin') if element is not None else None
     if origin is None:
         return pose
-    turns = _numbers(origin.get('rpy'), (0.0, 0.0, 0.0), path)
-    pose[:3, :3] = Rotation.from_euler('xyz', turns).as_matrix()
+    roll, pitch, yaw = _numbers(origin.get('rpy'), (0.0, 0.0, 0.0), path)
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in (roll, pitch, yaw))
+    pose[:3, :3] = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
     pose[:3, 3] = _numbers(origin.get('xyz'), (0.0, 0.0, 0.0), path)
     return pose
 
