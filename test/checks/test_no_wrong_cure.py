@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rolling_rover as rolling
+import scipy
 from rolling_rover import checked
-from scipy.ndimage import gaussian_filter1d
 
 from wheel_terra_estimator.checks import evidence, turning
 from wheel_terra_estimator.checks.calibration import calibrate
@@ -589,7 +589,7 @@ def test_no_yaw_seems_better_known_than_it_scatters(monkeypatch):
     """A motion beside hills of three times its size, neither of which the other knows of."""
     random, told = np.random.default_rng(1), []
     for _ in range(100):
-        real, imaginary = gaussian_filter1d(random.standard_normal((2, 2, 3000)), 8.0)
+        real, imaginary = scipy.ndimage.gaussian_filter1d(random.standard_normal((2, 2, 3000)), 8.0)
         motion, hills = real + 1j * imaginary
         monkeypatch.setattr(evidence, '_motions', lambda *_, m=motion, h=hills: (m, m + 3.0 * h))
         told.append(evidence.felt_yaw(None))

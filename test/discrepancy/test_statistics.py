@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy
 from scipy.optimize import least_squares
-from scipy.stats import chi2, kstest, multivariate_normal
 
 from wheel_terra_estimator.discrepancy.assessment import held_out
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
@@ -158,7 +158,9 @@ def test_evidence_is_the_integral_over_parameters(setting):
     got = evidence(problem, model, (floor,)).log_joint[0]
 
     smooth = smooth_error(problem, inputs, scale, amplitude)
-    density = multivariate_normal(np.zeros(problem.size), np.diag(problem.std**2) + smooth)
+    density = scipy.stats.multivariate_normal(
+        np.zeros(problem.size), np.diag(problem.std**2) + smooth
+    )
     total = 0.0
     for width, share in ((1 / WIDENING, 1 - WORSE_SHARE), (1.0, WORSE_SHARE)):
         for size, part in zip(EFFECT_SCALES, EFFECT_SHARES, strict=True):
@@ -205,7 +207,7 @@ def test_gap_test_is_calibrated(forward, setting):
         cells = problem.observed + shift + problem.std * rng.standard_normal(problem.size)
         case = replace(at_truth, residual=problem.rotation @ (cells - problem.observed))
         squares.append(gap_test.chi_square_p_value(case, one))
-    assert kstest(squares, 'uniform').pvalue > 1e-3
+    assert scipy.stats.kstest(squares, 'uniform').pvalue > 1e-3
     digging = problem.rotation @ problem.flat(np.outer(0.004 * forward.points.slip, [1.0, 0, 0]))
     real = replace(at_truth, residual=digging)
     assert gap_test.chi_square_p_value(real, one) < 1e-3
@@ -435,7 +437,7 @@ def test_chi_square_is_that_of_the_best_parameters(setting):
     rows = np.vstack([model.jacobian / np.sqrt(1.3), [1.0, 0.0]])
     right = np.append(problem.rotation @ problem.observed / np.sqrt(1.3), 0.0)
     rest = right - rows @ np.linalg.lstsq(rows, right, rcond=None)[0]
-    expected = chi2.sf(float(rest @ rest), problem.size - 1)
+    expected = scipy.stats.chi2.sf(float(rest @ rest), problem.size - 1)
     assert gap_test.chi_square_p_value(model, variance) == pytest.approx(expected, rel=1e-6)
 
 
@@ -463,7 +465,7 @@ def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
     assert spoilt.share_of_gap > 0.6
     assert spoilt.share_of_gap == pytest.approx(pull[spoilt.rows].sum() / pull.sum())
     assert {0.0 < w.p_value <= 1.0 for w in found} == {True}
-    assert kstest([w.p_value for w in clean], 'uniform').pvalue > 1e-3
+    assert scipy.stats.kstest([w.p_value for w in clean], 'uniform').pvalue > 1e-3
     assert sum(w.sentence == 'no region stands out from the noise' for w in clean) >= 20
 
 
@@ -568,5 +570,7 @@ def test_a_cell_set_apart_is_the_evidence_of_its_wider_noise(rng):
     wider[4, 4] = 0.3 + (outliers.OUTLIER_FACTOR * std) ** 2
     constant = -0.5 * size * np.log(2.0 * np.pi)
     price = np.log((1.0 - outliers.SHARE) / outliers.SHARE)
-    expected = multivariate_normal(np.zeros(size), wider).logpdf(target) - constant - price
+    expected = (
+        scipy.stats.multivariate_normal(np.zeros(size), wider).logpdf(target) - constant - price
+    )
     assert score == pytest.approx(float(expected))

@@ -33,7 +33,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import brentq
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -376,6 +375,8 @@ def pooled_correlation(blocks: Iterable[FloatArray]) -> float:
 
     if excess(0.0) >= 0.0 or excess(_GREATEST_CORRELATION) <= 0.0:
         return 0.0 if excess(0.0) >= 0.0 else _GREATEST_CORRELATION
+    from scipy.optimize import brentq  # heavy
+
     return float(brentq(excess, 0.0, _GREATEST_CORRELATION))
 
 
