@@ -219,21 +219,6 @@ def test_a_camera_whose_clock_is_ahead_takes_no_set_away(who, ahead):
     assert not any('wheel_odometry' in s.faults for s in sets)
 
 
-def test_wheels_stamped_since_boot_are_silent_not_late():
-    """The others go on at 5 Hz as without wheels, and their remedy is not a longer history."""
-    core, _ = make_core(**DEFAULT)
-    stream = [(t := 0.05 * i, odometry(t - 95.0)) for i in range(200)]
-    stream += [(t := 0.02 * i + 0.001, imu(t)) for i in range(500)]
-    stream += [(t := 0.02 * i + 0.002, sinkage(t)) for i in range(500)]
-    stream.sort(key=lambda pair: pair[0])
-    sets = [s for _, m in stream for s in core.add(m)]
-    assert len(sets) >= 5 * 9 and all('wheel_odometry' in s.faults for s in sets[5:])
-    assert (
-        core.rejected[('joint_states', 'stamp older than `history` (raise it, or set its clock)')]
-        > 150
-    )
-
-
 def test_a_reference_is_never_waited_for():
     core, _ = make_core(**DEFAULT)
     stream = [(0.05 * i, odometry(0.05 * i)) for i in range(200)]
