@@ -267,6 +267,30 @@ def test_a_driver_whose_stamp_stands_still_fills_nothing():
     assert core.health()['joint_states_stamp_repeated'] == 999
 
 
+@pytest.mark.parametrize(
+    ('late', 'clocks', 'told'),
+    [
+        ({}, {}, {}),
+        ({reference: 0.4, odometry: 0.3, imu: 0.3}, {sinkage: 0.1}, {}),
+        ({reference: 0.4}, {reference: 1.0}, {'reference_odom': '0.6 s ahead of wheels and IMU'}),
+        ({}, {imu: 1.5}, {'joint_states': '1.5 s behind imu/data'}),
+        ({imu: 0.8}, {}, {'imu/data': '0.8 s behind joint_states'}),
+    ],
+)
+def test_stamps_that_are_apart_beyond_what_is_waited_for_are_told(late, clocks, told):
+    arrivals = []
+    for kind, rate in ((odometry, 20), (imu, 50), (sinkage, 10), (reference, 2)):
+        for t in (n / rate for n in range(10 * rate)):
+            arrivals.append((t + late.get(kind, 0.0), kind(t + clocks.get(kind, 0.0))))
+    arrivals.sort(key=lambda each: each[0])
+    last = play(make_core(max_lag=-1.0, output_rate=20.0)[0], [m for _, m in arrivals])[-1]
+    found = {k: words for k, words in last.faults.items() if 'stamps' in words}
+    assert found.keys() == told.keys()
+    assert all(
+        found[k].startswith(f'stamps {words}: late, or a clock') for k, words in told.items()
+    )
+
+
 # -- Silence --------------------------------------------------------------------------------------
 
 

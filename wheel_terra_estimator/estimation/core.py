@@ -37,6 +37,7 @@ from wheel_terra_estimator.estimation.timing.clock_watch import (
 )
 from wheel_terra_estimator.estimation.timing.input_checks import (
     CHANNELS,
+    INERTIAL,
     WHEEL_ODOMETRY,
     InputChecks,
 )
@@ -318,7 +319,7 @@ ReferenceVelocity
 
     def _faults(self, silent: bool) -> dict[str, str]:
         """Return what became of the inputs since the last set, in words."""
-        faults = {}
+        faults, names = {}, self._checks.names
         if self._deferred:
             self._deferred = False
             faults['late inputs'] = (
@@ -331,8 +332,14 @@ ReferenceVelocity
                 f'stamps went back, {self._clock_steps} times so far: a new run begins, soil is '
                 'kept (a looped recording, a clock that was set, or two sources of other clocks)'
             )
+        for channel, by in self._lags.apart.items():
+            where = 'ahead of wheels and IMU' if by > 0 else f'behind {names[INERTIAL - channel]}'
+            faults[names[channel]] = (
+                f'stamps {abs(by) / SECOND:.1f} s {where}: late, or a clock is off -> set the '
+                'clocks, or sensors.*_stamp_offset of the one that is off'
+            )
         if silent:
-            name, every = self._checks.names[0], self._timeline.slow_odometry
+            name, every = names[WHEEL_ODOMETRY], self._timeline.slow_odometry
             words = f'{name} silent: wheel rates unknown'
             if every:
                 words = f'{name} comes every {every:.1f} s -> filter.silence: {2.5 * every:.1f}'

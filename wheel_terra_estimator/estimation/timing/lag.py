@@ -46,6 +46,7 @@ class LagLearner:
         self._repeats = deque[bool](maxlen=_MEMORY)
         self._odometry: int | None = None  # last stamp of it
         self._newest: int | None = None  # stamp of either channel
+        self._gap = 0  # between the last two of these
         self._leads = defaultdict[int, deque[int]](lambda: deque(maxlen=_LEADS))
         self._led: set[int] = set()  # other channels that were heard since then
         self.present: int | None = None
@@ -57,6 +58,18 @@ class LagLearner:
     def longest(self) -> int:
         """How long inputs may be held back at most [ns]."""
         return LONGEST_HOLD if self.fixed < 0 else self.fixed
+
+    @property
+    def apart(self) -> dict[int, int]:
+        """Channels -> how far their stamps are ahead when they come, beyond what is waited for.
+
+        Below 0: how far wheel odometry or IMU are behind the other [ns].
+        """
+        ahead = {c: min(each) for c, each in self._leads.items() if len(each) == _LEADS}
+        behind = {c: round(lag / _ROOM) for c, lag in self.learned.items()}
+        return {c: by for c, by in ahead.items() if by > LONGEST_HOLD + self._gap} | {
+            c: -by for c, by in behind.items() if by > LONGEST_HOLD
+        }
 
     def begin_run(self) -> None:
         """Forget the time, not the lags: they belong to the transport."""
@@ -85,6 +98,8 @@ class LagLearner:
             self._repeats.append(stamp == self._odometry and not whole)
             self._odometry = stamp
         newest = self._newest
+        if newest is not None and stamp > newest:
+            self._gap = stamp - newest
         self._newest = stamp if newest is None else max(newest, stamp)
         lags.append(0 if newest is None else max(newest - stamp, 0))
         self._counts[channel] += 1
