@@ -196,6 +196,11 @@ def test_rim_speeds_and_positions_of_a_log(convert, reference, sense):
     driven = np.clip(4.5 - middle, 0.0, 1.0)  # share of the second about it
     np.testing.assert_allclose(told.reference.velocity[:, 0], speed * driven, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(middle, 0.5 + 0.2 * np.arange(middle.size), atol=1e-6)
+    # A mean over a stop is no speed at an instant: it says so; on the way nothing is stated.
+    off = np.abs(told.reference.velocity[:, 0] - speed * (middle < 4.0))
+    std = np.sqrt(np.nan_to_num(told.reference.variance))
+    assert (off <= 2.0 * std + 1e-4)[np.abs(middle - 4.0) > 0.01].all() and (off > 0.1).any()
+    assert not std[middle < 3.4].any()
 
 
 def test_positions_need_wheels_that_count_one_way(convert, tmp_path, capsys):

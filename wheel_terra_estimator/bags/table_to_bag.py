@@ -43,6 +43,7 @@ _REFERENCE = {
 _PLACES = (('position.x', 'position.y'), ('latitude', 'longitude'))
 EARTH_RADIUS = 6_371_000.0  # mean [m]
 BASELINE = 1.0  # positions so far apart [s] make a speed: closer ones are noise
+UNSTEADY = 0.1  # deviation of the rates meanwhile, from which its own is stated, as a share [-]
 ONE_WAY = 0.5
 """Share of their rate that the wheels have in common, metre for metre, if all count one way [-]."""
 _LATEST = 2**31 - 1  # stamp that a message can hold [s]
@@ -225,8 +226,10 @@ class _Sender:
         self.last: dict[str, tuple[list[str], int]] = {}  # a reading, and rows since
         self.sent = 0
         self.short: dict[int, None] = {}  # lines, in order
-        self.places: deque[tuple[int, float, float, float]] = deque()  # stamp, place, turned
+        # Stamp, place, turned, squared
+        self.places: deque[tuple[int, float, float, float, float]] = deque()
         self.turned = 0.0  # how far all wheels have turned together [rad]
+        self.squared = 0.0  # integral of the square of their rate [rad^2/s]
         self.common = 0, 0.0  # stamp [ns] and rate that the wheels last had in common
         self.one_way = self.any_way = 0.0  # common rate and mean size of rates, times speed
 
@@ -244,7 +247,9 @@ class _Sender:
         )
         if _any_told(rates):
             (before, was), rate = self.common, _mean(rates)
-            self.turned += 0.5 * (was + rate) * (stamp - before) * 1e-9 if before else 0.0
+            seconds = (stamp - before) * 1e-9 if before else 0.0
+            self.turned += 0.5 * (was + rate) * seconds
+            self.squared += 0.5 * (was**2 + rate**2) * seconds
             self.common = stamp, rate
         if _any_told(rates) or _any_told(angles):
             message = pack.joint_state(
@@ -292,25 +297,29 @@ class _Sender:
         orientation = [float(part or 0.0) for part in quaternion] if whole else None
         self.bag.write('/imu/data', pack.imu(stamp, force, rate, orientation), stamp)
 
-    def _speed(self, stamp: int, place: list[float], *, degrees: bool) -> tuple[int, float]:
+    def _speed(self, stamp: int, place: list[float], *, degrees: bool) -> tuple[int, float, float]:
         """Return the speed between two positions, at the stamp in their middle; nan for none.
 
-        Its sense is that in which the wheels turned from one to the other.
+        Its sense is that in which the wheels turned from one to the other. Its variance is that of
+        their rates meanwhile, as a share, where they did not turn steadily; else 0.
         """
         x, y = place
         if math.isnan(x) or math.isnan(y):
-            return stamp, math.nan
-        self.places.append((stamp, x, y, self.turned))
+            return stamp, math.nan, 0.0
+        self.places.append((stamp, x, y, self.turned, self.squared))
         first = self.places[0]
         seconds = (stamp - first[0]) * 1e-9
         if seconds < BASELINE:
-            return stamp, math.nan
+            return stamp, math.nan, 0.0
         self.places.popleft()
         there, across = x - first[1], y - first[2]
         if degrees:  # latitude, longitude [rad], on a sphere
             there, across = EARTH_RADIUS * there, EARTH_RADIUS * across * math.cos(x)
-        speed = math.copysign(math.hypot(there, across) / seconds, self.turned - first[3])
-        return (stamp + first[0]) // 2, speed
+        turned = self.turned - first[3]
+        speed = math.copysign(math.hypot(there, across) / seconds, turned)
+        share = (self.squared - first[4]) * seconds / turned**2 - 1.0 if turned else 0.0
+        variance = speed**2 * share if share > UNSTEADY**2 else 0.0
+        return (stamp + first[0]) // 2, speed, variance
 
     def _sinkage(self, line: int, row: list[str], stamp: int) -> None:
         columns = self.layout.sinkage
@@ -322,18 +331,20 @@ class _Sender:
     def _reference(self, line: int, row: list[str], stamp: int, rates: list[float]) -> None:
         columns, arrival = self.layout.reference, stamp
         speed = self.value(line, row, columns.get('linear.x'))
+        told = self.value(line, row, columns.get('variance'))
+        variance = 0.0 if math.isnan(told) else told  # 0: the rover file decides
         for pair in _PLACES:
             if set(pair) <= set(columns):
                 place = [self.value(line, row, columns[key]) for key in pair]
-                stamp, speed = self._speed(stamp, place, degrees=pair == _PLACES[1])
+                stamp, speed, changing = self._speed(stamp, place, degrees=pair == _PLACES[1])
+                variance += changing
                 if not math.isnan(speed):
                     self.one_way += abs(speed * _mean(rates))
                     self.any_way += abs(speed) * _mean([abs(rate) for rate in rates])
         if math.isnan(speed):
             return
-        variance = self.value(line, row, columns.get('variance'))
         covariance = [0.0] * 36
-        covariance[0] = 0.0 if math.isnan(variance) else variance  # 0: the rover file decides
+        covariance[0] = variance
         self.bag.write('/reference_odom', pack.odometry(stamp, speed, 0.0, covariance), arrival)
 
 
