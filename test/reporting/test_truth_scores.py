@@ -16,7 +16,12 @@ from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.judgement.entrapment import Outcome, Verdict
 from wheel_terra_estimator.reporting.comparison import as_text, compare
 from wheel_terra_estimator.reporting.drive_style import Border
-from wheel_terra_estimator.reporting.drive_summary import DriveSummary, WarningSpan, WheelSummary
+from wheel_terra_estimator.reporting.drive_summary import (
+    DriveSummary,
+    MessageRow,
+    WarningSpan,
+    WheelSummary,
+)
 from wheel_terra_estimator.reporting.estimates_table import write_table
 from wheel_terra_estimator.reporting.replay_report import _error_row, _tone
 from wheel_terra_estimator.reporting.truth_scores import (
@@ -178,6 +183,11 @@ def test_a_drive_is_called_good_where_slip_is_known_and_no_wheel_travelled_by_it
     known = dataclasses.replace(wheel, slip=(0.0, 0.1), max_slip=0.1)
     verdict = DriveSummary('drive', 0.0, 1, (wheel, known), (), (), ()).verdict
     assert verdict == 'No stuck warning, no wheel in the classes high or stuck.'
+    row = MessageRow('joint_states', '/joint_states', 9, 'none')
+    alone = DriveSummary('drive', 0.0, 1, (known,), (), (row,), ()).verdict
+    assert alone == f'{verdict} Without a reference velocity it may have slipped unseen.'
+    both = (row, dataclasses.replace(row, name='reference_odom'))
+    assert DriveSummary('drive', 0.0, 1, (known,), (), both, ()).verdict == verdict
     noisy = dataclasses.replace(known, seconds={**seconds, 'stuck': 2.2}, slip_travel=0.004)
     verdict = DriveSummary('drive', 0.0, 1, (wheel, noisy), (), (), ()).verdict
     assert verdict.endswith('no wheel in the classes high or stuck for more than a centimetre.')

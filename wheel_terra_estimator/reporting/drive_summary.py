@@ -104,7 +104,10 @@ class DriveSummary:
         worst = far.index(max(far))
         if far[worst] < LEAST_TRAVEL:
             some = ' for more than a centimetre' if any(high) else ''
-            return f'No stuck warning, no wheel in the classes high or stuck{some}.'
+            heard = {row.name for row in self.messages if row.count}
+            unseen = heard and 'reference_odom' not in heard
+            cost = ' Without a reference velocity it may have slipped unseen.' if unseen else ''
+            return f'No stuck warning, no wheel in the classes high or stuck{some}.{cost}'
         name, far_in_cm = self.wheels[worst].name, 100.0 * far[worst]
         return (
             f'No stuck warning. {name} slipped most: {far_in_cm:.0f} cm in {high[worst]:.1f} s of '
