@@ -32,7 +32,11 @@ from wheel_terra_estimator.discrepancy.tables.checks import (
     check_pull_against_model,
     check_wheel_of_model,
 )
-from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable, operating_points
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    QUANTITIES,
+    SteadyTable,
+    operating_points,
+)
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
@@ -114,8 +118,13 @@ def diagnose(
             asked[part.name] = columns.asked(tens_alone)
             if not asked[part.name]:
                 break
-    if len(set(map(str, asked.values()))) > 1:  # what both show may be an error that they share
-        misread_in, misread = next((f'{name}: ', said) for name, said in asked.items() if said)
+    found = next(((f'{name}: ', said) for name, said in asked.items() if said), None)
+    if found and len(set(map(str, asked.values()))) > 1:
+        misread_in, misread = found
+    elif (
+        found and set(QUANTITIES) & found[1].keys()
+    ):  # load or slip may be an error that both share
+        misread_in, misread = f'{" and ".join(asked)}: ', found[1]
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
     if sweeps is not None and decision.verdict.status != 'agrees':

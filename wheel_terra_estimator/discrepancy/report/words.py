@@ -72,6 +72,11 @@ _COARSE = 0.05  # model-error floor above which agreement says little
 
 def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
     """Return what stays open and what to do next, without any statistics."""
+    if diagnosis.misread:
+        return {
+            'open': ['What the column holds: model.yaml is fitted to it as it stands.'],
+            'next': ['Correct the column, and diagnose again.'],
+        }
     still_off = channels_off(diagnosis.gap)
     left = [
         f'{plain(name)} is still off by more than noise and the allowed model error.'
@@ -85,8 +90,6 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
             left.append(f'These rows cannot tell {plain(effect.name)} from {competitors}.')
     if diagnosis.verdict in OPEN and not still_off:
         left.append('Why these rows need another soil, or more scatter, than was stated.')
-    if diagnosis.misread:
-        return {'open': left, 'next': ['Correct the column, and diagnose again.']}
     settled = not left
     if settled:
         left.append('Nothing beyond noise and the allowed model error.')
