@@ -66,7 +66,7 @@ class LagLearner:
         Below 0: how far wheel odometry or IMU are behind the other [ns].
         """
         ahead = {c: min(each) for c, each in self._leads.items() if len(each) == _LEADS}
-        behind = {c: round(lag / _ROOM) for c, lag in self.learned.items()}
+        behind = {c: min(each) for c, each in self._lags.items() if len(each) == _MEMORY}
         return {c: by for c, by in ahead.items() if by > LONGEST_HOLD + self._gap} | {
             c: -by for c, by in behind.items() if by > LONGEST_HOLD
         }
