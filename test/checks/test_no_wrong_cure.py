@@ -11,7 +11,7 @@ import rolling_rover as rolling
 import scipy
 from rolling_rover import checked
 
-from wheel_terra_estimator.checks import evidence, turning
+from wheel_terra_estimator.checks import evidence, imu, turning
 from wheel_terra_estimator.checks.calibration import calibrate
 from wheel_terra_estimator.checks.evidence import gather
 from wheel_terra_estimator.checks.rover_facts import from_configuration
@@ -297,6 +297,13 @@ def test_steps_of_an_accelerometer_are_noise():
     coarse = replace(WHOLE.imu, force=np.round(WHOLE.imu.force))
     told = [f for f in checked(imu=coarse).findings if f.fault == 'imu_noise']
     assert [f.value for f in told] == pytest.approx([1.0 / math.sqrt(12.0)], rel=0.1)
+
+
+def test_noise_of_an_imu_is_that_of_the_livelier_half():
+    """It shakes while the rover drives, six tenths of the time; columns differ by a factor."""
+    values = np.random.default_rng(1).standard_normal((20_037, 2)) * [1.0, 3.0]
+    values[8000:] *= 10.0
+    assert imu._upper_rms(values) == pytest.approx([10.0, 30.0], rel=0.05)
 
 
 def test_noise_of_another_unit_is_no_zero_of_a_sinkage():
