@@ -346,16 +346,19 @@ def test_a_unit_is_alike_within_the_deviation_of_a_gain():
     assert not units_apart('torque', 1.6, 0.5)
 
 
-@pytest.mark.parametrize('wrong', [('a.csv',), ('b.csv',), ('a.csv', 'b.csv')])
-def test_a_unit_of_one_or_both_of_two_tables_is_asked_for(wrong):
+@pytest.mark.parametrize(
+    ('wrong', 'times', 'options'),
+    [(('a.csv',), 10.0, TWO), (('b.csv',), 10.0, TWO), (('a.csv', 'b.csv'), 9.80665, Options())],
+)
+def test_a_unit_of_one_or_both_of_two_tables_is_asked_for(wrong, times, options):
     table, values, soil, rows = make('basic16')
     again = noisy(rows, solve(rows, soil), solve(rows, soil), np.random.default_rng(3))
     tables = {'a.csv': table, 'b.csv': again}
-    tables |= {name: {**tables[name], 'torque': 0.1 * tables[name]['torque']} for name in wrong}
+    tables |= {name: {**tables[name], 'torque': tables[name]['torque'] / times} for name in wrong}
     reference, table = (check_table(name, rows) for name, rows in tables.items())
     configuration = reader.from_parameters(values, complete=False)
-    found = diagnose(table, configuration, reference, TWO)
-    assert found.misread == {'torque': pytest.approx(10.0)}
+    found = diagnose(table, configuration, reference, options)
+    assert found.misread == {'torque': pytest.approx(times)}
     assert found.sentence.startswith(f'{" and ".join(wrong)}: The unit of torque looks wrong')
     assert not found.effects
 

@@ -121,9 +121,10 @@ def diagnose(
     found = next(((f'{name}: ', said) for name, said in asked.items() if said), None)
     if found and len(set(map(str, asked.values()))) > 1:
         misread_in, misread = found
-    elif (
-        found and set(QUANTITIES) & found[1].keys()
-    ):  # load or slip may be an error that both share
+    elif found and any(
+        quantity in QUANTITIES and not math.log10(float(times)).is_integer()
+        for quantity, times in found[1].items()
+    ):  # a load, slip or mere size may be an error that both share
         misread_in, misread = f'{" and ".join(asked)}: ', found[1]
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
     sweeps = table.sweeps() if reference is None and not misread else None
