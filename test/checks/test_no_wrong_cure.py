@@ -825,3 +825,26 @@ def test_sides_that_are_swapped_have_one_cure():
     )  # fmt: skip
     told = [f for f in checked(joints=swapped).findings if f.fault == 'swapped_sides']
     assert told and 'wheels.y' not in told[0].cure
+
+
+def test_places_of_wheels_with_x_for_y_are_no_exchanged_names():
+    half, base = rolling.HALF_TRACK, rolling.HALF_BASE
+    places = {'wheels.x': [half, -half, half, -half], 'wheels.y': [base, base, -base, -base]}
+    (finding,) = checked(rolling.rover(**places)).findings
+    assert finding.fault == 'axes' and 'wheels.y: [0.400, -0.400, 0.400, -0.400]' in finding.cure
+
+
+def test_wheels_of_a_side_that_hang_on_one_encoder_are_no_copies():
+    joints = replace(WHOLE.joints, rate=WHOLE.joints.rate[:, [0, 1, 0, 1]])
+    assert not checked(joints=joints).findings
+    swapped = rolling.rover(**{'wheels.names': [rolling.NAMES[i] for i in (1, 0, 2, 3)]})
+    assert [f.fault for f in checked(swapped, joints=joints).findings] == ['exchanged']
+
+
+def test_an_unlike_wheel_moves_no_reference():
+    """Half of the drive without a sign: the rims of its side tell no speed in turns."""
+    rate = WHOLE.joints.rate.copy()
+    rate[:, 3] = np.where(WHOLE.joints.seconds > 300.0, 0.3 * rate[:, 3], rate[:, 3])
+    assert 'reference_place' not in {
+        f.fault for f in checked(joints=replace(WHOLE.joints, rate=rate)).findings
+    }

@@ -132,6 +132,26 @@ def test_steered_wheels_roll_where_they_point(change, faults):
     assert report.figures['rover.effective_over_stated_track'] == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.parametrize(
+    'change, fault, wheel, said',
+    [
+        (lambda angle: angle * [1.0, 1.0, 0.0, 1.0], 'steering_frozen', 'rear_left', ''),
+        (lambda angle: angle + np.array([0.0, 0.14, 0, 0]), 'steering_zero', 'front_right', '0.1'),
+        (lambda angle: angle[:, [1, 0, 2, 3]], 'steering_exchanged', 'front_left, front_right',
+         'wheels.steering_joints: [front_right_steer, front_left_steer, rear_left_steer, rear'),
+    ],
+)  # fmt: skip
+def test_a_joint_that_does_not_steer_as_the_rover_turns(change, fault, wheel, said):
+    (finding,) = (f for f in steered(change).findings if f.kind != 'radius')
+    assert (finding.fault, finding.wheel) == (fault, wheel) and said in finding.cure
+
+
+def test_without_any_steering_in_turns_no_joint_is_blamed():
+    report = steered(lambda angle: 0.0 * angle)
+    assert not {f.fault for f in report.findings} & {'steering_frozen', 'steering_zero'}
+    assert 'frozen' in {entry.kind for entry in report.not_checked}
+
+
 @pytest.mark.parametrize('order', [(2, 1, 0, 3), (0, 3, 2, 1)])
 def test_front_and_rear_joints_of_a_side_that_are_exchanged(order):
     """They are steered alike, one to the left and one to the right: as two that are negated."""

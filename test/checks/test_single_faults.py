@@ -66,6 +66,10 @@ EXCHANGED = 'wheels.names: [front_right, front_left, rear_left, rear_right]'
 RENAMED = 'wheels.names: [fl_wheel, front_right, rear_left, rear_right]'
 THREE = {**both(lambda v: v[:, :3]), 'names': lambda names: names[:3]}
 FROZEN = 'up to '
+ALL = ', '.join(rolling.NAMES)
+MOST = 0.8 * np.quantile(np.abs(WHOLE.joints.rate), 0.98)
+NOISE = np.random.default_rng(9970).normal(0.0, 0.02, WHOLE.joints.rate.shape)
+TENTH = (np.arange(WHOLE.joints.stamp.size) % 10 == 0)[:, None]
 FAULTS = [  # channel, what its fields become, the only fault, its wheel, its true size, said
     (JOINTS, both(by([1, 1, -1, 1])), 'backwards', RL, None, 'direction: [1, 1, -1, 1]'),
     (JOINTS, both(by([-1, 1, -1, 1])), 'backwards', f'{FL}, {RL}', None, '[-1, 1, -1, 1]'),
@@ -76,6 +80,16 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, {'rate': by(4.0)}, 'rate_unit', None, approx(0.25, rel=0.03), 'before a gear'),
     (JOINTS, {'rate': np.abs}, 'rates_unsigned', None, None, ''),
     (JOINTS, {'rate': in_steps}, 'rate_steps', None, None, 'steps of'),
+    (JOINTS, {'rate': lambda v: np.clip(v, -MOST, MOST)}, 'rate_limit', ALL, None, f'{MOST:.4g}'),
+    (JOINTS, {'rate': lambda v: v[:, [0, 1, 0, 3]]}, 'copied', f'{FL}, {RL}', None, 'a copy'),
+    (JOINTS, {'rate': lambda v: v[:, [0, 1, 2, 0]]}, 'copied', f'{FL}, {RR}', None, 'a copy'),
+    (JOINTS, {'torque': lambda v: v[:, [0, 1, 2, 0]]}, 'copied', f'{FL}, {RR}', None, 'effort'),
+    (JOINTS, {'rate': lambda v: np.where([1, 0, 0, 0], np.abs(v), v)}, 'rates_unsigned', FL, None,
+     'other wheels'),
+    (JOINTS, {'rate': lambda v: v * [1, 1, 0, 1] + NOISE}, 'rate_frozen', RL, None, 'up to'),
+    (JOINTS, {'rate': lambda v: np.where(TENTH, 0.0, v)}, 'rate_zeros', ALL, None, 'publisher'),
+    (JOINTS, {'rate': lambda v: np.where(TENTH & [[0, 1, 0, 0]], 0.0, v)}, 'rate_zeros', FR, None,
+     ''),
     (JOINTS, {'rate': by([1, 1, 0.5, 1])}, 'wheel_counts', RL, None, ''),
     (JOINTS, {'rate': by([1, 1, 1.2, 1])}, 'wheel_scale', RL, approx(0.2 / 1.2, rel=0.01), ''),
     (JOINTS, {'torque': np.abs}, 'torque_unsigned', None, None, ''),

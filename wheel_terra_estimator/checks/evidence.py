@@ -267,6 +267,15 @@ class Evidence:
         """Return the evidence with other wheel rates (after something was mended)."""
         return replace(self, rate=rate, torque=self.torque if torque is None else torque)
 
+    def rows(self, kept: Mask) -> Evidence:
+        """Return the evidence with some messages of the wheel odometry."""
+        recording = replace(self.recording, joints=rows_of(self.joints, kept))
+        force, gyro = (None if one is None else one[kept] for one in (self.force, self.gyro))
+        left = replace(self, recording=recording, time=self.time[kept], force=force, gyro=gyro)
+        return replace(left, steering=self.steering[kept]).with_rate(
+            self.rate[kept], self.torque[kept]
+        )
+
     def with_channel(self, name: str, **values: Any) -> Evidence:
         """Return the evidence with other values in a channel of the recording."""
         channel = replace(getattr(self.recording, name), **values)

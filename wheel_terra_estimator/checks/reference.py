@@ -40,6 +40,7 @@ CLEAR_HEADING = 1.0  # turn in which a frame of the world is told from one of th
 STEADY = 0.9  # length of the mean direction of a velocity that keeps to a frame [-]
 TURNED_SIGMAS, TURNED_STD = 4.0, math.radians(1.0)  # of the direction on straights, at least [rad]
 LEAST_ASIDE, ASIDE_SIGMAS = 0.1, 6.0  # distance of a place beside base_link [m], in deviations
+UNLIKE_WHEELS = 0.5  # difference of the wheels of a side over the speed, at most [-]
 UNLIKE_SLIP = 0.2  # difference of the slip in turns to either side, over its mean [-]
 ASIDE = 'reference.aside_deg'
 FAR_ASIDE = math.radians(12.0)  # direction in which 2 % of a speed along x are lost [rad]
@@ -80,7 +81,8 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         sense = np.sign(np.interp(evidence.time, evidence.seconds(reference), calm))
         turns = (evidence.moving & ~evidence.unturned)[:, None]  # in which the sides may be unlike
         mended = evidence.with_rate(np.where(turns, np.nan, evidence.rate * sense[:, None]))
-        return [evidence.found('rates_unsigned', 0.95)], mended
+        told = evidence.found('rates_unsigned', 0.95, other='reference goes')
+        return [told], mended
     return [], evidence
 
 
@@ -164,6 +166,8 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         'reference', velocity=np.column_stack([turned.real, turned.imag, 0.0 * rim])
     )
     rival = '' if turns else ', or it is given in the world frame: drive a circle'
+    if all(evidence.facts.configuration.wheels.steered):
+        turns, rival = False, f'{rival}, or all wheels are steered aside, or read so'
     sure, words = 0.9 if turns else 0.5, {'angle': math.degrees(angle), 'rival': rival}
     return [evidence.found('reference_turned', sure, value=words['angle'], **words)], mended
 
@@ -313,6 +317,9 @@ def check_place(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     there = np.isfinite(evidence.rate).any(axis=0)  # more of them may be on one side
     side, lateral = evidence.facts.side[there], evidence.facts.lateral[there]
+    apart = [np.ptp(evidence.speed[:, there][:, side == one], axis=1) for one in np.unique(side)]
+    if np.nanquantile(apart, 0.9) > UNLIKE_WHEELS * np.nanquantile(np.abs(evidence.rim), 0.9):
+        return [], evidence  # the rims tell no speed of a side
     middle = evidence.rim + 0.5 * evidence.side_difference * side.mean()
     if {-1.0, 1.0} <= set(side):  # base_link may lie beside the middle between the sides
         middle = middle + evidence.yaw * 0.5 * sum(lateral[side == one].mean() for one in (-1, 1))

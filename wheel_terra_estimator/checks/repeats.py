@@ -61,6 +61,9 @@ def _held(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if times > 1.0:
         told = {'times': times, 'period': times * evidence.period}
         outcomes.append(evidence.found('rates_held', 0.95, **told))
+        values = np.nan_to_num(np.hstack([evidence.rate, evidence.torque]))
+        new = np.append(True, np.any(np.diff(values, axis=0) != 0.0, axis=1))
+        evidence = evidence.rows(new | ~evidence.moving)
     if reference is None:
         return outcomes, evidence
     driven = np.interp(evidence.seconds(reference), evidence.time, evidence.moving) > 0.5

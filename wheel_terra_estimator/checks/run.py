@@ -221,13 +221,17 @@ Check: TypeAlias = 'tuple[str, ModuleType, str] | tuple[str, ModuleType, str, bo
 """Kind of what it finds, module and name of a check; whether it also runs while driving."""
 AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('mounting', imu, 'check_upside', DRIVING),
+    ('jumps', wheel_rates, 'check_zeros'),
+    ('jumps', wheel_rates, 'check_limits', DRIVING),
     ('missing_wheel', wheel_rates, 'check_dead_wheels', DRIVING),
+    ('frozen', wheel_rates, 'check_copies', DRIVING),
     ('frozen', repeats, 'check_repeats', DRIVING),
     ('jumps', wheel_rates, 'check_wild'),
     ('unit', turning, 'check_steering_unit'),
     ('radius', wheel_rates, 'check_scales'),
+    ('swapped_sides', turning, 'check_axes'),
     ('sign', turning, 'check_signs', DRIVING),
-    ('sign', turning, 'check_steering_sign'),
+    ('sign', turning, 'check_steering'),
     ('sign', reference, 'check_sense', DRIVING),
     ('placeholder', reference, 'check_source', DRIVING),
     ('unit', turning, 'check_gyro_unit', DRIVING),

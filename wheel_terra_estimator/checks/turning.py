@@ -37,9 +37,10 @@ from wheel_terra_estimator.checks.finding import (
     listed,
     untold,
 )
-from wheel_terra_estimator.checks.rover_facts import RoverFacts
+from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
+    LEAST_FALL,
     Trial,
     block_fit,
     confidence,
@@ -56,6 +57,11 @@ Mask = BoolArray
 
 TRIAL_ROWS = 1000  # rows, spread over the drive, that hypotheses are compared on
 MOST_STEERING = 3.3  # steering angle that no wheel has [rad]
+AS_TURNED, STILL = 0.5, 0.3  # share of the turn that a wheel is steered by, or not [-]
+LEAST_STEERING_ZERO = math.radians(5.0)  # beyond what wheels slip aside [rad]
+LEAST_ACROSS = math.radians(1.5)  # the same of two that are exchanged
+LEAST_ASKED = 0.1  # speed aside in turns over that ahead, of a wheel that has to steer [-]
+LEAST_HEADINGS = 1.0  # turn in a drive that is not all on one cross slope [rad]
 MOST_WHEELS = 10  # wheels for which all combinations of signs are tried
 LEAST_TURNING_ROWS = 40  # rows with a turn by the gyro that the wheels must account for
 MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2  # residual of a cure; of steered wheels, at most [-]
@@ -258,34 +264,88 @@ def check_steering_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [told], replace(evidence, steering=np.radians(evidence.steering))
 
 
-def check_steering_sign(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return wheels that are steered against the turn of gyro and rims, and these mended."""
+def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return wheels that are not steered as the rover turns, and the evidence mended."""
     facts, track, steering = evidence.facts, track_ratio(evidence), evidence.steering
-    fits = _steered_as_turned(evidence, steering)
-    wrong, right = fits < -LEAST_CORRELATION, fits > LEAST_CORRELATION
+    gain, zero = _steered_as_turned(evidence, steering)
+    wrong, right, still = gain < -AS_TURNED, gain > AS_TURNED, np.abs(gain) < STILL
+    outcomes: list[Outcome] = []
+    if still.any():
+        frozen = evidence.found('steering_frozen', 0.9, wheel=facts.named(still))
+        outcomes.append(frozen if right.any() else untold('frozen', 'steering'))
+        steering = np.where(still & right.any(), np.nan, steering)
+    off = right & (np.abs(zero) > LEAST_STEERING_ZERO)
+    order = [facts.names.index(name) for name in _sides_exchanged(facts)]
+    # Of joints that are exchanged the inner one turns too little, to either side.
+    across = right & (np.abs(zero) > LEAST_ACROSS) & (zero * zero[order] < 0.0)
+    across &= across[order]
+    crossed = np.where(across, steering[:, order], steering)
+    left = np.abs(_steered_as_turned(evidence, crossed)[1]) if across.any() else zero
+    if across.any() and (left < LEAST_FALL * np.abs(zero))[across].all():
+        joints = facts.configuration.wheels.steering_joints
+        names = ', '.join(joints[j if across[i] else i] or "''" for i, j in enumerate(order))
+        told_of = {'wheel': facts.named(across), 'names': names}
+        outcomes.append(evidence.found('steering_exchanged', 0.9, **told_of))
+        steering = crossed
+    elif off.any():
+        zeros = {'zeros': listed(zero[off], '.3f'), 'degrees': listed(np.degrees(zero[off]), '.0f')}
+        outcomes.append(evidence.found('steering_zero', 0.9, wheel=facts.named(off), **zeros))
+        steering = steering - np.where(off, zero, 0.0)
     if track is None or track < 0.0 or not wrong.any():
-        return [], evidence
+        return outcomes, replace(evidence, steering=steering)
     sure, rival = 0.95, ''
     if not right.any():
         sure, rival = 0.75, ', or wheels.x has the wrong sign (positive ahead)'
     columns = (np.repeat(one[:, None], wrong.size, axis=1) for one in steering.T[wrong])
-    by_one_another = [_steered_as_turned(evidence, column)[wrong] for column in columns]
-    if (np.max(by_one_another, axis=0) > LEAST_CORRELATION).all():
+    by_one_another = [_steered_as_turned(evidence, column)[0][wrong] for column in columns]
+    if (np.nanmax(by_one_another, axis=0) > AS_TURNED).all():
         sure, rival = 0.5, f'{rival}, or these joints go by the names of one another'
     told = {'wheel': facts.named(wrong), 'value': -1.0, 'rival': rival}
     separate = '; turn one joint to the left by hand first and look at what is published'
-    finding = evidence.found('steering_sign', sure, **told, separate=separate if rival else '')
-    return [finding], replace(evidence, steering=steering * np.where(wrong, -1.0, 1.0))
+    told['separate'] = separate if rival else ''
+    outcomes.append(evidence.found('steering_sign', sure, **told))
+    return outcomes, replace(evidence, steering=steering * np.where(wrong, -1.0, 1.0))
 
 
-def _steered_as_turned(evidence: Evidence, steering: FloatArray) -> FloatArray:
-    """Return how well w_z x as of each wheel and its angle (k, n) agrees with that by the gyro."""
-    rows, x = evidence.turning, evidence.facts.configuration.wheels.x
-    if rows.sum() < LEAST_TURNING_ROWS:
-        return np.zeros(len(evidence.facts.names))
-    aside = evidence.speed[rows] * np.tan(np.nan_to_num(steering[rows]))
-    pairs = zip(aside.T, (evidence.yaw[rows, None] * x).T, strict=True)
-    return np.array([correlation(wheel, by_gyro) for wheel, by_gyro in pairs])
+def _steered_as_turned(evidence: Evidence, steering: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the share of its turn by the gyro that each wheel is steered by, and its zero [rad].
+
+    Without slip a wheel moves aside with ``v_y + w_z x``, where a wheel that does not steer does
+    not. Not a number where the angles (k, n) or the drive tell none.
+    """
+    x, steered = evidence.facts.configuration.wheels.x, np.isfinite(evidence.steering).any(axis=0)
+    gain, zero = np.full((2, x.size), np.nan)
+    rows, heading = evidence.moving, integrated(evidence.time, evidence.yaw)
+    if evidence.turning.sum() < LEAST_TURNING_ROWS or np.ptp(heading) < LEAST_HEADINGS:
+        return gain, zero
+    yaw, speed = evidence.yaw[rows, None], np.nan_to_num(evidence.speed[rows])
+    told = speed * np.tan(np.nan_to_num(evidence.steering[rows]))
+    others = ~steered if not steered.all() else steered
+    aside = np.median((told * steered - yaw * x)[:, others], axis=1, keepdims=True) + yaw * x
+    there = np.isfinite(steering).any(axis=0) & np.isfinite(evidence.rate).any(axis=0)
+    for i in np.flatnonzero(there & (steered | ~steered.any())):
+        seen = speed[:, i] * np.tan(np.nan_to_num(steering[rows, i]))
+        share, off = block_fit(np.column_stack([aside[:, i], speed[:, i]]), seen)
+        asked = np.quantile(np.abs(aside[:, i]), 0.9) > LEAST_ASKED * np.abs(speed[:, i]).mean()
+        if asked and share.std < 0.5 * STILL:
+            gain[i], zero[i] = share.value, math.atan(off.value)
+    return gain, zero
+
+
+def check_axes(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return x and y of the wheels that stand in each other's place, and the evidence mended."""
+    facts, wheels = evidence.facts, evidence.facts.configuration.wheels
+    if not facts.known or len(facts.names) != wheels.x.size:
+        return [], evidence
+    by_name = np.array([side_of(name) for name in facts.names])
+    turned = replace(facts, lateral=wheels.x, side=np.sign(wheels.x))
+    as_stated, left = left_in_turns(evidence), left_in_turns(replace(evidence, facts=turned))
+    if (by_name * wheels.x < 0.0).any() or not left < min(LEAST_FALL * as_stated, MOST_LEFT):
+        return [], evidence
+    places = {'wheels.x': wheels.y.tolist(), 'wheels.y': wheels.x.tolist()}
+    turned = replace(turned, configuration=facts.configuration.replace(places))
+    told = {'x': listed(wheels.y, '.3f'), 'y': listed(wheels.x, '.3f')}
+    return [evidence.found('axes', 0.9, **told)], replace(evidence, facts=turned)
 
 
 def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -453,8 +513,8 @@ def _sense_of_gyro(evidence: Evidence) -> tuple[str, int]:
     if curves or _turns_as_oriented(evidence, imu):
         return 'curves', curves or 1
     # The yaw rate of a reference may be made of the wheels or of the gyro: it tells neither.
-    fits = _steered_as_turned(evidence, evidence.steering)
-    senses = set(np.sign(fits[np.abs(fits) > LEAST_CORRELATION]).astype(int).tolist())
+    gain, _ = _steered_as_turned(evidence, evidence.steering)
+    senses = set(np.sign(gain[np.abs(gain) > AS_TURNED]).astype(int).tolist())
     return ('steering', senses.pop()) if len(senses) == 1 else ('', 0)
 
 
@@ -523,7 +583,11 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
             told = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
             finding = evidence.found('gyro_scale', 0.9, std=cure.std, **told)
-            return [finding], replace(evidence, gyro=evidence.gyro * [1.0, 1.0, cure.value])
+            times = np.array([1.0, 1.0, cure.value])
+            if not 0.5 < cure.value < 2.0:  # another unit, of all axes
+                times[:] = cure.value
+            evidence = evidence.with_channel('imu', rate=imu.rate * times)
+            return [finding], replace(evidence, gyro=evidence.gyro * times)
     return [], evidence
 
 

@@ -12,7 +12,13 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
+from wheel_terra_estimator.checks.evidence import (
+    BEND_OF_NOISE,
+    LEAST_MOVING_ROWS,
+    NO_NOISE,
+    Evidence,
+    row_medians,
+)
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, untold
 from wheel_terra_estimator.checks.reference import (
     LEAST_ROWS,
@@ -21,7 +27,14 @@ from wheel_terra_estimator.checks.reference import (
     units_of_reference,
 )
 from wheel_terra_estimator.checks.repeats import stays
-from wheel_terra_estimator.checks.statistics import correlation, lonely, robust_std, runs, step_of
+from wheel_terra_estimator.checks.statistics import (
+    correlation,
+    lonely,
+    moving_mean,
+    robust_std,
+    runs,
+    step_of,
+)
 
 MOST_COUNT = 0.07  # speed over rim speed of counts (90 in a turn), at most [-]
 UNIT_BAND = (0.7, 1.25)  # ratio of speeds over its unit's factor; slip makes it smaller [-]
@@ -32,9 +45,17 @@ OF_RADII = (0.3, 1.4)  # speed over rim speed of a wrong radius [-]
 LEAST_ROLLING_TRACK = 0.9  # effective over stated track of rates in rad/s, at least [-]
 LARGE_WHEEL = 0.6  # radius of a wheel whose rim speed is too near to its rate [m]
 FROZEN_TIME = 5.0  # a dead rate does not change for so long while others do [s]
+NOISE_TIME = 1.0  # noise of a dead encoder is averaged over this [s]
+NEXT_TO_NOTHING = 0.05  # its mean rate over that of the others, at most [-]
+ENDS, LEAST_ENDS = 0.1, 3  # share of driving at a limit of the rates, and times it is reached
+FINE = 50  # different rates of one that is not coarse, at least
+SAME_CHANGES = 0.95  # share of the changes of two rates that are the same of one sent twice [-]
+LEAST_CHANGES = 30
+SHORT_ZERO, MANY_ZEROS = 0.3, 10  # time of zeros between rates of driving [s], and their number
 LIVELY = 0.3  # rate of the others beside which none stands, over the working rate [-]
 GOES_ON = 0.25  # turn times track over the speed of the other side of a rover that goes on [-]
 SAME_SPEED = 0.05  # speed of a side against the middle in which all roll alike, at most [-]
+ONE_SIGN = 0.9  # share of rates of one sign that have none, less the rest [-]
 LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0  # speed over the others' of a radius; over scatter [ln]
 LEAST_COUNTS = 0.2  # speed of a wheel with fewer counts over the others', at least [-]
 WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0  # wild change over the greatest and usual value [-]
@@ -57,6 +78,25 @@ LEAST_STEP_SHARE = 0.02  # noise by steps that matters, over the working rate [-
 # Dead channels -----------------------------------------------------------------------------------
 
 
+def check_limits(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return rates that end at a number, again and again or of several wheels, and what is left."""
+    rate, noisy = np.abs(evidence.rate), NO_NOISE * BEND_OF_NOISE * evidence.working_rate
+    most = np.nanmax(rate, axis=0, initial=0.0)
+    at = rate == most
+    for index, ends in enumerate(at.T):
+        below, bend = rate[~ends, index], np.abs(np.diff(evidence.rate[:, index], 4))
+        bend = bend[np.lib.stride_tricks.sliding_window_view(~ends, 5).all(axis=1)]
+        often = len(runs(ends)) >= LEAST_ENDS or (most == most[index]).sum() > 1
+        often &= bool(ends.sum() > ENDS * evidence.moving.sum())
+        fine = np.unique(below[below > 0.0]).size > FINE and bend.size > FINE
+        at[:, index] &= often and fine and robust_std(bend) > noisy
+    if not at.any():
+        return [], evidence
+    told = {'wheel': evidence.facts.named(at.any(axis=0)), 'most': float(np.nanmax(rate[at]))}
+    told['long'] = float(at.any(axis=1).sum()) * evidence.period
+    return [evidence.found('rate_limit', 0.95, **told)], evidence.rows(~at.any(axis=1))
+
+
 def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels whose rate is frozen; they are left out of what follows."""
     moving = evidence.moving
@@ -70,28 +110,39 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
                 dead[name] = longest
                 rate[:, index] = np.nan
         if dead:
-            how = f'does not change for up to {max(dead.values()):.1f} s of driving'
+            how = f'does not follow the others for up to {max(dead.values()):.1f} s of driving'
             outcomes.append(evidence.found('rate_frozen', 0.97, wheel=', '.join(dead), how=how))
             evidence = evidence.with_rate(rate)
     return outcomes, evidence
 
 
 def _stands(evidence: Evidence, index: int) -> float:
-    """Return how long a rate is 0 while the others turn and no torque holds the wheel."""
+    """Return how long a rate is 0, or its mean, while the others turn and no torque holds it."""
     own, others = evidence.rate[:, index], np.delete(evidence.rate, index, axis=1)
     side = evidence.facts.side == evidence.facts.side[index]
     between = evidence.facts.has_sides() and evidence.facts.side[index] == 0.0
     # Between the sides a wheel stands in a turn on the spot.
     usual = row_medians(others if between else np.abs(others))
     busy = np.abs(usual) > LIVELY * evidence.working_rate
-    if evidence.facts.has_sides() and side.sum() > 1:  # which the rover may turn about
+    straight, zero = np.zeros(own.size, dtype=bool), own == 0.0
+    if evidence.facts.has_sides() and not between:
         turned = np.abs(evidence.yaw) * float(np.ptp(evidence.facts.lateral))
-        stands = (evidence.rate[:, side] == 0.0).all(axis=1)
-        busy &= ~stands | (turned < GOES_ON * row_medians(np.abs(evidence.speed[:, ~side])))
+        straight = turned < GOES_ON * row_medians(np.abs(evidence.speed[:, ~side]))
+        along = others
+        if side.sum() > 1:  # which the rover may turn about
+            busy &= ~(evidence.rate[:, side] == 0.0).all(axis=1) | straight
+            along = np.delete(evidence.rate, index, axis=1)[:, np.delete(side, index)]
+        mean = np.abs(moving_mean(np.nan_to_num(own), evidence.rows_in(NOISE_TIME)))
+        small = np.isfinite(own) & (mean < NEXT_TO_NOTHING * np.abs(row_medians(along)))
+        zero |= small if side.sum() > 1 else small & straight & (evidence.gyro is not None)
     longest = 0.0
-    for start, end in runs(own == 0.0):
+    for start, end in runs(zero | ~busy):
         rows = np.flatnonzero(busy[start:end]) + start
-        if rows.size * evidence.period > FROZEN_TIME and not _held(evidence, index, rows):
+        judged = rows[straight[rows]]  # in turns the sides push against each other
+        needed = FROZEN_TIME if (own[rows] == 0.0).all() else LONG_FROZEN_TIME
+        if rows.size * evidence.period > needed and not _held(
+            evidence, index, judged if judged.size else rows
+        ):
             longest = max(longest, rows.size * evidence.period)
     return longest
 
@@ -133,6 +184,51 @@ def _held(evidence: Evidence, index: int, rows: Any) -> bool:
     return bool(stalled or dragged)
 
 
+def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return zeros between rates at which no wheel stands for an instant, and what is left."""
+    zero, fast = evidence.rate == 0.0, np.abs(evidence.rate) > LIVELY * evidence.working_rate
+    for column, drives in zip(zero.T, fast.T, strict=True):
+        short = np.zeros(column.size, dtype=bool)
+        spans = [(a, b) for a, b in runs(column) if a > 0 and b < column.size]
+        for first, last in spans:
+            brief = evidence.time[last] - evidence.time[first - 1] < SHORT_ZERO + evidence.period
+            short[first:last] = brief and drives[first - 1] and drives[last]
+        column &= short & (len(runs(short)) >= MANY_ZEROS)
+    if not zero.any():
+        return [], evidence
+    wheels = zero.any(axis=0)
+    told = {'wheel': evidence.facts.named(wheels), 'count': int(zero.any(axis=1).sum())}
+    finding = evidence.found('rate_zeros', 0.95, **told)
+    if wheels.all():
+        return [finding], evidence.rows(~zero.all(axis=1))
+    return [finding], evidence.with_rate(np.where(zero, np.nan, evidence.rate))
+
+
+def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return wheels that read what another one does, and the evidence without these.
+
+    All wheels of a side may hang on one encoder, if those of the other side do.
+    """
+    outcomes, mended, rim = list[Outcome](), [], np.abs(evidence.rim)
+    turns = np.abs(evidence.yaw) * np.ptp(evidence.facts.lateral) > GOES_ON * rim
+    for field, table in (('velocity', evidence.rate), ('effort', evidence.torque)):
+        change = np.diff(table[evidence.moving], axis=0)
+        moves = np.nan_to_num(change) != 0.0
+        both = moves[:, :, None] | moves[:, None, :]
+        alike = ((change[:, :, None] == change[:, None, :]) & both).sum(axis=0)
+        alike *= evidence.facts.side[:, None] ** 2 + evidence.facts.side**2 > 0.0  # no tail axle
+        same = (alike > np.maximum(SAME_CHANGES * both.sum(axis=0), LEAST_CHANGES)).sum(axis=1)
+        copies, there = same > 1, np.isfinite(table).any(axis=0)
+        alone = int((there & ~copies).sum())
+        every = copies.all() and (turns & evidence.moving).sum() > LEAST_CHANGES
+        if copies.any() and (alone > (not there.all()) or (every and same.min() == same.size)):
+            told = {'field': field, 'wheel': evidence.facts.named(copies)}
+            outcomes.append(evidence.found('copied', 0.95, **told))
+            table = np.where(copies, np.nan, table)
+        mended.append(table)
+    return outcomes, evidence.with_rate(*mended) if outcomes else evidence
+
+
 def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return single rates and torques that leave the ones before and after; left out from here."""
     outcomes, mended = list[Outcome](), []
@@ -152,7 +248,7 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 
 def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return wheels that turn faster or slower than all others all along, made alike."""
+    """Return wheels without a sign, or faster or slower than all others all along, made alike."""
     facts, speed = evidence.facts, np.abs(evidence.speed)
     middle = row_medians(speed)
     rows = evidence.steady & (middle > 0.5 * evidence.working_rate * np.nanmean(evidence.radius))
@@ -161,10 +257,19 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     few = rows.sum() < 2 * LEAST_MOVING_ROWS or speed.shape[1] < 3
     if few or not facts.known:
         return [], evidence
+    sense = np.sign(evidence.speed)
+    common, outcomes = np.sign(row_medians(sense)), list[Outcome]()
+    unlike = [np.nanmean(sense[rows & (common == way)], axis=0) for way in (1.0, -1.0)]
+    unsigned = np.minimum(*np.abs(unlike)) * np.sign(unlike[0] * unlike[1]) > ONE_SIGN
+    if unsigned.any():
+        told_of = {'wheel': facts.named(unsigned), 'other': 'other wheels go'}
+        outcomes.append(evidence.found('rates_unsigned', 0.95, **told_of))
+        signed = np.abs(evidence.rate) * common[:, None]
+        evidence = evidence.with_rate(np.where(unsigned, signed, evidence.rate))
     ratio = speed[rows] / middle[rows, None]
     ratios = [np.nanmedian(part, axis=0) for part in (ratio, *np.array_split(ratio, 2))]
     whole, first, second = (np.log(np.maximum(part, 1e-3)) for part in ratios)
-    outcomes, rate, rolling = list[Outcome](), evidence.rate.copy(), facts.radius.copy()
+    rate, rolling = evidence.rate.copy(), facts.radius.copy()
     for i, name in enumerate(facts.names):
         beside = max(float(np.nanmax(np.abs(np.delete(whole, i)))), abs(first[i] - second[i]))
         if not abs(whole[i]) > max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LEAST_COUNTS):
