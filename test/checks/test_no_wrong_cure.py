@@ -848,3 +848,17 @@ def test_an_unlike_wheel_moves_no_reference():
     assert 'reference_place' not in {
         f.fault for f in checked(joints=replace(WHOLE.joints, rate=rate)).findings
     }
+
+
+def test_counts_that_come_and_go_are_no_second_publisher():
+    turned = np.cumsum(WHOLE.joints.rate, axis=0) / rolling.RATE
+    rate = np.diff(np.floor(turned / 0.25), axis=0, prepend=0.0) * 0.25 * rolling.RATE
+    told = checked(joints=replace(WHOLE.joints, rate=rate)).findings
+    assert {f.fault for f in told} <= {'rate_steps'}
+
+
+@pytest.mark.parametrize('step', [0.1, 0.02])
+def test_rounded_rates_are_neither_copies_nor_cut_off(step):
+    rate = step * np.round(WHOLE.joints.rate / step)
+    told = checked(joints=replace(WHOLE.joints, rate=rate)).findings
+    assert {f.fault for f in told} <= {'rate_steps'}

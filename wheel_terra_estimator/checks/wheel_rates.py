@@ -48,6 +48,7 @@ FROZEN_TIME = 5.0  # a dead rate does not change for so long while others do [s]
 NOISE_TIME = 1.0  # noise of a dead encoder is averaged over this [s]
 NEXT_TO_NOTHING = 0.05  # its mean rate over that of the others, at most [-]
 ENDS, LEAST_ENDS = 0.1, 3  # share of driving at a limit of the rates, and times it is reached
+SELDOM_SAME = 0.05  # share of them that repeat the one before, of those that are not rounded [-]
 FINE = 50  # different rates of one that is not coarse, at least
 SAME_CHANGES = 0.95  # share of the changes of two rates that are the same of one sent twice [-]
 LEAST_CHANGES = 30
@@ -88,7 +89,9 @@ def check_limits(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         bend = bend[np.lib.stride_tricks.sliding_window_view(~ends, 5).all(axis=1)]
         often = len(runs(ends)) >= LEAST_ENDS or (most == most[index]).sum() > 1
         often &= bool(ends.sum() > ENDS * evidence.moving.sum())
-        fine = np.unique(below[below > 0.0]).size > FINE and bend.size > FINE
+        below = below[below > 0.0]  # that are not rounded
+        fine = min(np.unique(below).size, bend.size) > FINE
+        fine &= bool(np.mean(np.diff(below) == 0.0) < SELDOM_SAME)
         at[:, index] &= often and fine and robust_std(bend) > noisy
     if not at.any():
         return [], evidence
@@ -187,13 +190,14 @@ def _held(evidence: Evidence, index: int, rows: Any) -> bool:
 def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return zeros between rates at which no wheel stands for an instant, and what is left."""
     zero, fast = evidence.rate == 0.0, np.abs(evidence.rate) > LIVELY * evidence.working_rate
-    for column, drives in zip(zero.T, fast.T, strict=True):
+    count = [np.unique(one).size > FINE for one in evidence.rate.T]  # else counts come and go
+    for column, drives, fine in zip(zero.T, fast.T, count, strict=True):
         short = np.zeros(column.size, dtype=bool)
         spans = [(a, b) for a, b in runs(column) if a > 0 and b < column.size]
         for first, last in spans:
             brief = evidence.time[last] - evidence.time[first - 1] < SHORT_ZERO + evidence.period
             short[first:last] = brief and drives[first - 1] and drives[last]
-        column &= short & (len(runs(short)) >= MANY_ZEROS)
+        column &= short & (len(runs(short)) >= MANY_ZEROS and fine)
     if not zero.any():
         return [], evidence
     wheels = zero.any(axis=0)
@@ -218,7 +222,8 @@ def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         alike = ((change[:, :, None] == change[:, None, :]) & both).sum(axis=0)
         alike *= evidence.facts.side[:, None] ** 2 + evidence.facts.side**2 > 0.0  # no tail axle
         same = (alike > np.maximum(SAME_CHANGES * both.sum(axis=0), LEAST_CHANGES)).sum(axis=1)
-        copies, there = same > 1, np.isfinite(table).any(axis=0)
+        fine = [not step_of(one[np.isfinite(one)]) for one in table[evidence.moving].T]
+        copies, there = (same > 1) & fine, np.isfinite(table).any(axis=0)
         alone = int((there & ~copies).sum())
         every = copies.all() and (turns & evidence.moving).sum() > LEAST_CHANGES
         if copies.any() and (alone > (not there.all()) or (every and same.min() == same.size)):
