@@ -839,6 +839,9 @@ def test_wheels_of_a_side_that_hang_on_one_encoder_are_no_copies():
     assert not checked(joints=joints).findings
     swapped = rolling.rover(**{'wheels.names': [rolling.NAMES[i] for i in (1, 0, 2, 3)]})
     assert [f.fault for f in checked(swapped, joints=joints).findings] == ['exchanged']
+    reverse = replace(joints, rate=joints.rate * [-1, 1, 1, 1])
+    reverse = replace(reverse, torque=joints.torque * [-1, 1, 1, 1])
+    assert [f.fault for f in checked(joints=reverse).findings] == ['backwards']
 
 
 def test_an_unlike_wheel_moves_no_reference():

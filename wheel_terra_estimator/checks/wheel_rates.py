@@ -216,7 +216,7 @@ def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes, mended, rim = list[Outcome](), [], np.abs(evidence.rim)
     turns = np.abs(evidence.yaw) * np.ptp(evidence.facts.lateral) > GOES_ON * rim
     for field, table in (('velocity', evidence.rate), ('effort', evidence.torque)):
-        change = np.diff(table[evidence.moving], axis=0)
+        change = np.abs(np.diff(table[evidence.moving], axis=0))  # whatever their signs
         moves = np.nan_to_num(change) != 0.0
         both = moves[:, :, None] | moves[:, None, :]
         alike = ((change[:, :, None] == change[:, None, :]) & both).sum(axis=0)
