@@ -22,7 +22,7 @@ from wheel_terra_estimator.discrepancy.selection.readings import Columns, units_
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
-from wheel_terra_estimator.discrepancy.tables.steady_table import operating_points
+from wheel_terra_estimator.discrepancy.tables.steady_table import concatenated, operating_points
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
@@ -378,10 +378,17 @@ def test_two_columns_in_another_unit_are_both_asked_for(unproposed):
 
 
 @pytest.mark.parametrize(
-    'columns', [('drawbar_pull', 'torque'), ('normal_load', 'drawbar_pull', 'torque')]
+    'columns',
+    [
+        ('drawbar_pull', 'torque'),
+        ('normal_load', 'drawbar_pull', 'torque'),
+        ('normal_load', 'torque'),  # without a column of the pull
+    ],
 )
 def test_forces_that_share_a_wrong_unit_are_asked_for_together(columns):
     table, values, *_ = make('basic16', stds=False)
+    if 'drawbar_pull' not in columns:
+        del table['drawbar_pull']
     table |= {column: table[column] / 9.80665 for column in columns}
     found = run(table, values)
     assert not found.effects
@@ -396,6 +403,13 @@ def test_no_unit_is_asked_for_that_cannot_be_beside_the_one_of_the_title(tmp_pat
     lacked = Columns(read_table(path), None, (), {}, None, None)._lacked()
     factors = [said['sinkage'] for said in lacked if 'sinkage' in said]
     assert sorted(factors) == pytest.approx([10.0, 25.4, 304.8, 1000.0])
+
+
+def test_tables_that_are_read_as_one_keep_the_units_that_they_share():
+    table, *_ = make('basic16')
+    units = {'sinkage': 1e-3, 'torque': 1e-2}, {'sinkage': 1e-3, 'torque': 1.0, 'slope': 1.0}
+    parts = [replace(check_table('t.csv', table), units=said) for said in units]
+    assert concatenated('both', parts, ()).units == {'sinkage': 1e-3, 'slope': 1.0}
 
 
 @pytest.mark.parametrize(

@@ -207,14 +207,15 @@ class Columns:
             force = UNITS['N'].get(name.split()[0])
             if force:
                 units = {'normal_load': force, 'drawbar_pull': force, 'torque': torque}
-                found += [{c: units[c] for c in some} for some in (*_TOGETHER, tuple(units))]
+                some = (*_TOGETHER, tuple(units))
+                found += [{c: units[c] for c in one if c in columns} for one in some]
         said = self.table.units
         lacked = [{c: u / said.get(c, 1.0) for c, u in some.items()} for some in found]
         seen = list[dict[str, float]]()
         for some in (*lacked, *({'normal_load': times} for times in _LOADS)):
             off = {c: times for c, times in some.items() if times != 1.0}
             gain = len(off) == 1 and 'normal_load' not in off and _is_gain(*off.values())
-            if off and off not in seen and not gain and off.keys() <= {*columns}:
+            if off and off not in seen and not gain:
                 seen.append(off)
                 yield off
 

@@ -121,11 +121,14 @@ def concatenated(name: str, parts: Sequence[SteadyTable], notes: tuple[str, ...]
     def column(part: SteadyTable, key: str) -> FloatArray:
         return part.columns.get(key, np.full(len(part), np.nan))
 
+    def same(key: str, unit: float) -> bool:
+        return all(part.units.get(key, unit) == unit for part in parts)
+
     return SteadyTable(
         name,
         columns={key: np.concatenate([column(part, key) for part in parts]) for key in names},
         notes=notes,
-        units=parts[0].units if all(p.units == parts[0].units for p in parts) else {},
+        units={c: u for p in parts for c, u in p.units.items() if same(c, u)},
         **{key: np.concatenate([getattr(part, key) for part in parts]) for key in _BY_ROW},
     )
 
