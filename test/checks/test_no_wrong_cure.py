@@ -865,3 +865,22 @@ def test_rounded_rates_are_neither_copies_nor_cut_off(step):
     rate = step * np.round(WHOLE.joints.rate / step)
     told = checked(joints=replace(WHOLE.joints, rate=rate)).findings
     assert {f.fault for f in told} <= {'rate_steps'}
+
+
+def test_rates_of_a_simulator_without_noise_are_no_copies():
+    """Of six wheels the corner ones are steered about the middle axle: front and rear are alike."""
+    motion, half = rolling.ten_minute_drive(), rolling.HALF_TRACK
+    inner, corner = (
+        np.hypot(motion.speed[:, None] - motion.yaw_rate[:, None] * [half, -half], reach)
+        * np.sign(motion.speed)[:, None]
+        / rolling.rolling_radius()
+        for reach in (0.0, rolling.HALF_BASE * np.abs(motion.yaw_rate)[:, None])
+    )
+    names = *rolling.NAMES[:2], 'middle_left', 'middle_right', *rolling.NAMES[2:]
+    rate = np.hstack([corner, inner, corner])
+    base = np.repeat([rolling.HALF_BASE, 0.0, -rolling.HALF_BASE], 2).tolist()
+    six = {'names': list(names), 'x': base, 'y': [half, -half] * 3}
+    sizes = {'radius': [rolling.RADIUS] * 6, 'width': [0.1] * 6}
+    rover = rolling.rover(**{f'wheels.{key}': value for key, value in (six | sizes).items()})
+    joints = replace(WHOLE.joints, names=names, rate=rate, torque=np.full(rate.shape, np.nan))
+    assert 'copied' not in {f.fault for f in checked(rover, joints=joints).findings}

@@ -222,7 +222,7 @@ def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         alike = ((change[:, :, None] == change[:, None, :]) & both).sum(axis=0)
         alike *= evidence.facts.side[:, None] ** 2 + evidence.facts.side**2 > 0.0  # no tail axle
         same = (alike > np.maximum(SAME_CHANGES * both.sum(axis=0), LEAST_CHANGES)).sum(axis=1)
-        fine = [not step_of(one[np.isfinite(one)]) for one in table[evidence.moving].T]
+        fine = [_measured(one[np.isfinite(one)]) for one in table[evidence.moving].T]
         copies, there = (same > 1) & fine, np.isfinite(table).any(axis=0)
         alone = int((there & ~copies).sum())
         every = copies.all() and (turns & evidence.moving).sum() > LEAST_CHANGES
@@ -232,6 +232,14 @@ def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             table = np.where(copies, np.nan, table)
         mended.append(table)
     return outcomes, evidence.with_rate(*mended) if outcomes else evidence
+
+
+def _measured(values: FloatArray) -> bool:
+    """Return whether values are not rounded and have noise, unlike those of a simulator."""
+    if values.size < FINE:
+        return False
+    noise = robust_std(np.diff(values, 4)) / BEND_OF_NOISE
+    return not step_of(values) and noise > NO_NOISE * float(np.quantile(np.abs(values), 0.9))
 
 
 def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
