@@ -95,25 +95,27 @@ def test_a_pitch_of_the_imu_that_no_circle_shows_is_named_beside_zeros_of_all_to
 JOINTS = ('front_left_steer', 'front_right_steer', 'rear_left_steer', 'rear_right_steer')
 
 
-def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES, **other):
+def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES, tighter=1.0, **other):
     """A rover with four steered wheels, long beside its track, in circles; angles changed."""
     motion, rover = rolling.ten_minute_drive(), rolling.rover(**{
         'wheels.x': list(x), 'wheels.steering_joints': list(JOINTS), 'wheels.names': list(names),
     })  # fmt: skip
+    motion = replace(motion, yaw_rate=tighter * motion.yaw_rate)
+    whole = rolling.recording(motion if tighter != 1.0 else None)
     along = motion.speed[:, None] - motion.yaw_rate[:, None] * rover.wheels.y
     aside = motion.yaw_rate[:, None] * rover.wheels.x
     angle = np.arctan2(aside, np.abs(along)) * np.sign(along)
-    noise = WHOLE.joints.rate - along / rolling.rolling_radius()  # what the recording adds
+    noise = whole.joints.rate - along / rolling.rolling_radius()  # what the recording adds
     rate = np.hypot(along, aside) * np.sign(along) / rolling.rolling_radius() + noise
     none = np.full_like(rate, np.nan)
     joints = replace(
-        WHOLE.joints,
-        names=WHOLE.joints.names + JOINTS,
+        whole.joints,
+        names=whole.joints.names + JOINTS,
         rate=np.hstack([rate, none]),
-        torque=np.hstack([WHOLE.joints.torque, none]),
+        torque=np.hstack([whole.joints.torque, none]),
         position=np.hstack([none, change(angle)]),
     )
-    return check_recording(replace(WHOLE, joints=joints, **other), rover)
+    return check_recording(replace(whole, joints=joints, **other), rover)
 
 
 @pytest.mark.parametrize(
@@ -144,6 +146,15 @@ def test_steered_wheels_roll_where_they_point(change, faults):
 def test_a_joint_that_does_not_steer_as_the_rover_turns(change, fault, wheel, said):
     (finding,) = (f for f in steered(change).findings if f.kind != 'radius')
     assert (finding.fault, finding.wheel) == (fault, wheel) and said in finding.cure
+
+
+def test_one_angle_that_is_published_for_both_wheels_of_an_axle_is_no_zero():
+    """As if there were one wheel in the middle: 11 degrees off in turns, none straight ahead."""
+
+    def both(angle):
+        return angle.reshape(-1, 2, 2).mean(axis=2).repeat(2, axis=1)
+
+    assert 'steering_zero' not in {f.fault for f in steered(both, tighter=1.8).findings}
 
 
 def test_without_any_steering_in_turns_no_joint_is_blamed():

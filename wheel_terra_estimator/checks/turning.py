@@ -274,7 +274,10 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         frozen = evidence.found('steering_frozen', 0.9, wheel=facts.named(still))
         outcomes.append(frozen if right.any() else untold('frozen', 'steering'))
         steering = np.where(still & right.any(), np.nan, steering)
-    off = right & (np.abs(zero) > LEAST_STEERING_ZERO)
+    ahead = np.nan_to_num(steering[evidence.unturned])
+    # One angle that is published for two wheels is off in turns alone.
+    stays = (np.median(ahead, axis=0) if ahead.size else 0.0) * zero > 0.5 * zero**2
+    off = right & stays & (np.abs(zero) > LEAST_STEERING_ZERO)
     order = [facts.names.index(name) for name in _sides_exchanged(facts)]
     # Of joints that are exchanged the inner one turns too little, to either side.
     across = right & (np.abs(zero) > LEAST_ACROSS) & (zero * zero[order] < 0.0)
