@@ -207,8 +207,8 @@ class Columns:
             force = UNITS['N'].get(name.split()[0])
             if force:
                 units = {'normal_load': force, 'drawbar_pull': force, 'torque': torque}
-                some = (*_TOGETHER, tuple(units))
-                found += [{c: units[c] for c in one if c in columns} for one in some]
+                groups = (*_TOGETHER, tuple(units))
+                found += [{c: units[c] for c in one if c in columns} for one in groups]
         said = self.table.units
         lacked = [{c: u / said.get(c, 1.0) for c, u in some.items()} for some in found]
         seen = list[dict[str, float]]()
