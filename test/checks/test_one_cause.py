@@ -157,6 +157,11 @@ def test_one_angle_that_is_published_for_both_wheels_of_an_axle_is_no_zero():
     assert 'steering_zero' not in {f.fault for f in steered(both, tighter=1.8).findings}
 
 
+def test_both_joints_of_an_axle_may_be_held_straight():
+    report = steered(lambda angle: angle * [1.0, 1.0, 0.0, 0.0])
+    assert 'steering_frozen' not in {f.fault for f in report.findings}
+
+
 def test_without_any_steering_in_turns_no_joint_is_blamed():
     report = steered(lambda angle: 0.0 * angle)
     assert not {f.fault for f in report.findings} & {'steering_frozen', 'steering_zero'}

@@ -270,15 +270,16 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     gain, zero = _steered_as_turned(evidence, steering)
     wrong, right, still = gain < -AS_TURNED, gain > AS_TURNED, np.abs(gain) < STILL
     outcomes: list[Outcome] = []
-    if still.any():
-        frozen = evidence.found('steering_frozen', 0.9, wheel=facts.named(still))
-        outcomes.append(frozen if right.any() else untold('frozen', 'steering'))
-        steering = np.where(still & right.any(), np.nan, steering)
+    order = [facts.names.index(name) for name in _sides_exchanged(facts)]
+    if still.any() and not right.any():
+        outcomes.append(untold('frozen', 'steering'))
+    elif (dead := still & ~still[order]).any():  # both of an axle may be held straight
+        outcomes.append(evidence.found('steering_frozen', 0.9, wheel=facts.named(dead)))
+        steering = np.where(dead, np.nan, steering)
     ahead = np.nan_to_num(steering[evidence.unturned])
     # One angle that is published for two wheels is off in turns alone.
     stays = (np.median(ahead, axis=0) if ahead.size else 0.0) * zero > 0.5 * zero**2
     off = right & stays & (np.abs(zero) > LEAST_STEERING_ZERO)
-    order = [facts.names.index(name) for name in _sides_exchanged(facts)]
     # Of joints that are exchanged the inner one turns too little, to either side.
     across = right & (np.abs(zero) > LEAST_ACROSS) & (zero * zero[order] < 0.0)
     across &= across[order]
