@@ -223,6 +223,12 @@ def test_from_a_recording_then_checked_and_calibrated(init, tmp_path, capsys):
     assert 'A GUESS, to be measured: centre of gravity' in better.read_text()
     assert 'rover.centre_of_gravity is still a guess' in capsys.readouterr().out
     assert np.allclose(reader.load([better]).wheels.radius, 0.117, atol=0.001)
+    measured = tmp_path / 'measured.yaml'
+    measured.write_text('/**: {ros__parameters: {rover: {centre_of_gravity: [0.0, 0.0, 0.2]}}}')
+    for known in (['--config', str(measured)], ['-p', 'rover.centre_of_gravity:=[0.0, 0.0, 0.2]']):
+        assert main([*command, *known, '--overwrite']) == 0
+        assert 'rover.centre_of_gravity is still' not in capsys.readouterr().out
+        assert 'A GUESS, to be measured: centre of gravity' not in better.read_text()
 
 
 @pytest.mark.parametrize('names', ['FLWheel FrontRightWheel RearWheelL RearWheelR', 'a b c d'])

@@ -466,6 +466,16 @@ def test_topics_of_other_clocks_never_carry_the_time_away_from_the_wheels(clocks
     assert core.health()['runs'] <= 3
 
 
+def test_a_lag_that_is_stated_ends_no_run():
+    """It may be longer than the history."""
+    stream = [(0.04 * n, imu(0.04 * n)) for n in range(500)]
+    stream += [(t + 3.0, odometry(t)) for t in np.arange(200) * 0.1]
+    core, _ = make_core(max_lag=5.0)
+    sets = play(core, [m for _, m in sorted(stream, key=lambda pair: pair[0])])
+    assert core.health()['runs'] == 1
+    assert sum('wheel_odometry' not in s.faults for s in sets) == 200
+
+
 def test_wheel_odometry_that_comes_late_in_a_burst_ends_no_run():
     core, _ = make_core(max_lag=-1.0)
     stream = [(0.01 * n, imu(0.01 * n)) for n in range(2000)]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from wheel_terra_estimator.cli.outputs import add_output, add_remaps
 from wheel_terra_estimator.configuration import reader as configuration_reader
+from wheel_terra_estimator.configuration import ros_yaml
 from wheel_terra_estimator.configuration.rover_template import GUESSED
 
 EXAMPLES = (
@@ -48,8 +49,14 @@ def run(arguments: argparse.Namespace) -> int:
         check_remaps(bag, remaps)
         recording = read_series(bag, remaps, name)
         calibration = calibrate(recording, configuration, tuple(remaps))
-    marks = [p.read_text('utf-8') for p in map(Path, arguments.config) if p.is_file()]
-    guessed = {key: words for text in marks for words, key in GUESSED.findall(text)}
+    guessed: dict[str, str] = {}
+    for path in filter(Path.is_file, map(Path, arguments.config)):
+        stated = ros_yaml.read(path)  # a later file wins, as a number that is known
+        guessed = {key: words for key, words in guessed.items() if key not in stated}
+        guessed |= {key: words for words, key in GUESSED.findall(path.read_text('utf-8'))}
+    known = {each.partition(':=')[0] for each in arguments.parameters}
+    known |= {change.key for change in calibration.changes}
+    guessed = {key: words for key, words in guessed.items() if key not in known}
     text = as_file(calibration, configuration, name, guessed)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(text, encoding='utf-8')

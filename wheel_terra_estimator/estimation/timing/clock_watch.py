@@ -84,7 +84,7 @@ class ClockWatch:
     def retune(self, clock_step: int, max_lag: int, history: int) -> None:
         """Go on with other limits."""
         self._clock_step = max(clock_step, max_lag)
-        self._reach = max(history, clock_step)
+        self._reach = max(history, self._clock_step)
         self._reach_back = max(history + max_lag, clock_step)
 
     def judge(self, channel: int, measurement: Measurement, present: int | None) -> Judgement:
