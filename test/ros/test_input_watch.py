@@ -97,6 +97,19 @@ def test_a_process_that_is_late_calls_no_topic_silent_and_says_by_how_much():
     assert watch.faults(5.0) == [('joint_states', 'silent for 3.0 s')]
 
 
+def test_a_process_that_is_always_late_still_tells_a_silent_topic():
+    watch, told = InputWatch(), set()
+    for look in range(30):
+        now = 0.9 * look
+        for number in range(18):
+            watch.heard('imu/data', now + 0.05 * (number - 18), 0.0, None)
+            if now < 10.0:
+                watch.heard('joint_states', now + 0.05 * (number - 18), 0.0, None)
+        watch.looked(now, 0.25)
+        told |= {topic for topic, words in watch.faults(now) if 'silent' in words}
+    assert told == {'joint_states'}
+
+
 def test_stamps_ahead_of_the_clock_are_told_of_the_topic_that_has_them():
     """A message that came late says nothing; one that is ahead among others neither."""
     watch = InputWatch()

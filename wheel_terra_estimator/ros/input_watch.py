@@ -61,7 +61,9 @@ class InputWatch:
         if now - self._first_look > START:
             self._behind = max(now - self._looked_at - period, 0.0)
             self._told = max(self._told, self._behind)
-            self.awake = now if self._behind > BEHIND else self.awake
+            # Who is always late would never tell a silence.
+            if self._behind > BEHIND and now - self.awake > UNKNOWN_PERIOD:
+                self.awake = now
         self._looked_at = now
 
     def heard(self, topic: str, now: float, delay: float, number: int | None) -> None:
