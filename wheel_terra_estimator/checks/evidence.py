@@ -234,8 +234,7 @@ class Evidence:
     def exactly_even(self) -> Mask:
         """Rows in which no rate changes, of rates without noise (a simulator's); else none."""
         rate = np.nan_to_num(self.rate)
-        bend = np.diff(rate[self.moving], 4, axis=0)
-        exact = robust_std(bend.ravel()) < NO_NOISE * BEND_OF_NOISE * self.working_rate
+        exact = noise_of(rate[self.moving]) < NO_NOISE * self.working_rate
         same = np.append(True, (np.diff(rate, axis=0) == 0.0).all(axis=1))
         return _shared(same & exact)
 
@@ -346,6 +345,11 @@ def gather(
             )
         )
     return Evidence(recording, facts, time, rate, torque, force, gyro, rotation, figures, steering)
+
+
+def noise_of(values: FloatArray) -> float:
+    """Return the noise of (k, ...) values that follow one another, whatever moves them."""
+    return robust_std(np.diff(values, 4, axis=0).ravel()) / BEND_OF_NOISE
 
 
 def once(tells: Callable[[Evidence], Result]) -> Callable[[Evidence], Result]:

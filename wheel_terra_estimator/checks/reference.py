@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import BEND_OF_NOISE, NO_NOISE, Evidence, Mask
+from wheel_terra_estimator.checks.evidence import NO_NOISE, Evidence, Mask, noise_of
 from wheel_terra_estimator.checks.finding import Outcome, untold
 from wheel_terra_estimator.checks.series import VelocitySeries, nearest
 from wheel_terra_estimator.checks.statistics import (
@@ -117,7 +117,7 @@ def check_source(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     forward, rim = reference.velocity[rows, 0], rim[rows]
     scale = float(np.median(forward / rim))
-    noise = abs(scale) * robust_std(np.diff(evidence.rim[evidence.moving], 4)) / BEND_OF_NOISE
+    noise = abs(scale) * noise_of(evidence.rim[evidence.moving])
     noisy = noise > NO_NOISE * float(np.median(np.abs(forward)))
     if not (noisy and robust_std(forward - scale * rim) < SHARES_NOISE * noise):
         return [], evidence

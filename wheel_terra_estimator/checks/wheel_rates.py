@@ -17,6 +17,7 @@ from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
     NO_NOISE,
     Evidence,
+    noise_of,
     row_medians,
 )
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, untold
@@ -236,10 +237,9 @@ def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def _measured(values: FloatArray) -> bool:
     """Return whether values are not rounded and have noise, unlike those of a simulator."""
-    if values.size < FINE:
+    if values.size < FINE or step_of(values):
         return False
-    noise = robust_std(np.diff(values, 4)) / BEND_OF_NOISE
-    return not step_of(values) and noise > NO_NOISE * float(np.quantile(np.abs(values), 0.9))
+    return noise_of(values) > NO_NOISE * float(np.quantile(np.abs(values), 0.9))
 
 
 def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

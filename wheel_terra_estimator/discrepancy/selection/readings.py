@@ -214,14 +214,11 @@ class Columns:
         seen = list[dict[str, float]]()
         for some in (*lacked, *({'normal_load': times} for times in _LOADS)):
             off = {c: times for c, times in some.items() if times != 1.0}
-            gain = len(off) == 1 and 'normal_load' not in off and _is_gain(*off.values())
+            alone = len(off) == 1 and 'normal_load' not in off
+            gain = alone and max(abs(math.log(times)) for times in off.values()) < _NEAR
             if off and off not in seen and not gain:
                 seen.append(off)
                 yield off
-
-
-def _is_gain(times: float) -> bool:
-    return abs(math.log(times)) < _NEAR
 
 
 def _scaled(said: Mapping[str, float], table: SteadyTable, points: OperatingPoints) -> Reading:
