@@ -142,9 +142,9 @@ def test_neither_a_rejected_reference_nor_one_at_rest_tells_of_slip(parts, ekf):
     assert update.known(2.1)
     hear(parts, update, ekf, 3.0, 0.5)  # wild
     assert update.known(3.1) and update.known(6.9) and not update.known(7.1)
-    assert not update.told_twice(3.1)
+    assert not update.known_twice(3.1)
     hear(parts, update, ekf, 4.0, 0.02)
-    assert update.told_twice(6.9) and not update.told_twice(7.1)
+    assert update.known_twice(6.9) and not update.known_twice(7.1)
     assert update.fresh(13.9) and not update.fresh(14.1)  # ten seconds after the last of all
     assert not reference_update(parts).fresh(0.0)
 

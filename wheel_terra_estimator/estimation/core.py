@@ -127,7 +127,7 @@ ReferenceVelocity
     def process_pending(self) -> None:
         """Make the steps that the next set would have to make, while nobody waits for it.
 
-        Changes no number: a step that fails is made again, and told of, at the next set.
+        Changes no number: a step that fails is made again, and reported, at the next set.
         """
         if self._timeline.released:
             with suppress(*_FAILURES), np.errstate(all='ignore'):

@@ -65,8 +65,8 @@ class Learned:
 
         Soil: the values of ``~/soil``, with deviations widened to hold in another place. Biases:
         those stated plus what was learned; torques and sinkages: as stated, since a zero of theirs
-        is not told from the soil. The deviations of sensors are those stated: a start may bring
-        another bias of the same kind.
+        cannot be separated from the soil. The deviations of sensors are those stated: a start may
+        bring another bias of the same kind.
 
         The filter learns the strength beside errors of its models that no parameter of the soil
         holds; without them it may be one that could not have carried the rover. Then it is the

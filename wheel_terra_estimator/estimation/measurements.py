@@ -83,7 +83,7 @@ class ReferenceVelocity:
     stamp: int
     forward: float  # velocity of ``base_link`` along its x axis [m/s]
     variance: float  # of ``forward`` [(m/s)^2]; 0 or less = not stated
-    lateral: float = math.nan  # velocity along its y axis [m/s]; nan = not told
+    lateral: float = math.nan  # velocity along its y axis [m/s]; nan = unknown
     lateral_variance: float = 0.0  # of ``lateral`` [(m/s)^2]; 0 or less = not stated
 
 

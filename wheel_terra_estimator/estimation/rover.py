@@ -15,7 +15,7 @@ from wheel_terra_estimator.estimation.contacts.load_distribution import (
 )
 
 _LEAST_LOW_RIM = 0.005
-"""Rim speed [m/s] below which v / rim speed is not told from the noise of encoders."""
+"""Rim speed [m/s] below which v / rim speed is lost in the noise of encoders."""
 _LOW_RIM_OVER_REST = 3.0
 _SKID_LENGTH = 0.3
 """Length between the axles over the track above which turning is skidding."""
@@ -51,7 +51,7 @@ class Rover:
     period: float
     """Least time between two cycles of the filter [s]."""
     low_rim: float
-    """Rim speed below which v / rim speed is not told from noise [m/s]."""
+    """Rim speed below which v / rim speed is lost in noise [m/s]."""
     contact_length: float
     """Travel after which a contact is new all along, and its shear that of the model [m]."""
     skids: bool
@@ -120,8 +120,8 @@ _FEW_WHEELS = 4  # up to which the suspension hardly matters
 
 def _load_std(configuration: Configuration) -> float:
     """Return the deviation of the load of a wheel, over the mean load."""
-    told = not {'rover.load_std', 'rover.suspension'}.isdisjoint(configuration.stated)
-    if told or configuration.wheels.count <= _FEW_WHEELS:
+    given = not {'rover.load_std', 'rover.suspension'}.isdisjoint(configuration.stated)
+    if given or configuration.wheels.count <= _FEW_WHEELS:
         return float(configuration.rover.load_std)
     return _UNSTATED_LOAD_STD
 

@@ -116,8 +116,8 @@ class SensorErrors:
         """Take off (sign -1) or put on biases and the centripetal acceleration w x (w x r)."""
         if self._none_inertial or not np.any(reading.specific_force):
             return reading
-        told = reading.angular_rate + sign * self.angular_rate_bias
-        rate = told if sign < 0.0 else reading.angular_rate  # the true one
+        corrected_rate = reading.angular_rate + sign * self.angular_rate_bias
+        rate = corrected_rate if sign < 0.0 else reading.angular_rate  # the true one
         felt = np.cross(rate, np.cross(rate, self._imu_position))
         force = reading.specific_force + sign * (self.specific_force_bias + np.nan_to_num(felt))
-        return replace(reading, specific_force=force, angular_rate=told)
+        return replace(reading, specific_force=force, angular_rate=corrected_rate)

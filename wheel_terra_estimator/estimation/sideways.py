@@ -6,8 +6,8 @@ The accelerometer feels the sum of the lateral forces of the soil (specific forc
 mass, gravity across the slope and the centripetal force with it). Each wheel resists being pushed
 sideways as its soil is sheared, along and across on one friction circle (Janosi and Hanamoto, with
 the displacement at one place of the contact; Ishigami et al. 2007, doi 10.1002/rob.20187). The
-lateral speed at which these forces add up to the felt one is that of the body; a reference that
-tells it corrects the model. Without one the deviation is that of the model: wide.
+lateral speed at which these forces add up to the felt one is that of the body; a measured
+lateral speed corrects the model. Without one the deviation is that of the model: wide.
 
 Everything here is plain numbers: any estimator that knows speed, turning, loads and soil can ask.
 """
@@ -43,8 +43,8 @@ _SOIL_SHARE = 0.4  # of a lateral speed that the soil allows: shear modulus, con
 _STRENGTH_SHARE = 0.25  # of the lateral force that the soil gives: strength, flank
 _FORCE_SHARE = 0.3  # of the lateral force of one wheel: how the sum is shared out
 _LOAD_SHARE = 0.03  # of the weight: forces of ruts, stones and toe
-_SPEED_SHARE = 0.02  # of the speed: lateral speed that nothing here tells
-_MEMORY = 5.0  # travel over which what a reference told of the model fades [m]
+_SPEED_SHARE = 0.02  # of the speed: lateral speed that nothing here measures
+_MEMORY = 5.0  # travel over which what a reference showed of the model fades [m]
 _SMOOTHING = 0.5  # time constant of the felt force: vibration slides no wheel [s]
 _BLIND_FORCE = 2.0  # lateral specific force without an accelerometer [m/s^2]
 
@@ -100,7 +100,7 @@ class Sideways:
 
 
 class SidewaysState(NamedTuple):
-    """Memory: what a reference told of the model, and the last answer."""
+    """Memory: what a reference showed of the model, and the last estimate."""
 
     time: float = math.nan  # [s]
     error: float = 0.0  # of the model's lateral speed over the rover's speed [-]
@@ -108,7 +108,7 @@ class SidewaysState(NamedTuple):
     pace: float = 0.0  # fastest of rims and hubs [m/s]
     felt: float = math.nan  # smoothed specific force along y [m/s^2]
     model_variance: float = 0.0  # of the model's lateral speed alone [(m/s)^2]
-    told: Sideways | None = None
+    latest: Sideways | None = None
 
 
 class SidewaysMotion(Component[SidewaysState]):
@@ -131,29 +131,29 @@ class SidewaysMotion(Component[SidewaysState]):
         fading = math.exp(-travel / _MEMORY)
         error, doubt = state.error * fading, 1.0 + (state.doubt - 1.0) * fading * fading
         if pace < self._rover.rest_speed or sum(given.loads) <= _NO_LOAD:
-            told = self._at_rest(given)
-            self.state = SidewaysState(time, error, doubt, pace, felt, 0.0, told)
-            return told
+            latest = self._at_rest(given)
+            self.state = SidewaysState(time, error, doubt, pace, felt, 0.0, latest)
+            return latest
         contacts = _contacts(self._rover, given)
         model, model_variance = model_speed(self._rover, given, contacts)
-        told = self._told(given, contacts, model + error * pace, doubt * model_variance)
-        self.state = SidewaysState(time, error, doubt, pace, felt, model_variance, told)
-        return told
+        latest = self._estimated(given, contacts, model + error * pace, doubt * model_variance)
+        self.state = SidewaysState(time, error, doubt, pace, felt, model_variance, latest)
+        return latest
 
     def correct(self, lateral: float, variance: float) -> None:
         """Take the lateral speed of the body from a slip-free reference [m/s], [(m/s)^2]."""
         state = self.state
-        if state.told is None or state.pace < self._rover.rest_speed or not state.model_variance:
+        if state.latest is None or state.pace < self._rover.rest_speed or not state.model_variance:
             return
         prior = state.doubt * state.model_variance
         gain = prior / (prior + variance)
-        error = state.error + gain * (lateral - state.told.velocity) / state.pace
+        error = state.error + gain * (lateral - state.latest.velocity) / state.pace
         self.state = state._replace(error=error, doubt=(1.0 - gain) * state.doubt)
 
     def _at_rest(self, given: SidewaysInputs) -> Sideways:
         """Return the answer of wheels that stand: angles held, the felt force shared by load."""
         loads = np.array(given.loads)
-        last = self.state.told or Sideways.unknown(given.loads)
+        last = self.state.latest or Sideways.unknown(given.loads)
         total, std = _felt_force(self._rover, given)
         share = loads / max(float(loads.sum()), TINY)
         force_std = np.hypot(np.abs(total * share), std * share) + _LOAD_SHARE * loads
@@ -166,7 +166,7 @@ class SidewaysMotion(Component[SidewaysState]):
             (0.5 * self._rover.rest_speed) ** 2,
         )
 
-    def _told(
+    def _estimated(
         self, given: SidewaysInputs, contacts: _Contacts, velocity: float, variance: float
     ) -> Sideways:
         rover = self._rover

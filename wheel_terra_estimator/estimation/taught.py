@@ -61,7 +61,7 @@ _MODEL_ERRORS = (
     (SLIP_SINKAGE, 0.0),
 )
 _SAME_FACTOR = {'soil.cohesion': _STRENGTH, 'soil.cohesive_modulus': _STIFFNESS}
-"""What the filter scales by one factor with another parameter, and so never tells from it."""
+"""What the filter scales by one factor with another parameter, and so never separates from it."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Parameter(NamedTuple):
     unit: str
     row: FloatArray  # (size,)
     like: str = ''
-    """Parameter that no drive tells it from, whatever the filter makes of it."""
+    """Parameter that no drive separates it from, whatever the filter makes of it."""
 
 
 class Teaching:

@@ -404,7 +404,7 @@ def _decide_closed(
 
 
 def _still_time(state: LimiterState, now: float) -> float:
-    """Return for how long the rover has been told to stand [s]."""
+    """Return for how long the rover has been commanded to stand [s]."""
     if state.sent == ZERO:
         return now - state.still_since
     return max(now - state.sent_at - COMMAND_TIMEOUT, 0.0)

@@ -100,7 +100,7 @@ from wheel_terra_estimator.estimation.words import COST
 _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
 _TURN = 0.1
-"""Lateral motion above which what turns the rover tells of the pulls [-]."""
+"""Lateral motion above which the yaw balance constrains the pulls [-]."""
 _SHARP_TURN = 0.3
 """The same above which slip comes from turning and says nothing of an entrapment."""
 _ANGLE_KNOWN = 0.6  # deviation of slip angles up to which they tell the lateral forces [rad]
@@ -316,7 +316,7 @@ class WheelSoilEstimator:
 
         if not cycle.reference_known:
             self._speed.keep_with_rims(ekf, cycle.yaw_compensated)
-            if cycle.lateral_motion <= _SHARP_TURN:  # in it no wheel tells of the body
+            if cycle.lateral_motion <= _SHARP_TURN:  # in it no wheel speed is that of the body
                 self._speed.keep_behind_driving_wheels(ekf, cycle)
         self._speed.end_cycle(
             time,
@@ -382,10 +382,10 @@ class WheelSoilEstimator:
                 # The soil that was learned downhill is not that of the climb before it.
                 self._buffer.cut()
         demand_change = self._demand.update(demand, dt, settled=self._contact_age.settled)
-        self._note_climb(demand, yaw_compensated.typical, dt, told=reference_known)
+        self._note_climb(demand, yaw_compensated.typical, dt, slip_known=reference_known)
         speed.begin(ekf, yaw_compensated)
         speed.follow_sides(yaw_compensated, dt)
-        heard = known(rims)
+        measured = known(rims)
         return Cycle(
             time=time,
             dt=dt,
@@ -395,7 +395,7 @@ class WheelSoilEstimator:
             yaw_rate=turning.yaw_rate,
             lateral_motion=turning.lateral_motion,
             headings=headings,
-            still=bool(heard) and all(abs(rim) < rover.rest_speed for rim in heard),
+            still=bool(measured) and all(abs(rim) < rover.rest_speed for rim in measured),
             torque=self._wheels.take_torque(),
             leaving_angles=self._leaving_angles.angles(time),
             loads=loads,
@@ -406,7 +406,7 @@ class WheelSoilEstimator:
 
     def _torque_over_load(self, cycle: Cycle) -> float:
         """Return the torques over loads times radii, positive where they drive; nan = none [-]."""
-        told = [
+        torques = [
             (torque - zero, load * radius)
             for torque, zero, load, radius, turns in zip(
                 cycle.torque,
@@ -418,14 +418,14 @@ class WheelSoilEstimator:
             )
             if turns and not isnan(torque)
         ]
-        most = sum(lever for _, lever in told)
+        most = sum(lever for _, lever in torques)
         if most <= 0.0:
             return NAN
-        return self._contact_age.state.direction * sum(torque for torque, _ in told) / most
+        return self._contact_age.state.direction * sum(torque for torque, _ in torques) / most
 
-    def _note_climb(self, demand: float, rim: float, dt: float, *, told: bool) -> None:
-        """Note what is asked and the slip, where a reference tells it and the rover rolls on."""
-        steady = told and self._contact_age.settled and abs(rim) >= self._rover.low_rim
+    def _note_climb(self, demand: float, rim: float, dt: float, *, slip_known: bool) -> None:
+        """Note what is asked and the slip, where a reference shows it and the rover rolls on."""
+        steady = slip_known and self._contact_age.settled and abs(rim) >= self._rover.low_rim
         straight = self._turning.state.lateral_motion <= _SHARP_TURN
         slip = 1.0 - float(self._ekf.mean[SPEED]) / rim if steady and straight else NAN
         self._climb.update(demand, slip, dt)
@@ -457,18 +457,18 @@ class WheelSoilEstimator:
             self._contact_age.advance(travel)
             self._note_ruts(cycle.dt)
             if travel > 0.0:
-                told = self._wheels.torque_known(cycle.time)
-                self._soil_process.predict(prediction, travel, torque_known=told)
+                torque_known = self._wheels.torque_known(cycle.time)
+                self._soil_process.predict(prediction, travel, torque_known=torque_known)
         self._ekf.predict(prediction.mean, prediction.F, prediction.Q)
 
     def _trusted(self, window: InertialWindow, time: float) -> InertialWindow:
-        """Return the IMU readings that may move the speed: none where nothing else tells of slip.
+        """Return the IMU readings that may move the speed: none where nothing else shows slip.
 
         An accelerometer alone cannot tell slip from its own drift: at 0.02 m/s^2 it takes seconds
         to make a rover at 5 cm/s stand.
         """
-        told = self._reference.known(time) or self._wheels.torque_known(time)
-        return window if told else InertialWindow()
+        shown = self._reference.known(time) or self._wheels.torque_known(time)
+        return window if shown else InertialWindow()
 
     def _note_ruts(self, dt: float) -> None:
         """Note how deep the ground is pressed that the wheels meet, after `dt` [s]."""
@@ -577,7 +577,7 @@ class WheelSoilEstimator:
                 turning=motion.lateral_motion > _SHARP_TURN
                 or sides_oppose(rims, body.headings.by_yaw_rate),
                 depth_read=self._depth_read(time),
-                slip_told=self._reference.told_twice(time),
+                slip_known=self._reference.known_twice(time),
                 demand=self._demand.state,
             ),
         )
@@ -604,11 +604,11 @@ class WheelSoilEstimator:
             if wheel.judged and abs(rim) > self._rover.low_rim
         ]
         steady = self._contact_age.settled and lateral_motion <= _SHARP_TURN and bool(turning)
-        told = time - inertial.force_time <= self._rover.silence
+        measured = time - inertial.force_time <= self._rover.silence
         self._slopes.update(
             SlopeInstant(
                 time,
-                self._demand.state if told else NAN,
+                self._demand.state if measured else NAN,
                 median([wheel.slip for wheel, _ in turning]) if steady else 0.0,
                 median([wheel.std for wheel, _ in turning]) if steady else 1.0,
                 median([rim for _, rim in turning]) * since if steady and since > 0.0 else 0.0,
@@ -641,11 +641,13 @@ class WheelSoilEstimator:
         )
 
     def _lateral_forces(self, cycle: Cycle) -> Sideways | None:
-        """Return the lateral forces in a turn, None where nothing tells them."""
-        told = self._sideways.state.told
-        if told is None or cycle.lateral_motion < _TURN or max(told.angle_std) > _ANGLE_KNOWN:
+        """Return the lateral forces in a turn, None where they are unknown."""
+        sideways = self._sideways.state.latest
+        if sideways is None or cycle.lateral_motion < _TURN:
             return None
-        return told
+        if max(sideways.angle_std) > _ANGLE_KNOWN:
+            return None
+        return sideways
 
     def _instant(self, time: float, body: BodyMotion) -> Instant:
         """Return what a smoother judges anew."""
@@ -672,8 +674,10 @@ class WheelSoilEstimator:
         """Return speed [m/s] and variance of the filter, carried on from its last cycle."""
         time = self._clock.time
         window = self._trusted(self._inertial.state.window, time)
-        told = self._reference.known(time)
-        return SpeedAndVariance(*self._speed.present(self._ekf, time, rims, window, inflated=told))
+        slip_known = self._reference.known(time)
+        return SpeedAndVariance(
+            *self._speed.present(self._ekf, time, rims, window, inflated=slip_known)
+        )
 
     def _usual_speed(self, rims: RimSpeeds) -> SpeedAndVariance | None:
         """Return speed [m/s] and variance by the slip that is usual at such torques.
@@ -683,8 +687,8 @@ class WheelSoilEstimator:
         """
         time, turns = self._clock.time, self._turning.state.lateral_motion > _SHARP_TURN
         straight = self._contact_age.settled and not turns
-        told = straight and self._wheels.torque_known(time)
-        if self._reference.known(time) or not told or self._clock.assessment.holds:
+        applies = straight and self._wheels.torque_known(time)
+        if self._reference.known(time) or not applies or self._clock.assessment.holds:
             return None
         usual = slip_of_torque(self._torque_coefficient.state)
         if isnan(usual.slip) or not abs(rims.typical) >= self._rover.low_rim:
@@ -733,8 +737,8 @@ class WheelSoilEstimator:
             sinkage=self._sinkage_process.state,
             margin=self._margin.state.margin,
             assessment=self._clock.assessment,
-            slip_on_slope=self._slopes.state.told,
-            sideways=self._sideways.state.told,
+            slip_on_slope=self._slopes.state.latest,
+            sideways=self._sideways.state.latest,
         )
 
     def learned(self) -> dict[str, Any]:

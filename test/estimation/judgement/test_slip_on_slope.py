@@ -50,7 +50,7 @@ def at(found: SlipOnSlope, slope):
 
 @pytest.mark.parametrize('seed', range(2))
 def test_a_climb_tells_what_steeper_ground_costs(seed):
-    found = learned((0.0, 6.0, 12.0), seed=seed).state.told
+    found = learned((0.0, 6.0, 12.0), seed=seed).state.latest
     for slope in (5.0, 10.0, 15.0):
         slip, std, entrapment = at(found, slope)
         true = slip_of(math.tan(math.radians(slope)))
@@ -77,14 +77,14 @@ def test_a_climb_tells_what_going_down_costs(soil):
         slip = float(np.interp(demand, pulls, slips))
         curve.update(Instant(i * PERIOD, float(demand), slip, 0.02, RIM * PERIOD, 1.0))
     for slope, most in ((-15.0, 0.25), (-10.0, 0.1), (-5.0, 0.05)):
-        slip, std, _ = at(curve.state.told, slope)
+        slip, std, _ = at(curve.state.latest, slope)
         true = float(np.interp(math.tan(math.radians(slope)), pulls, slips))
         assert abs(slip - true) < min(most, 1.96 * std), slope
 
 
 def test_how_well_the_soil_brakes_is_unknown_to_who_never_drove_downhill():
     up, both = learned((0.0, 5.0, 10.0)).state, learned((-10.0, 0.0, 10.0)).state
-    assert at(up.told, -15.0)[1] > 1.5 * at(both.told, -15.0)[1]
+    assert at(up.latest, -15.0)[1] > 1.5 * at(both.latest, -15.0)[1]
 
 
 def test_ground_far_beyond_the_soil_leaves_finite_numbers():
@@ -92,7 +92,7 @@ def test_ground_far_beyond_the_soil_leaves_finite_numbers():
     for i in range(200):
         demand = -5.0 if i % 2 else 5.0
         curve.update(Instant(i * PERIOD, demand, 0.2, 0.02, RIM * PERIOD, 1.0))
-    assert np.isfinite(curve.state.mean).all() and np.isfinite(curve.state.told).all()
+    assert np.isfinite(curve.state.mean).all() and np.isfinite(curve.state.latest).all()
 
 
 @pytest.mark.parametrize('offset', [-0.1, 0.2])
@@ -111,7 +111,7 @@ def test_a_slip_that_fits_the_curve_moves_nothing(offset, demand, monkeypatch):
 
 
 def test_it_is_less_sure_the_farther_it_looks():
-    std = learned((0.0, 5.0, 10.0)).state.told.std
+    std = learned((0.0, 5.0, 10.0)).state.latest.std
     assert (np.diff(std[SLOPES >= 10.0][:3]) > 0.0).all()
 
 
@@ -147,8 +147,8 @@ def test_beyond_what_was_driven_the_greatest_pull_is_less_known():
     driven = learned((0.0, 5.0, 10.0)).state
     assert math.degrees(math.atan(driven.driven[1])) == pytest.approx(10.0, abs=0.5)
     plain = slips_at(driven.mean, driven.covariance, 0.03)
-    assert at(driven.told, 20.0)[1] > 1.05 * at(plain, 20.0)[1]
-    assert at(driven.told, 5.0)[1] == pytest.approx(at(plain, 5.0)[1], rel=0.02)
+    assert at(driven.latest, 20.0)[1] > 1.05 * at(plain, 20.0)[1]
+    assert at(driven.latest, 5.0)[1] == pytest.approx(at(plain, 5.0)[1], rel=0.02)
 
 
 def test_what_is_not_known_teaches_nothing():
@@ -159,7 +159,7 @@ def test_what_is_not_known_teaches_nothing():
     curve.update(Instant(0.2, 0.2, 0.9, 0.05, 0.0, 1.0))  # no way made
     np.testing.assert_array_equal(curve.state.mean, before.mean)
     np.testing.assert_array_equal(curve.state.covariance, before.covariance)
-    assert np.isfinite(curve.state.told).all()
+    assert np.isfinite(curve.state.latest).all()
 
 
 def test_sets_of_the_core_have_it_once_a_second():

@@ -352,7 +352,7 @@ def test_a_median_above_0_9_is_warned_of_also_right_after_a_start():
     assert found[-1].reason == 'median slip 0.97: entrapment under way; stop, back out'
     # Less surely known, it is where a reference says that the rover stands.
     doubtful = [wheel(0.98, rim=0.05)._replace(slip_std=0.1)] * 6
-    sees = {'speed_known': True, 'slip_told': True}
+    sees = {'speed_known': True, 'slip_known': True}
     assert first(held(StuckMonitor(SETTINGS), doubtful, 3.0, **sees)) == pytest.approx(
         1.0, abs=0.11
     )

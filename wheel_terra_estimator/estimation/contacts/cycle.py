@@ -34,8 +34,8 @@ class RimSpeeds(NamedTuple):
                     for rim, by_yaw_rate in zip(rims, headings.by_yaw_rate, strict=True)
                 ]
             )
-        heard = known(each)
-        return cls(each, median(heard) if heard else NAN)
+        measured = known(each)
+        return cls(each, median(measured) if measured else NAN)
 
     def along(self, least: float) -> bool:
         """Tell whether the wheels drive the body along, faster than `least` [m/s].
@@ -47,13 +47,13 @@ class RimSpeeds(NamedTuple):
     @property
     def magnitude(self) -> float:
         """Median of the magnitudes of the known ones [m/s]; nan = none is known."""
-        heard = known(self.each)
-        return median([abs(rim) for rim in heard]) if heard else NAN
+        measured = known(self.each)
+        return median([abs(rim) for rim in measured]) if measured else NAN
 
     def oppose(self, speed: float) -> bool:
         """Tell whether all wheels turn against a speed of the body [m/s]; in a spin some do not."""
-        heard = known(self.each)
-        return bool(heard) and all(speed * rim < 0.0 for rim in heard)
+        measured = known(self.each)
+        return bool(measured) and all(speed * rim < 0.0 for rim in measured)
 
 
 class Cycle(NamedTuple):

@@ -54,13 +54,13 @@ class Climbed(NamedTuple):
 
 
 class SteepestClimb(Component[Climbed]):
-    """Follows what is asked and the slip while a reference velocity tells the slip."""
+    """Follows what is asked and the slip while a reference velocity shows the slip."""
 
     def __init__(self) -> None:
         super().__init__(Climbed())
 
     def update(self, demand: float, slip: float, dt: float) -> None:
-        """Take a cycle of steady driving; nan = it was none, or the slip is not told."""
+        """Take a cycle of steady driving; nan = it was none, or the slip is not known."""
         most, its_slip, mean_demand, mean_slip = self.state
         if isnan(demand) or isnan(slip):
             self.state = Climbed(most, its_slip)

@@ -131,12 +131,12 @@ class Linearisation(Component[FloatArray]):
         nothing = np.zeros(len(turning))
         if states.leaving_angle is None:
             return nothing, nothing
-        told = turning & ~np.isnan(states.leaving_angle)
+        measured = turning & ~np.isnan(states.leaving_angle)
         angle = states.leaving_angle - self._leaving_angle_std
         torque, pull = self._models.torque_and_pull(states._replace(leaving_angle=angle))
         return (
-            np.where(told, np.abs(torque - forces.torque), 0.0),
-            np.where(told, np.abs(pull - forces.pull), 0.0),
+            np.where(measured, np.abs(torque - forces.torque), 0.0),
+            np.where(measured, np.abs(pull - forces.pull), 0.0),
         )
 
     def smoothed(self, forces: WheelForces, moment: FloatArray, turning: BoolArray) -> FloatArray:

@@ -24,7 +24,7 @@ _GREATEST_TORQUE_STD = 0.17  # [ln]
 _SLIP_SCALE = 0.17  # s_0 [-]
 _SLIP_SCALE_STD = 0.6  # [ln]
 _LEAST_STD = 0.04  # of the slip [-]: the torque of rolling without pull
-_MOST_MOBILISED = 0.9  # of the greatest torque: beyond, it tells nothing of the slip
+_MOST_MOBILISED = 0.9  # of the greatest torque: beyond, it says nothing of the slip
 
 
 class SlipOfTorque(NamedTuple):

@@ -50,7 +50,7 @@ class PullEvidence(NamedTuple):
     cycle: Cycle
     readings: Floats  # last torque of each wheel [N m], nan = never known
     stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
-    aside: Sideways | None  # lateral forces in a turn, where they are told; None elsewhere
+    aside: Sideways | None  # lateral forces in a turn, where they are known; None elsewhere
     tilt_std: float  # of the body against the ground, by digging alone [rad]: doubt, no weight
 
 

@@ -44,7 +44,7 @@ or nothing."""
 class StationaryPull(NamedTuple):
     """Pull of a wheel that does not turn under a load."""
 
-    pull: float  # [N], nan where no torque tells
+    pull: float  # [N], nan where no torque is known
     expected: float  # the pull, or what the wheel's share of the slope asks [N]
     std: float  # [N]
 
@@ -64,18 +64,18 @@ class StationaryWheels:
         """Return the pulls of a cycle at a state `x` (size,), and what to expect of each wheel.
 
         `speed_std` is the deviation of the body's speed [m/s]. Pulls are [N], nan where no torque
-        tells; None stands for a wheel that turns.
+        is known; None stands for a wheel that turns.
         """
         loads, share = cycle.loads, cycle.loads.slope_share
-        told = [
+        by_torque = [
             not (turns or isnan(rim) or isnan(torque)) and load >= LEAST_LOAD
             for turns, rim, torque, load in zip(
                 cycle.turns, cycle.rims, cycle.torque, loads.load, strict=True
             )
         ]
-        pulls = [NAN] * len(told)
-        if any(told):
-            pulls = np.where(told, self._pulls(x, speed_std, cycle), NAN).tolist()
+        pulls = [NAN] * len(by_torque)
+        if any(by_torque):
+            pulls = np.where(by_torque, self._pulls(x, speed_std, cycle), NAN).tolist()
         return tuple(pulls), [
             None if turns else self.expectation(pull, load, share, cycle.lateral_motion)
             for turns, pull, load in zip(cycle.turns, pulls, loads.load, strict=True)
@@ -110,8 +110,8 @@ class StationaryWheels:
         )
         by_torque, by_pull = forces.d_torque[STRENGTH], forces.d_pull[STRENGTH]
         jammed = (direction * torques > 0.0) & ~creeps & (cycle.lateral_motion < _STRAIGHT)
-        tells = (by_torque != 0.0) & ~jammed
-        gain = np.where(tells, by_pull / np.where(tells, by_torque, 1.0), 0.0)
+        usable = (by_torque != 0.0) & ~jammed
+        gain = np.where(usable, by_pull / np.where(usable, by_torque, 1.0), 0.0)
         pull = forces.pull + gain * (direction * torques - forces.torque)
         most = _MOST_DRAG * loads
         # Where nothing turns faster than the speed is in doubt, the rover comes to rest.

@@ -65,7 +65,7 @@ class Headings(NamedTuple):
         return (along * rolled - across * pushed) / (along * along + across * across)
 
     def yaw_rate(self, rims: Floats) -> float:
-        """Return the yaw rate at which wheels would roll, by least squares [rad/s]; 0: not told."""
+        """Return the yaw rate at which wheels would roll, by least squares [rad/s]; 0: unknown."""
         aa = ab = bb = along = across = 0.0
         for a, b, rim in zip(self.by_speed, self.by_yaw_rate, rims, strict=True):
             if not isnan(rim):

@@ -41,7 +41,7 @@ _OPPOSED = 0.5
 def sides_oppose(rims: Floats, by_yaw_rate: Floats) -> bool:
     """Tell whether the wheels ask for a spin on the spot, however little the body follows.
 
-    `rims` [m/s], nan = unknown; the sign of `by_yaw_rate` [m] (see `Headings`) tells the side.
+    `rims` [m/s], nan = unknown; the sign of `by_yaw_rate` [m] (see `Headings`) gives the side.
     """
     if not (any(rim > 0.0 for rim in rims) and any(rim < 0.0 for rim in rims)):
         return False  # most of the time
@@ -58,7 +58,7 @@ class TurningState(NamedTuple):
     """Turning of the rover, curvature of its path."""
 
     yaw_rate: float = 0.0  # smoothed [rad/s]
-    yaw_rate_std: float = 1.0  # nothing was heard yet
+    yaw_rate_std: float = 1.0  # nothing was received yet
     by_wheels: float = 0.0
     """Yaw rate to expect of the rim speeds alone [rad/s]; a rover that skids turns less."""
     lateral_motion: float = 0.0

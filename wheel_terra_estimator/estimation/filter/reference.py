@@ -25,7 +25,7 @@ it by chance, from 5 to 0.05 % [-]."""
 
 # Tuned on simulated drives, seeds 1000 to 1019, and the nine snow immobilisations.
 _KNOWN_TIME = 5.0
-"""Age [s] up to which a reference tells slip and soil apart; after that the soil is held."""
+"""Age [s] up to which a reference separates slip from soil; after that the soil is held."""
 _FRESH_TIME = 10.0
 """Age [s] up to which the speed rests on more than a guess, for the stuck warning."""
 _LONGEST_GAP = 10.0  # between references that is remembered [s]
@@ -53,9 +53,9 @@ class ReferenceState(NamedTuple):
     """What is remembered of the references."""
 
     time: float = -math.inf  # of the last one [s]
-    told_time: float = -math.inf
-    """Of the last one that told of slip [s]: wheels turned, and it was not rejected."""
-    told_before: float = -math.inf  # of the one before it [s]
+    slip_time: float = -math.inf
+    """Of the last one that shows slip [s]: wheels turned, and it was not rejected."""
+    slip_time_before: float = -math.inf  # of the one before it [s]
     gap: float = 10.0  # between them, smoothed [s]
     sliding_until: float = -1.0  # a slide on standing wheels is believed until then [s]
     rejected: int = 0
@@ -104,12 +104,12 @@ class ReferenceUpdate(Component[ReferenceState]):
         return reference.forward - state, variance
 
     def known(self, time: float) -> bool:
-        """Say whether a reference that told of slip is young enough to tell it and soil apart."""
-        return time - self.state.told_time < _KNOWN_TIME
+        """Say whether a reference that shows slip is recent enough to separate it from the soil."""
+        return time - self.state.slip_time < _KNOWN_TIME
 
-    def told_twice(self, time: float) -> bool:
-        """Say whether two such references are young: a mean over a start is the first one."""
-        return time - self.state.told_before < _KNOWN_TIME
+    def known_twice(self, time: float) -> bool:
+        """Say whether two such references are recent: a mean over a start is the first one."""
+        return time - self.state.slip_time_before < _KNOWN_TIME
 
     def fresh(self, time: float) -> bool:
         """Say whether the present speed rests on a reference."""
@@ -186,7 +186,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
         rests = still and time >= state.sliding_until
         if not rests and not state.rejected_in_a_row:
-            state = state._replace(told_time=time, told_before=state.told_time)
+            state = state._replace(slip_time=time, slip_time_before=state.slip_time)
         self.state = state
         return opened
 

@@ -61,13 +61,13 @@ _REVERSED_SLIP_SHARE = 0.5
 anew, and the slip grows with them. Tuned on stops and reversals of both worlds, seeds 1000 to
 1005."""
 _FIRST_SIGHT_SHARE = 0.3
-"""Deviation of the speed over the rim speed when the wheels are first heard."""
+"""Deviation of the speed over the rim speed when wheel rates first arrive."""
 _LEAST_RATIO = -0.5  # remembered v / rim speed
 _MOST_RATIO = 2.0
 _LEAST_RATIO_STD = 0.1
 _MOST_RATIO_STD = 0.5
 _RATIO_RIM = 2.0  # over the low rim speed: v / rim speed is remembered above it
-_COAST_DRIFT = 0.05  # [m/s^2] of a rover whose wheels are not heard
+_COAST_DRIFT = 0.05  # [m/s^2] of a rover whose wheel rates are missing
 _COAST_WALK = 0.02  # [m/s/sqrt(s)]
 _RIM_CHANGE = 0.2
 """Error of a change of rim speed as a change of speed, over that change [-]."""
@@ -328,7 +328,7 @@ class SpeedProcess(Component[SpeedState]):
     def learn_bias(self, ekf: GatedFilter, cycle: Cycle, step: SpeedStep) -> float:
         """Fuse that wheels and accelerometer tell of the same change of speed.
 
-        `combined` weighs the two for a given speed and bias; how well they agree tells of these:
+        `combined` weighs the two for a given speed and bias; how well they agree measures both:
         most of all at rest, where the wheels know. `step` is the prediction without accelerometer.
         Return the variance [(m/s)^2] that it lacks where the two differ by more than the gate: soil
         that lets go or gives way is no random walk, and wheels do not see it. Where they differ for

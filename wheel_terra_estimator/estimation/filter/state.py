@@ -10,8 +10,8 @@ speed            m/s    Body speed. The process follows the rim speed (v / rim s
                         Speed itself, not the ratio, so that locked wheels can slide.
 gravity_bias     m/s^2  Accelerometer bias plus gravity that leaks in through attitude errors: what
                         is wrong with the accelerometer as a sensor of dv/dt.
-shear_strength   ln     Common factor on cohesion and tan(phi); the two are not told apart by
-                        wheels of nearly equal load.
+shear_strength   ln     Common factor on cohesion and tan(phi); wheels of nearly equal load do
+                        not separate the two.
 shear_modulus    ln     Common factor on K; seen at low slip, as shear_strength is at high slip.
 slip_sinkage     -      Added to n1 in N = n0 + n1 |s|.
 centroid         -      Common shift of the centroid of the contact stress, as a share of the
@@ -21,7 +21,7 @@ mound            -      The part of that shift that comes with slip, (s - onset)
                         behind the wheel and pushes it (the effect ``soil_mound``). Seen where slip
                         changes.
 slip_per_demand  -      Slip for each share of the load that the ground asks along the body: what a
-                        change of slope costs at once, before the next reference velocity tells.
+                        change of slope costs at once, before the next reference velocity shows it.
                         Learned from them, since it is the inverse slope of a traction curve that
                         no soil file knows.
 sinkage (n)      m      Rim below the surface.
@@ -102,9 +102,9 @@ class StateLayout:
 
         Their uncertainty counts, but they keep mean and variance: else what the models get wrong
         would end up there. The rut that forms at a start, or is left behind after a spin on the
-        spot (contacts that are not `settled`), tells no speed. Where the rover moves against its
+        spot (contacts that are not `settled`), shows no speed. Where the rover moves against its
         wheels (`opposes_rims`), their forces are the same at any such speed. Of wheels without a
-        sinkage reading (`unread`), sinkage and errors of the shear model are not told apart.
+        sinkage reading (`unread`), sinkage and errors of the shear model are not separable.
         """
         entries = []
         if not settled or opposes_rims:

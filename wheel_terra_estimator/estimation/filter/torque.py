@@ -49,8 +49,8 @@ class TorqueUpdate(Component['tuple[float | None, ...]']):
     @property
     def nis(self) -> float | None:
         """Mean of the NIS of the wheels; None = no torque came yet."""
-        told = [nis for nis in self.state if nis is not None]
-        return sum(told) / len(told) if told else None
+        known = [nis for nis in self.state if nis is not None]
+        return sum(known) / len(known) if known else None
 
     def zeros(self, mean: FloatArray) -> Floats:
         """Return the zeros of the sensors in a state [N m]."""

@@ -63,7 +63,7 @@ class InertialWindow(NamedTuple):
 
     @property
     def tells_force(self) -> bool:
-        """Whether anything tells the specific force."""
+        """Whether the specific force is known."""
         return self.readings > 0 or self.gravity is not None
 
 

@@ -81,10 +81,10 @@ _IN_STEP = 0.2  # share by which two spacings of readings may differ
 _LONGEST_GAP = 0.5  # between readings that are compared [s]
 _LEAST_SHARE = 0.01  # of the stated deviation
 _MOST_SHARE = 100.0
-_TOLD_AFTER = 100  # readings before it is told
+_REPORTED_AFTER = 100  # readings before it is reported
 _TOLD_REFERENCES = 10
 _MUCH = 5.0  # times what is stated, to be said
-_FAR = 1000.0  # times what is stated, from which the figure tells nothing more
+_FAR = 1000.0  # times what is stated, from which the figure means nothing more
 _CLEARLY = 2.0
 """Times what is stated, to be taken in its place: less may be the motion's own."""
 
@@ -230,7 +230,7 @@ class SeenNoise(Component[SeenNoiseState]):
     def seen(self, sensor: str) -> float | None:
         """Return the deviation of one message as seen; None while too few came."""
         state = self.state.channels[sensor]
-        least = _TOLD_REFERENCES if sensor == 'reference' else _TOLD_AFTER
+        least = _TOLD_REFERENCES if sensor == 'reference' else _REPORTED_AFTER
         return math.sqrt(state.variance) if state.readings >= least else None
 
     def variance(self, sensor: str, stated: float | None = None) -> float:

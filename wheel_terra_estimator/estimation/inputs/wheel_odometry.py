@@ -19,7 +19,7 @@ _SMOOTHING_TIME = 0.05
 """Time constant of the rim speeds [s]: fast odometry is noisy or quantised; less than any use
 of the rim speed needs."""
 _LONGEST_SMOOTHED = 0.06
-"""A wheel that is heard this slowly [s between messages] is not smoothed."""
+"""A wheel whose messages come this slowly [s between messages] is not smoothed."""
 _SLOPE_GAIN = 0.5  # smoothing of the rim speeds' rate of change, per message
 _LONGEST_CARRIED = 0.15
 """Time [s] over which a rim speed is carried on at its rate of change: over the lag of its

@@ -118,8 +118,8 @@ class PublishedClasses:
         time = estimates.stamp * NANOSECOND
         update, most_std = self._classifier.update, self._most_std
         self._states = [
-            ClassState() if told == UNKNOWN or std > most_std else update(state, time, slip)
-            for state, told, slip, std in zip(
+            ClassState() if given == UNKNOWN or std > most_std else update(state, time, slip)
+            for state, given, slip, std in zip(
                 self._states,
                 estimates.slip_class.tolist(),
                 estimates.slip.tolist(),
@@ -132,9 +132,9 @@ class PublishedClasses:
         left = np.stack([estimates.rim_travel_left, estimates.time_to_stuck])
         outlook = np.vstack([np.where(stuck, 0.0, left), estimates.stuck_probability])
         if self._outlook is not None:
-            told = classes if estimates.stuck else estimates.slip_class
-            stalls = estimates.stuck_probability >= 1.0  # a wheel that stands, and tells
-            outlook = np.where((told == UNKNOWN) & ~stalls, self._outlook, outlook)
+            given = classes if estimates.stuck else estimates.slip_class
+            stalls = estimates.stuck_probability >= 1.0  # a wheel that is known to stand
+            outlook = np.where((given == UNKNOWN) & ~stalls, self._outlook, outlook)
         self._outlook = outlook
         return replace(
             estimates,

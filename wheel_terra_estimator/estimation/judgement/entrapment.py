@@ -83,7 +83,7 @@ def verdicts(time: FloatArray, slip: FloatArray, warnings: Sequence[Span]) -> tu
     over = np.append(~found.under_way, True)
     ends = [row + int(np.argmax(over[row:])) for row in found.there]
     high = _median(np.abs(slip)) > NEAR_MISS_SLIP
-    told = []
+    verdicts = []
     for start, taken_back in warnings:
         first, soon, last = np.searchsorted(
             time, [start, start + FORESIGHT, max(start + FORESIGHT, taken_back)]
@@ -94,11 +94,11 @@ def verdicts(time: FloatArray, slip: FloatArray, warnings: Sequence[Span]) -> tu
             if end > first and begin < last
         ]
         if ahead:
-            told.append(Verdict(Outcome.ENTRAPPED, float(time[ahead[0]] - start)))
+            verdicts.append(Verdict(Outcome.ENTRAPPED, float(time[ahead[0]] - start)))
         else:
             near = bool(high[first:soon].any())
-            told.append(Verdict(Outcome.NEAR_MISS if near else Outcome.FALSE))
-    return tuple(told)
+            verdicts.append(Verdict(Outcome.NEAR_MISS if near else Outcome.FALSE))
+    return tuple(verdicts)
 
 
 def lead_of(entrapped: float, warnings: Sequence[Span]) -> float | None:

@@ -74,8 +74,8 @@ class CurveState(NamedTuple):
     demand: float = math.nan  # low-passed
     time: float = math.nan  # [s]
     direction: float = 0.0
-    told: SlipOnSlope | None = None
-    told_second: int = -1
+    latest: SlipOnSlope | None = None
+    latest_second: int = -1
 
 
 class SlopeCurve(Component[CurveState]):
@@ -99,9 +99,9 @@ class SlopeCurve(Component[CurveState]):
                 reversed_ = old.direction * state.direction < 0.0
                 state = self._corrected(state, now, reversed_)
         second = int(now.time)
-        if second != state.told_second:
-            told = slips_at(state.mean, state.covariance, SCATTER, self._beyond(state.driven))
-            state = state._replace(told=told, told_second=second)
+        if second != state.latest_second:
+            latest = slips_at(state.mean, state.covariance, SCATTER, self._beyond(state.driven))
+            state = state._replace(latest=latest, latest_second=second)
         self.state = state
 
     def _beyond(self, driven: tuple[float, float]) -> FloatArray:

@@ -195,8 +195,8 @@ class _Judges:
         variance = float(now.covariance[SPEED, SPEED]) + carried
         if instant.usual is not None:
             speed, variance = pooled(SpeedAndVariance(speed, variance), instant.usual)
-        heard = known(given.rims)
-        typical = sum(map(abs, heard)) / len(given.rims)
+        rims = known(given.rims)
+        typical = sum(map(abs, rims)) / len(given.rims)
         least = max(typical * LEAST_SLIP_STD, _LEAST_SHARE * instant.motion.speed_std)
         return Moment(
             instant,

@@ -158,7 +158,7 @@ class ClockWatch:
         astray = self._odometry_astray >= PROVING_MESSAGES
         return (
             (not late and odometry and len(channels) > 1)
-            # Another topic alone for so long that wheel odometry would have been heard.
+            # Another topic alone for so long that wheel odometry would have arrived.
             or (not late and stamps[-1] - stamps[0] > 3 * self._clock_step)
             or len(channels) >= MOST_HELD
             # Wheel odometry keeps the time: where it and another topic have different clocks

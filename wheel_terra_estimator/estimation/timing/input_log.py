@@ -21,7 +21,12 @@ from wheel_terra_estimator.estimation.timing.input_checks import (
     REFERENCE,
     WHEEL_ODOMETRY,
 )
-from wheel_terra_estimator.estimation.timing.merging import Heard, merge_step, merge_wheels, same
+from wheel_terra_estimator.estimation.timing.merging import (
+    LastMeasured,
+    merge_step,
+    merge_wheels,
+    same,
+)
 from wheel_terra_estimator.estimation.timing.step_grid import LONGEST_STEP, StepGrid
 
 KEPT_STATE_SPACING = 50_000_000
@@ -67,7 +72,7 @@ class _Walk(NamedTuple):
     next_reference: int  # a reference velocity is used again from this stamp on
     step_index: int  # of the last wheel odometry; -1: none yet
     end: int  # stamp of the last step
-    heard: Heard
+    measured: LastMeasured
     steps: int  # since the start of the run
 
 
@@ -309,9 +314,9 @@ class InputLog:
         return after if ends else None
 
     def _step(self, stamp: int, pending: list[list[Any]], after: _Walk) -> None:
-        inputs, heard = merge_step(stamp, pending, self._walk.heard)
+        inputs, measured = merge_step(stamp, pending, self._walk.measured)
         self.counts['steps'] += 1
-        self._walk = after._replace(end=stamp, heard=heard, steps=after.steps + 1)
+        self._walk = after._replace(end=stamp, measured=measured, steps=after.steps + 1)
         for runner in self._runners:
             runner.step(stamp, inputs)
 

@@ -48,7 +48,7 @@ class LagLearner:
         self._newest: int | None = None  # stamp of either channel
         self._gap = 0  # between the last two of these
         self._leads = defaultdict[int, deque[int]](lambda: deque(maxlen=_LEADS))
-        self._led: set[int] = set()  # other channels that were heard since then
+        self._led: set[int] = set()  # other channels that were received since then
         self.present: int | None = None
         self._first: int | None = None
         self._odometry_heard = False

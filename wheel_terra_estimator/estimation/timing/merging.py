@@ -57,12 +57,14 @@ def _newer(before: FloatArray, after: FloatArray) -> tuple[FloatArray, bool]:
     return np.where(given, after, before), bool(np.any(given & ~np.isnan(before)))
 
 
-Heard: TypeAlias = 'tuple[int, ...] | None'
+LastMeasured: TypeAlias = 'tuple[int, ...] | None'
 """Stamp of the last rate of each wheel [ns], None = none yet; a rate is the mean since then."""
 
 
-def merge_step(stamp: int, parts: Sequence[list[Any]], heard: Heard) -> tuple[StepInputs, Heard]:
-    """Return the inputs of a step, merged from what came since the last, and what is heard then.
+def merge_step(
+    stamp: int, parts: Sequence[list[Any]], measured: LastMeasured
+) -> tuple[StepInputs, LastMeasured]:
+    """Return the inputs of a step, merged from what came since the last one, and `measured` anew.
 
     `parts` are entries in the order of stamps, each with one measurement or None per channel. Plain
     floats, which beat numpy for a few readings.
@@ -71,34 +73,34 @@ def merge_step(stamp: int, parts: Sequence[list[Any]], heard: Heard) -> tuple[St
         [measurement for measurement in channel if measurement is not None]
         for channel in zip(*parts, strict=True)
     )
-    rates, heard = _odometry(stamp, odometry, heard)
+    rates, measured = _odometry(stamp, odometry, measured)
     merged: list[Any] = [
         rates,
         inertial[0] if len(inertial) == 1 else _inertial(stamp, inertial),
         *[some[0] if len(some) == 1 else _mean_reading(stamp, some) for some in wheels],
         references[-1] if references else None,
     ]
-    return StepInputs(*merged), heard
+    return StepInputs(*merged), measured
 
 
 def _odometry(
-    stamp: int, readings: list[WheelOdometry], before: Heard
-) -> tuple[WheelOdometry | None, Heard]:
+    stamp: int, readings: list[WheelOdometry], before: LastMeasured
+) -> tuple[WheelOdometry | None, LastMeasured]:
     if not readings:
         return None, before
     count = len(readings[0].rate)
-    heard = list(before or (0,) * count)
+    measured = list(before or (0,) * count)
     total, weighted = [0] * count, [0.0] * count
     for reading in readings:
         now = reading.stamp
         for i, rate in enumerate(reading.rate.tolist()):
             if not isnan(rate):
-                weight = min(max(now - heard[i], 1), LONGEST_INTERVAL)
+                weight = min(max(now - measured[i], 1), LONGEST_INTERVAL)
                 total[i] += weight
                 weighted[i] += weight * rate
-                heard[i] = now
+                measured[i] = now
     if len(readings) == 1:
-        return readings[0], tuple(heard)
+        return readings[0], tuple(measured)
     mean = [w / t if t else nan for w, t in zip(weighted, total, strict=True)]
     merged = WheelOdometry(
         stamp,
@@ -106,7 +108,7 @@ def _odometry(
         _mean([reading.torque for reading in readings]),
         _newest([reading.steering for reading in readings]),
     )
-    return merged, tuple(heard)
+    return merged, tuple(measured)
 
 
 def _newest(rows: list[FloatArray | None]) -> FloatArray | None:

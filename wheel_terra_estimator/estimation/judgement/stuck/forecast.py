@@ -38,7 +38,7 @@ _STEP = 0.05
 """Rim travel of a step [m]: a second at 5 cm/s, for which an entrapment must last."""
 _STEPS = 80
 TRAVELS = _STEP * np.arange(_STEPS + 1)
-"""Rim travels at which the probability is told [m]."""
+"""Rim travels at which the probability is given [m]."""
 _LEVELS = np.linspace(0.0, 1.6, 9) * ENTRAPPED_SLIP
 _LEAST_STD = 1e-3
 

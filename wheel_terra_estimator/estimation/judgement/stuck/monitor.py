@@ -89,7 +89,7 @@ class StuckMonitor(Component[StuckState]):
         situation = observe(old.memory, time, motion)
         ahead = outlook(situation, settings)
         digs = situation.slip > _DIGGING_SLIP and situation.slip_std < USUAL_STD
-        at_once = motion.slip_told and _stands(situation) and not motion.turning
+        at_once = motion.slip_known and _stands(situation) and not motion.turning
         digs = digs and (situation.settled or at_once)
         likely = ahead.probability > settings.threshold or digs
         there = likely and not situation.braked, situation.standing, situation.burying

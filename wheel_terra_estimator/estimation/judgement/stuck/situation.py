@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the stuck warning is told of the rover, what it remembers, and what it makes of both."""
+"""What the stuck warning gets of the rover, what it remembers, and what it derives from both."""
 
 from __future__ import annotations
 
@@ -49,13 +49,13 @@ class WheelMotion(NamedTuple):
 def driving_share(torque: float, limit: float, rim_speed: float) -> float:
     """Return `WheelMotion.torque_share`; nan without a limit or a torque [N m].
 
-    `rim_speed` tells the direction [m/s]: that of the wheel, or of those that turn.
+    `rim_speed` has the sign of the direction [m/s]: that of the wheel, or of those that turn.
     """
     return math.copysign(torque, torque * rim_speed) / limit if limit > 0.0 else NAN
 
 
 class RoverMotion(NamedTuple):
-    """What the warning needs of the rover: all that it is told."""
+    """All inputs of the warning."""
 
     speed: float  # [m/s]
     speed_known: bool
@@ -64,7 +64,7 @@ class RoverMotion(NamedTuple):
     turning: bool = False
     """Sharply: slip that comes from turning says nothing of what is ahead."""
     depth_read: bool = True  # sensors tell the sinkage of most wheels
-    slip_told: bool = False  # by two references of the last seconds, while wheels turned
+    slip_known: bool = False  # by two references of the last seconds, while wheels turned
     demand: float = NAN  # what the ground asks in the direction of the drive, over the load [-]
 
 
@@ -100,12 +100,12 @@ class Situation:
     @cached_property
     def rim(self) -> float:
         """Typical rim speed, that of standing wheels included [m/s]."""
-        told = known([abs(w.rim_speed) for w in self.motion.wheels])
-        return median(told) if told else 0.0
+        rims = known([abs(w.rim_speed) for w in self.motion.wheels])
+        return median(rims) if rims else 0.0
 
     @cached_property
     def slip(self) -> float:
-        """Typical slip; 0 where no wheel tells."""
+        """Typical slip; 0 where it is known of no wheel."""
         return median([w.slip for w in self.moving]) if self.moving else 0.0
 
     @cached_property
@@ -210,7 +210,7 @@ class Situation:
 
     @property
     def slip_magnitude(self) -> float:
-        """Median of |s|, braking included; nan where no wheel tells."""
+        """Median of |s|, braking included; nan where it is known of no wheel."""
         return median([abs(w.slip) for w in self.moving]) if self.moving else NAN
 
 
