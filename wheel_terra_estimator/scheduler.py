@@ -100,9 +100,9 @@ def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
 
     Raises UserError where the machine has no shared memory left for them.
     """
-    told, tell = multiprocessing.Pipe(duplex=False)
+    receiver, sender = multiprocessing.Pipe(duplex=False)
     try:
-        pool = ProcessPoolExecutor(processes, initializer=_watch, initargs=(told,))
+        pool = ProcessPoolExecutor(processes, initializer=_watch, initargs=(receiver,))
     except (OSError, ImportError) as error:  # its semaphores are files there
         raise UserError(
             f'processes side by side need shared memory: {error}; look at df -h /dev/shm and make '
@@ -111,20 +111,20 @@ def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     try:
         yield pool
     except BaseException:
-        tell.send_bytes(b'stop')  # nobody takes it out, so that every worker sees it
+        sender.send_bytes(b'stop')  # nobody takes it out, so that every worker sees it
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-        tell.close()
-        told.close()
+        sender.close()
+        receiver.close()
 
 
-def _watch(told: Connection) -> None:
+def _watch(receiver: Connection) -> None:
     """Let a worker end when its parent has ended or says so; Ctrl-C is the parent's affair."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     parent = multiprocessing.parent_process()
-    watched: list[Any] = [told] if parent is None else [told, parent.sentinel]
+    watched: list[Any] = [receiver] if parent is None else [receiver, parent.sentinel]
 
     def end_with_parent() -> None:
         wait_for_one(watched)
@@ -167,7 +167,7 @@ def _client(address: str) -> Any:
             f"--scheduler: Dask is missing; pip install 'dask[distributed]' ({error})"
         ) from None
     for name in ('distributed', 'distributed.client'):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what is lost is told here
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what is lost is reported here
 
     async def greet() -> None:
         keys = Security().get_connection_args('client')

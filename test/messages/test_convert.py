@@ -328,4 +328,4 @@ def test_a_pose_alone_is_no_velocity(converter, factory):
     ]
     assert [f and f.forward for f in found] == [0.0, 0.0, None, None, 0.0, 0.1]
     ((topic, why),) = converter.rejected
-    assert topic == 'reference_odom' and why.startswith('tells a pose alone')
+    assert topic == 'reference_odom' and why.startswith('holds a pose alone')

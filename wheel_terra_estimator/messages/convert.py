@@ -44,7 +44,7 @@ INPUT_TYPES = {
 _FASTEST = 30.0  # lateral speed that no rover has [m/s]
 DAMAGED = 'damaged message'  # why bytes are refused that are no message of their type
 _NO_WHEEL = 'none of the configured wheels in it'
-_GONE = 1_000_000_000  # other joints alone for so long [ns] are told
+_GONE = 1_000_000_000  # other joints alone for so long [ns] are reported
 _MOST_LETTERS = 300  # of the names of joints in one line of words
 
 
@@ -114,8 +114,8 @@ class InputConverter:
         values = self._wheel_values('joint_states', message, velocity, 'velocity')
         if values is None:
             return None
-        told = len(effort) > 0
-        torque = self._wheel_values('joint_states', message, effort, 'effort') if told else None
+        given = len(effort) > 0
+        torque = self._wheel_values('joint_states', message, effort, 'effort') if given else None
         if torque is None:
             torque = np.full(self.wheels.count, math.nan)
         unknown = np.count_nonzero(np.isnan(values))
@@ -151,22 +151,22 @@ class InputConverter:
         return WheelOdometry(message.stamp, rate, np.full_like(rim_speed, math.nan))
 
     def _imu(self, message: Message) -> InertialReading | None:
-        """Specific force, angular rate and attitude in ``base_link``; nan where not told."""
+        """Specific force, angular rate and attitude in ``base_link``; nan where not given."""
         values = message.numbers[0].tolist()
         attitude, rates, forces = values[:4], values[13:16], values[25:28]
         of_attitude, of_rate, of_force = values[4:13], values[16:25], values[28:]
-        told = of_force[0] != -1.0, of_rate[0] != -1.0  # REP 145
-        for words, there in zip(('linear acceleration', 'angular velocity'), told, strict=True):
+        given = of_force[0] != -1.0, of_rate[0] != -1.0  # REP 145
+        for words, there in zip(('linear acceleration', 'angular velocity'), given, strict=True):
             if not there:
                 self.rejected['imu/data', f'says that it has no {words} (covariance -1)'] += 1
         force, rate = (
             np.array(vector) if there else np.full(3, math.nan)
-            for vector, there in zip((forces, rates), told, strict=True)
+            for vector, there in zip((forces, rates), given, strict=True)
         )
         orientation = None
         if of_attitude[0] != -1.0:  # REP 145: -1 is "no orientation"
             orientation = self._orientation(attitude)
-        if orientation is None and not any(told):
+        if orientation is None and not any(given):
             return None
         if self._mounted:
             with np.errstate(all='ignore'):
@@ -195,23 +195,23 @@ class InputConverter:
         return None if values is None else kind(message.stamp, values)
 
     def _reference_odom(self, message: Message) -> ReferenceVelocity | None:
-        """Body velocity from a slip-free source; none where it moves and tells no velocity."""
+        """Body velocity from a slip-free source; none where it moves and holds no velocity."""
         values, place = message.numbers[0].tolist(), message.numbers[1].tolist()
         before, self._place = self._place, place
         if place != before and before is not None and not any(values):
             self.rejected[
-                'reference_odom', 'tells a pose alone: twist and its covariance are 0'
+                'reference_odom', 'holds a pose alone: twist and its covariance are 0'
             ] += 1
             return None
         forward, lateral, covariance = values[0], values[1], values[6:]
         variance = covariance[7]
-        # Zero is what a source that tells no lateral speed sends; 1e6 what it says of it.
-        told = lateral != 0.0 and abs(lateral) < _FASTEST and not variance >= _FASTEST**2
+        # Zero is what a source that measures no lateral speed sends; 1e6 what it says of it.
+        given = lateral != 0.0 and abs(lateral) < _FASTEST and not variance >= _FASTEST**2
         return ReferenceVelocity(
             message.stamp,
             forward,
             covariance[0],
-            lateral if told else math.nan,
+            lateral if given else math.nan,
             variance if variance > 0.0 else 0.0,
         )
 

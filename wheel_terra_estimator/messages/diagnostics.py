@@ -58,7 +58,7 @@ class FaultLog:
         return [f'{subject}: {f.words}' for (subject, _), f in self._faults.items()]
 
     def publish(self) -> list[str]:
-        """Take note that all faults are told; return those that were not before."""
+        """Take note that all faults are reported; return those that were not before."""
         new = []
         for (subject, _), fault in self._faults.items():
             if not fault.published:
@@ -185,10 +185,10 @@ class Diagnostics:
         ``words``: why there are none.
         """
         self.look()
-        told = '; '.join([words, *self._log.standing(self.clock(0))])
+        text = '; '.join([words, *self._log.standing(self.clock(0))])
         stuck = latest is not None and latest.stuck
         values = [('stuck', str(stuck).lower()), *_values(self._counters())]
-        node = self._node_status(STALE, told, values)
+        node = self._node_status(STALE, text, values)
         if latest is not None:
             unknown = replace(
                 latest,

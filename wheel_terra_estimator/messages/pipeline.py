@@ -42,7 +42,7 @@ class Pipeline:
         self.names = configuration.wheels.names
         self.converter = InputConverter(configuration)
         self.core = EstimatorCore(configuration, estimator, judged_by=InputJudge)
-        self.received: Counter[str] = Counter()  # messages heard, by input topic
+        self.received: Counter[str] = Counter()  # messages received, by input topic
         self.diagnostics = Diagnostics(self.names, self.counters, self._faults, node_name)
         # ``transport_faults``, ``transport_values``: return what whoever brings the messages has to
         # say in diagnostics: faults since it was last asked (subject and words), and key-values
@@ -51,7 +51,7 @@ class Pipeline:
         # Gets each measurement before the core does
         self.on_measurement: Callable[[Measurement], object] | None = None
         self._published = 0
-        self._refused: Counter[tuple[str, str]] = Counter()  # as told
+        self._refused: Counter[tuple[str, str]] = Counter()  # as reported
         self._reasons: dict[str, str] = {}  # of the last refusal, by topic
 
     def hear(self, topic: str, message: Any) -> list[EstimateSet]:

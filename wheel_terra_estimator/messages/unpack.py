@@ -3,7 +3,7 @@
 """Messages out of their CDR bytes, for the node and for recordings alike.
 
 rclpy and rosbags make objects of every field of a message, which takes three to ten times as long;
-of the four types that are heard only stamp, names and numbers are used.
+of the four types that are read only stamp, names and numbers are used.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The order in which a live node heard its inputs, for ``wheel-terra replay --arrival``."""
+"""The order in which a live node received its inputs, for ``wheel-terra replay --arrival``."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def why_no_arrival_log(path: Path) -> str:
 class ArrivalLog:
     """Line after line, ``TOPIC STAMP``, `RESET` or `TUNE`, to a file.
 
-    ``inputs``: files that the node reads. ``complain``: is told, once, why the log ends early: a
-    disk that is full ends the log, not the node. Raises UserError where it may not, or cannot, be
-    written.
+    ``inputs``: files that the node reads. ``complain``: is called once with the reason why
+    the log ends early: a disk that is full ends the log, not the node. Raises UserError where it
+    may not, or cannot, be written.
     """
 
     def __init__(

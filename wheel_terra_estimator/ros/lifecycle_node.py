@@ -3,7 +3,7 @@
 """The node: hears the rover's topics, publishes slip, sinkage, pull, classes and warnings.
 
 It is an adapter of `Pipeline`; what it adds is transport: life cycle, quality of service,
-parameters, services, what is kept over a restart, and diagnostics when nothing is heard.
+parameters, services, what is kept over a restart, and diagnostics when nothing arrives.
 Estimation is driven by messages and their stamps alone; the timers run on the steady clock and
 watch over silence.
 """
@@ -70,7 +70,7 @@ MESSAGE_TYPES = {topic: _message_class(name) for topic, name in INPUT_TYPES.item
 WATCH_PERIOD = 0.25  # [s]
 BEHIND = 500_000_000  # [ns] that a message waited, from which on this process is behind
 OVERLOADED = 'left out: this process cannot keep up'
-DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
+DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing arrives
 SILENCE = 1.5  # [s] of the steady clock without a set
 START = 1.0  # [s] in which the node says what it waits for, and not what is missing
 DISCOVERY = 5.0  # [s] in which publishers may not have been found yet: no warning in the log
@@ -319,8 +319,8 @@ class EstimatorNode(LifecycleNode):
             left_out = self._overloaded and topic in FREQUENT and came < last - BEHIND
             self._hear(topic, data, info, OVERLOADED if left_out else '')
         span = last - first
-        heard = min(span, BEHIND) if self._overloaded else span
-        self._overloaded = span > BEHIND and (self._seconds() - begun) * _SECOND > heard
+        limit = min(span, BEHIND) if self._overloaded else span
+        self._overloaded = span > BEHIND and (self._seconds() - begun) * _SECOND > limit
 
     @staticmethod
     def _came(info: dict[str, Any]) -> int:
@@ -340,12 +340,12 @@ class EstimatorNode(LifecycleNode):
         number = info.get('publication_sequence_number')
         if topic in self._shared and number and number < NOT_NUMBERED:
             values = message.numbers[topic == 'joint_states']  # nan: this one does not tell of it
-            told = [name for name, v in zip(message.names, values, strict=False) if v == v]
-            wheels = [name for name in told if name in pipeline.names] if message.names else ['']
+            known = [name for name, v in zip(message.names, values, strict=False) if v == v]
+            wheels = [name for name in known if name in pipeline.names] if message.names else ['']
             self._watch_inputs.mixed(topic, wheels, number)
         number = number if topic in self._numbered else None
         clock = self._nanoseconds()  # 0: none has come yet
-        self._watch_inputs.heard(
+        self._watch_inputs.received(
             topic, now, (clock - message.stamp) / _SECOND if clock else 0.0, number
         )
         if refused:
@@ -490,7 +490,7 @@ class EstimatorNode(LifecycleNode):
     def _watch(self, *taken: _Message) -> None:
         """Keep diagnostics going when stamps do not: silence, or a slowly played bag.
 
-        `taken` is what was taken already and not heard.
+        `taken` is what was taken already and not received.
         """
         if self._pipeline is None:
             return  # was due when the node was cleaned up
@@ -565,7 +565,7 @@ class EstimatorNode(LifecycleNode):
             topic: other_quality(publishers, self._subscriptions_made[topic].qos_profile)
             for topic, publishers in found.items()
         }
-        # With several publishers the counts of their messages cannot be told apart.
+        # With several publishers the counts of their messages cannot be separated.
         single = {topic for topic, publishers in found.items() if len(publishers) == 1}
         self._watch_inputs.believe_gaps(self._numbered & single)
         self._numbered = single
@@ -585,7 +585,7 @@ class EstimatorNode(LifecycleNode):
             age = self._watch_inputs.age(topic, now)
             if age is None:
                 words.append(f'{name}: never received ({self._publishers_in_words(topic)})')
-            elif age > SILENCE and not self._watch_inputs.is_silent(topic, now):  # told as a fault
+            elif age > SILENCE and not self._watch_inputs.is_silent(topic, now):  # a fault
                 words.append(f'{name}: silent for {age:.0f} s')
         for (topic, reason), count in (self._pipeline.rejected - self._rejected).items():
             reason = self._pipeline.converter.in_words(topic, reason)

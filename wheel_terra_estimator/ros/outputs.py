@@ -37,7 +37,7 @@ def make_publisher(node: Node, kind: Any, topic: str, latched: bool = False) -> 
         topic,
         output_profile(latched),
         # rclpy looks at every event handler whenever anything happens, which costs more than a
-        # message. A subscriber whose quality of service does not fit is told so by its own node.
+        # message. A subscriber whose quality of service does not fit is warned by its own node.
         event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
         qos_overriding_options=OVERRIDABLE,
     )

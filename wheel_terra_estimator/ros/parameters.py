@@ -104,7 +104,7 @@ def declare(node: Node, configuration: Configuration) -> None:
 
 
 def descriptor(parameter: Parameter) -> ParameterDescriptor:
-    """Return what tools are told of a parameter: meaning, unit, range, when it may change."""
+    """Return the descriptor of a parameter: meaning, unit, range, when it may change."""
     unit = f' [{parameter.unit}]' if parameter.unit else ''
     tuning = is_tuning(parameter.key)
     when = '' if tuning else '; read-only while the node is configured'

@@ -44,7 +44,7 @@ class _Signals:
 
 
 def run_node(module: str, name: str, args: list[str] | None = None) -> int:
-    """Make the node of a class in a module of `ros` and serve it until it is told to stop."""
+    """Make the node of a class in a module of `ros` and serve it until it is asked to stop."""
     gc.disable()  # until the node stands: what is made so far lives as long as it does
     signals = _Signals() if threading.current_thread() is threading.main_thread() else None
     factory = getattr(import_module(f'{__package__}.{module}'), name)

@@ -39,7 +39,7 @@ class SimulatedDrive:
 
     @property
     def configuration(self) -> Configuration:
-        """What the estimator is told."""
+        """What the estimator receives."""
         return self.scenario.configuration
 
     def __repr__(self) -> str:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the simulated rover is told to do; drives of limited torque, and steering, that follow."""
+"""Commands to the simulated rover; drives of limited torque, and steering, that follow them."""
 
 from __future__ import annotations
 
