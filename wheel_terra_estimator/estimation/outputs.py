@@ -190,12 +190,12 @@ class Outputs:
         return [max(std, least) for std in loads], [max(std, least) for std in pulls]
 
     def _slip_velocity(self, given: Sources) -> tuple[list[float], list[float]]:
-        """Return r w - v of each wheel and its deviation [m/s]."""
+        """Return r w - v of each wheel and its deviation [m/s]; held where no rate is known."""
         velocity, deviation = [], []
         headings = given.headings
         for i, (rim, rim_std) in enumerate(zip(given.rims, self._rim_std, strict=True)):
             if isnan(rim):
-                velocity.append(0.0)
+                velocity.append(given.slips[i].velocity)
                 deviation.append(_UNKNOWN_STD)
                 continue
             velocity.append(rim - headings.speed(i, given.speed, given.yaw_rate))

@@ -263,3 +263,16 @@ def test_the_deviation_of_a_slip_is_that_of_its_two_speeds(rim, v):
     by_v = (slip(rim, v + step) - slip(rim, v - step)) / (2.0 * step)
     expected = np.hypot(by_v * 0.004, by_rim * 0.003)
     assert slip_and_deviation(rim, v, 0.004, 0.003, 0.002)[1] == pytest.approx(expected)
+
+
+def test_slip_and_slip_velocity_are_held_while_no_rate_is_known():
+    parts = Parts(reader.load(SAND))
+    judge = SlipJudge(parts.rover, parts.sensors)
+    body = BodyMotion(0.04, 0.001, 0.0, 0.0, straight_headings(parts.rover), 0.0, False)
+    assert {wheel.velocity for wheel in judge.update(0.9, (float('nan'),) * 6, body)} == {0.0}
+    known = judge.update(1.0, (0.05,) * 6, body)
+    unknown = judge.update(1.1, (float('nan'),) * 6, body._replace(speed=0.01))
+    assert [(w.slip, w.velocity) for w in unknown] == [(w.slip, w.velocity) for w in known]
+    assert known[0].velocity == pytest.approx(0.01)
+    standing = judge.update(1.2, (0.0,) * 6, body._replace(speed=0.0))
+    assert {wheel.velocity for wheel in standing} == {0.0}

@@ -42,6 +42,7 @@ class WheelSlip(NamedTuple):
     rest_since: float = NAN  # [s], nan = not at rest
     resting: bool = False
     judged: bool = False  # its rate is known and it is not at rest: it has a class
+    velocity: float = 0.0  # rim less ground speed [m/s], held where no rate is known
 
 
 class SlipJudge(Component[tuple[WheelSlip, ...]]):
@@ -81,16 +82,16 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
             drift = _DRIFT * headings.across[i] * body.speed
             v_std = math.hypot(v_std, drift)
         if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
-            return self._at_rest(before, time)
+            return self._at_rest(before, time, rim - v)
         slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)
-        return WheelSlip(slip, min(max(std, _LEAST_STD), 1.0), judged=True)
+        return WheelSlip(slip, min(max(std, _LEAST_STD), 1.0), judged=True, velocity=rim - v)
 
-    def _at_rest(self, before: WheelSlip, time: float) -> WheelSlip:
+    def _at_rest(self, before: WheelSlip, time: float, velocity: float) -> WheelSlip:
         """Return a wheel that stands: its slip holds its last value."""
         since = time if isnan(before.rest_since) else before.rest_since
         resting = time - since >= self._rover.rest_time - TIME_ROUNDING
         judged = before.judged and not resting
-        return before._replace(rest_since=since, resting=resting, judged=judged)
+        return before._replace(rest_since=since, resting=resting, judged=judged, velocity=velocity)
 
 
 def slip_and_deviation(
