@@ -553,6 +553,8 @@ class WheelSoilEstimator:
         ekf = self._ekf
         sinkage = ekf.mean[self._layout.sinkage].tolist()
         seen, onward = [], max(known(rims), key=abs, default=0.0)
+        if abs(onward) <= rover.rest_speed:
+            onward = 0.0  # all stand
         for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
             limit, torque = rover.torque_limit[i], wheels.state.torque[i]
             seen.append(

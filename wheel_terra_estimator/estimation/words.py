@@ -36,7 +36,7 @@ def reasons_in_words(
         if isnan(rim):
             text = 'no wheel rate'
         elif stands:
-            text = 'stalled: torque near its limit, hardly turning while others turn'
+            text = 'stalled: torque near its limit, hardly turning'
         elif wheel.resting:
             text = 'at rest'
         else:

@@ -125,6 +125,26 @@ def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
     assert '2 wheels stalled' in found[-1].reason
 
 
+@pytest.mark.parametrize(('torques', 'raises'), [((0.95, 0.8, 0.1, -0.9), True), ((0.95,), False)])
+def test_wheels_that_pull_at_rest_are_stalled_and_two_of_them_raise_it(torques, raises):
+    """Wheels that need less than a second to pull away do not. They spring back as they stop."""
+    monitor = StuckMonitor(SETTINGS)
+    held(monitor, [wheel(0.2, rim=0.05, torque=0.4)] * 4, 2.9)
+    held(monitor, [wheel(0.2, rim=-0.003, torque=-0.9)] * 4, 0.1, start=2.9)
+    torques = (*torques, 0.0, 0.0, 0.0)[:4]
+    stands = [wheel(0.2, rim=0.0, known=False, torque=torque) for torque in torques]
+    found = held(monitor, stands, 10.0, start=3.0)
+    assert found[-1].stalled == tuple(torque > 0.7 for torque in torques)
+    assert not any(any(a.stalled) or a.stuck for a in found[:10])
+    if not raises:
+        assert first(found) is None
+        return
+    assert 1.0 < first(found) < 1.5 and found[-1].direction == 1
+    assert found[-1].reason.startswith('2 wheels stalled near their torque limit')
+    told = [wheel(0.2, rim=math.nan, known=False, torque=torque) for torque in torques]
+    assert not any(held(StuckMonitor(SETTINGS), told, 3.0)[-1].stalled), 'no rates are no rest'
+
+
 @pytest.mark.parametrize('spinning', [True, False])
 def test_a_side_that_turns_round_behind_a_spin_is_no_stall(spinning):
     """Left wheels from -0.3 to 0.5 rad/s within a second, near their torque limit at zero."""

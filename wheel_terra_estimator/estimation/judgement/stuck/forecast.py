@@ -171,6 +171,6 @@ def outlook(s: Situation, settings: StuckSettings) -> Outlook:
     telling = [
         ahead.probability
         for ahead, wheel, stands in zip(found, wheels, s.stalled, strict=True)
-        if wheel.known or stands
+        if wheel.known or (stands and s.moving)
     ]
     return Outlook(tuple(found), median(telling) if telling else 0.0, reach)

@@ -28,8 +28,10 @@ _DEEPENING_RADII, _DEEPENED = 5.0, 0.1
 """Rim travel over which a depth is usual, and how much more is none; both over the radius [-]."""
 _CRUISE_TIME = 5.0  # [s] in which the speed before is forgotten
 _SLOWED = 0.2  # of the rim speed: more is missing where wheels are held, or stopped
+_CREEP = 0.1  # of the speed before: below it no direction is taken, wheels settle as they stop
 NEAR_LIMIT = 0.7
 """Of the torque limit: below it nothing holds the wheels, above it nobody stops them."""
+_PULLING_AWAY = 1.0  # [s] that a wheel of a rover at rest may pull near its limit before it turns
 
 
 class WheelMotion(NamedTuple):
@@ -49,9 +51,12 @@ class WheelMotion(NamedTuple):
 def driving_share(torque: float, limit: float, rim_speed: float) -> float:
     """Return `WheelMotion.torque_share`; nan without a limit or a torque [N m].
 
-    `rim_speed` has the sign of the direction [m/s]: that of the wheel, or of those that turn.
+    `rim_speed` has the sign of the direction [m/s]: that of the wheel, or of those that turn; 0:
+    unknown.
     """
-    return math.copysign(torque, torque * rim_speed) / limit if limit > 0.0 else NAN
+    if limit <= 0.0:
+        return NAN
+    return (math.copysign(torque, torque * rim_speed) if rim_speed else abs(torque)) / limit
 
 
 class RoverMotion(NamedTuple):
@@ -78,6 +83,8 @@ class Memory(NamedTuple):
     depth: float = NAN  # usual typical sinkage over the radius [-]
     way: int = 0  # of the rims: 1 forward, -1 backward, 0 both
     way_since: float = NAN  # [s]
+    pulls_since: float = NAN
+    """Since when all wheels stand and one pulls near its limit [s]; nan = it is not so."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +93,7 @@ class Situation:
 
     motion: RoverMotion
     memory: Memory
+    time: float = NAN  # [s]
 
     @cached_property
     def moving(self) -> tuple[WheelMotion, ...]:
@@ -191,13 +199,22 @@ class Situation:
     @cached_property
     def standing(self) -> bool:
         """Whether the rover stands for want of power, or is about to."""
+        if self.pulls_at_rest:
+            return self.strain > NEAR_LIMIT
         return self._held(self.strain) and (
             self.slowed or self.rim < (1.0 - _SLOWED) * self.fastest
         )
 
     @cached_property
+    def pulls_at_rest(self) -> bool:
+        """Whether the rover stands, and has for too long not turned a wheel that pulls."""
+        return self.time - self.memory.pulls_since > _PULLING_AWAY
+
+    @cached_property
     def stalled(self) -> tuple[bool, ...]:
-        """Wheels that pull near their limit and hardly turn while another turns."""
+        """Wheels that pull near their limit and hardly turn while another turns, or all stand."""
+        if self.pulls_at_rest:
+            return tuple([w.torque_share > NEAR_LIMIT for w in self.motion.wheels])
         return tuple(
             [
                 self._held(w.torque_share) and abs(w.rim_speed) < _STALL_RATIO * self.fastest
@@ -225,9 +242,11 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
     ruts = memory.ruts or tuple([w.sinkage for w in motion.wheels])
     usual = now.depth if isnan(memory.depth) else memory.depth
     way = memory.way
-    if moves:
+    if moves and now.rim > _CREEP * memory.cruise:
         forward = sum([1 if w.rim_speed > 0.0 else -1 for w in now.moving])
         way = (forward > 0) - (forward < 0)
+    stands = not moves and not any(isnan(w.rim_speed) for w in motion.wheels)
+    pulls = stands and any(w.torque_share > NEAR_LIMIT for w in motion.wheels)
     return Situation(
         motion,
         Memory(
@@ -248,5 +267,9 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
             + gain_of(now.rim * dt, _DEEPENING_RADII * now.radius) * (now.depth - usual),
             way=way,
             way_since=memory.way_since if way == memory.way else time,
+            pulls_since=(time if isnan(memory.pulls_since) else memory.pulls_since)
+            if pulls
+            else NAN,
         ),
+        time,
     )
