@@ -57,7 +57,7 @@ def plain_drive():
     return drive()
 
 
-def drive(duration=7.0, seed=3, **keys):
+def drive(duration=5.5, seed=3, **keys):
     base = {'configuration': SAND, 'sensors.jitter': 0.0, 'sensors.sinkage_outliers': 0.0}
     return simulate(load({**base, 'duration': duration, **keys}), seed)
 
@@ -89,7 +89,7 @@ def climbed(climb):
     return estimate(climb, estimator=estimator), estimator, start
 
 
-def last(values, seconds=5):
+def last(values, seconds=3):
     return np.mean(values[-10 * seconds :], axis=0)
 
 
@@ -125,25 +125,19 @@ def test_each_quadrant_has_the_right_signs(slope, speed, climb, climbed):
 
 
 def test_missing_inputs_widen_the_deviations_and_are_said(climb, climbed):
-    start = replace(climb, arrivals=climb.arrivals[: len(climb.arrivals) // 3])
+    start = replace(climb, arrivals=climb.arrivals[: len(climb.arrivals) // 4])
     for mode, key, field in (
         ('no_reference', 'reference', 'slip_std'),
         ('no_torque', 'torque', 'drawbar_pull_std'),
         ('no_sinkage', 'sinkage', 'sinkage_std'),
+        ('no_orientation', 'orientation', None),
     ):
-        poor, full = told_at_the_end(start, mode, climbed)
+        poor = estimate(start, mode)[-1]
+        full = next(s for s in climbed[0] if s.stamp == poor.stamp)
         assert key in poor.faults
         assert key not in full.faults
-        assert getattr(poor, field).mean() > getattr(full, field).mean()
-    poor, full = told_at_the_end(start, 'no_orientation', climbed)
-    assert 'orientation' in poor.faults
-    assert 'orientation' not in full.faults
-
-
-def told_at_the_end(start, mode, climbed):
-    """Return the last set of the start in a mode, and that of all inputs at its stamp."""
-    poor = estimate(start, mode)[-1]
-    return poor, next(s for s in climbed[0] if s.stamp == poor.stamp)
+        if field is not None:
+            assert getattr(poor, field).mean() > getattr(full, field).mean()
 
 
 @pytest.mark.parametrize('law', LAWS[1:])
@@ -158,12 +152,12 @@ def test_each_contact_law_follows_a_climb_with_a_reference(climb, climbed, law):
 def test_snapshot_comes_back_to_the_bit(climb):
     inputs = merged(a.measurement for a in climb.arrivals)
     estimator = WheelSoilEstimator(climb.configuration)
-    for stamp, given in inputs[:300]:
+    for stamp, given in inputs[:200]:
         estimator.step(stamp, given)
     memory = estimator.snapshot()
     ends = []
     for _ in range(2):
-        for stamp, given in inputs[300:400]:
+        for stamp, given in inputs[200:260]:
             estimator.step(stamp, given)
         ends.append(estimator.estimates())
         estimator.restore(memory)
@@ -187,9 +181,9 @@ def test_new_run_keeps_the_soil_only_when_asked(climb, climbed):
 
 
 def test_rest_holds_slip_and_says_unknown():
-    run = drive(**{'drive.time': [0.0, 2.5, 2.6], 'drive.forward': [0.05, 0.05, 0.0]})
+    run = drive(**{'drive.time': [0.0, 2.0, 2.1], 'drive.forward': [0.05, 0.05, 0.0]})
     sets = estimate(run)
-    at_rest = sets[-30:]
+    at_rest = sets[-20:]
     assert all((s.slip_class == SlipClass.UNKNOWN).all() for s in at_rest)
     assert all(np.array_equal(s.slip, at_rest[0].slip) for s in at_rest)
     assert abs(at_rest[-1].forward_velocity) < 1e-3
@@ -197,7 +191,7 @@ def test_rest_holds_slip_and_says_unknown():
 
 def test_locked_wheels_that_slide_have_slip_minus_one():
     estimator, zero = WheelSoilEstimator(reader.load(SAND)), np.zeros(6)
-    for i in range(100):
+    for i in range(50):
         speed = 0.03 if i % 5 == 0 else None
         estimator.step(*step_inputs(0.1 * i, zero, zero, (-1.7, 0.0, 9.6), speed))
     s = estimator.estimates()
@@ -208,9 +202,9 @@ def test_locked_wheels_that_slide_have_slip_minus_one():
 
 
 def test_wheel_without_load_is_found_by_its_torque_and_taken_back():
-    run = drive(15.0, **{'slope.angle_deg': [5.0]}, **fault('lifted', 'front_left', 5.0, 10.0))
+    run = drive(10.0, 2, **{'slope.angle_deg': [5.0]}, **fault('lifted', 'front_left', 3.5, 6.5))
     sets, truth = estimate(run), run.truth
-    lifted, after = slice(70, 95), slice(122, 145)
+    lifted, after = slice(53, 63), slice(87, 99)
     for part in (lifted, after):
         load = np.mean([s.normal_load for s in sets[part]], axis=0)
         assert load == pytest.approx(truth.normal_load[part].mean(axis=0), abs=25.0)
@@ -222,12 +216,12 @@ SLIDE = 9.81 * np.sin(np.radians(20.0))  # weight along 20 degrees, of a kilogra
 
 
 def slid(followed):
-    """Wheels turn forward on 20 degrees; from 4 s on a rover that is followed slides back."""
+    """Wheels turn forward on 20 degrees; from 2 s on a rover that is followed slides back."""
     estimator, sets = WheelSoilEstimator(reader.load(SAND)), []
     force = SLIDE, 0.0, 9.81 * np.cos(np.radians(20.0))
-    for time in 0.1 * np.arange(140):
+    for time in 0.1 * np.arange(90):
         told = followed and round(10 * time) % 5 == 0
-        speed = float(np.clip(0.02 - 0.02 * (time - 4.0), -0.1, 0.02)) if told else None
+        speed = float(np.clip(0.02 - 0.03 * (time - 2.0), -0.1, 0.02)) if told else None
         estimator.step(*step_inputs(time, np.full(6, 0.4), np.full(6, 20.0), force, speed))
         sets.append(estimator.estimates())
     return sets
@@ -260,23 +254,23 @@ def test_torques_alone_carry_no_rover_backwards():
 
 
 def test_a_rover_that_is_stuck_stays_so_without_a_reference_until_the_ground_asks_for_less():
-    """On 8 degrees it digs itself in; its references end, and 12 s later the slope does."""
+    """On 8 degrees it digs itself in; its references end, and 9 s later the slope does."""
     parts = Parts(reader.load(SAND))
     estimator, rover = WheelSoilEstimator(parts.configuration), parts.rover
     torque = 0.35 * np.array(parts.cycle().loads.load) * np.array(rover.slip_radius)
     told = {}
-    for time in np.arange(0.0, 30.0, 0.1):
-        slope = math.radians(8.0 if time < 24.0 else 0.0)
+    for time in np.arange(0.0, 21.0, 0.1):
+        slope = math.radians(8.0 if time < 16.0 else 0.0)
         force = rover.gravity * np.array([math.sin(slope), 0.0, math.cos(slope)])
-        speed = None if time > 12.0 else 0.002 if time > 5.0 else 0.095
+        speed = None if time > 7.0 else 0.002 if time > 2.5 else 0.095
         rate = 0.1 / np.array(rover.slip_radius)
         estimator.step(*step_inputs(time, rate, torque, tuple(force), speed))
         told[round(time)] = estimator.estimates()
-    assert not told[4].stuck and told[4].slip.max() < 0.1
-    assert all(told[time].stuck and told[time].slip.min() > 0.9 for time in range(10, 23))
-    stds = [np.median(told[time].slip_std) for time in (12, 17, 22)]
+    assert not told[2].stuck and told[2].slip.max() < 0.1
+    assert all(told[time].stuck and told[time].slip.min() > 0.9 for time in range(6, 15))
+    stds = [np.median(told[time].slip_std) for time in (7, 11, 15)]
     assert stds == sorted(stds), 'less and less is known'
-    assert not told[29].stuck and told[29].slip.max() < 0.5
+    assert not told[20].stuck and told[20].slip.max() < 0.5
 
 
 @pytest.mark.slow
@@ -298,7 +292,7 @@ def test_nothing_drifts_along_the_ridge_of_slip_and_strength():
 def test_a_wheel_sunk_to_its_hub_is_followed():
     d = plain_drive()
     sunk = 0.98 * float(d.configuration.wheels.radius[0])
-    half = d.arrivals[0].measurement.stamp + 4_000_000_000
+    half = d.arrivals[0].measurement.stamp + 3_000_000_000
     estimator = WheelSoilEstimator(d.configuration)
     for stamp, inputs in merged(inputs_of_mode(d.arrivals, 'reference')):
         if inputs.sinkage is not None and stamp > half:
@@ -361,11 +355,11 @@ def test_wheel_rates_that_come_once_a_second_count():
 def test_a_steered_rover_is_judged_along_its_wheels():
     """On an arc the inner wheels of a steered rover are slow because they are on inner circles."""
     arcs = {
-        'drive__time': [0.0, 2.0, 3.0],
+        'drive__time': [0.0, 0.5, 1.0],
         'drive__forward': [0.05, 0.05, 0.05],
         'drive__turn_rate': [0.0, 0.0, 0.05],
     }
-    drive = simulate(load('steered_turns', **arcs), 4, duration=6.5)
+    drive = simulate(load('steered_turns', **arcs), 4, duration=4.5)
     truth, configuration = drive.truth, drive.configuration
     turning = np.abs(truth.yaw_rate) > 0.03
     assert turning.sum() > 25
@@ -386,10 +380,10 @@ def test_a_steered_rover_is_judged_along_its_wheels():
 
 def test_what_a_standing_wheel_pulled_is_forgotten_when_all_have_stood():
     estimator, pulls = WheelSoilEstimator(reader.load(SAND)), []
-    for i in range(90):
-        rate = np.array([0.4 if i < 60 else 0.0] * 5 + [0.0])
+    for i in range(60):
+        rate = np.array([0.4 if i < 35 else 0.0] * 5 + [0.0])
         torque, speed = np.where(rate > 0.0, 4.0, -4.0), 0.1 * rate[0]
         estimator.step(*step_inputs(0.1 * i, rate, torque, (0.0, 0.0, 9.8), speed))
         pulls.append(float(estimator.estimates().drawbar_pull[5]))
-    assert pulls[59] < -10.0
+    assert pulls[34] < -10.0
     assert pulls[-1] == pytest.approx(0.0, abs=0.1)
