@@ -141,7 +141,7 @@ def test_what_was_not_judged_live_is_not_judged_later(pairs):
 
 def test_a_late_reference_is_smoothed_at_its_own_stamp(drive):
     """However late references come, within the history, the smoothed drive is nearly the same."""
-    early = [a for a in drive.arrivals if a.measurement.stamp < drive.truth.stamp[0] + 5e9]
+    early = [a for a in drive.arrivals if a.measurement.stamp < drive.truth.stamp[0] + 4e9]
 
     def delayed(seconds):
         def arrival(a):
@@ -165,14 +165,14 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
     scenario = load(
         {
             'configuration': ['generic_six_wheel', 'hit_lss1'],
-            'duration': 7.5,
+            'duration': 6.0,
             'slope.angle_deg': [6.0],
-            'drive.time': [0.0, 4.5, 5.5],
+            'drive.time': [0.0, 3.5, 4.5],
             'drive.forward': [0.05, 0.05, -0.05],
         }
     )
     drive = simulate(scenario, 1)
-    turned = drive.truth.stamp[0] + round(5.1e9)  # the commands cross zero at 5 s
+    turned = drive.truth.stamp[0] + round(4.1e9)  # the commands cross zero at 4 s
 
     def slips(until):
         heard = (a.measurement for a in drive.arrivals)
@@ -180,9 +180,9 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
         return {s.stamp: s.slip for s, _ in sets if s.stamp < turned - round(2e9)}
 
     whole, climb = slips(drive.truth.stamp[-1]), slips(turned)
-    assert len(whole) > 25
+    assert len(whole) > 15
     for stamp, slip in climb.items():
-        np.testing.assert_allclose(whole[stamp], slip, atol=0.01)
+        np.testing.assert_allclose(whole[stamp], slip, atol=0.004)
 
 
 def test_a_spool_forgets_what_is_wound_back():
