@@ -81,7 +81,7 @@ def test_without_a_speed_wheels_that_are_read_to_bury_themselves(
 ):
     """At slip 0.1, as it seems; depth in metres per metre of rim travel, from 0.42 radii on."""
     monitor, found = StuckMonitor(SETTINGS), []
-    for i in range(600):  # 25 radii of rim travel
+    for i in range(400):  # 17 radii of rim travel
         deep = min(0.05 + growth * 0.05 * 0.1 * i, 0.12)
         rows = [wheel(0.1)._replace(sinkage=deep if n < wheels else 0.05) for n in range(6)]
         found.append(judge(monitor, 0.1 * i, 0.045, known, rows, depth_read=read))
@@ -92,25 +92,38 @@ def test_without_a_speed_wheels_that_are_read_to_bury_themselves(
         assert 'of their radius deep' in raised.reason
 
 
-def test_steep_climb_that_holds_raises_nothing():
-    slips = [min(0.1 + 0.01 * 0.1 * i, 0.6) for i in range(1500)]
-    assert first(course([[wheel(s)] * 6 for s in slips])) is None
+HOLDS = [[wheel(min(0.1 + 0.001 * i, 0.6))] * 6 for i in range(800)]
+GUESS = wheel(1.0)._replace(slip_std=0.4)
+
+
+@pytest.mark.parametrize(
+    ('rows', 'most'),
+    [
+        (HOLDS, 1.0),  # a steep climb
+        ([[wheel(0.1)] * 5 + [wheel(0.95, rim=0.2)]] * 300, 1.0),
+        ([[GUESS] * 6] * 150, 1.0),  # the first set of a run may say slip 0.95 +- 1
+        # Class 3, but a wheel that is dragged digs nobody in.
+        ([[wheel(-0.97, rim=0.0005)] * 6] * 150, 0.05),
+        ([[wheel(-0.97, rim=0.003, torque=-0.95)] * 6] * 150, 0.05),
+        ([[wheel(-0.97, rim=0.003, torque=0.0)] * 6] * 150, 0.05),
+    ],
+    ids=['climb', 'one spins', 'a guess', 'locked', 'dragged', 'skids'],
+)
+def test_what_is_no_entrapment_raises_nothing(rows, most):
+    found = course(rows)
+    assert first(found) is None
+    assert all(w.probability < most for w in found[-1].wheels)
 
 
 def test_a_near_miss_raises_nothing():
     """Slip peaks at 0.65 while all wheels sink by 1 cm per metre of rim travel, and falls again."""
-    slips = [0.2 + 0.45 * math.exp(-(((0.1 * i - 30.0) / 8.0) ** 2)) for i in range(600)]
+    slips = [0.2 + 0.45 * math.exp(-(((0.1 * i - 30.0) / 8.0) ** 2)) for i in range(500)]
     rows = [
         [wheel(s)._replace(sinkage=0.02 + 0.01 * 0.05 * 0.1 * i)] * 6 for i, s in enumerate(slips)
     ]
     found = course(rows)
     assert max(slips) > 0.64 and first(found) is None
     assert max(a.wheels[0].probability for a in found) < 0.5
-
-
-def test_one_spinning_wheel_raises_nothing():
-    rows = [[wheel(0.1)] * 5 + [wheel(0.95, rim=0.2)] for _ in range(600)]
-    assert first(course(rows)) is None
 
 
 def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
@@ -179,13 +192,13 @@ def test_the_direction_is_that_of_the_rims_that_led_in_and_stays_until_it_clears
         rows = [[wheel(slip, rim=ahead * rim, known=rim != 0.0)] * 6] * round(10 * seconds)
         return course(rows, monitor=monitor, start=start)[-1]
 
-    assert drive(0.2, -0.05, 20.0, 0.0).direction == 0, 'none while it is not stuck'
-    assert drive(0.97, 0.05, 20.0, 20.0).direction == ahead
-    assert drive(0.97, 0.0, 60.0, 40.0).direction == ahead, 'rest changes nothing'
-    backing = drive(0.97, -0.05, 20.0, 100.0)
+    assert drive(0.2, -0.05, 5.0, 0.0).direction == 0, 'none while it is not stuck'
+    assert drive(0.97, 0.05, 10.0, 5.0).direction == ahead
+    assert drive(0.97, 0.0, 20.0, 15.0).direction == ahead, 'rest changes nothing'
+    backing = drive(0.97, -0.05, 10.0, 35.0)
     assert backing.stuck and backing.direction == ahead, 'nor does digging on the way out'
-    assert drive(0.1, -0.05, 20.0, 120.0).direction == 0
-    assert drive(0.97, -0.05, 20.0, 140.0).direction == -ahead, 'a new one is its own'
+    assert drive(0.1, -0.05, 10.0, 45.0).direction == 0
+    assert drive(0.97, -0.05, 10.0, 55.0).direction == -ahead, 'a new one is its own'
 
 
 @pytest.mark.parametrize(
@@ -296,12 +309,8 @@ def test_a_wheel_that_is_dragged_is_not_stalled():
     assert not any(stalled(-0.9).stalled)
 
 
-def test_a_slip_that_nobody_knows_is_not_digging():
-    """The first set of a run may say slip 0.95 +- 1: that is no entrapment in sight."""
-    guess, untold = wheel(1.0)._replace(slip_std=0.4), wheel(0.95)._replace(slip_std=1.0)
-    assert first(course([[guess] * 6] * 300)) is None
-    assert first(course([[wheel(1.0)] * 6] * 300)) is not None
-    outlook = course([[untold] * 6])[0].wheels[0]
+def test_an_entrapment_is_as_near_as_the_slip_is_known():
+    outlook = course([[wheel(0.95)._replace(slip_std=1.0)] * 6])[0].wheels[0]
     assert outlook.probability < 0.05 and outlook.travel == 10.0
     assert course([[wheel(0.95)] * 6])[0].wheels[0].travel == 0.0
 
@@ -395,12 +404,3 @@ def test_the_threshold_is_the_probability_that_raises_it(threshold):
     assert found.stuck and found.wheels[0].probability > threshold
     likely = next(i for i, probability in enumerate(before) if probability > threshold)
     assert len(before) - likely == pytest.approx(5, abs=1), 'for half a second'
-
-
-def test_braking_near_minus_one_is_never_an_entrapment():
-    """Class 3, but a wheel that is dragged digs nobody in."""
-    for rim, torque in ((0.0005, math.nan), (0.003, -0.95), (0.003, 0.0)):
-        rows = [[wheel(-0.97, rim=rim, torque=torque)] * 6 for _ in range(300)]
-        found = course(rows)
-        assert first(found) is None
-        assert all(w.probability < 0.05 for w in found[-1].wheels)
