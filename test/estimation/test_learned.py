@@ -42,7 +42,7 @@ def deviation(key):
 
 @pytest.fixture(scope='module')
 def drive():
-    scenario = {'configuration': ['generic_six_wheel', 'dry_sand_ding2015'], 'duration': 9.0}
+    scenario = {'configuration': ['generic_six_wheel', 'dry_sand_ding2015'], 'duration': 6.0}
     return simulate(load(scenario | {'slope.angle_deg': [8.0]}), 3)
 
 
@@ -129,7 +129,7 @@ def test_the_bias_of_the_accelerometer_has_the_sign_of_the_sensor():
     rim_rate = 0.1 / float(rover.wheels.slip_radius[0])
 
     def driving():
-        for i in range(50 * 6):
+        for i in range(50 * 4):
             stamp = START + i * SECOND // 50
             yield InertialReading(stamp, np.array([0.08, 0.0, GRAVITY]), np.zeros(3), LEVEL)
             if i % 5 == 0:

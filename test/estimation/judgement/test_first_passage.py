@@ -70,7 +70,7 @@ def test_digging_is_what_more_than_half_of_the_wheels_do(sinks, of, digging):
     assert followed(motions).digging == pytest.approx(digging, rel=0.05, abs=1e-9)
 
 
-def simulated(slip, std, deepening, travel, paths=100_000):
+def simulated(slip, std, deepening, travel, paths=40_000):
     """Share of simulated paths that come above 0.9, in steps of 5 cm, exact in each."""
     rng, step = np.random.default_rng(1), 0.05
     # The present slip: what is seen and what slips usually are, each with its own weight.

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Slip on slopes: the learned curve against the one that made the slips, and when it is told."""
 
+import functools
 import math
 
 import numpy as np
@@ -30,7 +31,8 @@ def slip_of(demand, offset=0.03, scale=0.35, greatest=0.5):
     return offset - scale * math.log(1.0 - demand / greatest)
 
 
-def learned(slopes_deg, seconds=200.0, std=0.03, noise=0.02, seed=1):
+@functools.cache
+def learned(slopes_deg, seconds=120.0, std=0.03, noise=0.02, seed=1):
     """A curve that saw a climb through some slopes."""
     rng = np.random.default_rng(seed)
     curve = SlopeCurve()
@@ -73,7 +75,7 @@ def test_a_climb_tells_what_going_down_costs(soil):
     pulls = found.drawbar_pull / 100.0
     assert (np.diff(pulls) > 0.0).all()
     curve = SlopeCurve()
-    for i, demand in enumerate(np.linspace(0.0, 0.6 * pulls.max(), 2000)):
+    for i, demand in enumerate(np.linspace(0.0, 0.6 * pulls.max(), 1200)):
         slip = float(np.interp(demand, pulls, slips))
         curve.update(Instant(i * PERIOD, float(demand), slip, 0.02, RIM * PERIOD, 1.0))
     for slope, most in ((-15.0, 0.25), (-10.0, 0.1), (-5.0, 0.05)):
