@@ -3,6 +3,7 @@
 """Wheels on the ground: turning, wheels without load or standing, smoothed slopes, pulls."""
 
 import math
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -116,21 +117,6 @@ def rigid_body(rover, angles, speed, side, yaw_rate):
     return (velocity[:, :2] * ahead).sum(axis=1), (velocity[:, :2] * left).sum(axis=1)
 
 
-def about_a_point_to_the_left(rover, yaw_rate):
-    """All axles steer about a point 2 m to the left: rim speeds are the distances from it."""
-    distance = 2.0 - np.array(rover.lateral)
-    angles = np.arctan2(rover.longitudinal, distance)
-    return headings(rover, angles.tolist()), yaw_rate * np.hypot(rover.longitudinal, distance)
-
-
-def test_wheels_that_follow_ackermann_are_not_pushed_sideways(parts):
-    yaw_rate = 0.03
-    found, expected = about_a_point_to_the_left(parts.rover, yaw_rate)
-    speeds = [found.speed(i, 2.0 * yaw_rate, yaw_rate) for i in range(6)]
-    assert speeds == pytest.approx(expected)
-    assert found.side_speeds(2.0 * yaw_rate, yaw_rate) == pytest.approx([0.0] * 6, abs=1e-12)
-
-
 def test_any_steering_is_that_of_a_rigid_body_which_slides_least(parts):
     rng = np.random.default_rng(3)
     angles, speed, yaw_rate = rng.uniform(-0.6, 0.6, 6), 0.05, 0.04
@@ -149,8 +135,13 @@ def test_any_steering_is_that_of_a_rigid_body_which_slides_least(parts):
 
 
 def test_wheels_that_roll_ask_for_the_speed_of_the_body(parts):
-    yaw_rate = 0.03
-    found, rims = about_a_point_to_the_left(parts.rover, yaw_rate)
+    """All axles steer about a point 2 m to the left: rim speeds are the distances from it."""
+    rover, yaw_rate = parts.rover, 0.03
+    ahead, aside = np.array(rover.longitudinal), 2.0 - np.array(rover.lateral)
+    found, rims = (
+        headings(rover, np.arctan2(ahead, aside).tolist()),
+        yaw_rate * np.hypot(ahead, aside),
+    )
     asked = [found.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)]
     assert asked == pytest.approx([2.0 * yaw_rate] * 6)
     assert math.isnan(found.body_speed(0, NAN, yaw_rate))
@@ -222,23 +213,21 @@ def test_a_start_is_no_change_of_the_demand():
 # -- Wheels without load ----------------------------------------------------------------------
 
 
-def lifted(parts, torque, *, steps, found=None, lateral_motion=0.0, rims=FORWARD):
+def lifted(parts, torque, steps, lateral_motion=0.0, rims=FORWARD, found=None, start=0):
     found = found or UnloadedWheels(parts.rover, parts.sensors)
-    start = 0.0 if not hasattr(found, 'clock') else found.clock
-    for i in range(steps):
-        time = start + 0.1 * i
-        found.update(parts.cycle(rims, time=time, torque=torque, lateral_motion=lateral_motion))
-    found.clock = start + 0.1 * steps
+    for i in range(start, start + steps):
+        given = {'torque': torque, 'lateral_motion': lateral_motion}
+        found.update(parts.cycle(rims, time=0.1 * i, **given))
     return found
 
 
 def test_a_wheel_without_torque_carries_nothing_and_is_taken_back(parts):
     up, down = (0.5, *(10.0,) * 5), (10.0,) * 6
-    found = lifted(parts, up, steps=3)
+    found = lifted(parts, up, 3)
     assert not any(found.state.unloaded)  # not at once
-    lifted(parts, up, steps=3, found=found)
+    lifted(parts, up, 3, found=found, start=3)
     assert found.state.unloaded == (True, *(False,) * 5)
-    lifted(parts, down, steps=6, found=found)
+    lifted(parts, down, 6, found=found, start=6)
     assert not any(found.state.unloaded)
 
 
@@ -475,111 +464,80 @@ def test_the_residuals_of_known_sums_are_distributed_as_least_squares_does():
     assert found == pytest.approx(np.linalg.lstsq(rows, values, rcond=None)[0])
 
 
-def test_the_pull_of_a_wheel_that_seems_in_the_air_is_as_open_as_its_load(parts):
-    """On a climb of 20 degrees a load that is off by 5 % of the mean gives a third of that."""
-    pulls = Pulls(parts.rover, parts.sensors, (300.0,) * 6)
-    cycle = parts.cycle(loads=(0.0, *(360.0,) * 5), turns=(False, *(True,) * 5))
-    climb = cycle.loads._replace(force=(3.4, 0.0, 9.2))
-    ekf = parts.filter()
-    evidence = PullEvidence(
-        forces_at(parts), None, cycle._replace(loads=climb), (np.nan,) * 6, (np.nan,) * 6, None, 0.0
-    )
-    pulls.update(ekf.mean, 1e-9 * np.eye(len(ekf.mean)), evidence, tilt=0.0)
-    assert pulls.state.pull[0] == 0.0
-    load_std = 300.0 * parts.rover.load_std
-    assert pulls.state.std[0] == pytest.approx(load_std * 3.4 / 9.2, rel=1e-3)
-
-
-def test_a_pull_is_as_open_as_its_load(parts):
-    """A load that is off by a share of the mean one takes as much of its pull along."""
-    forces, cycle, none = forces_at(parts), parts.cycle(), (NAN,) * 6
-    states = []
-    for share in (0.05, 0.2):
-        pulls = Pulls(replace(parts.rover, load_std=share), parts.sensors, (300.0,) * 6)
-        evidence = PullEvidence(forces, None, cycle, none, none, None, 0.0)
+def published_pulls(parts, forces, cycle, excess=NAN, cycles=1, aside=None, load_std=None):
+    """Pulls after cycles in which all torques read `excess` more than the model."""
+    rover = parts.rover if load_std is None else replace(parts.rover, load_std=load_std)
+    pulls = Pulls(rover, parts.sensors, (300.0,) * 6)
+    readings = tuple((forces.torque + excess).tolist())
+    evidence = PullEvidence(forces, None, cycle, readings, (NAN,) * 6, aside, tilt_std=0.0)
+    for _ in range(cycles):
         pulls.update(forces.state, 1e-9 * np.eye(len(forces.state)), evidence, tilt=0.0)
-        states.append(pulls.state)
+    return pulls.state
+
+
+def test_a_pull_is_as_open_as_its_load(parts, here):
+    """A load that is off by a share of the mean one takes as much of its pull along."""
+    cycle = parts.cycle()
+    states = [published_pulls(parts, here, cycle, load_std=share) for share in (0.05, 0.2)]
     of_load = 300.0 * np.array(states[0].pull) / cycle.loads.load
     more = np.square(states[1].std) - np.square(states[0].std)
     assert more == pytest.approx((0.2**2 - 0.05**2) * of_load**2, rel=1e-6)
+    # One that seems in the air, on a climb of 20 degrees: a third of what its load is off by.
+    cycle = parts.cycle(loads=(0.0, *(360.0,) * 5), turns=(False, *(True,) * 5))
+    climb = cycle._replace(loads=cycle.loads._replace(force=(3.4, 0.0, 9.2)))
+    lifted = published_pulls(parts, here, climb)
+    assert lifted.pull[0] == 0.0
+    assert lifted.std[0] == pytest.approx(300.0 * parts.rover.load_std * 3.4 / 9.2, rel=1e-3)
 
 
-def published_pull(parts, excess, lateral_motion=0.0, aside=None):
-    """Pulls after 40 cycles in which all torques read `excess` more than the model."""
-    pulls = Pulls(parts.rover, parts.sensors, (300.0,) * 6)
-    forces, cycle = forces_at(parts), parts.cycle(lateral_motion=lateral_motion)
-    ekf = parts.filter()
-    ekf.mean[:] = forces.state
-    for _ in range(40):
-        pulls.update(
-            ekf.mean,
-            1e-9 * np.eye(len(ekf.mean)),
-            PullEvidence(
-                forces,
-                total=None,
-                cycle=cycle,
-                readings=tuple((forces.torque + excess).tolist()),
-                stationary=(np.nan,) * 6,
-                aside=aside,
-                tilt_std=0.0,
-            ),
-            tilt=0.0,
-        )
-    return np.array(pulls.state.pull), forces
+def published_pull(parts, here, excess, lateral_motion=0.0, aside=None):
+    cycle = parts.cycle(lateral_motion=lateral_motion)
+    return np.array(published_pulls(parts, here, cycle, excess, 40, aside).pull)
 
 
-def test_the_pull_follows_a_torque_that_the_model_does_not_explain(parts):
-    pull, forces = published_pull(parts, 6.0)
-    gain = forces.pull_rows[:, SHEAR_STRENGTH] / forces.torque_rows[:, SHEAR_STRENGTH]
-    assert pull - forces.pull == pytest.approx(6.0 * gain, rel=0.2)
+def test_the_pull_follows_a_torque_that_the_model_does_not_explain(parts, here):
+    pull = published_pull(parts, here, 6.0)
+    gain = here.pull_rows[:, SHEAR_STRENGTH] / here.torque_rows[:, SHEAR_STRENGTH]
+    assert pull - here.pull == pytest.approx(6.0 * gain, rel=0.2)
     # In a turn, too; what the sensor's zero may be is not believed.
-    assert published_pull(parts, 6.0, lateral_motion=0.5)[0] == pytest.approx(pull)
-    assert published_pull(parts, 0.05)[0] == pytest.approx(forces.pull, abs=1e-3)
+    assert published_pull(parts, here, 6.0, lateral_motion=0.5) == pytest.approx(pull)
+    assert published_pull(parts, here, 0.05) == pytest.approx(here.pull, abs=1e-3)
+    # James and Stein (1961) by hand: 1 - 2 noise / excess^2, the noise the sensor's zero alone.
+    parts = copy(parts)
+    parts.sensors = replace(parts.sensors, torque_std=0.0, torque_gain_std=0.0, torque_zero_std=1.0)
+    half = published_pull(parts, here, 2.0)  # 1 - 2 * 1^2 / 2^2 = 0.5
+    assert half - here.pull == pytest.approx(1.0 * gain, rel=1e-2)
 
 
-def test_in_a_steady_turn_the_moments_of_pulls_and_lateral_forces_cancel(parts):
+def test_in_a_steady_turn_the_moments_of_pulls_and_lateral_forces_cancel(parts, here):
     x, y = np.array(parts.rover.longitudinal), np.array(parts.rover.lateral)
-    plain, _ = published_pull(parts, 0.0)
+    plain = published_pull(parts, here, 0.0)
     known = Sideways.unknown((60.0,) * 6)
     for force in (-20.0 * np.sign(x), 5.0 * x):
         aside = replace(known, force=tuple(force), force_std=(1e-6,) * 6)
-        pull, _ = published_pull(parts, 0.0, aside=aside)
+        pull = published_pull(parts, here, 0.0, aside=aside)
         assert np.sum(x * force - y * pull) == pytest.approx(0.0, abs=1e-6)
         assert pull.sum() == pytest.approx(plain.sum(), abs=0.5)
     # base_link elsewhere on the same rover.
-    moved = replace(parts.rover, longitudinal=tuple(x + 0.6), centre_of_gravity=(0.6, 0.0, 0.0))
-    parts.rover = moved
-    assert published_pull(parts, 0.0, aside=aside)[0] == pytest.approx(pull)
+    moved = copy(parts)
+    centre = (0.6, 0.0, 0.0)
+    moved.rover = replace(parts.rover, longitudinal=tuple(x + 0.6), centre_of_gravity=centre)
+    assert published_pull(moved, here, 0.0, aside=aside) == pytest.approx(pull)
     doubted = replace(aside, force_std=(1e6,) * 6)
-    assert published_pull(parts, 0.0, aside=doubted)[0] == pytest.approx(plain, abs=1e-6)
+    assert published_pull(moved, here, 0.0, aside=doubted) == pytest.approx(plain, abs=1e-6)
 
 
-def test_contacts_form_from_half_of_their_length_to_all_of_it(parts):
-    age = ContactAge(parts.rover)
-    told = []
+def test_contacts_form_within_their_length_and_their_doubt_falls_from_there_on(parts):
+    age, forming, variances = ContactAge(parts.rover), [], []
     for _ in range(4):
-        told.append(age.forming)
+        forming.append(age.forming)
         age.advance(0.4 * parts.rover.contact_length)
-    assert told == [False, False, True, False]
-
-
-def test_the_doubt_of_the_shear_model_is_the_stated_one_at_a_contact_length(parts):
-    """And falls by the same factor over each further one."""
-    age, variances = ContactAge(parts.rover), []
+    assert forming == [False, False, True, False]  # from half of their length to all of it
+    age = ContactAge(parts.rover)
     for _ in range(3):
         age.advance(parts.rover.contact_length)
         variances.append(age.shear_variance)
-    assert variances[0] == pytest.approx(START_VARIANCE)
-    assert variances[1] / variances[0] == pytest.approx(np.exp(-DECAY))
-    assert variances[2] / variances[1] == pytest.approx(np.exp(-DECAY))
-
-
-def test_half_of_an_excess_of_twice_the_noise_is_believed(parts):
-    """James and Stein (1961) by hand: 1 - 2 noise / excess^2, the noise the sensor's zero alone."""
-    parts.sensors = replace(parts.sensors, torque_std=0.0, torque_gain_std=0.0, torque_zero_std=1.0)
-    pull, forces = published_pull(parts, 2.0)  # 1 - 2 * 1^2 / 2^2 = 0.5
-    gain = forces.pull_rows[:, SHEAR_STRENGTH] / forces.torque_rows[:, SHEAR_STRENGTH]
-    assert pull - forces.pull == pytest.approx(1.0 * gain, rel=1e-2)
+    assert variances == pytest.approx(START_VARIANCE * np.exp(-DECAY * np.arange(3)))
 
 
 @pytest.mark.parametrize(
