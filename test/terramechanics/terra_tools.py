@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A second wheel-soil model, adaptive and scalar, and random contacts."""
 
+import functools
 import math
 from typing import Any
 
@@ -91,31 +92,26 @@ def second_model(
     )
 
 
-def random_cases(count: int, seed: int) -> list[tuple[Soil, dict, OperatingPoints]]:
-    """Random soils, wheels and loads that a soil can carry."""
-    random = np.random.default_rng(seed)
-    cases = []
-    while len(cases) < count:
-        soil = Soil(
-            random.uniform(0, 2e4),
-            10 ** random.uniform(5.6, 6.7),
-            random.uniform(0.6, 1.3),
-            random.uniform(0, 2000),
-            random.uniform(0.3, 0.8),
-            random.uniform(0.003, 0.03),
-            random.uniform(0.3, 0.6),
-            random.uniform(-0.4, 0.0),
-        )
-        r = random.uniform(0.05, 0.3)
-        wheel = Wheel(r, r * random.uniform(0.5, 1.5), r * random.uniform(0, 0.15), 20)
-        load = random.uniform(1e3, 8e3) * wheel.radius * wheel.width
+@functools.cache
+def random_cases(count: int, seed: int, rows: int = 40) -> list[tuple[Soil, dict, OperatingPoints]]:
+    """Random effects, and under each of them soils, wheels and loads that a soil can carry."""
+    random, cases = np.random.default_rng(seed), []
+    low = (0.0, 5.6, 0.6, 0.0, 0.3, 0.003, 0.3, -0.4, 0.05, 0.5, 0.0, 1e3, -0.6)
+    high = (2e4, 6.7, 1.3, 2e3, 0.8, 0.03, 0.6, 0.0, 0.3, 1.5, 0.15, 8e3, 0.9)
+    for _ in range(count):
+        n1, c2, lam, kappa, onset = random.uniform((0, 0, 0, 0, 0.2), (0.5, 0.3, 1, 2, 0.6))
         effects = {
-            'slip_sinkage_exponent': {'n1': random.uniform(0, 0.5)},
-            'stress_peak_shift': {'c2': random.uniform(0, 0.3)},
-            'lug_shear_radius': {'lam': random.uniform(0, 1)},
-            'soil_mound': {'kappa': random.uniform(0, 2), 'onset': random.uniform(0.2, 0.6)},
+            'slip_sinkage_exponent': {'n1': n1},
+            'stress_peak_shift': {'c2': c2},
+            'lug_shear_radius': {'lam': lam},
+            'soil_mound': {'kappa': kappa, 'onset': onset},
         }
-        row = points(random.uniform(-0.6, 0.9, 4), load, wheel)
-        if not WheelSoilModel(soil, effects, strict=False).steady_state(row).flags.any():
-            cases.append((soil, effects, row))
+        drawn = random.uniform(low, high, (rows, len(low)))
+        for _ in range(2):  # all, then those that are carried
+            kc, kphi, *soil, r, width, lugs, pressure, slip = drawn.T
+            wheel = Wheel(r, r * width, r * lugs, 20)
+            case = Soil(kc, 10.0**kphi, *soil), points(slip, pressure * r * wheel.width, wheel)
+            flags = WheelSoilModel(case[0], effects, strict=False).steady_state(case[1]).flags
+            drawn = drawn[flags == 0]
+        cases.append((case[0], effects, case[1]))
     return cases

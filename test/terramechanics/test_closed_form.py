@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import quad
 from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, state
 
-from wheel_terra_estimator.terramechanics import closed_form
+from wheel_terra_estimator.terramechanics import closed_form, quadrature
 from wheel_terra_estimator.terramechanics.closed_form import branch_moments
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -54,23 +54,40 @@ def test_decoupled_pull_is_exact_for_triangles():
     assert decoupled_pull(torque, load, t1, tm, t2, radius) == pytest.approx(pull, rel=1e-8)
 
 
-@pytest.mark.parametrize('sign', [1.0, -1.0])
-def test_accuracy_over_random_contacts(sign):
-    """Errors of pull and sinkage over slip up to 0.9, or skid."""
-    pull, depth = np.zeros(0), np.zeros(0)
-    for soil, effects, row in random_cases(150, 11):
-        moving = replace(row, slip=sign * np.abs(row.slip))
+@pytest.mark.parametrize('way', ['drives', 'skids', 'slides'])
+def test_accuracy_over_random_contacts(way, monkeypatch):
+    """Errors of forces and sinkage over slip up to 0.9, skid, or slip angles on both sides."""
+    monkeypatch.setattr(quadrature, 'NODES', 40)
+    drawn, errors, depth = np.random.default_rng(4), [], np.zeros(0)
+    for soil, effects, row in random_cases(15, 11):
+        turned = {
+            'drives': {'slip': np.abs(row.slip)},
+            'skids': {'slip': -np.abs(row.slip)},
+            'slides': {'slip_angle': drawn.uniform(-1.5, 1.5, row.slip.shape)},
+        }[way]
         truth, other = (
-            WheelSoilModel(soil, effects, method, strict=False).steady_state(moving)
+            WheelSoilModel(soil, effects, method, strict=False).steady_state(replace(row, **turned))
             for method in ('quadrature', 'closed_form')
         )
         good = (truth.flags == 0) & (other.flags == 0)
-        off = (other.drawbar_pull - truth.drawbar_pull) / row.normal_load
-        pull = np.append(pull, np.abs(off)[good])
+        errors.append(
+            np.array(
+                [
+                    np.abs(getattr(other, name) - getattr(truth, name))[good]
+                    / row.normal_load[good]
+                    for name in ('drawbar_pull', 'lateral_force')
+                ]
+            )
+        )
         depth = np.append(depth, np.abs(other.sinkage / truth.sinkage - 1.0)[good])
-    assert pull.size > 500
+    pull, aside = np.hstack(errors)
+    assert pull.size > 450
     assert np.mean((pull < 0.05) & (depth < 0.1)) > 0.98
     assert np.quantile(pull, 0.95) < 0.01
+    if way == 'slides':
+        off = np.append(pull, aside)
+        assert np.quantile(off, 0.95) < 0.005
+        assert off.max() < 0.03
 
 
 def conditioned(effects: dict, wheel: Wheel = WHEEL) -> ConditionedForces:
@@ -148,7 +165,7 @@ def test_cohesion_alone_is_mobilised_as_in_the_quadrature():
 
 
 def test_balance_without_iteration_agrees_with_the_bracketed_solver():
-    random, count = np.random.default_rng(12), 500
+    random, count = np.random.default_rng(12), 250
     wheel = Wheel(random.uniform(0.05, 0.3, count), random.uniform(0.05, 0.3, count), 0.01, 20)
     # One in ten is more than the soil carries.
     load = 10.0 ** random.uniform(2.0, 5.0, count) * wheel.radius * wheel.width

@@ -72,7 +72,7 @@ def test_a_wheel_is_the_sum_of_its_plates():
     state = ResistiveForce(2.0).steady_state(OperatingPoints(SLIPS, 60.0, WHEEL))
     for k, slip in enumerate(SLIPS):
         hub = 0.15 * (1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip))
-        edges = np.linspace(0.0, state.entrance_angle[k], 20001)
+        edges = np.linspace(0.0, state.entrance_angle[k], 10001)
         load = pull = torque = 0.0
         for a in 0.5 * (edges[1:] + edges[:-1])[::10]:
             x, y = 0.15 * math.sin(a), -0.15 * math.cos(a)

@@ -8,9 +8,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, second_model, state
+from terra_tools import EFFECTS, SAND, WHEEL, points, second_model, state
 
-from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import METHODS, WheelSoilModel
 from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS, Terms, build_contact
@@ -91,29 +90,6 @@ def test_at_90_degrees_the_two_speeds_decide(method):
     locked = state([-1.0], slip_angle=math.pi / 2, method=method)
     assert abs(locked.torque[0]) < 1e-3 * WHEEL.radius * abs(locked.lateral_force[0])
     assert np.isfinite(locked.outputs()).all()
-
-
-def test_closed_form_keeps_to_the_quadrature_sideways(monkeypatch):
-    monkeypatch.setattr(quadrature, 'NODES', 40)
-    drawn = np.random.default_rng(4)
-    errors = []
-    for soil, effects, row in random_cases(120, 4):
-        beta = drawn.uniform(-1.5, 1.5, len(row.slip))
-        tilted = replace(row, slip_angle=beta)
-        truth, other = (
-            WheelSoilModel(soil, effects, method, strict=False).steady_state(tilted)
-            for method in ('quadrature', 'closed_form')
-        )
-        good = (truth.flags == 0) & (other.flags == 0)
-        load = row.normal_load[good]
-        errors += [
-            np.abs((getattr(other, name) - getattr(truth, name))[good] / load)
-            for name in ('drawbar_pull', 'lateral_force')
-        ]
-    off = np.concatenate(errors)
-    assert off.size > 800
-    assert np.quantile(off, 0.95) < 0.005
-    assert off.max() < 0.03
 
 
 def test_flank_needs_sideways_motion_and_grows_with_sinkage():
