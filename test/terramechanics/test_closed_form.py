@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Closed forms: against integrals, the quadrature and finite differences; safe at the edges."""
+"""Closed forms and the balance of loads: against integrals, the quadrature, finite differences."""
 
 import itertools
 import math

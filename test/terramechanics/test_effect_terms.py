@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The catalogue: each effect does what it says, vanishes when neutral, is refused by name."""
+"""The catalogue: effects do what they say, in each form, vanish when neutral, are refused by name."""
 
 import functools
 import itertools

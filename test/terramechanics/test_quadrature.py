@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The reference model against a second model, limit cases, symmetry and scaling."""
+"""The reference model against a second model, limit cases, symmetry and scaling; slip ratios."""
 
 import math
 from dataclasses import replace
