@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Noise as it is seen, on ramps, in means, beside a moving filter; as messages of the IMU state it."""
+"""Noise as it is seen, on ramps and beside a moving filter, and as messages of the IMU state it."""
 
 from dataclasses import replace
 from math import nan, radians

@@ -85,18 +85,6 @@ def test_a_stamp_that_comes_again_with_other_numbers_is_said():
     assert said == {'stamp repeated with other numbers (the newer ones count)': 1}
 
 
-def test_odometry_a_little_later_than_the_imu_still_gets_its_set():
-    core, _ = make_core()
-    core.add(imu(0.0))
-    core.add(odometry(0.0))
-    core.add(imu(0.12, force=7.0))
-    (estimates,) = core.add(odometry(0.1))
-    assert times([estimates]) == [0.1]
-    in_order, _ = make_core()
-    expected = play(in_order, [imu(0.0), odometry(0.0), odometry(0.1)])
-    assert essence([estimates]) == essence(expected[1:])  # without the younger input
-
-
 def test_messages_that_hold_some_of_the_wheels_complete_one_another():
     core, _ = make_core(max_lag=0.2)
     nan = math.nan
@@ -254,6 +242,7 @@ def test_a_late_reference_costs_one_run_of_its_lateness():
         core.add(measurement)
     health = core.health()
     assert health['reference_odom_late'] == 11
+    assert health['clock_steps_back'] == 0
     # Half a second at 50 Hz from a kept state at most 0.1 s before, and one step for each IMU
     # message that has the stamp of the set just given.
     assert health['steps_repeated'] < 11 * 36 + 120 * 1.1
@@ -377,16 +366,6 @@ def test_one_stale_message_ends_no_run():
     )
 
 
-def test_a_reference_that_is_always_late_ends_no_run():
-    core, _ = make_core()
-    stream = [(0.1 * i, odometry(0.1 * i)) for i in range(100)]
-    stream += [(0.5 * i + 1.5, reference(0.5 * i)) for i in range(15)]
-    for _, measurement in sorted(stream, key=lambda pair: pair[0]):
-        core.add(measurement)
-    assert core.health()['clock_steps_back'] == 0
-    assert core.health()['reference_odom_late'] == 15
-
-
 def test_one_stamp_from_the_future_does_no_harm():
     core, _ = make_core()
     stream = drive(2.0)
@@ -419,18 +398,6 @@ def test_a_slow_lone_odometry_gets_its_sets_at_once():
         [60.0],
         [90.0],
     ]
-
-
-def test_wheel_odometry_keeps_the_time_where_clocks_differ_for_good():
-    """An IMU whose clock is an hour ahead is left out; the sets follow the wheels."""
-    core, _ = make_core()
-    sets = []
-    for i in range(200):
-        sets += core.add(imu(3600.0 + 0.02 * i))
-        if i % 5 == 0:
-            sets += core.add(odometry(0.02 * i))
-    assert times(sets)[-10:] == [round(0.1 * i, 6) for i in range(30, 40)]
-    assert core.health()['imu/data_rejected: stamp far ahead of all others'] > 100
 
 
 def _always(offset):

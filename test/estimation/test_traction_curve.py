@@ -113,17 +113,12 @@ def test_measured_wheels_lie_within_the_stated_interval(wheel):
         assert abs(usual.slip - slip) < 1.96 * usual.std
 
 
-def test_half_of_the_greatest_torque_takes_the_scale_times_ln_2():
-    usual = slip_of_torque(0.275)
-    assert usual.slip == pytest.approx(0.17 * math.log(2.0))
+def test_half_of_the_greatest_torque_takes_the_scale_times_ln_2_whichever_way():
+    usual, braking = slip_of_torque(0.275), slip_of_torque(-0.275)
+    assert usual.slip == pytest.approx(0.17 * math.log(2.0)) == -braking.slip
+    assert braking.std == usual.std
     there_and_back = torque_of_slip(np.array([usual.slip, -usual.slip]))
     assert there_and_back == pytest.approx([0.275, -0.275])
-
-
-def test_braking_wheels_skid_as_driving_ones_slip():
-    driving, braking = slip_of_torque(0.3), slip_of_torque(-0.3)
-    assert braking.slip == -driving.slip
-    assert braking.std == driving.std
 
 
 def test_torque_tells_nothing_on_the_plateau_or_where_there_is_none():

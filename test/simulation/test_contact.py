@@ -107,12 +107,6 @@ def test_side_slip_acts_against_the_motion_and_costs_pull(twenty):
     assert (shear < 1.2 * (np.tan(np.radians(31.9)) * load + cohesion)).all()
 
 
-def test_bad_geometry_and_effects_are_refused():
-    wheel = Wheel(np.array([0.2]), np.array([0.1]))
-    with pytest.raises(ValueError, match='not in the catalogue'):
-        ContactModel(wheel, SOIL, wheel.radius, {'magic': {}}, 9.81)
-
-
 @pytest.mark.parametrize('law', LAWS)
 def test_the_ground_of_each_contact_law_is_that_law(law):
     random = np.random.default_rng(9)
