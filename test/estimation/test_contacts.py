@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from parts import SAND, Parts
+from scipy.optimize import minimize_scalar
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.contact_age import DECAY, START_VARIANCE, ContactAge
@@ -121,14 +122,12 @@ def test_any_steering_is_that_of_a_rigid_body_which_slides_least(parts):
     rng = np.random.default_rng(3)
     angles, speed, yaw_rate = rng.uniform(-0.6, 0.6, 6), 0.05, 0.04
     found = headings(parts.rover, angles.tolist())
-    drifts = np.linspace(-0.1, 0.1, 20001)
-    across = [
-        (rigid_body(parts.rover, angles, speed, v, yaw_rate)[1] ** 2).sum() for v in drifts[::100]
-    ]
-    coarse = drifts[::100][int(np.argmin(across))]
-    fine = coarse + np.linspace(-1e-3, 1e-3, 2001)
-    across = [(rigid_body(parts.rover, angles, speed, v, yaw_rate)[1] ** 2).sum() for v in fine]
-    along, aside = rigid_body(parts.rover, angles, speed, fine[int(np.argmin(across))], yaw_rate)
+
+    def sliding(drift):
+        return (rigid_body(parts.rover, angles, speed, drift, yaw_rate)[1] ** 2).sum()
+
+    least = minimize_scalar(sliding, bounds=(-0.1, 0.1), method='bounded', options={'xatol': 1e-9})
+    along, aside = rigid_body(parts.rover, angles, speed, least.x, yaw_rate)
     speeds = [found.speed(i, speed, yaw_rate) for i in range(6)]
     assert speeds == pytest.approx(along.tolist(), abs=1e-5)
     assert found.side_speeds(speed, yaw_rate) == pytest.approx(aside.tolist(), abs=1e-5)

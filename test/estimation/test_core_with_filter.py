@@ -24,7 +24,7 @@ def rover():
     return reader.load(['frostyboy'])
 
 
-def drive(seed, duration=4.0):
+def drive(seed, duration=3.0):
     """A start, a drive and a stop, with all channels and noise."""
     rng = np.random.default_rng(seed)
     noise = rng.standard_normal
@@ -46,7 +46,7 @@ def drive(seed, duration=4.0):
     return sorted(stream, key=lambda m: m.stamp)
 
 
-def tail(duration=4.0):
+def tail(duration=3.0):
     """Wheel odometry after everything has arrived."""
     stamps = [START + round((duration + 1.0 + 0.1 * i) * SECOND) for i in range(3)]
     return [WheelOdometry(stamp, np.full(4, 3.0), np.full(4, 20.0)) for stamp in stamps]
@@ -79,10 +79,10 @@ def test_late_inputs_end_in_the_same_bits(rover, seed):
 
 def test_after_a_reset_nothing_is_left(rover):
     core = EstimatorCore(rover)
-    for m in drive(1):
+    for m in drive(1, 2.0):
         core.add(m)
     core.reset()
-    again, fresh = (play(each, drive(2)) for each in (core, EstimatorCore(rover)))
+    again, fresh = (play(each, drive(2, 2.0)) for each in (core, EstimatorCore(rover)))
     assert list(map(bits, again)) == list(map(bits, fresh))
 
 
