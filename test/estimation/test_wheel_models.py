@@ -10,7 +10,6 @@ import pytest
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelForces, WheelStates
-from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
 from wheel_terra_estimator.terramechanics.contact_law import LAWS, contact_law
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -114,18 +113,6 @@ def test_agrees_with_the_quadrature_at_its_own_steady_state(rover, models, slip)
     )
     firmer = models.bearing(state._replace(stiffness=0.1))
     assert firmer.load == pytest.approx(np.exp(0.1) * bearing.load, rel=0.15)
-
-
-def test_the_default_is_the_closed_form_of_the_configured_soil():
-    rover = rover_with(LAWS[0], KEYS)
-    assert reader.load(['generic_six_wheel']).rover.contact_law == LAWS[0]
-    wheels = rover.wheels
-    effects = rover.effects | SHEARED_LUGS
-    plain = ConditionedForces(wheels.wheel, rover.soil, effects, 'lug_tip')
-    soil = rover.soil.cohesion, np.tan(rover.soil.friction_angle)
-    expected = plain.forces(ConditionedInputs(0.7, 0.02, 290.0, *soil, rover.soil.shear_modulus))
-    answer = contact_models(rover).forces(WheelStates(0.7, 0.02, 290.0))
-    np.testing.assert_allclose((answer.torque, answer.pull), expected, rtol=1e-14)
 
 
 def test_strength_of_the_resistive_force_is_friction_at_the_rim():

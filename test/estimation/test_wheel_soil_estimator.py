@@ -11,11 +11,8 @@ import pytest
 from parts import SAND, Parts, step_inputs
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.contacts.steering import straight_headings
-from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     LeavingAngleReading,
@@ -407,21 +404,6 @@ def run(estimator, seconds, wheels, up=9.8, gap=0.1, rate=0.4):
         estimator.step(*step_inputs(i * gap, rates, torques, (0.1, 0.0, up), speed))
         sets.append(estimator.estimates())
     return sets
-
-
-def test_a_rover_with_one_axle_has_no_curvature_before_it_has_moved():
-    parts = Parts(reader.load(ONE_WHEEL))
-    turning = Turning(parts.rover, parts.sensors)
-    assert turning.curvature(0.05) == 0.0
-    turning.update(
-        InertialWindow(5, 0.0, 0.0, 49.0, rates=5),
-        0.1,
-        0.0,
-        0.05,
-        straight_headings(parts.rover),
-        (0.05,),
-    )
-    assert turning.curvature(0.05) == 0.0
 
 
 @pytest.mark.parametrize('gap', [0.1, 2.0])

@@ -77,14 +77,6 @@ def twenty():
     return wheel, load, forces
 
 
-def test_a_wheel_above_its_depth_of_balance_is_sinking(twenty):
-    *_, forces = twenty
-    ratios = [forces(share, 0.2).support_ratio for share in (0.01, 0.05, 0.2, 0.5)]
-    assert (np.diff(ratios, axis=0) < 0.0).all()
-    assert (ratios[0] > 1.0).all()
-    assert (ratios[-1] < 1.0).all()
-
-
 def test_stiffness_changes_the_support_and_nothing_else(twenty):
     *_, forces = twenty
     soft, firm = forces(0.1, 0.3, stiffness=0.3), forces(0.1, 0.3)

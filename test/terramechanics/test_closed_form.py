@@ -262,11 +262,3 @@ def test_what_three_angles_do_not_settle_goes_to_the_bracketed_solver():
     np.testing.assert_allclose(angle, expected, rtol=1e-8)
     np.testing.assert_allclose(pull, 2.0 * expected, rtol=1e-8)
     np.testing.assert_allclose(torque, 3.0 * expected, rtol=1e-8)
-
-
-def test_soil_without_weight_does_not_bulldoze():
-    light = replace(SAND, density=0.0, cohesion=0.0)
-    plain, pushed = (
-        state(0.3, soil=light, effects=effects) for effects in (None, {'bulldozing': {'kb': 1.0}})
-    )
-    assert plain.drawbar_pull == pytest.approx(pushed.drawbar_pull)

@@ -10,7 +10,6 @@ import pytest
 from terra_tools import SAND, WHEEL, points, second_model, state
 
 from wheel_terra_estimator.terramechanics.kinematics import (
-    shear_displacement,
     slip_of_speed_ratio,
     slip_ratio,
     speed_ratio,
@@ -131,13 +130,3 @@ def test_speed_ratio_is_the_inverse():
     # Opposed, standing, driving, rolling, braking.
     found = slip_of_speed_ratio(np.array([-1.0, -0.0, 0.3, 1.0, 2.5]))
     assert found == pytest.approx([1.0, 1.0, 0.7, 0.0, -0.6])
-
-
-def test_shear_displacement_starts_at_zero_and_has_its_slope():
-    assert shear_displacement(0.5, 0.5, 0.16, 0.1) == 0.0
-    # d j/dt = -(R - (v/w) cos t), from the rim's speed against the soil.
-    t, step = 0.2, 1e-6
-    slope = (
-        shear_displacement(t + step, 0.5, 0.16, 0.1) - shear_displacement(t - step, 0.5, 0.16, 0.1)
-    ) / (2 * step)
-    assert slope == pytest.approx(-(0.16 - 0.1 * math.cos(t)))

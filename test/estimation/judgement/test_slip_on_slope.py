@@ -112,11 +112,6 @@ def test_a_slip_that_fits_the_curve_moves_nothing(offset, demand, monkeypatch):
     np.testing.assert_allclose(curve.state.mean, mean, atol=1e-4)
 
 
-def test_it_is_less_sure_the_farther_it_looks():
-    std = learned((0.0, 5.0, 10.0)).state.latest.std
-    assert (np.diff(std[SLOPES >= 10.0][:3]) > 0.0).all()
-
-
 def test_the_probability_is_that_of_drawn_curves():
     mean, covariance = np.array([0.05, -0.8, -0.7]), np.diag([0.03, 0.2, 0.15]) ** 2
     draws = np.random.default_rng(3).multivariate_normal(mean, covariance, 200_000)
