@@ -110,14 +110,17 @@ def test_a_gyro_without_accelerometer_and_the_reverse_are_kept_apart():
     assert window.mean_force() == pytest.approx((9.8 * np.sin(0.1), 0.0, 9.8 * np.cos(0.1)))
 
 
+PARTS = Parts(reader.load(SAND))
+RADIUS = PARTS.rover.slip_radius[0]
+
+
 def odometry(rate, torque):
     return WheelOdometry(0, np.array(rate), np.array(torque))
 
 
 @pytest.fixture
 def wheels():
-    parts = Parts(reader.load(SAND))
-    return WheelOdometryInput(parts.rover, parts.sensors)
+    return WheelOdometryInput(PARTS.rover, PARTS.sensors)
 
 
 def test_torques_are_means_and_the_last_one_is_held(wheels):
@@ -145,20 +148,16 @@ def test_a_rate_that_is_too_old_is_unknown(wheels):
 def test_fast_odometry_is_smoothed_and_slow_is_not(wheels):
     for i in range(100):
         wheels.update(0.01 * i, odometry([0.4 + (0.1 if i % 2 else -0.1)] * 6, [NAN] * 6))
-    radius = wheels.state.rim_speed[0] / 0.4
-    assert radius == pytest.approx(Parts(reader.load(SAND)).rover.slip_radius[0], rel=0.04)
+    assert wheels.state.rim_speed[0] / 0.4 == pytest.approx(RADIUS, rel=0.04)
     wheels.update(1.09, odometry([0.8] * 6, [NAN] * 6))
-    assert wheels.state.rim_speed[0] == pytest.approx(
-        0.8 * Parts(reader.load(SAND)).rover.slip_radius[0]
-    )
+    assert wheels.state.rim_speed[0] == pytest.approx(0.8 * RADIUS)
 
 
 def test_a_ramp_goes_on_to_the_stamp_of_a_reference_between_two_messages(wheels):
     """A reference velocity halfway through a ramp belongs to the rim speed of its own stamp."""
-    radius = Parts(reader.load(SAND)).rover.slip_radius[0]
     for i in range(10):
         wheels.update(0.1 * i, odometry([0.1 * i] * 6, [NAN] * 6))
-    assert wheels.rim_speeds(0.95)[0] == pytest.approx(0.95 * radius, rel=0.01)
+    assert wheels.rim_speeds(0.95)[0] == pytest.approx(0.95 * RADIUS, rel=0.01)
     # A constant rate that scatters by its noise stays what it is.
     for i in range(10, 40):
         wheels.update(0.1 * i, odometry([0.9 + 0.002 * (-1) ** i] * 6, [NAN] * 6))
@@ -167,23 +166,21 @@ def test_a_ramp_goes_on_to_the_stamp_of_a_reference_between_two_messages(wheels)
 
 def test_smoothing_does_not_put_a_ramp_behind(wheels):
     """Odometry at 100 Hz is smoothed over 50 ms: 5 % of the speed a second after a start."""
-    radius = Parts(reader.load(SAND)).rover.slip_radius[0]
     for i in range(101):
         wheels.update(0.01 * i, odometry([0.01 * i] * 6, [NAN] * 6))
-    assert wheels.state.rim_speed[0] < 0.97 * radius
-    assert wheels.rim_speeds(1.0)[0] == pytest.approx(radius, rel=0.002)
+    assert wheels.state.rim_speed[0] < 0.97 * RADIUS
+    assert wheels.rim_speeds(1.0)[0] == pytest.approx(RADIUS, rel=0.002)
 
 
 def test_a_wheel_in_messages_of_its_own_is_smoothed_by_its_own_rate(wheels):
     """Six wheels at 20 Hz in turns, on a ramp that ends at 1 s."""
-    radius = Parts(reader.load(SAND)).rover.slip_radius[0]
     for i in range(126):
         time, rates = i / 120, np.full(6, NAN)
         rates[i % 6] = min(time, 1.0)
         wheels.update(time, odometry(rates, [NAN] * 6))
         if time == 0.95:
-            np.testing.assert_allclose(wheels.rim_speeds(time), 0.95 * radius, rtol=0.02)
-    np.testing.assert_allclose(wheels.state.rim_speed, radius, rtol=0.03)
+            np.testing.assert_allclose(wheels.rim_speeds(time), 0.95 * RADIUS, rtol=0.02)
+    np.testing.assert_allclose(wheels.state.rim_speed, RADIUS, rtol=0.03)
 
 
 def test_sinkage_and_leaving_angle_are_kept_wheel_by_wheel():

@@ -25,24 +25,25 @@ def distribution(position=THREE, height=0.4, contact_height=0.0, suspension='rig
     )
 
 
-def test_three_wheels_uphill_by_hand():
-    loads = distribution(contact_height=-0.1).loads([2.0, 0.0, 9.0])
-    # Moment about the rear contact: 2 W_front * 2 = m (f_z * 1 - f_x * 0.5).
-    front = 10.0 * (9.0 * 1.0 - 2.0 * 0.5) / 2.0 / 2.0
-    assert loads == pytest.approx([front, front, 90.0 - 2 * front])
+FOUR = np.array([[1.0, 0.5], [1.0, -0.5], [-1.0, 0.5], [-1.0, -0.5]])
 
 
-def test_side_slope_loads_the_lower_side():
-    four = np.array([[1.0, 0.5], [1.0, -0.5], [-1.0, 0.5], [-1.0, -0.5]])
-    loads = distribution(four, 0.5).loads([0.0, 1.0, 9.0])  # left up: the right wheels carry more
-    assert loads.sum() == pytest.approx(90.0)
-    assert loads[1] - loads[0] == pytest.approx(10.0 * 1.0 * 0.5 / 1.0)
-
-
-def test_lifted_wheel_never_pulls_on_the_ground():
-    loads = distribution(height=1.0).loads([-12.0, 0.0, 9.0])
-    assert loads.min() == 0.0
-    assert loads.sum() == pytest.approx(90.0)
+@pytest.mark.parametrize(
+    ('position', 'height', 'contact_height', 'force', 'loads'),
+    [
+        # Uphill, moment about the rear contact: 2 W_front * 2 = m (f_z * 1 - f_x * 0.5).
+        (THREE, 0.4, -0.1, (2.0, 0.0, 9.0), (20.0, 20.0, 50.0)),
+        # Left up: the right wheels carry m f_y h more in all, on a track of 1 m.
+        (FOUR, 0.5, 0.0, (0.0, 1.0, 9.0), (20.0, 25.0, 20.0, 25.0)),
+        # A wheel that is lifted never pulls on the ground.
+        (THREE, 1.0, 0.0, (-12.0, 0.0, 9.0), (45.0, 45.0, 0.0)),
+    ],
+)
+def test_loads_of_a_rigid_chassis_are_those_of_statics(
+    position, height, contact_height, force, loads
+):
+    found = distribution(position, height, contact_height).loads(list(force))
+    assert found == pytest.approx(loads)
 
 
 def test_shares_are_kept_and_checked():

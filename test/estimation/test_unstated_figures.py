@@ -72,35 +72,34 @@ def test_the_prior_of_a_soil_that_nobody_states_is_the_spread_of_the_shipped_one
 
 def test_a_soil_that_somebody_states_is_known_as_well_as_he_says():
     stated = reader.from_parameters({**TEN_LINES, 'soil.shear_modulus': 0.02})
-    assert SoilPriors.from_configuration(stated).shear_modulus_std == pytest.approx(
-        PRIORS.least_shear_modulus_std
-    )
+    least = PRIORS.least_shear_modulus_std
+    assert SoilPriors.from_configuration(stated).shear_modulus_std == pytest.approx(least)
     named = reader.from_parameters({**TEN_LINES, 'soil.name': 'beach'})
     assert not named.soil_stated
 
 
-def test_hard_ground_may_be_stiffer_than_any_soil_but_no_ground_gives_way_by_decimetres():
-    """Shear moduli of soils: 10 to 25 mm in sand, to 36 mm in the shipped ones but one."""
-    configuration = reader.from_parameters(TEN_LINES)
+def bounds_of(**stated):
+    """Return the bounds of the state, and the configuration."""
+    configuration = reader.from_parameters({**TEN_LINES, **stated})
     rover = Rover.from_configuration(configuration)
     layout = layout_of(rover, SensorFigures.from_configuration(configuration))
-    limits = bounds(rover, layout, SoilPriors.from_configuration(configuration))
-    low, high = configuration.soil.shear_modulus * np.exp(
-        [limit[SHEAR_MODULUS] for limit in limits]
-    )
+    return bounds(rover, layout, SoilPriors.from_configuration(configuration)), configuration
+
+
+def test_hard_ground_may_be_stiffer_than_any_soil_but_no_ground_gives_way_by_decimetres():
+    """Shear moduli of soils: 10 to 25 mm in sand, to 36 mm in the shipped ones but one."""
+    limits, configuration = bounds_of()
+    factors = np.exp([limit[SHEAR_MODULUS] for limit in limits])
+    low, high = configuration.soil.shear_modulus * factors
     assert low < 0.001
     assert 0.036 < high < 0.05
 
 
-@pytest.mark.parametrize('n1', [None, 0.4])
+@pytest.mark.parametrize('n1', [0.0, 0.4])
 def test_no_soil_lifts_a_wheel_that_slips(n1):
     """Every slip-sinkage law (Ding 2010, Lyasko 2010) has more sinkage at more slip."""
-    stated = {} if n1 is None else {f'{EFFECT}.enabled': True, f'{EFFECT}.n1': n1}
-    configuration = reader.from_parameters({**TEN_LINES, **stated})
-    rover = Rover.from_configuration(configuration)
-    layout = layout_of(rover, SensorFigures.from_configuration(configuration))
-    least, _ = bounds(rover, layout, SoilPriors.from_configuration(configuration))
-    assert (n1 or 0.0) + least[SLIP_SINKAGE] == pytest.approx(0.0)
+    (least, _), _ = bounds_of(**({f'{EFFECT}.enabled': True, f'{EFFECT}.n1': n1} if n1 else {}))
+    assert n1 + least[SLIP_SINKAGE] == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize('scale', [0.3, 3.0])
