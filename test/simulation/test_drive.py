@@ -40,7 +40,7 @@ def kind(drive: SimulatedDrive, type_: type) -> list[Any]:
 
 @pytest.fixture(scope='module')
 def exact():
-    return simulate(load(EXACT | {'slope.angle_deg': [6.0], 'duration': 8.0}))
+    return simulate(load(EXACT | {'slope.angle_deg': [6.0], 'duration': 6.0}))
 
 
 @pytest.fixture(scope='module')
@@ -78,7 +78,7 @@ def test_exact_sensors_show_the_truth(exact):
         assert message.forward == pytest.approx(speed, abs=5e-4)
         assert message.variance == pytest.approx(0.003**2)
     inertial = kind(exact, InertialReading)
-    assert len(inertial) == pytest.approx(50 * 8, abs=1)
+    assert len(inertial) == pytest.approx(50 * 6, abs=1)
     # Pitch is nose-up negative in the quaternion (REP 103); at rest x shows g sin(pitch).
     assert inertial[-1].orientation[1] == pytest.approx(-np.sin(np.radians(6.0) / 2), abs=0.005)
     assert inertial[-1].specific_force[0] == pytest.approx(9.80665 * np.sin(np.radians(6)), abs=0.1)
@@ -118,7 +118,7 @@ def test_a_seed_is_a_drive_whichever_way_it_is_stepped():
 def test_noise_has_the_stated_size_and_no_message_overtakes_one_of_its_topic():
     changes = {'sinkage_outliers': 0.0, 'jitter': 0.02}
     still = {f'sensors.{name}': value for name, value in changes.items()}
-    drive = simulate(load(LEVEL | still | {'duration': 9.0, 'drive.forward': [0.0]}), 4)
+    drive = simulate(load(LEVEL | still | {'duration': 7.0, 'drive.forward': [0.0]}), 4)
     figures = drive.configuration.sensors
     for type_, name in (
         (SinkageReading, 'sinkage'),
@@ -177,7 +177,7 @@ def test_a_weak_drive_ends_at_a_quarter_of_its_torque_and_a_coasting_one_has_non
         'faults.end': [99.0, 99.0],
     }
     limits = [f'wheels.torque_limit:={[40.0] * 6}']
-    hill = EXACT | faults | {'slope.angle_deg': [8.0], 'duration': 3.5}
+    hill = EXACT | faults | {'slope.angle_deg': [8.0], 'duration': 3.0}
     torque = simulate(load(hill, parameters=limits)).truth.torque[-1]
     assert torque[:2] == pytest.approx([10.0, 0.0], abs=0.05)
     assert (torque[2:] > 11.0).all()
