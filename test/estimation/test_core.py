@@ -112,14 +112,13 @@ class Digging(Failing):
     def estimates(self):
         slip = np.full(2, 0.1 if self.rate > 0.0 else 0.97)
         reasons = ('digs; rover: digs in',) * 2 if self.digs else ('slip',) * 2
-        direction = int(self.digs)
-        return replace(
-            super().estimates(),
-            slip=slip,
-            stuck=self.digs,
-            stuck_direction=direction,
-            reasons=reasons,
-        )
+        warning = {'stuck': self.digs, 'stuck_direction': int(self.digs), 'reasons': reasons}
+        return replace(super().estimates(), slip=slip, **warning)
+
+
+def digging_core():
+    config = configuration(output_rate=0.0, max_lag=0.0)
+    return EstimatorCore(config, Digging(config, 'raise'))
 
 
 @pytest.mark.parametrize(
@@ -127,8 +126,7 @@ class Digging(Failing):
     ['clock steps back', pytest.param('filter fails', marks=pytest.mark.filter_fails)],
 )
 def test_a_warning_and_its_direction_stand_over_a_new_beginning(how):
-    config = configuration(output_rate=0.0, max_lag=0.0)
-    core = EstimatorCore(config, Digging(config, 'raise'))
+    core = digging_core()
     play(core, [odometry(10.0 + 0.1 * i, rate=5.0) for i in range(5)], flush=False)
     start = 0.0
     if how == 'filter fails':
@@ -145,8 +143,7 @@ def test_a_warning_and_its_direction_stand_over_a_new_beginning(how):
 
 
 def test_a_reset_clears_the_warning():
-    config = configuration(output_rate=0.0, max_lag=0.0)
-    core = EstimatorCore(config, Digging(config, 'raise'))
+    core = digging_core()
     play(core, [odometry(10.0 + 0.1 * i, rate=5.0) for i in range(5)], flush=False)
     assert play(core, [odometry(0.1 * i) for i in range(5)])[-1].stuck, 'held over the clock step'
     core.reset()
@@ -155,8 +152,7 @@ def test_a_reset_clears_the_warning():
 
 
 def test_a_gap_between_two_sets_is_no_time_driven_free():
-    config = configuration(output_rate=0.0, max_lag=0.0)
-    core = EstimatorCore(config, Digging(config, 'raise'))
+    core = digging_core()
     core.warning.restore(StuckState(True, 'digs in', stamp_at(-10.0), -1))
     apart = play(core, [odometry(2.0 * i) for i in range(10)])
     assert all(s.stuck and s.stuck_direction == -1 for s in apart)
