@@ -198,14 +198,9 @@ def test_the_demand_gives_its_changes_and_nothing_but_them():
     changes = [demand.update(0.15, 0.1, settled=True) for _ in range(40)]
     assert changes[0] > changes[1] > 0.0
     assert sum(changes) == pytest.approx(0.10, rel=1e-3)
-
-
-def test_a_start_is_no_change_of_the_demand():
-    demand = Demand()
-    demand.update(0.05, 0.1, settled=True)
-    assert demand.update(0.30, 0.1, settled=False) == 0.0
-    assert demand.update(0.30, 0.1, settled=True) == 0.0
-    assert demand.update(NAN, 0.1, settled=True) == 0.0
+    # Nor is a start, nor what nobody knows.
+    for asked, settled in ((0.30, False), (0.30, True), (NAN, True)):
+        assert demand.update(asked, 0.1, settled=settled) == 0.0
     assert demand.state == 0.30
 
 
@@ -282,13 +277,10 @@ def standing_pull(parts, torque, speed, lateral_motion=0.0, speed_std=0.0, other
     return wheels.update(x, speed_std, cycle)[0][0]
 
 
-@pytest.mark.parametrize('torque', [-8.0, 20.0])
-def test_a_dragged_wheel_is_a_drag_whatever_its_jammed_drive_reads(parts, torque):
-    assert standing_pull(parts, torque, 0.05) < -0.2 * 60.0
-    assert standing_pull(parts, -torque, -0.05) > 0.2 * 60.0
-
-
-def test_torque_tells_the_drag_of_a_locked_wheel(parts):
+def test_a_dragged_wheel_is_a_drag_by_its_torque_whatever_its_jammed_drive_reads(parts):
+    for torque in (-8.0, 20.0):
+        assert standing_pull(parts, torque, 0.05) < -0.2 * 60.0
+        assert standing_pull(parts, -torque, -0.05) > 0.2 * 60.0
     assert standing_pull(parts, -8.0, 0.05) < standing_pull(parts, -4.0, 0.05) - 5.0
     # In a turn a torque against the drag may be the soil's.
     straight, turn = (standing_pull(parts, 8.0, 0.05, side) for side in (0.0, 0.5))

@@ -231,11 +231,6 @@ def test_a_sum_tells_none_of_its_parts():
     assert both['a'].verdict == both['b'].verdict == LEARNED
 
 
-def test_a_deviation_that_grew_has_gained_nothing():
-    row = Teaching([Parameter('a', '-', np.ones(1))], np.eye(1)).judged(np.array([[4.0]]))[0]
-    assert (row.verdict, row.bits, row.std) == (ASSUMED, 0.0, 2.0)
-
-
 def test_the_estimator_has_learned_nothing_before_it_drives():
     rows = {row.name: row for row in WheelSoilEstimator(reader.load(SAND)).taught()}
     assert all(row.verdict != LEARNED and row.bits == 0.0 for row in rows.values())
@@ -243,7 +238,9 @@ def test_the_estimator_has_learned_nothing_before_it_drives():
     assert rows['soil.cohesive_modulus'].confounded_with == 'soil.frictional_modulus'
 
 
-def test_what_no_drive_tells_apart_is_never_learned():
+def test_a_deviation_that_grew_has_gained_nothing_nor_what_no_drive_tells_apart():
+    alone = Teaching([Parameter('a', '-', np.ones(1))], np.eye(1)).judged(np.array([[4.0]]))[0]
+    assert (alone.verdict, alone.bits, alone.std) == (ASSUMED, 0.0, 2.0)
     parameters = [Parameter('a', '-', np.ones(1), like='b')]
     row = Teaching(parameters, np.eye(1)).judged(np.array([[0.01]]))[0]
     assert (row.verdict, row.bits, row.std, row.confounded_with) == (CONFOUNDED, 0.0, 1.0, 'b')

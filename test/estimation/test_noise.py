@@ -43,14 +43,15 @@ def read(noise, sensor, std, times, slope=0.0, messages=1):
     return noise.seen(sensor)
 
 
-def test_white_noise_on_a_ramp_is_seen_as_it_is(noise):
-    times = 0.1 * np.arange(400)
-    assert read(noise, 'torque', 0.8, times, slope=5.0) == pytest.approx(0.8, rel=0.08)
-
-
-def test_means_of_several_messages_tell_the_noise_of_one(noise):
-    times = 0.1 * np.arange(800)
-    assert read(noise, 'gyro', 0.01, times, messages=10) == pytest.approx(0.01, rel=0.08)
+@pytest.mark.parametrize(
+    ('sensor', 'std', 'count', 'how'),
+    [
+        ('torque', 0.8, 400, {'slope': 5.0}),
+        ('gyro', 0.01, 800, {'messages': 10}),  # means of several tell the noise of one
+    ],
+)
+def test_white_noise_is_seen_as_it_is_on_a_ramp_and_in_means(noise, sensor, std, count, how):
+    assert read(noise, sensor, std, 0.1 * np.arange(count), **how) == pytest.approx(std, rel=0.08)
 
 
 def test_noise_clearly_beyond_what_is_stated_is_taken_in_its_place(noise):
@@ -85,12 +86,6 @@ def test_noise_that_messages_of_the_imu_state_is_told_as_stated():
     assert '(covariance of imu/data, or sensors.angular_rate_std: ' in words['default']
 
 
-def test_a_factor_that_tells_nothing_is_not_written_out(noise):
-    for i in range(20):
-        noise.compare_reference(float(i), 0.05 * (-1) ** i, 1e-4, 1e-6, stated=1e-300)
-    assert 'reference noise over 1000 times what is stated' in noise.in_words()['stated']
-
-
 def test_what_nobody_stated_is_known_after_the_first_seconds():
     rng = np.random.default_rng(8)
     told, silent = SeenNoise(sensors()), SeenNoise(sensors(), given=())
@@ -113,6 +108,12 @@ def test_steps_and_gaps_are_no_noise(noise):
     before = noise.state.channels['sinkage'].readings
     noise.read('sinkage', 100.0, (0.5, 0.5))
     assert noise.state.channels['sinkage'].readings == before
+
+
+def compared(noise, innovations, variance, filter_variance, *stated):
+    for i, innovation in enumerate(innovations):
+        noise.compare_reference(float(i), innovation, variance, filter_variance, *stated)
+    return noise.seen('reference')
 
 
 @pytest.mark.parametrize('factor', [0.5, 1.0, 4.0])
@@ -141,10 +142,9 @@ def test_a_vibrating_rover_is_told_in_words(noise):
 
 
 def test_a_reference_that_is_off_by_a_constant_is_not_noisy_for_it(noise):
-    rng, std = np.random.default_rng(9), noise.stated['reference']
-    for i in range(600):
-        noise.compare_reference(float(i), 5.0 * std + std * rng.normal(), std**2, 1e-9 * std**2)
-    assert noise.seen('reference') == pytest.approx(std, rel=0.3)
+    std = noise.stated['reference']
+    innovations = std * (5.0 + np.random.default_rng(9).normal(size=600))
+    assert compared(noise, innovations, std**2, 1e-9 * std**2) == pytest.approx(std, rel=0.3)
 
 
 @pytest.mark.parametrize('first', [1, 15])
@@ -160,14 +160,18 @@ def test_wild_references_are_no_noise(noise, first):
 
 @pytest.mark.parametrize(('share', 'told'), [(1.0, False), (0.1, True)])
 def test_a_reference_is_held_against_its_own_covariance(noise, share, told):
-    rng, std = np.random.default_rng(7), 20.0 * noise.stated['reference']
-    for i in range(300):
-        innovation = std * rng.normal()
-        noise.compare_reference(float(i), innovation, std**2, 1e-6 * std**2, (share * std) ** 2)
+    std = 20.0 * noise.stated['reference']
+    innovations = std * np.random.default_rng(7).normal(size=300)
+    seen = compared(noise, innovations, std**2, 1e-6 * std**2, (share * std) ** 2)
+    assert seen == pytest.approx(std, rel=0.3)
     assert noise.report()['reference_noise_stated_m_s'] == pytest.approx(share * std)
-    assert noise.seen('reference') == pytest.approx(std, rel=0.3)
     assert ('covariance of reference_odom' in noise.in_words().get('stated', '')) is told
     assert 'default' not in noise.in_words()
+
+
+def test_a_factor_that_tells_nothing_is_not_written_out(noise):
+    compared(noise, [0.05, -0.05] * 10, 1e-4, 1e-6, 1e-300)
+    assert 'reference noise over 1000 times what is stated' in noise.in_words()['stated']
 
 
 # Noise of the IMU as its messages state it: the same as in a file, and no placeholder.

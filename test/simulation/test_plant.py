@@ -294,14 +294,11 @@ def test_moments_balance_for_any_force():
             assert about_pivot[bogie].sum() == pytest.approx(0.0, abs=1e-6)
 
 
-def test_no_wheel_pulls_on_the_ground():
-    suspension = Suspension(rover('rover.suspension:=rigid'))
-    loads = suspension.normal_loads(180.0, np.array([9.0, 0.0, 4.0]), np.zeros(6), np.zeros(6))
+def test_no_wheel_pulls_on_the_ground_and_given_shares_are_kept():
+    rigid = Suspension(rover('rover.suspension:=rigid'))
+    loads = rigid.normal_loads(180.0, np.array([9.0, 0.0, 4.0]), np.zeros(6), np.zeros(6))
     assert loads.min() >= LEAST_LOAD_SHARE * 180.0 * 4.0 / 6.0 * 0.5
     assert loads.sum() == pytest.approx(720.0)
-
-
-def test_given_shares():
     configuration = rover(
         'rover.suspension:=shares', 'rover.load_shares:=[0.1, 0.1, 0.2, 0.2, 0.2, 0.2]'
     )
