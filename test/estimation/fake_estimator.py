@@ -4,6 +4,7 @@
 
 import math
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -121,6 +122,16 @@ def play(core, measurements, flush=True):
     """Feed the core and return all sets."""
     sets = [estimates for measurement in measurements for estimates in core.add(measurement)]
     return sets + core.flush() if flush else sets
+
+
+def every(step, kind, count, late=0.0, start=0.0):
+    """(time of arrival, message) of a topic whose messages come so much late [s]."""
+    return [(t + late, kind(t)) for t in (start + step * i for i in range(count))]
+
+
+def by_arrival(*topics):
+    """Messages of topics as `every` gives them, in the order of their arrival."""
+    return [m for _, m in sorted((pair for topic in topics for pair in topic), key=itemgetter(0))]
 
 
 def arriving(stream, delays):

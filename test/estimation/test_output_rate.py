@@ -10,8 +10,10 @@ import pytest
 from fake_estimator import (
     FakeEstimator,
     arriving,
+    by_arrival,
     configuration,
     essence,
+    every,
     imu,
     make_core,
     odometry,
@@ -108,8 +110,7 @@ def test_imu_and_sinkage_are_averaged_and_references_stay_at_their_stamps():
 
 def test_a_slow_odometry_does_not_merge_the_imu_over_seconds():
     core, fake = recording_core()
-    stream = [odometry(1.0 * i) for i in range(4)] + [imu(0.02 * i + 0.001) for i in range(150)]
-    play(core, sorted(stream, key=lambda m: m.stamp))
+    play(core, by_arrival(every(1.0, odometry, 4), every(0.02, imu, 150, start=0.001)))
     assert max(b - a for a, b in pairwise([s for s, _ in fake.inputs])) <= 0.15e9
 
 
@@ -210,23 +211,18 @@ def test_punctual_inputs_are_not_held_back():
 def test_a_camera_whose_clock_is_ahead_takes_no_set_away(who, ahead):
     """Two computers, no NTP: the sets are due, and known, as the wheels' stamps say."""
     core, _ = make_core(**DEFAULT)
-    stream = [(t := 0.05 * i, odometry(t)) for i in range(200)]
-    stream += [(t := 0.02 * i + 0.001, imu(t)) for i in range(500)]
-    stream += [(t := 0.5 * i + 0.002, who(t + ahead)) for i in range(2, 20)]
-    stream.sort(key=lambda pair: pair[0])
-    sets = [s for _, m in stream for s in core.add(m)]
+    cameras = every(0.5, who, 18, late=-ahead, start=1.002 + ahead)
+    others = every(0.05, odometry, 200), every(0.02, imu, 500, start=0.001)
+    sets = play(core, by_arrival(*others, cameras), flush=False)
     assert [s.stamp for s in sets] == [stamp_at(0.05 * i) for i in range(200)]
     assert not any('wheel_odometry' in s.faults for s in sets)
 
 
 def test_a_reference_is_never_waited_for():
     core, _ = make_core(**DEFAULT)
-    stream = [(0.05 * i, odometry(0.05 * i)) for i in range(200)]
-    stream += [(0.5 * i + 0.4, reference(0.5 * i)) for i in range(18)]
-    stream.sort(key=lambda pair: pair[0])
-    assert [s.stamp for _, m in stream for s in core.add(m)] == [
-        stamp_at(0.05 * i) for i in range(200)
-    ]
+    stream = by_arrival(every(0.05, odometry, 200), every(0.5, reference, 18, late=0.4))
+    sets = play(core, stream, flush=False)
+    assert [s.stamp for s in sets] == [stamp_at(0.05 * i) for i in range(200)]
 
 
 def test_what_is_later_than_can_be_run_again_is_bounded_counted_and_told():

@@ -11,8 +11,10 @@ import pytest
 from fake_estimator import (
     SECOND,
     arriving,
+    by_arrival,
     configuration,
     essence,
+    every,
     imu,
     make_core,
     odometry,
@@ -225,21 +227,15 @@ def test_an_input_older_than_the_history_is_dropped_and_counted():
 def test_slightly_late_imu_messages_cost_little():
     """250 Hz, each 6 ms later than the odometry of its time: batched, not one run each."""
     core, fake = make_core()
-    stream = [(0.01 * i, odometry(0.01 * i)) for i in range(400)]
-    stream += [(0.004 * i + 0.006, imu(0.004 * i)) for i in range(1000)]
-    for _, measurement in sorted(stream, key=lambda pair: pair[0]):
-        core.add(measurement)
-    distinct = len({m.stamp for _, m in stream})
-    assert fake.steps < 3.5 * distinct
+    stream = by_arrival(every(0.01, odometry, 400), every(0.004, imu, 1000, late=0.006))
+    play(core, stream, flush=False)
+    assert fake.steps < 3.5 * len({m.stamp for m in stream})
 
 
 def test_a_late_reference_costs_one_run_of_its_lateness():
     core, _ = make_core()
-    stream = [(0.1 * i, odometry(0.1 * i)) for i in range(120)]
-    stream += [(0.02 * i + 0.001, imu(0.02 * i)) for i in range(600)]
-    stream += [(1.0 * i + 0.75, reference(1.0 * i + 0.25)) for i in range(11)]  # 0.5 s late
-    for _, measurement in sorted(stream, key=lambda pair: pair[0]):
-        core.add(measurement)
+    wheels, references = every(0.1, odometry, 120), every(1.0, reference, 11, 0.5, start=0.25)
+    play(core, by_arrival(wheels, every(0.02, imu, 600, 0.001), references), flush=False)
     health = core.health()
     assert health['reference_odom_late'] == 11
     assert health['clock_steps_back'] == 0
@@ -286,9 +282,8 @@ def test_stamps_that_are_apart_beyond_what_is_waited_for_are_told(late, clocks, 
 
 def test_sets_go_on_at_five_hertz_while_the_wheel_odometry_is_silent():
     core, _ = make_core()
-    stream = [imu(0.02 * i) for i in range(200)]
-    stream += [odometry(0.1 * i) for i in range(11)] + [odometry(3.0 + 0.1 * i) for i in range(10)]
-    sets = play(core, sorted(stream, key=lambda m: m.stamp))
+    wheels = every(0.1, odometry, 11) + every(0.1, odometry, 10, start=3.0)
+    sets = play(core, by_arrival(every(0.02, imu, 200), wheels))
     silent = [s for s in sets if stamp_at(1.0) < s.stamp < stamp_at(3.0)]
     assert times(silent) == [1.5, 1.7, 1.9, 2.1, 2.3, 2.5, 2.7, 2.9]
     for estimates in silent:
@@ -303,9 +298,7 @@ def test_sets_go_on_at_five_hertz_while_the_wheel_odometry_is_silent():
 def test_wheel_odometry_that_comes_slowly_is_told_with_what_lets_it_count(period):
     """Its class is unknown between, for at most 2.5 periods with the number that is named."""
     end = 20 * period
-    stream = [imu(0.02 * i) for i in range(round(1.5 * end / 0.02))]
-    stream += [odometry(period * i) for i in range(20)]
-    stream.sort(key=lambda m: m.stamp)
+    stream = by_arrival(every(0.02, imu, round(1.5 * end / 0.02)), every(period, odometry, 20))
     sets = play(make_core(output_rate=20.0)[0], stream)
     told = [s.faults.get('wheel_odometry', '') for s in sets if period * 3 < s.stamp / SECOND - 100]
     assert told[0] == f'joint_states comes every {period} s -> filter.silence: {2.5 * period:.1f}'
@@ -435,21 +428,19 @@ def test_topics_of_other_clocks_never_carry_the_time_away_from_the_wheels(clocks
 
 def test_a_lag_that_is_stated_ends_no_run():
     """It may be longer than the history."""
-    stream = [(0.04 * n, imu(0.04 * n)) for n in range(500)]
-    stream += [(t + 3.0, odometry(t)) for t in np.arange(200) * 0.1]
     core, _ = make_core(max_lag=5.0)
-    sets = play(core, [m for _, m in sorted(stream, key=lambda pair: pair[0])])
+    sets = play(core, by_arrival(every(0.04, imu, 500), every(0.1, odometry, 200, late=3.0)))
     assert core.health()['runs'] == 1
     assert sum('wheel_odometry' not in s.faults for s in sets) == 200
 
 
 def test_wheel_odometry_that_comes_late_in_a_burst_ends_no_run():
+    """It stops coming at 8 s and comes at twice its rate from 16 s on."""
     core, _ = make_core(max_lag=-1.0)
-    stream = [(0.01 * n, imu(0.01 * n)) for n in range(2000)]
-    for n in range(1000):
-        t = 0.02 * n
-        stream.append((max(t, 16.0 + 0.01 * t) if t > 8.0 else t, odometry(t)))
-    sets = play(core, [m for _, m in sorted(stream, key=lambda pair: pair[0])])
+    wheels = [
+        (max(t, 16.0 + 0.01 * t) if t > 8.0 else t, m) for t, m in every(0.02, odometry, 1000)
+    ]
+    sets = play(core, by_arrival(every(0.01, imu, 2000), wheels))
     assert core.health()['clock_steps_back'] == 0
     assert 'wheel_odometry' not in sets[-1].faults
 
