@@ -15,12 +15,18 @@ from wheel_terra_estimator.terramechanics.model import METHODS, WheelSoilModel
 from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS, Terms, build_contact
 
 FLANK = {'side_bulldozing': {'ks': 0.8}}
+SECOND_MODEL = ('slip_sinkage_exponent', 'stress_peak_shift', 'lug_shear_radius')
 
 
-@pytest.mark.parametrize(('slip', 'beta'), [(0.3, 0.1), (-0.4, 0.5), (0.0, 0.8), (0.8, 1.4)])
+@pytest.mark.parametrize(
+    ('slip', 'beta'), [(0.3, 0.1), (-0.4, 0.5), (0.0, 0.8), (0.8, 1.4), (0.6, 0.0), (-0.6, 0.0)]
+)
 def test_agrees_with_integrals_of_its_own(slip, beta):
-    truth = second_model(slip, 80.0, beta=beta, ks=0.8)
-    ours = state([slip], slip_angle=beta, effects=FLANK)
+    effects = {name: EFFECTS[name] for name in SECOND_MODEL}
+    truth = second_model(slip, 80.0, n1=0.3 * (beta == 0.0), c2=0.15, lam=0.5, beta=beta, ks=0.8)
+    if beta:  # sliding sideways digs in as slip does: see below
+        del effects['slip_sinkage_exponent']
+    ours = state([slip], slip_angle=beta, effects={**effects, **FLANK})
     found = (*ours.outputs()[0], ours.lateral_force[0])
     assert found == pytest.approx(truth, rel=3e-4, abs=1e-4)
 
