@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The gated filter against the textbook, and over a simulated day."""
+"""The gated filter against the textbook; that it stays sound over a drive: test/lab/evaluation."""
 
 import numpy as np
 import pytest
@@ -53,31 +53,6 @@ def test_nan_never_stays():
     assert np.isfinite(kalman.mean).all()
     assert np.isfinite(kalman.covariance).all()
     assert kalman.restarts == 1
-
-
-def day(steps, every=500):
-    kalman, _ = make(25)
-    rng = np.random.default_rng(2)
-    F = np.eye(25)
-    F[0, 1] = -0.001
-    Q = np.diag(rng.uniform(0.0, 1e-6, 25))
-    Q[3, 3] = 0.0  # a constant: its variance only ever shrinks
-    H = rng.standard_normal((200, 12, 25))
-    noise = rng.standard_normal((200, 12))
-    R = np.full(12, 1e-4)
-    worst = np.inf
-    for i in range(steps):
-        kalman.predict(F @ kalman.mean, F, Q)
-        kalman.update(noise[i % 200] * 1e-2, H[i % 200], R)
-        if i % every == 0:
-            P = kalman.covariance
-            assert (P == P.T).all()
-            worst = min(worst, float(np.linalg.eigvalsh(P).min()))
-    return worst
-
-
-def test_covariance_stays_symmetric_and_positive():
-    assert day(600, every=20) > -1e-15
 
 
 @pytest.mark.filterwarnings('error')
