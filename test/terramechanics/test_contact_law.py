@@ -86,27 +86,8 @@ def test_a_wheel_is_the_sum_of_its_plates():
         assert load == pytest.approx(60.0, rel=2e-3)
         assert state.drawbar_pull[k] == pytest.approx(pull, rel=2e-3, abs=0.02)
         assert state.torque[k] == pytest.approx(torque, rel=2e-3, abs=0.005)
-
-
-def test_limit_of_a_shallow_contact():
-    # Flat plates that slide along the surface: every stress has the same two components.
-    state = ResistiveForce(1.0).steady_state(OperatingPoints([0.5, -0.5], 1e-4, WHEEL))
-    friction = (-0.124 + 0.253 + 0.007) / (0.206 + 0.169)
-    assert state.drawbar_pull == pytest.approx([friction * 1e-4, -friction * 1e-4], rel=0.02)
-    assert state.torque == pytest.approx(0.15 * state.drawbar_pull, rel=0.03)
-    angle = (3.0 * 1e-4 / (0.375e6 * 0.1 * 0.15**2 * 2.0 / 2.0)) ** (1.0 / 3.0)
-    assert state.entrance_angle == pytest.approx(angle, rel=0.02)
-
-
-def test_resistive_forces_scale_with_size():
-    # Stress grows with depth: forces with width and the square of the length.
-    small = ResistiveForce(1.0).steady_state(OperatingPoints(SLIPS, 20.0, WHEEL))
-    large = ResistiveForce(1.0).steady_state(OperatingPoints(SLIPS, 160.0, Wheel(0.3, 0.2)))
-    assert large.sinkage == pytest.approx(2.0 * small.sinkage, rel=1e-8)
-    assert large.drawbar_pull == pytest.approx(8.0 * small.drawbar_pull, rel=1e-6)
-    assert large.torque == pytest.approx(16.0 * small.torque, rel=1e-6)
-    back = OperatingPoints(SLIPS, 20.0, WHEEL, angular_velocity=-1.0)
-    assert ResistiveForce(1.0).steady_state(back).torque == pytest.approx(-small.torque)
+    back = OperatingPoints(SLIPS, 60.0, WHEEL, angular_velocity=-1.0)
+    assert ResistiveForce(2.0).steady_state(back).torque == pytest.approx(-state.torque)
 
 
 def test_the_table_gives_the_forces_of_the_integrals():
