@@ -217,8 +217,8 @@ def config(tmp_path: Path, rover: Configuration) -> list[str]:
     return ['--config', str(tmp_path / 'rover.yaml')]
 
 
-@pytest.fixture
-def proposed_law(tmp_path: Path) -> Path:
+@pytest.fixture(scope='session')
+def proposed_law(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file of a law that no listed effect states, as a diagnosis writes it."""
     law = {
         'enabled': True,
@@ -228,8 +228,9 @@ def proposed_law(tmp_path: Path) -> Path:
         'coefficients_std': [0.01, 0.1],
     }
     values = {f'effects.learned_closure.{key}': value for key, value in law.items()}
-    reader.from_parameters(values, complete=False).write(tmp_path / 'proposal.yaml')
-    return tmp_path / 'proposal.yaml'
+    path = tmp_path_factory.mktemp('law') / 'proposal.yaml'
+    reader.from_parameters(values, complete=False).write(path)
+    return path
 
 
 @pytest.fixture(scope='session')

@@ -10,6 +10,7 @@ import random
 import signal
 import tempfile
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -109,21 +110,42 @@ def parameters(tmp_path):
     return str(path)
 
 
+@pytest.fixture
+def executor():
+    """What turns nodes of this process, in a context of its own."""
+    with _executor() as made:
+        yield made
+
+
+@pytest.fixture
+def listener(executor):
+    """Return a node in this process and a function that spins until a condition holds."""
+    with _listener(executor) as made:
+        yield made
+
+
 @pytest.fixture(scope='class')
-def running_estimator(tmp_path_factory):
-    """One estimator node for the tests of a class, in their order."""
+def running_estimator(tmp_path_factory, proposed_law):
+    """For the tests of a class, in their order: a node with most of what a user can set, a listener
+    as of `listener`.
+    """
     from wheel_terra_estimator.configuration import reader
 
     path = tmp_path_factory.mktemp('estimator') / 'rover.yaml'
     reader.load(['pathfinder']).write(path)
-    process = ForkedProcess('estimator_node', '--ros-args', '--params-file', str(path))
-    yield process
-    process.stop(signal.SIGKILL)
+    arguments = ['--ros-args', '--params-file', str(path), '--params-file', str(proposed_law)]
+    reliable = 'qos_overrides./reference_odom.subscription.reliability:=reliable'
+    for value in ('rover.mass:=20', 'rover.contact_law:=wong_reece', reliable):
+        arguments += ['-p', value]
+    arguments += ['-r', 'joint_states:=/drive/joints']
+    with _executor() as executor, _listener(executor) as listener:
+        process = ForkedProcess('estimator_node', *arguments, constants=SOON)
+        yield process, *listener
+        process.stop(signal.SIGKILL)
 
 
-@pytest.fixture
-def executor():
-    """What turns nodes of this process, in a context of its own."""
+@contextmanager
+def _executor():
     import rclpy
     from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
@@ -136,9 +158,8 @@ def executor():
     rclpy.shutdown(context=context)
 
 
-@pytest.fixture
-def listener(executor):
-    """Return a node in this process and a function that spins until a condition holds."""
+@contextmanager
+def _listener(executor):
     from rclpy.node import Node
 
     node = Node('listener', context=executor.context)

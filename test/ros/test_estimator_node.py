@@ -11,7 +11,6 @@ import pytest
 import ros_types as ros
 
 from wheel_terra_estimator.configuration import reader, shipped
-from wheel_terra_estimator.messages.convert import INPUT_TYPES
 from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS
 
 ROVER = ['--ros-args', '--params-file']
@@ -111,21 +110,24 @@ def test_a_silence_is_put_down_to_what_is_refused_in_it():
     assert words.endswith('/joint_states: rejected: damaged (1 messages)')
 
 
-@pytest.mark.usefixtures('running_estimator')
 class TestOneNode:
-    """One node for all, in this order: it has heard nothing before the last."""
+    """One node for all, in this order: each has heard what the tests before it sent."""
 
-    def test_silence_is_said_in_diagnostics(self, listener):
-        node, until = listener
+    def test_silence_is_said_in_diagnostics_and_log(self, running_estimator):
+        process, node, until = running_estimator
         diagnostics = hear(node, ros.DiagnosticArray, '/diagnostics')
-        until(lambda: diagnostics)
-        until(lambda: 'never received' in diagnostics[-1].status[0].message)
+        until(lambda: diagnostics and 'never received' in diagnostics[-1].status[0].message)
         statuses = diagnostics[-1].status
         assert len(statuses) == 5, 'one per wheel and one for the node'
         assert all(s.level == ros.DiagnosticStatus.STALE for s in statuses)
+        until(lambda: '[WARN]' in process.said())
+        waits, _, warns = process.said().partition('[WARN]')
+        assert 'waiting for /drive/joints, /imu/data' in waits
+        assert 'listening to /drive/joints, /imu/data' in waits
+        assert 'never received' in warns
 
-    def test_topics_types_and_stuck_for_those_who_come_late(self, listener):
-        node, until = listener
+    def test_topics_types_and_stuck_for_those_who_come_late(self, running_estimator):
+        _, node, until = running_estimator
         expected = {
             **dict.fromkeys(JOINT_OUTPUTS, 'sensor_msgs/msg/JointState'),  # listed in test_pack
             'slip_class': 'std_msgs/msg/UInt8MultiArray',
@@ -142,94 +144,63 @@ class TestOneNode:
             assert offered()[f'{NODE}/{topic}'] == kind
             (info,) = node.get_publishers_info_by_topic(f'{NODE}/{topic}')
             assert info.qos_profile.reliability.name == 'RELIABLE'
-        for topic in INPUT_TYPES:
-            if subscribers := node.get_subscriptions_info_by_topic(f'/{topic}'):
-                assert subscribers[0].qos_profile.reliability.name == 'BEST_EFFORT', topic
+        for topic in ('/drive/joints', '/imu/data'):
+            (info,) = node.get_subscriptions_info_by_topic(topic)
+            assert info.qos_profile.reliability.name == 'BEST_EFFORT', topic
         stuck = hear(node, ros.Bool, f'{NODE}/stuck', latched())
-        until(lambda: stuck)
-        assert [m.data for m in stuck] == [False]
         direction = hear(node, ros.Int8, f'{NODE}/stuck_direction', latched())
-        until(lambda: direction)
-        assert [m.data for m in direction] == [0]
+        until(lambda: stuck and direction)
+        assert [m.data for m in (*stuck, *direction)] == [False, 0]
 
-    def test_messages_that_give_no_estimate_are_explained(self, listener):
-        node, until = listener
+    def test_a_proposed_law_is_a_further_file_and_an_integer_may_stand_for_a_number(
+        self, running_estimator
+    ):
+        _, node, until = running_estimator
+        get = node.create_client(ros.GetParameters, f'{NODE}/get_parameters')
+        until(get.service_is_ready)
+        law = 'effects.learned_closure'
+        names = [f'{law}.enabled', f'{law}.targets', f'{law}.coefficients', 'rover.contact_law']
+        future = get.call_async(ros.GetParameters.Request(names=[*names, 'rover.mass']))
+        until(future.done)
+        enabled, targets, coefficients, contact_law, mass = future.result().values
+        assert enabled.bool_value
+        assert list(targets.string_array_value) == ['torque', 'exponent']
+        assert list(coefficients.double_array_value) == [0.05, 0.4]
+        assert contact_law.string_value == 'wong_reece'
+        assert mass.double_value == 20.0
+
+    def test_what_nobody_sends_or_cannot_be_heard_is_named(self, running_estimator):
+        _, node, until = running_estimator
         diagnostics = hear(node, ros.DiagnosticArray, '/diagnostics')
-        wheels = node.create_publisher(ros.JointState, 'joint_states', 10)
+        imu = node.create_publisher(ros.Imu, 'imu/data', 10)
+        message = ros.Imu()
+        message.linear_acceleration.z = 9.81
 
-        def said_after(message, *words):
-            wheels.publish(message)
+        def said(*words):
+            message.header.stamp.sec += 1
+            imu.publish(message)
             return any(all(w in m.status[0].message for w in words) for m in diagnostics)
+
+        until(lambda: said('wheel rates unknown', '/drive/joints: never received (no publishers)'))
+        other = node.create_publisher(ros.Twist, '/drive/joints', 10)
+        offered = ros.QoSProfile(depth=10, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
+        node.create_publisher(ros.Odometry, 'reference_odom', offered)
+        until(lambda: said('geometry_msgs/msg/Twist comes there, needed is sensor_msgs/msg/Joint'))
+        until(lambda: said('/reference_odom: nothing comes from /listener: best effort publisher'))
+        node.destroy_publisher(other)  # a participant has one type on a topic
+
+    def test_messages_that_give_no_estimate_are_explained(self, running_estimator):
+        _, node, until = running_estimator
+        diagnostics = hear(node, ros.DiagnosticArray, '/diagnostics')
+        wheels = node.create_publisher(ros.JointState, '/drive/joints', 10)
+
+        def said_after(message, words):
+            wheels.publish(message)
+            return any(words in m.status[0].message for m in diagnostics)
 
         mast = wheel_message(['mast'], 100.0)
         until(lambda: said_after(mast, 'it but mast; wheels.names: front_left_wheel_joint'))
         until(lambda: said_after(wheel_message(['front_left_wheel_joint'], 0.0), 'stamp is zero'))
-
-
-def test_publisher_of_another_type_or_quality_is_named(start, parameters, listener):
-    node, until = listener
-    diagnostics = hear(node, ros.DiagnosticArray, '/diagnostics')
-    node.create_publisher(ros.Twist, 'joint_states', 10)
-    offered = ros.QoSProfile(depth=10, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
-    node.create_publisher(ros.Odometry, 'reference_odom', offered)
-    wanted = 'qos_overrides./reference_odom.subscription.reliability:=reliable'
-    start('estimator_node', *ROVER, parameters, '-p', wanted)
-
-    def said(words):
-        return any(words in message.status[0].message for message in diagnostics)
-
-    until(lambda: said('geometry_msgs/msg/Twist comes there, needed is sensor_msgs/msg/JointState'))
-    until(lambda: said('/reference_odom: nothing comes from /listener: best effort publisher'))
-
-
-def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, parameters, listener):
-    node, until = listener
-    diagnostics = hear(node, ros.DiagnosticArray, '/diagnostics')
-    imu = node.create_publisher(ros.Imu, 'imu/data', 10)
-    process = start('estimator_node', *ROVER, parameters, '-r', 'joint_states:=/drive/joints')
-    message = ros.Imu()
-    message.linear_acceleration.z = 9.81
-
-    def said(words):
-        message.header.stamp.sec += 1
-        imu.publish(message)
-        return any(words in m.status[0].message for m in diagnostics)
-
-    until(
-        lambda: (
-            said('wheel rates unknown') and said('/drive/joints: never received (no publishers)')
-        )
-    )
-    until(lambda: 'listening to /drive/joints, /imu/data' in process.said())
-
-
-def test_a_proposed_law_is_a_further_file_and_an_integer_may_stand_for_a_number(
-    start, parameters, proposed_law, listener
-):
-    node, until = listener
-    further = [
-        '--params-file',
-        str(proposed_law),
-        '-p',
-        'rover.mass:=20',
-        '-p',
-        'use_sim_time:=true',
-    ]
-    further += ['-p', 'rover.contact_law:=wong_reece']
-    start('estimator_node', *ROVER, parameters, *further)
-    stuck = hear(node, ros.Bool, f'{NODE}/stuck', latched())
-    until(lambda: stuck)
-    get = node.create_client(ros.GetParameters, f'{NODE}/get_parameters')
-    until(get.service_is_ready)
-    law = 'effects.learned_closure'
-    names = [f'{law}.enabled', f'{law}.targets', f'{law}.coefficients', 'rover.contact_law']
-    future = get.call_async(ros.GetParameters.Request(names=names))
-    until(future.done)
-    enabled, targets, coefficients, contact_law = future.result().values
-    assert enabled.bool_value
-    assert list(targets.string_array_value) == ['torque', 'exponent']
-    assert list(coefficients.double_array_value) == [0.05, 0.4]
-    assert contact_law.string_value == 'wong_reece'
 
 
 @pytest.mark.parametrize('others', [(), ('--params-file', str(shipped.find('pathfinder')))])

@@ -21,33 +21,43 @@ from wheel_terra_estimator.configuration import reader
 STALE = b'\x03'
 
 
-def call(node, until, kind, name, **request):
-    client = node.create_client(kind, f'{NODE}/{name}')
-    until(client.service_is_ready)
-    until(answer_to_a_question(node))
-    future = client.call_async(kind.Request(**request))
-    until(future.done)
-    return future.result()
-
-
-def answer_to_a_question(node):
-    """Return whether the node answers: then it has heard of each client that was made before.
-
-    An answer to a client of which it has not heard yet is lost; a question may be asked again.
-    """
-
-    client = node.create_client(ros.GetState, f'{NODE}/get_state')
+@pytest.fixture
+def call(listener):
+    """Return a function that calls a service of the node and returns the answer."""
+    node, until = listener
+    kinds = {
+        'change_state': ros.ChangeState,
+        'get_state': ros.GetState,
+        'reset': ros.Trigger,
+        'save_soil': ros.Trigger,
+        'set_enabled': ros.SetBool,
+        'set_parameters': ros.SetParameters,
+    }
+    # The node hears of the clients in this order, and an answer to a client of which it has not
+    # heard yet is lost; to get the state may be asked again.
+    made = {
+        name: node.create_client(kind, f'{NODE}/{name}')
+        for name, kind in sorted(kinds.items(), key=lambda item: item[0] == 'get_state')
+    }
     asked, turns = [], itertools.count()
 
-    def answered():
-        if client.service_is_ready() and next(turns) % 20 == 0:
-            asked.append(client.call_async(ros.GetState.Request()))
+    def hears_all():
+        ready = all(client.service_is_ready() for client in made.values())
+        if ready and next(turns) % 20 == 0:
+            asked.append(made['get_state'].call_async(ros.GetState.Request()))
         return any(future.done() for future in asked)
 
-    return answered
+    def answer(name, **request):
+        if not asked:
+            until(hears_all)
+        future = made[name].call_async(kinds[name].Request(**request))
+        until(future.done)
+        return future.result()
+
+    return answer
 
 
-def test_life_cycle_services_and_live_parameters(start, parameters, listener, tmp_path):
+def test_life_cycle_services_and_live_parameters(start, parameters, listener, call, tmp_path):
     names = reader.load(['pathfinder']).wheels.names
     node, until = listener
     soil = tmp_path / 'soil.yaml'
@@ -61,10 +71,10 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
 
     def change(transition):
         wanted = ros.Transition(id=transition)
-        return call(node, until, ros.ChangeState, 'change_state', transition=wanted).success
+        return call('change_state', transition=wanted).success
 
     def state():
-        return call(node, until, ros.GetState, 'get_state').current_state.label
+        return call('get_state').current_state.label
 
     def drive(condition):
         def step():
@@ -83,10 +93,10 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
     def set_parameter(name, value):
         kind = ros.ParameterValue(type=ros.ParameterType.PARAMETER_DOUBLE, double_value=value)
         wanted = [ros.Parameter(name=name, value=kind)]
-        return call(node, until, ros.SetParameters, 'set_parameters', parameters=wanted).results[0]
+        return call('set_parameters', parameters=wanted).results[0]
 
     assert state() == 'unconfigured'
-    assert not call(node, until, ros.Trigger, 'reset').success
+    assert not call('reset').success
     for transition in (ros.Transition.TRANSITION_ACTIVATE, ros.Transition.TRANSITION_CLEANUP, 250):
         assert not change(transition)
     assert state() == 'unconfigured'
@@ -105,12 +115,12 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
     # The filter had gone on: stamps do not begin anew.
     assert slip[0].header.stamp.sec + 1e-9 * slip[0].header.stamp.nanosec > 100.0
 
-    assert call(node, until, ros.SetBool, 'set_enabled', data=False).success
+    assert call('set_enabled', data=False).success
     drive(lambda: said[-1].status[0].message.startswith('disabled'))
     count = len(slip)
     drive(lambda: sent % 10 == 0)
     assert len(slip) == count
-    assert call(node, until, ros.SetBool, 'set_enabled', data=True).success
+    assert call('set_enabled', data=True).success
     drive(lambda: len(slip) > count + 2)
 
     refused = set_parameter('rover.mass', 1.0)
@@ -121,13 +131,13 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
     assert not rate_is_two()
     drive(rate_is_two)
 
-    answer = call(node, until, ros.Trigger, 'save_soil')
+    answer = call('save_soil')
     assert answer.success and answer.message == str(soil)
     again = reader.load([parameters, soil])
     assert again.soil.cohesion > 0.0 and 'soil.cohesion' in again.stated
     assert json.loads(soil.with_name('soil.yaml.state.json').read_text())['stuck'] is False
 
-    assert call(node, until, ros.SetBool, 'set_enabled', data=False).success
+    assert call('set_enabled', data=False).success
     assert change(ros.Transition.TRANSITION_DEACTIVATE)
     assert change(ros.Transition.TRANSITION_CLEANUP)
     assert state() == 'unconfigured'
@@ -160,7 +170,7 @@ def test_what_is_stated_is_the_same_after_a_cleanup(listener, parameters):
         estimator.destroy_node()
 
 
-def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener, tmp_path):
+def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener, call, tmp_path):
     from wheel_terra_estimator.configuration.soil_file import write_values
 
     node, until = listener
@@ -193,11 +203,11 @@ def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener
 
     until(told)
     assert len(stuck) == 1, 'rest does not clear it'
-    assert call(node, until, ros.Trigger, 'reset').success
+    assert call('reset').success
     until(lambda: not stuck[-1].data and direction[-1].data == 0)
     assert not state.exists()
     until(lambda: told() and sent % 20 == 0)
-    assert not call(node, until, ros.Trigger, 'save_soil').message.endswith('empty')
+    assert not call('save_soil').message.endswith('empty')
     written = reader.load([parameters, soil]).soil.cohesion
     assert written == pytest.approx(432.1, rel=0.2)
     status, words = process.stop(signal.SIGINT)
@@ -236,6 +246,7 @@ def test_a_closing_that_hangs_is_cut_short(monkeypatch):
     from wheel_terra_estimator.ros import process
 
     assert process.LONGEST_END <= 1.0
+    monkeypatch.setattr(process, 'LONGEST_END', 0.05)
     ended, status = threading.Event(), []
     monkeypatch.setattr(process.os, '_exit', lambda number: (status.append(number), ended.set()))
     before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
@@ -270,12 +281,10 @@ def test_wrong_parameters_end_it_with_one_line(start, parameters, tmp_path):
 
 
 @pytest.mark.parametrize('home', [None, '/proc'])
-def test_where_no_log_can_be_written_the_first_line_names_the_cure(
-    start_interpreter, monkeypatch, home
-):
+def test_where_no_log_can_be_written_the_first_line_names_the_cure(start, monkeypatch, home):
     for name in ('HOME', 'ROS_HOME', 'ROS_LOG_DIR'):
         monkeypatch.delenv(name, raising=False)
     if home:
         monkeypatch.setenv('HOME', home)
-    said, _ = start_interpreter('traction_limiter_node').communicate(timeout=60.0)
+    _, said = start('traction_limiter_node').stop()
     assert 'set ROS_LOG_DIR' in said.splitlines()[0]
