@@ -6,12 +6,10 @@ import errno
 import json
 import os
 import resource
-import signal
 from pathlib import Path
 
 import pytest
-import ros_types as ros
-from test_estimator_node import ROVER, hear
+from test_estimator_node import ROVER
 
 from wheel_terra_estimator import output_folder
 from wheel_terra_estimator.configuration import reader
@@ -158,15 +156,6 @@ def test_the_folder_is_on_the_disk_behind_each_rename(tmp_path, monkeypatch):
     for name in ('s.yaml', 's.yaml.state.json'):
         file = synced.index((tmp_path / name).stat().st_ino)
         assert tmp_path.stat().st_ino in synced[file:]
-
-
-def test_a_place_that_takes_no_file_is_told_at_the_start(start, parameters, listener):
-    node, until = listener
-    said = hear(node, ros.DiagnosticArray, '/diagnostics')
-    path = '/proc/s.yaml'
-    process = start('estimator_node', *ROVER, parameters, '-p', f'soil_file:={path}')
-    until(lambda: any(f'soil_file: {path}: ' in m.status[0].message for m in said))
-    process.stop(signal.SIGINT)
 
 
 @pytest.mark.parametrize('name', ['soil_file', 'record_arrival'])
