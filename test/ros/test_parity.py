@@ -14,7 +14,7 @@ from recordings import beginning
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 
-SECONDS = 6.0
+SECONDS = 4.0
 """Of a recording that is played."""
 NODE = 'estimator_node'
 DEMO = Path(__file__).resolve().parents[2] / 'data' / 'demo'
@@ -73,9 +73,10 @@ def assert_same_bits(live, again, least):
 
 @pytest.fixture
 def forked_node(monkeypatch):
-    """The player of a recording gets its node from the server."""
+    """The player of a recording gets its node from the server, and waits less for its last word."""
     from wheel_terra_lab import live_drive
 
+    monkeypatch.setattr(live_drive, 'QUIET', 1.0)
     monkeypatch.setattr(live_drive, 'start_node', lambda given: ForkedProcess(NODE, *given))
 
 
@@ -91,7 +92,7 @@ def test_live_and_replayed_numbers_are_the_same_bits(bag, tmp_path):
     logged = ['--arrival', str(arrival), *REPLAY[bag]]
     run_live(source, live, '--rate', '4', *logged)
     assert main(['replay', str(source), '-o', str(again), *logged]) == 0
-    assert_same_bits(live, again, least=12)
+    assert_same_bits(live, again, least=8)
 
 
 @pytest.mark.usefixtures('forked_node')
@@ -101,7 +102,7 @@ def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
     source = beginning(DEMO / 'pathfinder', tmp_path / 'source', SECONDS)
     run_live(source, live, *REPLAY['pathfinder'])
     assert main(['replay', str(source), '-o', str(again), *REPLAY['pathfinder']]) == 0
-    assert_same_bits(live, again, least=50)
+    assert_same_bits(live, again, least=30)
 
 
 def test_ctrl_c_ends_a_live_drive_without_a_traceback(start, tmp_path):
