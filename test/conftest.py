@@ -37,16 +37,6 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile('same')
 
-LONGEST = (
-    'ros/test_parity.py',
-    'ros/test_transport_faults.py',
-    'discrepancy',
-    'estimation/test_wheel_soil_estimator.py',
-)
-"""Files and folders that begin first, so that no worker ends long after the others."""
-WAITING, BETWEEN = 'ros', 3
-"""A folder whose tests wait most of their time: so many files that compute go between two of it."""
-
 
 def pytest_xdist_auto_num_workers() -> int:
     """Two more than cores: tests of nodes wait most of their time."""
@@ -54,23 +44,8 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Sort the files, each as it stands: the longest first, those that wait among the others."""
-    here = Path(__file__).parent
-
-    def rank(file: Path) -> int:
-        path = file.relative_to(here) if file.is_relative_to(here) else file
-        names = {path.as_posix(), path.parts[0]}
-        return next((i for i, name in enumerate(LONGEST) if name in names), len(LONGEST))
-
-    files = sorted(dict.fromkeys(item.path for item in items), key=rank)
-    waiting = [file for file in files if file.parent.name == WAITING]
-    order = []
-    for number, file in enumerate(file for file in files if file.parent.name != WAITING):
-        if waiting and number % BETWEEN == 0:
-            order.append(waiting.pop(0))
-        order.append(file)
-    place = {file: number for number, file in enumerate([*order, *waiting])}
-    items.sort(key=lambda item: place[item.path])
+    """Sort the files by name: those of nodes, which wait, lie among those that compute."""
+    items.sort(key=lambda item: (item.path.name, item.path))
 
 
 def pytest_collection_finish() -> None:
