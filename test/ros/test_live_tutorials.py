@@ -42,15 +42,13 @@ def named_in_table(page, below):
     return re.findall(r'^\| `~/(\w+)` \| `(\w+)` \|', text, re.M)
 
 
-def test_the_live_tutorials_in_one_drive(start, listener, tmp_path):
+def test_the_live_tutorials_in_one_drive(start, parameters, listener):
     """Drive on firm ground; every topic of the controller's table comes, the command passes."""
-    configuration = reader.load(['pathfinder'])
-    rover = tmp_path / 'my_rover.yaml'
-    configuration.write(rover)
+    wheels_of = reader.load(['pathfinder']).wheels
     found = runs('node')
     assert set(found) == {'estimator_node', 'traction_limiter_node'}
     for executable, arguments in found.items():
-        start(executable, *(str(rover) if a == rover.name else a for a in arguments))
+        start(executable, *(parameters if a == 'my_rover.yaml' else a for a in arguments))
 
     node, until = listener
     table = named_in_table('node', '## Feeding a controller')
@@ -75,8 +73,8 @@ def test_the_live_tutorials_in_one_drive(start, listener, tmp_path):
         )
     )
 
-    names, rate, clock = configuration.wheels.names, 1.0, 100.0
-    speed = rate * float(configuration.wheels.slip_radius[0])
+    names, rate, clock = wheels_of.names, 1.0, 100.0
+    speed = rate * float(wheels_of.slip_radius[0])
     command = ros.TwistStamped()
     command.twist.linear.x = speed
 

@@ -7,22 +7,20 @@ import signal
 import time
 
 import pytest
+from test_estimator_node import ROVER
 
 from wheel_terra_estimator.configuration import reader
 
-ROVER = 'generic_six_wheel'
 RATES = {'joint_states': 100.0, 'imu/data': 100.0, 'sinkage': 10.0, 'reference_odom': 5.0}
 
 
 @pytest.fixture
-def drive(executor, start, tmp_path):
+def drive(executor, start, parameters):
     """A rover that publishes all inputs, and what turns it and starts a node."""
     from wheel_terra_lab.studies.live_rover import Rover
 
-    configuration = reader.load([ROVER])
-    path = tmp_path / 'rover.yaml'
-    configuration.write(path)
-    rover = Rover(configuration.wheels.names, RATES, context=executor.context)
+    names = reader.load(['pathfinder']).wheels.names
+    rover = Rover(names, RATES, context=executor.context)
     executor.add_node(rover)
 
     def until(condition):
@@ -32,10 +30,7 @@ def drive(executor, start, tmp_path):
             due = rover.publish_due()
             executor.spin_once(timeout_sec=max(due - time.monotonic(), 0.0))
 
-    def start_node(**more):
-        return start('estimator_node', '--ros-args', '--params-file', str(path), **more)
-
-    yield rover, until, start_node
+    yield rover, until, lambda: start('estimator_node', *ROVER, parameters)
     executor.remove_node(rover)
     rover.destroy_node()
 

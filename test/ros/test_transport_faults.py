@@ -6,22 +6,14 @@ from types import SimpleNamespace
 
 import pytest
 import ros_types as ros
-from test_estimator_node import NODE
+from test_estimator_node import NODE, ROVER
 
 from wheel_terra_estimator.configuration import reader
 
-ROVER = ('generic_six_wheel',)
 BURST = 200  # messages sent while the node is held up
 TURNS = 20  # of the node in this process between two looks at a condition
 HELD_UP = 0.25
 """Time for which a node is held up [s]: a quarter of a second at 1000 Hz fills its queue."""
-
-
-@pytest.fixture
-def rover(tmp_path):
-    path = tmp_path / 'rover.yaml'
-    reader.load(ROVER).write(path)
-    return ['--ros-args', '--params-file', str(path)]
 
 
 @pytest.fixture
@@ -39,7 +31,7 @@ def heard(listener):
 
 def joint_states(node, stamp, *, topic='joint_states'):
     """Return a function that publishes wheel rates with stamps a millisecond apart."""
-    names = list(reader.load(ROVER).wheels.names)
+    names = list(reader.load(['pathfinder']).wheels.names)
     publisher = node.create_publisher(ros.JointState, topic, 1000)
     message = ros.JointState(name=names, velocity=[1.0] * len(names), effort=[2.0] * len(names))
 
@@ -51,7 +43,7 @@ def joint_states(node, stamp, *, topic='joint_states'):
     return publisher, send
 
 
-def test_what_is_wrong_around_a_node_is_told_until_it_ends(start, heard, rover, soon):
+def test_what_is_wrong_around_a_node_is_told_until_it_ends(start, heard, parameters, soon):
     """Another node of its name, no clock, no place for what it learns; estimates go on."""
     from rclpy.node import Node
 
@@ -61,7 +53,7 @@ def test_what_is_wrong_around_a_node_is_told_until_it_ends(start, heard, rover, 
     publisher, send = joint_states(node, [100_000_000_000])
     nowhere = '/proc/s.yaml'
     given = ('-p', 'use_sim_time:=true', '-p', f'soil_file:={nowhere}')
-    start('estimator_node', *rover, *given, **soon)
+    start('estimator_node', *ROVER, parameters, *given, **soon)
     until(lambda: publisher.get_subscription_count() and node.count_publishers(f'{NODE}/slip'))
     until(lambda: (send(), len(sets) > 3 and statuses)[1])
     assert not any('another node' in s.message for s in statuses)
@@ -110,14 +102,14 @@ def test_fast_topics_are_queued_for_a_quarter_of_a_second_at_1000_hz(listener, t
 
 
 @pytest.fixture
-def node_here(heard, rover):
+def node_here(heard, parameters):
     """Return the estimator in this process, and a waiting that turns it, too."""
     from rclpy.executors import SingleThreadedExecutor
 
     from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
 
     node, until, _ = heard
-    estimator = EstimatorNode(context=node.context, cli_args=rover)
+    estimator = EstimatorNode(context=node.context, cli_args=[*ROVER, parameters])
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(estimator)
 
