@@ -12,6 +12,7 @@ import signal
 import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -161,6 +162,22 @@ def library_metadata() -> Iterator[None]:
     """Write metadata as the library does, from here on in a file: for tests of what is written."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bag_writer, 'YAML', LIBRARY_YAML)
+        yield
+
+
+@pytest.fixture(scope='session', autouse=True)
+def quick_parsers() -> Iterator[None]:
+    """The parsers of a command are made once: 5 ms of each run of one."""
+    from wheel_terra_estimator.cli import main
+
+    made, commands = main._parsers, main.COMMANDS
+    kept = cache(made)
+
+    def parsers(needed: Iterable[str]) -> Any:
+        return kept(tuple(needed)) if main.COMMANDS is commands else made(tuple(needed))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(main, '_parsers', parsers)
         yield
 
 

@@ -19,7 +19,7 @@ from wheel_terra_estimator.output_folder import MARKER
 @pytest.fixture
 def bags(make_bag, drive):
     """Drives of three lengths, and what is none."""
-    paths = [make_bag(drive[: len(drive) * k // 3], name=f'drive{k}') for k in (3, 2, 1)]
+    paths = [make_bag(drive[: len(drive) * k // 9], name=f'drive{k}') for k in (3, 2, 1)]
     broken = paths[0].parent / 'broken.mcap'
     broken.write_bytes(b'none')
     return [str(path) for path in (paths[0], broken, *paths[1:])]
