@@ -234,7 +234,7 @@ def test_shared_memory_that_is_full_is_said(monkeypatch):
         pass
 
 
-@pytest.mark.parametrize(('words', 'status'), [('effects', 0), ('check nowhere', 2)])
+@pytest.mark.parametrize(('words', 'status'), [('effects', 0), ('effects nowhere', 2)])
 def test_exit_status_with_closed_streams(words, status):
     code = 'import sys; from wheel_terra_estimator.cli.main import main; sys.exit(main())'
     script = f'"{sys.executable}" -c "{code}" {words} >&- 2>&-'

@@ -69,7 +69,7 @@ def test_points_of_a_table(tmp_path, printed, refused):
 
 def test_picture_and_the_refusal_to_overwrite(tmp_path, refused):
     picture = tmp_path / 'curves.png'
-    assert main([*BASE, '--load', '40,80', '-o', str(picture)]) == 0
+    assert main([*BASE, '--slip', '0:0.8:5', '-o', str(picture)]) == 0
     assert picture.read_bytes().startswith(b'\x89PNG') and picture.stat().st_size > 10_000
     before = picture.read_bytes()
     refused([*BASE, '-o', str(picture)], 'exists already; choose another path or give --overwrite')

@@ -18,7 +18,7 @@ from wheel_terra_estimator.simulation.scenario import load
 def bag_path(tmp_path_factory):
     path = tmp_path_factory.mktemp('bags') / 'drive'
     status = main(
-        ['simulate', '--scenario', 'turns', '--seed', '3', '--duration', '6', '-o', str(path)]
+        ['simulate', '--scenario', 'turns', '--seed', '3', '--duration', '3', '-o', str(path)]
     )
     assert status == 0
     return path
@@ -33,7 +33,7 @@ def test_the_bag_has_inputs_and_truth(bag_path):
 
 @pytest.fixture(scope='module')
 def drive():
-    return simulate(load('turns'), 3, 6.0)
+    return simulate(load('turns'), 3, 3.0)
 
 
 def test_variances_of_the_imu_are_those_of_its_sensors(bag_path, drive):
