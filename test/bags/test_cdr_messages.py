@@ -103,7 +103,7 @@ def test_numbers_are_those_of_rosbags(name, little, factory):
     dice = random.Random(name)
     kind, store = INPUT_TYPES[name], factory.store
     read = 0
-    for message in messages(factory, name, 150, dice):
+    for message in messages(factory, name, 100, dice):
         data = bytearray(store.serialize_cdr(message, kind, little_endian=little))
         for damage in (0, 0, 1, 3, 20):
             for _ in range(damage):
@@ -115,7 +115,7 @@ def test_numbers_are_those_of_rosbags(name, little, factory):
             found = with_ours(kind, bytes(data))
             assert shown(found) == shown(with_rosbags(store, kind, bytes(data)))
             read += found is not None
-    assert read > 300
+    assert read > 200
 
 
 @pytest.mark.ros

@@ -75,12 +75,13 @@ def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path):
 
 
 def test_every_command_says_what_is_damaged(make_bag, config, tmp_path, capsys):
+    """Of a bag that is cut in half; a check begins with the loss."""
     bag = make_bag()
     estimates = str(tmp_path / 'estimates')
     assert main(['replay', str(bag), *config, '-o', estimates]) == 0
     for folder in (bag, Path(estimates)):
         (file,) = folder.glob('*.mcap')
-        file.write_bytes(file.read_bytes()[:-200])
+        file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     calibrated = str(tmp_path / 'calibrated.yaml')
     for command in (
         ['replay', str(bag), *config],
@@ -94,15 +95,9 @@ def test_every_command_says_what_is_damaged(make_bag, config, tmp_path, capsys):
         main(command)
         said = capsys.readouterr()
         assert 'whole messages recovered' in said.out + said.err, command
-
-
-def test_a_check_of_a_bag_that_is_cut_in_half_begins_with_the_loss(make_bag, capsys):
-    bag = make_bag()
-    (file,) = bag.glob('*.mcap')
-    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
-    assert main(['check', str(bag)]) == 1
-    _, note, finding, *_ = capsys.readouterr().out.splitlines()
-    assert 'whole messages recovered' in note and 'of the recording are lost' in finding
+        if command[0] == 'check' and '--json' not in command:
+            _, note, finding, *_ = said.out.splitlines()
+            assert 'whole messages recovered' in note and 'of the recording are lost' in finding
 
 
 @pytest.mark.parametrize('closed', [True, False])

@@ -143,7 +143,7 @@ def read(path: Path, sender: Any) -> None:
 CHUNK = 2**24  # bytes
 WALKS, ONCE = 5.0, 4
 """Plain walks that a chunk may cost; chunks that a file may cost whatever it unpacks to."""
-PART = limits.HELD // 16
+PART = limits.HELD // 32
 """For small files: a bomb costs what is allowed, whatever its size."""
 LARGE = [pytest.mark.slow, pytest.mark.timeout(900)]
 ELSEWHERE = (zeros, lying_zeros)  # quick in test_input_file.py: a file costs the limit at any size

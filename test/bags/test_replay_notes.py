@@ -1,10 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a replay says of stamps that stand still and of a filter that fails."""
+"""What a replay says of silent wheels and a filter that fails; figures, and the truth beside."""
 
 import csv
 import json
-import re
 import tracemalloc
 from dataclasses import replace
 from typing import Any
@@ -30,24 +29,12 @@ from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import summarise
 
 
-def test_stamps_that_stand_still_are_counted(make_bag, factory, config, printed):
-    header = factory.header(1_700_000_000_000_000_000)
-    rows = [
-        ('/joint_states', factory.joint_state(header, ('left', 'right'), velocity=(2.0, -2.0)), i)
-        for i in range(50)
-    ]
-    assert re.search(
-        r'joint_states +50 +49 x stamp repeated, merged',
-        printed(['replay', str(make_bag(messages=rows)), *config]),
-    )
-
-
 @pytest.mark.parametrize(('period', 'said'), [(1, True), (0.5, False)])
 def test_wheel_odometry_that_counts_as_silent_most_of_the_time_is_told(
     make_bag, factory, config, printed, period, said
 ):
     rows = []
-    for i in range(160):
+    for i in range(80):
         header = factory.header(1_700_000_000_000_000_000 + i * 50_000_000)
         rows.append(('/imu/data', factory.imu(header, (0.0, 0.0, 9.81), (0.0,) * 3, None), i))
         if i % round(20 * period) == 0:
@@ -61,7 +48,7 @@ def test_wheel_odometry_that_counts_as_silent_most_of_the_time_is_told(
 
 @pytest.mark.filter_fails
 def test_a_failing_filter_is_said_in_summary_and_diagnostics(
-    make_bag, rover, monkeypatch, tmp_path
+    make_bag, drive, rover, monkeypatch, tmp_path
 ):
     usual, calls = WheelSoilEstimator.estimates, []
 
@@ -71,10 +58,8 @@ def test_a_failing_filter_is_said_in_summary_and_diagnostics(
             raise ZeroDivisionError
         return usual(self)
 
-    with open_bag(make_bag()) as bag:
-        result = replay(bag, rover, {})
-        assert not any('started anew' in note for note in result.notes)
-        monkeypatch.setattr(WheelSoilEstimator, 'estimates', failing)
+    monkeypatch.setattr(WheelSoilEstimator, 'estimates', failing)
+    with open_bag(make_bag(drive[:35])) as bag:
         result = replay(bag, rover, {}, tmp_path / 'out')
     assert any('filter failed and was started anew once' in note for note in result.notes)
     assert b'filter_restarts' in next((tmp_path / 'out').glob('*.mcap')).read_bytes()
@@ -83,7 +68,7 @@ def test_a_failing_filter_is_said_in_summary_and_diagnostics(
 def test_odometry_that_might_be_the_reference_is_named(tmp_path):
     """On a measured drive, on which the filter never restarts."""
     drive = next(drive for drive in DRIVES if drive.name == 'pathfinder')
-    recording = beginning(shipped.demo_recording(drive.name), tmp_path / 'drive', 6.0)
+    recording = beginning(shipped.demo_recording(drive.name), tmp_path / 'drive', 2.0)
     with open_bag(recording) as bag:
         result = replay(bag, reader.load(['pathfinder']), {})
         (said,) = [note for note in result.notes if 'reference_odom:=' in note]
@@ -97,7 +82,7 @@ def test_odometry_that_might_be_the_reference_is_named(tmp_path):
 
 def test_a_log_of_arrivals_holds_parameters_and_may_know_more_than_the_bag(tmp_path):
     """The node hears messages before the recorder does; what a log of another bag is, is told."""
-    recording = beginning(shipped.demo_recording('entrapment'), tmp_path / 'drive', 6.0)
+    recording = beginning(shipped.demo_recording('entrapment'), tmp_path / 'drive', 2.0)
     rover, log = reader.load(['generic_six_wheel', 'test_sand']), tmp_path / 'order.txt'
     tuned = {'filter.gate': 6.0, 'filter.class_thresholds': [0.2, 0.5, 0.8]}
     with open_bag(recording) as bag:
@@ -251,17 +236,17 @@ def sets(count: int):
 def test_figures_of_a_thinned_drive_are_those_of_all_sets():
     names = tuple(f'w{i}' for i in range(estimate_set().slip.size))
     whole, thinned = HistoryRecorder(names), HistoryRecorder(names, 50)
-    everything = list(sets(700))
+    everything = list(sets(300))
     for each in everything:
         whole.add(each)
         thinned.add(each)
     long, short = whole.history(), thinned.history()
-    assert long.stamp.size == 700
+    assert long.stamp.size == 300
     assert short.stamp.size <= 50
     border = Border(0.25, np.inf)
     summary, same = (summarise('', h, {}, {}, {}, (), border, ()) for h in (short, long))
     assert summary == same
-    assert summary.sets == 700
+    assert summary.sets == 300
     classes = np.array([s.slip_class for s in everything])
     slips = np.abs([s.slip for s in everything])
     sinkages = np.array([s.sinkage for s in everything])
@@ -279,9 +264,9 @@ def test_memory_of_a_recorder_does_not_grow():
     recorder = HistoryRecorder(names, 25)
     sizes = []
     tracemalloc.start()
-    for number, each in enumerate(sets(600), start=1):
+    for number, each in enumerate(sets(300), start=1):
         recorder.add(each)
-        if number in (50, 600):
+        if number in (50, 300):
             sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
     assert sizes[1] < sizes[0] + 50_000
