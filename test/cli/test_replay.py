@@ -88,9 +88,7 @@ def test_what_cannot_be_used_is_one_line_and_status_2(
     assert not out.exists()
 
 
-def test_interrupted_replay_leaves_a_readable_bag(
-    make_bag, config, tmp_path, capsys, monkeypatch
-):
+def test_interrupted_replay_leaves_a_readable_bag(make_bag, config, tmp_path, capsys, monkeypatch):
     """Ctrl-C in the midst of a drive (of a process: test_several_bags)."""
     bag, out = make_bag(), tmp_path / 'out'
     write, count = BagFile.write, itertools.count()
