@@ -121,7 +121,11 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
 
     def run(command: Iterable[Any], *words: str) -> str:
         capsys.readouterr()
-        assert main([str(part) for part in command]) == 2
+        try:
+            status: Any = main([str(part) for part in command])
+        except SystemExit as end:  # of argparse
+            status = end.code
+        assert status == 2
         said = capsys.readouterr().err
         assert said.count('\n') == 1, said
         assert all(word in said for word in words), said

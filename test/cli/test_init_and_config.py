@@ -64,7 +64,7 @@ def init(tmp_path):
     return run
 
 
-def test_from_a_urdf(init):
+def test_from_a_urdf(init, capsys):
     rover = init(urdf=CART)
     assert rover.wheels.names == ('left_wheel_joint', 'right_wheel_joint')
     assert np.allclose(rover.wheels.y, [0.3, -0.3])
@@ -75,6 +75,9 @@ def test_from_a_urdf(init):
     assert rover.rover.mass == pytest.approx(44.0)
     assert rover.rover.centre_of_gravity[2] == pytest.approx((40 * 0.3 + 4 * 0.2) / 44, abs=1e-4)
     assert init(urdf=CART) == 2  # nothing is overwritten
+    assert 'wheels.direction is a guess' not in capsys.readouterr().out
+    init('--overwrite', urdf=CART.replace('rpy="1.5707963 0 0"', 'rpy="0 0 0"'))  # not across
+    assert 'wheels.direction is a guess' in capsys.readouterr().out
 
 
 def test_a_tape_wins_over_the_places_of_a_urdf(init):
@@ -192,15 +195,13 @@ def test_what_is_no_urdf(init, tmp_path, capsys, text, word):
     assert not (tmp_path / 'rover.yaml').exists()
 
 
-def test_a_number_of_wheels_is_no_name(init, capsys):
-    assert init('--wheels', '6') == 2
-    assert 'names of the wheel joints' in capsys.readouterr().err
-
-
 def test_wheels_by_name_and_where_they_are(init, capsys):
-    """Two need no wheelbase; one without a partner has a guessed place."""
+    """Two need no wheelbase, one no track either; one without a partner has a guessed place."""
     rover = init('--wheels', 'left, right', '--radius', 0.1, '--track', 0.4, '--mass', 9)
     assert rover.wheels.x.tolist() == [0.0, 0.0]
+    one = init('--overwrite', '--wheels', 'wheel', '--radius', 0.1, '--mass', 15)
+    assert one.wheels.y.tolist() == [0.0]
+    capsys.readouterr()
     init('--overwrite', '--wheels', 'a, b, c, d, e', *MEASURES)
     said = capsys.readouterr().out
     assert 'wheels.x is a guess' in said and 'wheels.y is a guess' in said
@@ -267,24 +268,12 @@ def test_a_turning_joint_that_is_left_out_is_told(init, tmp_path, capsys):
 
 
 def test_all_measures_that_are_missing_are_named_at_once(init, tmp_path, capsys):
+    assert init('--wheels', '6') == 2
+    assert 'names of the wheel joints' in capsys.readouterr().err
     assert init('--bag', PATHFINDER, '--mass', 22) == 2
     complaint = capsys.readouterr().err
     assert all(name in complaint for name in ('--radius', '--track', '--wheelbase'))
     assert '--mass' not in complaint and not (tmp_path / 'rover.yaml').exists()
-
-
-def test_a_single_wheel_needs_neither_track_nor_wheelbase(tmp_path):
-    file = tmp_path / 'rig.yaml'
-    measures = ['--wheels', 'wheel', '--radius', '0.1', '--mass', '15']
-    assert main(['init', *measures, '-o', str(file)]) == 0
-    assert reader.load([file]).wheels.y.tolist() == [0.0]
-
-
-def test_an_axis_that_is_not_across_leaves_the_sign_a_guess(tmp_path, printed):
-    urdf = tmp_path / 'cart.urdf'
-    urdf.write_text(CART.replace('rpy="1.5707963 0 0"', 'rpy="0 0 0"'))
-    made = printed(['init', '--urdf', str(urdf), '-o', str(tmp_path / 'rover.yaml')])
-    assert 'wheels.direction is a guess' in made
 
 
 def test_config(printed, refused):

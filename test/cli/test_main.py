@@ -21,15 +21,6 @@ from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.scheduler import worker_pool
 
 
-def complaint(capsys, *arguments):
-    """Return exit status and the complaint of a command line that argparse refuses."""
-    with pytest.raises(SystemExit) as end:
-        main.main(list(arguments))
-    said = capsys.readouterr().err
-    assert said.count('\n') == 1
-    return end.value.code, said
-
-
 def test_version(capsys):
     with pytest.raises(SystemExit) as end:
         main.main(['--version'])
@@ -37,11 +28,9 @@ def test_version(capsys):
     assert capsys.readouterr().out.split()[-1] == __version__
 
 
-def test_a_mistyped_command_or_option_gets_the_nearest(capsys):
-    status, said = complaint(capsys, 'repaly')
-    assert status == 2 and "did you mean 'replay'?" in said
-    status, said = complaint(capsys, 'replay', 'bag', '--confg', 'rover')
-    assert status == 2 and "no option '--confg'; did you mean '--config'?" in said
+def test_a_mistyped_command_or_option_gets_the_nearest(refused):
+    refused(['repaly'], "did you mean 'replay'?")
+    refused(['replay', 'bag', '--confg', 'rover'], "no option '--confg'; did you mean '--config'?")
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ import signal
 from typing import Any
 
 import numpy as np
-import pytest
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
@@ -69,23 +68,6 @@ def test_what_was_learned_is_a_further_config_of_every_command(
     assert read_values(kept) == values
     assert main(['replay', bag, *config, '--save-soil', str(kept), '--overwrite']) == 0
     assert read_values(kept)['sensors.torque_zero'] == [0.0, 0.0]
-
-
-@pytest.mark.parametrize(
-    ('extra', 'words'),
-    [
-        (['-p', 'wheels.names:=[a, b]'], 'no wheel of wheels.names (a, b)'),
-        (['--remap', 'odm:=/x'], 'does not listen to odm'),
-        (['-p', 'rover.mas:=1'], 'rover.mass'),
-        (['--remap', 'sinkage:=/laser'], '/laser is not in the bag'),
-    ],
-)
-def test_what_cannot_be_used_is_one_line_and_status_2(
-    make_bag, config, extra, words, tmp_path, refused
-):
-    out = tmp_path / 'out'
-    refused(['replay', str(make_bag()), *config, *extra, '-o', str(out)], words)
-    assert not out.exists()
 
 
 def test_interrupted_replay_leaves_a_readable_bag(make_bag, config, tmp_path, capsys, monkeypatch):

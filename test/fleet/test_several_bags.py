@@ -51,7 +51,8 @@ def test_several_are_what_each_is_alone(bags, config, tmp_path, printed):
     assert '<td>drive3</td>' in page and 'broken.mcap' in page
 
 
-def test_a_restart_passes_over_what_is_done_by_content(bags, config, tmp_path):
+def test_a_restart_passes_over_what_is_done_by_content(bags, config, tmp_path, printed):
+    """Same content under another name is done; other content of one name gets another folder."""
     out = tmp_path / 'out'
     good = [bags[0], *bags[2:]]
     assert main(['replay', *good[:2], *config, '-o', str(out)]) == 0
@@ -63,14 +64,19 @@ def test_a_restart_passes_over_what_is_done_by_content(bags, config, tmp_path):
     summary = (out / 'summary.csv').read_bytes()
     assert main(['replay', *good[:2], *config, '-o', str(out)]) == 0
     assert written() == first and (out / 'summary.csv').read_bytes() == summary
-    renamed = Path(good[0]).with_name('renamed')  # same content under another name
+    renamed = Path(good[0]).with_name('renamed')
     Path(good[0]).rename(renamed)
-    assert main(['replay', str(renamed), *good[1:], *config, '-o', str(out)]) == 0
+    (tmp_path / 'other').mkdir()
+    third = Path(good[2]).rename(tmp_path / 'other' / 'drive3')
+    given = [str(renamed), good[1], str(third)]
+    told = json.loads(printed(['replay', *given, *config, '-o', str(out), '--json']))
+    assert [drive['folder'] for drive in told['drives']] == ['drive3', 'drive2', 'drive3_2']
+    assert [drive['bag'] for drive in told['drives']] == given
     then = written()
-    assert set(then) == {'drive3', 'drive2', 'drive1'}
+    assert set(then) == {'drive3', 'drive2', 'drive3_2'}
     assert {name: then[name] for name in first} == first
     other = ['-p', 'rover.mass:=41.0']  # another configuration: nothing is done
-    assert main(['replay', *good[1:], *config, *other, '-o', str(out)]) == 0
+    assert main(['replay', good[1], str(renamed), *config, *other, '-o', str(out)]) == 0
     assert written()['drive3'] == first['drive3'] and written()['drive2'] != first['drive2']
 
 
@@ -92,16 +98,6 @@ def test_an_output_that_has_lost_a_file_is_made_anew(bags, config, tmp_path, und
     assert not (out / 'drive1').exists()
 
 
-def test_bags_of_one_name_get_folders_of_their_own(bags, config, tmp_path, printed):
-    (tmp_path / 'other').mkdir()
-    Path(bags[2]).rename(tmp_path / 'other' / 'drive3')
-    out = tmp_path / 'out'
-    given = [bags[0], str(tmp_path / 'other' / 'drive3')]
-    told = json.loads(printed(['replay', *given, *config, '-o', str(out), '--json']))
-    assert [drive['folder'] for drive in told['drives']] == ['drive3', 'drive3_2']
-    assert [drive['bag'] for drive in told['drives']] == given
-
-
 @pytest.mark.parametrize(
     ('more', 'words'),
     [
@@ -113,18 +109,12 @@ def test_bags_of_one_name_get_folders_of_their_own(bags, config, tmp_path, print
     ],
 )
 def test_what_cannot_be_done_is_said_first(
-    bags, config, tmp_path, monkeypatch, capsys,
-    more, words
-):  # fmt: skip
+    bags, config, tmp_path, monkeypatch, refused, more, words
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'taken').mkdir()
     (tmp_path / 'taken' / 'note.txt').touch()
-    try:
-        status = main(['replay', *bags, *config, *more])
-    except SystemExit as end:
-        status = int(str(end.code))
-    assert status == 2
-    assert words in capsys.readouterr().err
+    refused(['replay', *bags, *config, *more], words)
     assert not (tmp_path / 'o').exists()
 
 
