@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import main
+from wheel_terra_estimator.cli.terminal import Harmless
 from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.scheduler import worker_pool
 
@@ -169,12 +170,10 @@ def test_output_that_fails_is_no_error_of_the_program(number, room, arguments):
         assert room is not None, 'all was written'
 
 
-def test_a_terminal_that_knows_ascii_alone(capsys, monkeypatch):
+def test_a_terminal_that_knows_ascii_alone():
     plain = io.TextIOWrapper(io.BytesIO(), encoding='ascii')
-    monkeypatch.setattr(sys, 'stdout', plain)
-    assert main.main(['effects']) == 0
-    assert '+- 500' in plain.buffer.getvalue().decode('ascii')
-    assert not capsys.readouterr().err
+    print('3 \xb1 1 \x1b[2J', file=Harmless(plain), flush=True)
+    assert plain.buffer.getvalue() == rb'3 \xb1 1 \x1b[2J' + b'\n'
 
 
 EFFECTS = """
