@@ -21,7 +21,7 @@ def test_text_names_every_effect_and_parameter(printed):
             continue
         for parameter in effect.parameters:
             assert f'{parameter.name} [{parameter.unit}]' in text
-    assert max(map(len, text.splitlines())) <= 100
+    assert max(map(len, text.splitlines())) <= 100 and text.isascii()
 
 
 def test_json_holds_what_a_program_needs(printed):
