@@ -146,7 +146,9 @@ WALKS, ONCE = 5.0, 4
 PART = limits.HELD // 32
 """For small files: a bomb costs what is allowed, whatever its size."""
 LARGE = [pytest.mark.slow, pytest.mark.timeout(900)]
-ELSEWHERE = (zeros, lying_zeros)  # quick in test_input_file.py: a file costs the limit at any size
+# Quick elsewhere: zeros in test_input_file.py, heads that are tried in test_damage.py; short messages
+# and other records cost what packed ones and wrong ones do.
+ELSEWHERE = (zeros, lying_zeros, headless, short_messages, metadata)
 CASES = [
     pytest.param(make, size, id=f'{make.__name__}-{size}', marks=LARGE if size > 10**5 else ())
     for make in MCAPS
