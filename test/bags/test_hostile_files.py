@@ -61,14 +61,6 @@ def packed_gaps(size: int) -> bytes:
     return mcap(chunk(data), size)
 
 
-def headless(size: int) -> bytes:
-    return mcap(b'\x28\xb5\x2f\xfd', size)
-
-
-def headless_bombs(size: int) -> bytes:
-    return mcap(_pack(bytes(2**24), 'zstd'), size)
-
-
 def nested_chunks(size: int) -> bytes:
     """Each reaches to the end of the file."""
     parts, left = [], size
@@ -113,7 +105,7 @@ def many_topics(size: int) -> bytes:
     return b''.join(parts)
 
 
-MCAPS = (zeros, lying_zeros, packed_messages, packed_gaps, headless, headless_bombs,
+MCAPS = (zeros, lying_zeros, packed_messages, packed_gaps,
          nested_chunks, nested_plain_chunks, nested_messages, opcodes, short_messages, metadata,
          many_topics)  # fmt: skip
 
@@ -146,9 +138,9 @@ WALKS, ONCE = 5.0, 4
 PART = limits.HELD // 32
 """For small files: a bomb costs what is allowed, whatever its size."""
 LARGE = [pytest.mark.slow, pytest.mark.timeout(900)]
-# Quick elsewhere: zeros in test_input_file.py, heads that are tried in test_damage.py; short messages
-# and other records cost what packed ones and wrong ones do.
-ELSEWHERE = (zeros, lying_zeros, headless, short_messages, metadata)
+# Quick elsewhere: zeros in test_input_file.py; short messages and other records cost what packed
+# and wrong ones do.
+ELSEWHERE = (zeros, lying_zeros, short_messages, metadata)
 CASES = [
     pytest.param(make, size, id=f'{make.__name__}-{size}', marks=LARGE if size > 10**5 else ())
     for make in MCAPS

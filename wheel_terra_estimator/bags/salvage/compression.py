@@ -14,7 +14,6 @@ from wheel_terra_estimator.bags.salvage.limits import MEGABYTE, in_words
 from wheel_terra_estimator.errors import UserError
 
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
-MAGICS = {ZSTD_MAGIC: 'zstd', b'\x04\x22\x4d\x18': 'lz4'}
 CODECS = ('', 'zstd', 'lz4')  # compressions of MCAP chunks that can be read; empty: none
 
 _SLICE = 4096  # packed bytes fed at a time behind an error, so that little is lost before it

@@ -19,14 +19,14 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
-from itertools import accumulate, islice, pairwise
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
 
 from wheel_terra_estimator.bags.salvage import RawMessage, Topic, limits
 from wheel_terra_estimator.bags.salvage import mcap_records as mcap
-from wheel_terra_estimator.bags.salvage.compression import MAGICS, bomb, unpack
+from wheel_terra_estimator.bags.salvage.compression import bomb, unpack
 from wheel_terra_estimator.bags.salvage.limits import MEGABYTE, in_words
 from wheel_terra_estimator.bags.salvage.losses import Losses
 from wheel_terra_estimator.errors import UserError
@@ -34,7 +34,6 @@ from wheel_terra_estimator.errors import UserError
 _FOOTER = mcap.HEAD + 20 + len(mcap.MAGIC)  # [byte], with the closing magic
 _IN_CHUNK = (mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE)
 _LONGEST_STRETCH = 4 * MEGABYTE  # of messages outside of chunks that are read at once
-_MOST_HEADLESS = 1000  # packed chunks without their heads that are tried
 _GAP_WORK = 2**14  # what the search in or behind damage costs, in bytes unpacked
 _LONGEST_LIST = 4 * MEGABYTE  # of topics and types by the recorder that is read
 _FORGET_AFTER = 32 * MEGABYTE  # of the file that was looked at
@@ -44,7 +43,6 @@ _UNPACKED = 3  # in a compressed chunk without checksum that unpacked without an
 _LISTED = 2  # in the recorder's own list of topics
 _PLAIN = 2
 _DAMAGED = 1  # in a chunk whose checksum is wrong, or that cannot be unpacked to its end
-_PACKED = re.compile(b'|'.join(map(re.escape, MAGICS)))  # the first bytes of packed data
 _TOPIC = re.compile(r'[/~A-Za-z_][A-Za-z0-9_/~{}.-]*')
 _TYPE = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/|::)[A-Za-z0-9_/:.-]+')
 
@@ -200,7 +198,6 @@ class McapFile:
             self.losses.state = 'was not closed'
         gaps: list[mcap.Gap] = []
         self._take_records(begin, end, gaps)
-        self._take_headless_chunks(gaps)
         damaged = []
         for piece in self._pieces:  # grows
             if not self._count(piece, again=False):
@@ -240,21 +237,6 @@ class McapFile:
                     self._definitions.add(content, item)
                 except ValueError:
                     gaps.append(mcap.Gap(item.begin, item.end))
-
-    def _take_headless_chunks(self, gaps: list[mcap.Gap]) -> None:
-        """Note packed chunks in gaps: they say themselves where they begin and end."""
-        left = _MOST_HEADLESS
-        for gap in gaps:
-            found = _PACKED.finditer(self._map, gap.begin, gap.end)
-            begins = [(match.start(), MAGICS[match[0]]) for match in islice(found, left)]
-            left -= len(begins)
-            for (at, codec), (end, _) in pairwise([*begins, (gap.end, '')]):
-                head = mcap.ChunkHead(0, mcap.LATEST, 0, 0, codec, at, end - at)
-                self._pieces.append(Piece(at, end, head, head.start, head.end))
-        if not left:
-            self.losses.left_out.append(
-                f'packed data behind the first {_MOST_HEADLESS} pieces without a head left out'
-            )
 
     def _look_inside(self, piece: Piece, gaps: list[mcap.Gap]) -> None:
         """Find what a packed chunk seems to hold that reaches too far, as it lost bytes."""
