@@ -35,12 +35,10 @@ _FOOTER = mcap.HEAD + 20 + len(mcap.MAGIC)  # [byte], with the closing magic
 _IN_CHUNK = (mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE)
 _LONGEST_STRETCH = 4 * MEGABYTE  # of messages outside of chunks that are read at once
 _GAP_WORK = 2**14  # what the search in or behind damage costs, in bytes unpacked
-_LONGEST_LIST = 4 * MEGABYTE  # of topics and types by the recorder that is read
 _FORGET_AFTER = 32 * MEGABYTE  # of the file that was looked at
 # Votes of a copy of a definition, by where it stands:
 _SOUND = 100  # in a chunk whose checksum is right: no number of others outvotes it
 _UNPACKED = 3  # in a compressed chunk without checksum that unpacked without an error
-_LISTED = 2  # in the recorder's own list of topics
 _PLAIN = 2
 _DAMAGED = 1  # in a chunk whose checksum is wrong, or that cannot be unpacked to its end
 _TOPIC = re.compile(r'[/~A-Za-z_][A-Za-z0-9_/~{}.-]*')
@@ -482,8 +480,6 @@ class _Definitions:
     def __init__(self) -> None:
         self._schemas: dict[int, Counter[str]] = defaultdict(Counter)
         self._channels: dict[int, Counter[tuple[int, str]]] = defaultdict(Counter)
-        self._listed: set[str] = set()  # topics and types in the recorder's own list
-        self._list_left = _LONGEST_LIST
 
     def add(self, content: Any, record: mcap.Record, votes: int = _PLAIN) -> None:
         """Count a definition; ``ValueError`` if it is damaged."""
@@ -495,11 +491,6 @@ class _Definitions:
             number, schema, topic = mcap.channel(content, record)
             if _TOPIC.fullmatch(topic):
                 self._channels[number][schema, topic] += votes
-        elif record.opcode == mcap.METADATA and record.end - record.begin < self._list_left:
-            # The recorder's own list of topics: it decides where two copies differ.
-            self._list_left -= record.end - record.begin
-            text = bytes(content[record.begin : record.end]).decode('utf-8', 'replace')
-            self._listed.update(line.rpartition(': ')[2] for line in text.split('\n'))
 
     def numbers(self) -> frozenset[int]:
         """Return the identifiers of the known channels."""
@@ -509,9 +500,9 @@ class _Definitions:
         """Return identifier -> topic, type."""
         found = {}
         for number, votes in self._channels.items():
-            schema, topic = self._chosen(votes, lambda definition: definition[1])
+            schema, topic = _most(votes)
             names = self._schemas.get(schema)
-            found[number] = (topic, self._chosen(names, str) if names else '')
+            found[number] = (topic, _most(names) if names else '')
         return found
 
     def undecided(self) -> list[str]:
@@ -521,18 +512,14 @@ class _Definitions:
         """
         found = []
         for number, votes in sorted(self._channels.items()):
-            weight = self._weights(votes, lambda definition: definition[1])
-            topics = sorted({topic for _, topic in weight})
-            if len(topics) > 1 and max(weight.values()) < _SOUND:
+            topics = sorted({topic for _, topic in votes})
+            if len(topics) > 1 and max(votes.values()) < _SOUND:
                 found.append(f'copies of channel {number} differ: {" or ".join(topics)}')
         return found
 
-    def _chosen(self, votes: Counter[Any], name: Any) -> Any:
-        weight = self._weights(votes, name)
-        return max(weight, key=lambda definition: weight[definition])
 
-    def _weights(self, votes: Counter[Any], name: Any) -> dict[Any, int]:
-        return {d: n + _LISTED * (name(d) in self._listed) for d, n in votes.items()}
+def _most(votes: Counter[Any]) -> Any:
+    return max(votes, key=votes.__getitem__)
 
 
 def _votes(piece: Piece, content: Content) -> int:
