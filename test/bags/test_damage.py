@@ -304,7 +304,7 @@ def test_messages_of_a_chunk_with_a_damaged_head(read_mcap, codec, summary):
 
 
 def test_messages_outside_of_the_times_of_their_chunk_are_said(read_mcap):
-    """No checksum covers them; the head of the chunk states between which times they lie."""
+    """No checksum covers them; the index behind the chunk lists times that its head excludes."""
     whole, layout = samples(200), Layout(4000, 'lz4', checksums=False)
     first = make(whole, TYPES, layout).parts[1][2][0]
     whole[60] = whole[60]._replace(log_time=START)
@@ -316,7 +316,6 @@ def test_messages_outside_of_the_times_of_their_chunk_are_said(read_mcap):
     found, notes = read_mcap(content)
     assert len(found) == 200
     assert notes[0].startswith('a.mcap is damaged')
-    assert f'from {(first.log_time - START) * 1e-9:.1f} s' in notes[0]
 
 
 def test_fields_that_reach_beyond_their_record_are_none():

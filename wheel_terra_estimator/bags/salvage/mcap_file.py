@@ -360,24 +360,12 @@ class McapFile:
         ``wanted``: channels whose messages are kept. ``allowed``: greatest memory that they may
         take [byte].
         """
-        head, known = piece.head, self._definitions.numbers()
-        if head is None:
-            possible = [mcap.Possible((mcap.MESSAGE,), known)]
-        elif content.sound:
-            possible = [mcap.Possible(_IN_CHUNK)]
-        else:  # at second try, the times in the head may be what is damaged
-            possible = [mcap.Possible(_IN_CHUNK, known, head.start, head.end)]
-            possible.append(mcap.Possible(_IN_CHUNK, known))
-        found: list[Reading] = []
-        for each in possible:
-            if not found or found[-1].lost_bytes:
-                found.append(self._pass(piece.begin, content.data, each, wanted, allowed))
-        self._add_work(_ROW_SIZE * sum(reading.counts.total() for reading in found))
-        best = min(found, key=lambda reading: reading.lost_bytes)
-        if best is not found[0] and 2 * found[0].counts.total() > best.counts.total():
-            # Few messages lie outside of the times of the head: these are damaged, not the head.
-            best.lost_between.append((None, None))
-        return best
+        known = () if content.sound else self._definitions.numbers()
+        opcodes = (mcap.MESSAGE,) if piece.head is None else _IN_CHUNK
+        possible = mcap.Possible(opcodes, known)
+        found = self._pass(piece.begin, content.data, possible, wanted, allowed)
+        self._add_work(_ROW_SIZE * found.counts.total())
+        return found
 
     def _pass(
         self,

@@ -92,9 +92,6 @@ class Possible:
 
     opcodes: Container[int] = range(1, 0x10)  # kinds of records there
     channels: Container[int] = ()  # known channels; every one is possible while there is none
-    # ``start``, ``end``: log times [ns] between which the messages lie
-    start: int = 0
-    end: int = LATEST
     longest: int = 2**32  # message [byte]
 
 
@@ -102,7 +99,7 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
     """Yield the records between two places, and the gaps between them."""
     at = begin
     unpack = _MESSAGE.unpack_from
-    channels, start, last = possible.channels, possible.start, possible.end
+    channels = possible.channels
     any_channel = not channels
     before: Record | None = None  # found, but damage behind it may show that it is none
     behind_damage = False  # messages of a chunk that lost its head: bytes may be missing in one
@@ -115,7 +112,7 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
             if (
                 after <= end
                 and length >= MESSAGE_HEAD
-                and start <= log_time <= last
+                and log_time <= LATEST
                 and (any_channel or channel in channels)
                 and (after == end or _head_fits(content, after, end, possible))
             ):
@@ -188,9 +185,7 @@ def _next(content: Buffer, begin: int, stop: int, end: int, possible: Possible) 
     for at in _candidates(content, begin, min(stop + HEAD - 1, end)):
         if _fits(content, at, end, possible):
             after = at + HEAD + _RECORD.unpack_from(content, at)[1]
-            surely = content[at] == CHUNK or (
-                content[at] == MESSAGE and (possible.start > 0 or _times_agree(content, at))
-            )
+            surely = content[at] == CHUNK or (content[at] == MESSAGE and _times_agree(content, at))
             if surely or after == end or _head_fits(content, after, end, possible):
                 return at
     return stop
@@ -240,7 +235,7 @@ def _fits(content: Buffer, at: int, end: int, possible: Possible) -> bool:
             return False
         _, _, channel, _, log_time, _ = _MESSAGE.unpack_from(content, at)
         known = not possible.channels or channel in possible.channels
-        return known and possible.start <= log_time <= possible.end
+        return known and log_time <= LATEST
     if opcode in _STRINGS:
         skipped, count = _STRINGS[opcode]
         return _strings_fill(content, at + HEAD + skipped, at + HEAD + length, count)
