@@ -1,32 +1,198 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""``wheel-terra replay`` from the command line."""
+"""``wheel-terra replay`` and ``compare``: findings before estimates, outputs, truth in sight."""
 
+import contextlib
+import io
 import itertools
+import json
 import re
 import signal
+import warnings
 from typing import Any
 
 import numpy as np
+import pytest
+from recordings import beginning, changed
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
+from wheel_terra_estimator.bags.history import read_estimates
+from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
 from wheel_terra_estimator.bags.storage import messages_of, open_bag
+from wheel_terra_estimator.bags.writer import NAMESPACE
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import read_values
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.messages.convert import JOINT_STATE
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, JOINT_STATE
+from wheel_terra_estimator.simulation import scenario
+from wheel_terra_estimator.simulation.drive import simulate
 
-SLIP_ON_SLOPE = '/wheel_terra_estimator/slip_on_slope'
+CONFIG = ['--config', 'generic_six_wheel', '--config', 'test_sand']
 
 
-def assert_slip_follows_the_reference(history: EstimateHistory) -> None:
-    """Rim speed 0.42 m/s, reference 0.36 m/s: slip 1/7 on both wheels when it was just heard."""
-    seconds = history.seconds
-    just_heard = (seconds % 1.0 > 0.05) & (seconds % 1.0 < 0.15) & (seconds > 1.5)
-    assert just_heard.any()
-    np.testing.assert_allclose(history.values['slip'][just_heard], 1 / 7, atol=0.06)
+def driven(folder, seconds, **changes):
+    source = scenario.load('turns', **changes)
+    write_simulated_drive(simulate(source, seed=5, duration=seconds), folder)
+    return folder
+
+
+@pytest.fixture(scope='module')
+def simulated(tmp_path_factory):
+    """Half a metre in four seconds."""
+    fast = {'drive__time': [0.0], 'drive__forward': [0.2], 'drive__turn_rate': [0.0]}
+    return driven(tmp_path_factory.mktemp('drive') / 'drive', 4.0, **fast)
+
+
+@pytest.fixture(scope='module')
+def upside_down(tmp_path_factory):
+    """A longer drive with the IMU on its back, the topics of the truth without a message."""
+
+    def turned(topic, message):
+        if topic == '/imu/data':
+            for vector in (message.linear_acceleration, message.angular_velocity):
+                vector.y, vector.z = -vector.y, -vector.z
+            message.orientation_covariance = np.array([-1.0] + [0.0] * 8)
+        return message if topic[1:] in INPUT_TYPES else None
+
+    folder = tmp_path_factory.mktemp('fault')
+    return changed(driven(folder / 'right', 10.0), folder / 'drive', turned)
+
+
+@pytest.fixture(scope='module')
+def live(simulated, tmp_path_factory):
+    """Folder of the estimates `out` and their table, and what was said."""
+    folder, said = tmp_path_factory.mktemp('live'), io.StringIO()
+    written = ['--table', str(folder / 'table.csv'), '-o', str(folder / 'out')]
+    with contextlib.redirect_stdout(said):
+        assert main(['replay', str(simulated), *CONFIG, *written]) == 0
+    return folder, said.getvalue()
+
+
+def test_truth_and_table(simulated, live, tmp_path):
+    folder, said = live
+    assert 'against the truth (/ground_truth)' in said and 'true / estimated' in said
+    assert 'not used, on /ground_truth' not in said
+    assert (folder / 'table.csv').read_text().startswith('stamp [ns],wheel,')
+    assert main(['replay', str(simulated), *CONFIG, '--table', str(tmp_path / 't.xls')]) == 2
+
+
+def test_findings_come_before_anything_else(upside_down, printed, tmp_path):
+    told = json.loads(printed(['replay', str(upside_down), *CONFIG, '--json']))
+    assert [f['kind'] for f in told['findings']] == ['mounting']
+    assert not told['warnings']
+    for wheel in told['wheels']:
+        seconds = dict(wheel['seconds'])
+        # The inputs are on trial for 8 s.
+        assert sum(seconds.values()) - seconds['unknown'] < 8.0, 'until it is told'
+    short = beginning(upside_down, tmp_path / 'short', 4.0)
+    said = printed(['replay', str(short), *CONFIG])
+    assert said.startswith('finding: mounting') and 'imu_mounting_roll_deg: 180' in said
+    assert 'against the truth' not in said
+
+
+def test_smoothed_and_compared(simulated, live, tmp_path, printed, undrawn):
+    """Same sets at the same times, warnings and diagnostics as given live, both in the report."""
+    page, table = tmp_path / 'page.html', tmp_path / 'table.csv'
+    ways = ['--track', str(tmp_path / 'way.csv')]
+    smooth = ['--smooth', '--report', str(page), '--table', str(table), *ways]
+    said = printed(['replay', str(simulated), *CONFIG, *smooth, '-o', str(tmp_path / 'smooth')])
+    assert 'note: smoothed: each estimate knows' in said
+    with open_bag(live[0] / 'out') as plain, open_bag(tmp_path / 'smooth') as smooth:
+        assert plain.topics.keys() == smooth.topics.keys()
+        for topic in plain.topics:
+            one, other = list(plain.messages([topic])), list(smooth.messages([topic]))
+            assert [m[0] for m in one] == [m[0] for m in other], topic
+            same = [m[2] for m in one] == [m[2] for m in other]
+            if topic in (
+                '/diagnostics',
+                *(f'{NAMESPACE}/{name}' for name in ('stuck', 'mobility')),
+            ):
+                assert same, topic
+            elif topic in (f'{NAMESPACE}/{name}' for name in ('slip', 'slip_stddev', 'twist')):
+                assert not same, topic
+    assert 'The estimates are those of the fixed-interval smoother' in page.read_text()
+    assert table.is_file()
+    assert 'Where the ground is bad' in page.read_text()
+    assert (tmp_path / 'way.csv').is_file()
+    pair = [live[0] / 'out', tmp_path / 'smooth']
+    told = json.loads(printed(['compare', *pair, '--truth', simulated, '--json']))
+    assert told['differences']['drawbar_pull']['rms'] > 0.0
+    assert told['errors']['a']['quantities']['slip']['rms'] > 0.0
+    assert 'same slip class in' in printed(['compare', *pair])
+    assert main(['compare', str(pair[0]), str(simulated)]) == 2
+
+
+def test_a_report_is_a_page_and_a_remap_leads_to_an_input(simulated, tmp_path, refused):
+    refused(
+        ['replay', str(simulated), *CONFIG, '--report', str(tmp_path / 'r.pdf')], 'ends in .html'
+    )
+    wrong = ['--remap', 'sinkage:=/nothing']
+    said = refused(['replay', str(simulated), *CONFIG, *wrong])
+    assert '--remap sinkage:=/ground_truth' not in said
+
+
+SPANS = (10**10, 10**13, 4 * 10**17)  # [ns]
+WILD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, 5e-324)
+
+
+def run(command, bag, capsys, *more):
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        status = main([command, str(bag), *CONFIG, *more])
+    out, err = capsys.readouterr()
+    assert status in (0, 1), err
+    assert not err and 'nan' not in out.split() and 'internal error' not in out
+    return out
+
+
+@pytest.mark.parametrize(
+    'seed', [s if s % 4 == 0 else pytest.param(s, marks=pytest.mark.slow) for s in range(9)]
+)
+def test_random_stamps(simulated, tmp_path, capsys, seed):
+    random = np.random.default_rng(seed)
+
+    def change(topic, message):
+        if hasattr(message, 'header') and random.random() < (1.0, 0.5, 0.02)[seed // 3]:
+            stamp = int(1.7e18) + int(random.integers(0, SPANS[seed % 3]))
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+        return message
+
+    bag = changed(simulated, tmp_path / 'bag', change)
+    run('check', bag, capsys)
+    run('replay', bag, capsys)
+
+
+def test_a_recording_without_stamps_is_no_success(simulated, tmp_path, capsys):
+    def change(topic, message):
+        if hasattr(message, 'header'):
+            message.header.stamp.sec = message.header.stamp.nanosec = 0
+        return message
+
+    assert main(['replay', str(changed(simulated, tmp_path / 'bag', change)), *CONFIG]) == 2
+    said = capsys.readouterr()
+    assert 'x stamp is zero or negative' in said.out and 'bag: no estimate; ' in said.err
+
+
+def test_wild_numbers_in_the_truth(simulated, tmp_path, capsys):
+    numbers = itertools.cycle(WILD)
+
+    def change(topic, message):
+        if topic == '/ground_truth/twist':
+            message.twist.twist.linear.x = next(numbers)
+        elif topic.startswith('/ground_truth/s') and hasattr(message, 'position'):
+            message.position = np.array([next(numbers) for _ in message.position])
+        return message
+
+    assert 'against the truth' in run(
+        'replay', changed(simulated, tmp_path / 'bag', change), capsys
+    )
+
+
+def test_without_an_imu_the_first_finding_says_so(simulated, tmp_path, printed):
+    bag = changed(simulated, tmp_path / 'bag', lambda topic, m: None if 'imu' in topic else m)
+    assert 'no IMU in the recording' in printed(['check', str(bag), *CONFIG], 1).splitlines()[1]
+    assert 'no IMU in the recording' in printed(['replay', str(bag), *CONFIG]).splitlines()[0]
 
 
 def test_drive_gives_a_bag_a_report_and_a_summary(make_bag, config, tmp_path, printed):
@@ -39,9 +205,15 @@ def test_drive_gives_a_bag_a_report_and_a_summary(make_bag, config, tmp_path, pr
     assert 'without a reference velocity' not in said
     with open_bag(out) as bag:
         history = read_estimates(bag)
-        on_slopes = [m.stamp for _, _, m in messages_of(bag, {SLIP_ON_SLOPE: JOINT_STATE})]
+        on_slopes = [
+            m.stamp for _, _, m in messages_of(bag, {f'{NAMESPACE}/slip_on_slope': JOINT_STATE})
+        ]
     assert len(on_slopes) >= 3 and all(round(d * 1e-9) == 1 for d in np.diff(on_slopes))
-    assert_slip_follows_the_reference(history)
+    # Rim speed 0.42 m/s, reference 0.36 m/s: slip 1/7 on both wheels when it was just heard.
+    seconds = history.seconds
+    just_heard = (seconds % 1.0 > 0.05) & (seconds % 1.0 < 0.15) & (seconds > 1.5)
+    assert just_heard.any()
+    np.testing.assert_allclose(history.values['slip'][just_heard], 1 / 7, atol=0.06)
     assert (history.slip_class[-10:] == SlipClass.LOW).all()
     page = report.read_text()
     assert len(re.findall('<path class="line', page)) == 2 + 2 * 3 + 2  # speeds; two wheels; slopes
