@@ -69,12 +69,11 @@ def live(simulated, tmp_path_factory):
     return folder, said.getvalue()
 
 
-def test_truth_and_table(simulated, live, tmp_path):
+def test_truth_and_table(live):
     folder, said = live
     assert 'against the truth (/ground_truth)' in said and 'true / estimated' in said
     assert 'not used, on /ground_truth' not in said
     assert (folder / 'table.csv').read_text().startswith('stamp [ns],wheel,')
-    assert main(['replay', str(simulated), *CONFIG, '--table', str(tmp_path / 't.xls')]) == 2
 
 
 def test_findings_come_before_anything_else(upside_down, printed, tmp_path):
@@ -123,12 +122,12 @@ def test_smoothed_and_compared(simulated, live, tmp_path, printed, undrawn):
     assert main(['compare', str(pair[0]), str(simulated)]) == 2
 
 
-def test_a_report_is_a_page_and_a_remap_leads_to_an_input(simulated, tmp_path, refused):
-    refused(
-        ['replay', str(simulated), *CONFIG, '--report', str(tmp_path / 'r.pdf')], 'ends in .html'
-    )
-    wrong = ['--remap', 'sinkage:=/nothing']
-    said = refused(['replay', str(simulated), *CONFIG, *wrong])
+def test_files_have_their_endings_and_a_remap_leads_to_an_input(simulated, refused):
+    command = ['replay', simulated, *CONFIG]
+    refused([*command, '--report', 'r.pdf'], 'ends in .html')
+    refused([*command, '--table', 't.xls'], 'ends in .csv or .parquet')
+    refused([*command, '--track', 'way.png'], 'ends in .csv')
+    said = refused([*command, '--remap', 'sinkage:=/nothing'])
     assert '--remap sinkage:=/ground_truth' not in said
 
 

@@ -106,8 +106,3 @@ def test_table_and_strip(rover, tmp_path):
     begin, end = (float(v) for v in re.match(r'M([\d.]+) [\d.]+H([\d.]+)', high).groups())
     way = track.values['distance'][track.values['slip_class'] == 2]
     assert (begin, end) == (pytest.approx(way[0], rel=1e-4), pytest.approx(way[-1], abs=0.05))
-
-
-def test_what_a_track_cannot_be_is_said_first(tmp_path, refused):
-    command = ['replay', str(tmp_path), '--config', 'pathfinder', '--track', 'way.png']
-    refused(command, 'ends in .csv')
