@@ -58,9 +58,6 @@ def read_series(
                 collector.add(log_time, data)
         heard[topic] = log_time
     garbage = Counter({c.topic: len(c.arrivals) - len(c.stamps) for c in collectors.values()})
-    if garbage.total() or bag.damaged:
-        for collector in collectors.values():
-            garbage[collector.topic] += collector.leave_out_strays()
     notes = [
         *bag.notes,
         *(f'{n} damaged messages on {topic} were left out' for topic, n in garbage.items() if n),
@@ -89,9 +86,6 @@ def read_series(
 
 
 LARGEST = 1e9  # A number beyond this is damage in any unit
-_STRAY = 1e9
-"""Stamps of a damaged recording that lie so far [ns] from where the others do are damaged."""
-_STRAYS = 0.2  # greatest share of such stamps that damage explains
 
 
 def credible(values: Any) -> Any:
@@ -144,7 +138,6 @@ class _Collector:
         self.arrivals: list[int] = []
         self.stamps: list[int] = []  # of the messages that could be read, and their log times
         self._log_times: list[int] = []
-        self._sound: Any = slice(None)  # which of them are kept
         self._alike: dict[Layout, _Alike] = {}
         self._latest: _Alike | None = None
 
@@ -161,32 +154,20 @@ class _Collector:
         self.stamps.append(layout.stamp(data))
         self._log_times.append(log_time)
 
-    def leave_out_strays(self) -> int:
-        """Leave out what is stamped far from its log time, unless much is; return how many."""
-        delays = np.subtract(self._log_times, self.stamps, dtype=float)
-        if not delays.size:
-            return 0
-        stray = np.abs(delays - np.median(delays)) > _STRAY
-        if np.mean(stray) > _STRAYS:  # a clock that was set, not damage
-            return 0
-        self._sound = np.flatnonzero(~stray)
-        return int(stray.sum())
-
     def series(self) -> Any:
         raise NotImplementedError
 
     @property
     def times(self) -> tuple[Any, Any]:
         """Stamps and log times [ns]."""
-        stamps, log_times = (np.array(t, dtype=np.int64) for t in (self.stamps, self._log_times))
-        return stamps[self._sound], log_times[self._sound]
+        return np.array(self.stamps, dtype=np.int64), np.array(self._log_times, dtype=np.int64)
 
     def table(self, field: int, columns: int) -> Any:
         """Return a list of numbers of all messages, (messages, columns)."""
         values = np.full((len(self.stamps), columns), math.nan)
         for layout, alike in self._alike.items():
             self.fill(values, alike.places, layout.names, alike.numbers(field))
-        return credible(values)[self._sound]
+        return credible(values)
 
     def fill(self, values: Any, places: list[int], names: tuple[str, ...], numbers: Any) -> None:
         values[places] = numbers
