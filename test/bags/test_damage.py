@@ -74,9 +74,9 @@ def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path):
     assert last - first < gone[-1] - gone[0] + 0.2
 
 
-def test_every_command_says_what_is_damaged(make_bag, config, tmp_path, capsys):
+def test_every_command_says_what_is_damaged(make_bag, drive, config, tmp_path, capsys):
     """Of a bag that is cut in half; a check begins with the loss."""
-    bag = make_bag()
+    bag = make_bag(drive[:50])
     estimates = str(tmp_path / 'estimates')
     assert main(['replay', str(bag), *config, '-o', estimates]) == 0
     for folder in (bag, Path(estimates)):

@@ -82,7 +82,7 @@ def test_odometry_that_might_be_the_reference_is_named(tmp_path):
 
 def test_a_log_of_arrivals_holds_parameters_and_may_know_more_than_the_bag(tmp_path):
     """The node hears messages before the recorder does; what a log of another bag is, is told."""
-    recording = beginning(shipped.demo_recording('entrapment'), tmp_path / 'drive', 2.0)
+    recording = beginning(shipped.demo_recording('entrapment'), tmp_path / 'drive', 1.4)
     rover, log = reader.load(['generic_six_wheel', 'test_sand']), tmp_path / 'order.txt'
     tuned = {'filter.gate': 6.0, 'filter.class_thresholds': [0.2, 0.5, 0.8]}
     with open_bag(recording) as bag:

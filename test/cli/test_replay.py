@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recordings import beginning, changed
+from message_factory import serialised
+from recordings import changed
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import read_estimates
-from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
+from wheel_terra_estimator.bags.simulated_drive import TRUTH_TOPICS, write_simulated_drive
 from wheel_terra_estimator.bags.storage import messages_of, open_bag
 from wheel_terra_estimator.bags.writer import NAMESPACE
 from wheel_terra_estimator.cli.main import main
@@ -31,32 +32,13 @@ from wheel_terra_estimator.simulation.drive import simulate
 CONFIG = ['--config', 'generic_six_wheel', '--config', 'test_sand']
 
 
-def driven(folder, seconds, **changes):
-    source = scenario.load('turns', **changes)
-    write_simulated_drive(simulate(source, seed=5, duration=seconds), folder)
-    return folder
-
-
 @pytest.fixture(scope='module')
 def simulated(tmp_path_factory):
     """Half a metre in four seconds."""
     fast = {'drive__time': [0.0], 'drive__forward': [0.2], 'drive__turn_rate': [0.0]}
-    return driven(tmp_path_factory.mktemp('drive') / 'drive', 4.0, **fast)
-
-
-@pytest.fixture(scope='module')
-def upside_down(tmp_path_factory):
-    """A longer drive with the IMU on its back, the topics of the truth without a message."""
-
-    def turned(topic, message):
-        if topic == '/imu/data':
-            for vector in (message.linear_acceleration, message.angular_velocity):
-                vector.y, vector.z = -vector.y, -vector.z
-            message.orientation_covariance = np.array([-1.0] + [0.0] * 8)
-        return message if topic[1:] in INPUT_TYPES else None
-
-    folder = tmp_path_factory.mktemp('fault')
-    return changed(driven(folder / 'right', 10.0), folder / 'drive', turned)
+    folder = tmp_path_factory.mktemp('drive') / 'drive'
+    write_simulated_drive(simulate(scenario.load('turns', **fast), 5, 4.0), folder)
+    return folder
 
 
 @pytest.fixture(scope='module')
@@ -76,16 +58,34 @@ def test_truth_and_table(live):
     assert (folder / 'table.csv').read_text().startswith('stamp [ns],wheel,')
 
 
-def test_findings_come_before_anything_else(upside_down, printed, tmp_path):
-    told = json.loads(printed(['replay', str(upside_down), *CONFIG, '--json']))
+@pytest.fixture
+def upside_down(make_drive, tmp_path):
+    """Drives with the IMU on its back, by their steps; topics of the truth without a message."""
+
+    def make(steps):
+        inputs = ('joint_states', 'imu/data', 'reference_odom')
+        topics = {**{f'/{name}': INPUT_TYPES[name] for name in inputs}, **TRUTH_TOPICS}
+        with BagFile(tmp_path / f'{steps}', topics) as bag:
+            for number, (topic, message, time) in enumerate(make_drive(steps)):
+                if topic == '/imu/data':
+                    message.linear_acceleration.z = -9.8
+                    message.angular_velocity.z = 0.001 * (number % 4 - 1.5)
+                    message.orientation_covariance[0] = -1.0
+                bag.write(topic, serialised(message), time)
+        return bag.path
+
+    return make
+
+
+def test_findings_come_before_anything_else(upside_down, config, printed):
+    told = json.loads(printed(['replay', upside_down(100), *config, '--json']))
     assert [f['kind'] for f in told['findings']] == ['mounting']
     assert not told['warnings']
     for wheel in told['wheels']:
         seconds = dict(wheel['seconds'])
         # The inputs are on trial for 8 s.
         assert sum(seconds.values()) - seconds['unknown'] < 8.0, 'until it is told'
-    short = beginning(upside_down, tmp_path / 'short', 4.0)
-    said = printed(['replay', str(short), *CONFIG])
+    said = printed(['replay', upside_down(30), *config])
     assert said.startswith('finding: mounting') and 'imu_mounting_roll_deg: 180' in said
     assert 'against the truth' not in said
 

@@ -102,7 +102,7 @@ def estimate(
 
     Examples
     --------
-    >>> drive = simulate('firm_drive', seed=1, duration=1.5)
+    >>> drive = simulate('firm_drive', seed=1, duration=1.0)
     >>> columns = estimate(drive, as_frame=False)
     >>> wheel = drive.configuration.wheels.names[0]
     >>> bool(abs(columns[f'slip.{wheel}'][-1]) < 0.3)
@@ -126,7 +126,7 @@ def smooth(
 
     Examples
     --------
-    >>> drive = simulate('firm_drive', seed=1, duration=1.5)
+    >>> drive = simulate('firm_drive', seed=1, duration=1.0)
     >>> columns = smooth(drive, as_frame=False)
     >>> columns.keys() == estimate(drive, as_frame=False).keys()
     True
@@ -157,7 +157,7 @@ def simulate(
 
     Examples
     --------
-    >>> drive = simulate('firm_drive', seed=1, duration=1.5)
+    >>> drive = simulate('firm_drive', seed=1, duration=1.0)
     >>> drive.truth.slip.shape[1] == drive.configuration.wheels.count
     True
     """
@@ -186,7 +186,7 @@ def taught(
 
     Examples
     --------
-    >>> rows = taught(simulate('firm_drive', seed=1, duration=1.5))
+    >>> rows = taught(simulate('firm_drive', seed=1, duration=1.0))
     >>> {row.verdict for row in rows} <= {'learned', 'assumed', 'confounded'}
     True
     """
