@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import json
 import sys
 import textwrap
@@ -13,6 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from wheel_terra_estimator.cli.terminal import suggestion
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import (
     Effect,
@@ -55,9 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     known = catalogue()
     for name in arguments.names:
         if name not in known:
-            close = difflib.get_close_matches(name, known, n=1)
-            hint = f"did you mean '{close[0]}'? " if close else ''
-            raise UserError(f'no effect {name}; {hint}there are: {", ".join(known)}')
+            raise UserError(f'no effect {name}; {suggestion(name, list(known))}')
     chosen = {name: known[name] for name in arguments.names or known}
     sys.stdout.write(as_json(chosen) if arguments.json else as_text(chosen))
     return 0
