@@ -7,7 +7,6 @@ import re
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.reporting.fleet_summary import DriveRow
 from wheel_terra_estimator.reporting.html import render
 from wheel_terra_estimator.reporting.time_figure import (
     HEIGHT,
@@ -86,17 +85,3 @@ def test_limits_leave_the_same_room_on_both_sides():
     low, high = limits(np.array([0.0, np.nan, 10.0]), within=(2.0, 3.0))
     assert 0.0 - low == pytest.approx(high - 10.0)
     assert 0.5 < high - 10.0 < 1.0
-
-
-@pytest.mark.parametrize(
-    ('row', 'tone'),
-    [
-        (DriveRow('a', error='no wheel'), 'bad'),
-        (DriveRow('a', sets=10, stuck_warnings=1), 'bad'),
-        (DriveRow('a', sets=0), 'bad'),
-        (DriveRow('a', sets=10, seconds={'high': 0.0, 'stuck': 1.0}), 'warn'),
-        (DriveRow('a', sets=10, seconds={'high': 0.0, 'stuck': 0.0}), 'good'),
-    ],
-)
-def test_the_colour_of_a_drive_among_many(row, tone):
-    assert row.tone == tone

@@ -23,7 +23,7 @@ from wheel_terra_estimator.reporting.drive_summary import (
     WheelSummary,
 )
 from wheel_terra_estimator.reporting.estimates_table import write_table
-from wheel_terra_estimator.reporting.replay_report import _error_row, _tone
+from wheel_terra_estimator.reporting.replay_report import _error_row
 from wheel_terra_estimator.reporting.truth_scores import (
     QuantityError,
     TruthErrors,
@@ -171,8 +171,11 @@ def test_a_warning_without_its_slip_is_said():
 def test_a_drive_with_high_slip_stuck_wheels_or_nothing_known_is_shown_as_a_warning(
     high, stuck, slip, tone
 ):
-    wheels = [SimpleNamespace(seconds={'high': high, 'stuck': stuck}, slip=slip)]
-    assert _tone(SimpleNamespace(wheels=wheels)) == tone
+    wheels = (SimpleNamespace(seconds={'high': high, 'stuck': stuck}, slip=slip),)
+    drive = DriveSummary('drive', 0.0, 9, wheels, (), (), ())
+    assert drive.tone == tone
+    for bad in ({'sets': 0}, {'warnings': (WarningSpan(0.0, None, ''),)}):
+        assert dataclasses.replace(drive, **bad).tone == 'bad'
 
 
 def test_a_drive_is_called_good_where_slip_is_known_and_no_wheel_travelled_by_it():

@@ -114,6 +114,14 @@ class DriveSummary:
             'the classes high and stuck.'
         )
 
+    @property
+    def tone(self) -> str:
+        """Colour of the drive on a page: bad, warn or good."""
+        if self.warnings or not self.sets:
+            return 'bad'
+        high = any(wheel.seconds['high'] + wheel.seconds['stuck'] > 0.0 for wheel in self.wheels)
+        return 'warn' if high or all(wheel.slip is None for wheel in self.wheels) else 'good'
+
 
 def summarise(
     title: str,

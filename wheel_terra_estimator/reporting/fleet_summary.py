@@ -72,13 +72,6 @@ class DriveRow:
         found = f' {len(self.findings)} finding{plural}.' if self.findings else ''
         return f'{self.bag}: {self.duration:.1f} s. {self.verdict}{found}'
 
-    @property
-    def tone(self) -> str:
-        """Colour of the drive on the page."""
-        if self.error or self.stuck_warnings or not self.sets:
-            return 'bad'
-        return 'warn' if self.seconds['high'] + self.seconds['stuck'] > 0.0 else 'good'
-
 
 def worst_first(rows: Sequence[DriveRow]) -> list[DriveRow]:
     """Sort by stuck warnings, time stuck, time in the class high, slip; failed ones last."""

@@ -59,7 +59,7 @@ def write_replay_report(
         'replay.html',
         summary=summary,
         rover=configuration.rover.name or 'rover',
-        tone='bad' if summary.warnings or not summary.sets else _tone(summary),
+        tone=summary.tone,
         cards=_cards(summary),
         classes=[(c.name.lower(), colour) for c, colour in CLASS_COLOURS.items()],
         wheels=[_wheel_row(wheel) for wheel in summary.wheels],
@@ -92,11 +92,6 @@ def _error_row(error: QuantityError) -> dict[str, str]:
         'worst': f'{scale * error.worst:.3g}',
         'within': f'{100 * error.within_two_std:.0f} %',
     }
-
-
-def _tone(summary: DriveSummary) -> str:
-    high = any(wheel.seconds['high'] + wheel.seconds['stuck'] > 0.0 for wheel in summary.wheels)
-    return 'warn' if high or all(wheel.slip is None for wheel in summary.wheels) else 'good'
 
 
 def _cards(summary: DriveSummary) -> list[tuple[str, str]]:
