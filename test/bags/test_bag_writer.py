@@ -5,12 +5,12 @@
 import struct
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 import numpy as np
 import pytest
 import yaml
 from estimate_sets import STAMP, some_estimates
+from recordings import contents
 
 from wheel_terra_estimator.bags.history import WHEEL_FIELDS, HistoryRecorder, read_estimates
 from wheel_terra_estimator.bags.storage import jazzy_types, open_bag
@@ -60,19 +60,14 @@ def messages(path: Path) -> list[tuple[int, str, Any]]:
 
 def test_topics_have_full_names_and_their_types(bag):
     joint_state = 'sensor_msgs/msg/JointState'
+    quantities = ('slip', 'sinkage', 'slip_stddev', 'sinkage_stddev', 'mobility', 'soil')
+    quantities += ('slip_angle', 'slip_angle_stddev')
     with open_bag(bag) as opened:
         found = {name: (topic.type, topic.message_count) for name, topic in opened.topics.items()}
     own = '/wheel_terra_estimator'
     assert found == {
-        f'{own}/slip': (joint_state, 25),
-        f'{own}/sinkage': (joint_state, 25),
-        f'{own}/slip_stddev': (joint_state, 25),
-        f'{own}/sinkage_stddev': (joint_state, 25),
-        f'{own}/mobility': (joint_state, 25),
-        f'{own}/soil': (joint_state, 25),
+        **{f'{own}/{topic}': (joint_state, 25) for topic in quantities},
         f'{own}/slip_on_slope': (joint_state, 0),
-        f'{own}/slip_angle': (joint_state, 25),
-        f'{own}/slip_angle_stddev': (joint_state, 25),
         f'{own}/slip_class': ('std_msgs/msg/UInt8MultiArray', 25),
         f'{own}/twist': ('geometry_msgs/msg/TwistWithCovarianceStamped', 25),
         f'{own}/stuck': ('std_msgs/msg/Bool', 3),
@@ -175,22 +170,13 @@ def test_a_reset_clears_the_stuck_warning(tmp_path):
     assert said == [False, True, False, True, False]
 
 
-def test_bags_carry_checksums(make_bag):
-    """As the format asks: of a chunk over its records, of the summary up to the checksum itself."""
+def test_chunks_carry_checksums(make_bag):
+    """A bit is turned round. Of the summary: test_a_sound_file_is_read_by_its_index."""
     (file,) = make_bag().glob('*.mcap')
-    content = file.read_bytes()
-    at, chunks = 8, 0
-    while content[at] != 2:
-        opcode, length = struct.unpack_from('<BQ', content, at)
-        if opcode == 6:
-            checksum, letters = struct.unpack_from('<II', content, at + 33)
-            assert not letters
-            assert checksum == crc32(content[at + 49 : at + 9 + length])
-            chunks += 1
-        at += 9 + length
-    summary, _, checksum = struct.unpack_from('<QQI', content, at + 9)
-    assert chunks
-    assert checksum == crc32(content[summary : at + 25])
+    content = bytearray(file.read_bytes())
+    content[content.index(struct.pack('<d', 9.0))] ^= 1  # a rate
+    file.write_bytes(content)
+    assert 'a chunk with a wrong checksum' in contents(file)[1][0]
 
 
 def test_every_column_of_a_wheel_has_its_unit_or_is_a_ratio():
