@@ -258,16 +258,11 @@ def test_orientation_of_base_link_agrees_with_the_turned_vectors(make_converter,
 
 
 def test_roll_pitch_yaw_are_about_fixed_axes(rover):
-    roll, pitch, yaw = 0.3, -0.5, 1.1
-    x = np.array([[1, 0, 0], [0, np.cos(roll), -np.sin(roll)], [0, np.sin(roll), np.cos(roll)]])
-    y = np.array([[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]])
-    z = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
-    angles = {'roll': roll, 'pitch': pitch, 'yaw': yaw}
-    turned = rover.replace(
-        {f'sensors.imu_mounting_{name}_deg': math.degrees(a) for name, a in angles.items()}
-    )
-    found = imu_mounting(turned).as_matrix()
-    np.testing.assert_allclose(found, z @ y @ x, atol=1e-15)
+    """That is, about its own axes as they turn with it: yaw, pitch, roll."""
+    angles = {'roll': 20.0, 'pitch': -30.0, 'yaw': 60.0}
+    turned = rover.replace({f'sensors.imu_mounting_{key}_deg': a for key, a in angles.items()})
+    found = imu_mounting(turned).as_euler('ZYX', degrees=True)
+    np.testing.assert_allclose(found, [60.0, -30.0, 20.0], atol=1e-12)
 
 
 def test_sinkage_leaving_angle_and_reference(joints, converter, odometry):
