@@ -178,8 +178,6 @@ class McapFile:
 
     def _indexed_piece(self, record: mcap.Record) -> Piece:
         begin, end, channels = mcap.indexed_chunk(self._map, record)
-        if end > self._size:
-            raise ValueError('the index points behind the file')
         head = mcap.chunk_head(self._map, begin, self._size)
         if head is None or head.begin + head.packed != end:
             raise ValueError('the index points to no chunk')
