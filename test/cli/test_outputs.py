@@ -138,7 +138,7 @@ REFUSED = {
     'trial': 'trial --effect nobody -o',
     'soilbin run': 'soilbin run {bad} -o',
     'soilbin rows': 'soilbin rows --no-cache --sweep pull --seeds 1 --scheduler {silent} -o',
-    'reproduce': 'reproduce nakashima --run --seeds 1 --no-cache --scheduler {silent} -o',
+    'reproduce': 'reproduce nakashima --run --part table7 --seeds 1 --no-cache --scheduler {silent} -o',
     'evaluate': 'evaluate --kinds climb --first-seed -1 -o',
     'demo': 'demo --no-node -o',
 }

@@ -16,7 +16,7 @@ import pytest
 from test_ros_yaml import read_by_ros
 
 from wheel_terra_estimator.configuration import parameters, reader, shipped
-from wheel_terra_estimator.configuration.parameters import DECLARED, by_spelling, declared
+from wheel_terra_estimator.configuration.parameters import DECLARED, RETIRED, by_spelling, declared
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
 from wheel_terra_estimator.terramechanics import effects
 from wheel_terra_estimator.terramechanics.contact_law import LAWS
@@ -58,6 +58,19 @@ def test_spellings_are_unique():
     assert len(by_spelling(table)) == len(table) + sum(len(p.aliases) for p in table.values())
     stated = Path(parameters.__file__).with_name('parameters.yaml').read_text()
     assert len({p.key for p in DECLARED}) == stated.count('{type: '), 'a key stands twice'
+    assert not set(RETIRED) & set(by_spelling(table))
+
+
+def test_a_retired_key_is_left_out_and_said(tmp_path):
+    with_it = parameter_file(tmp_path, 'old.yaml', 'rover.name: mine\nfilter.demand_walk: 0.02')
+    with pytest.warns(ConfigurationWarning) as said:
+        read = reader.load([with_it], complete=False)
+    assert [str(warning.message) for warning in said] == [
+        f'{with_it}: filter.demand_walk no longer exists and is left out: '
+        'filter.ratio_walk holds on every ground; delete this line'
+    ]
+    assert read.rover.name == 'mine'
+    assert 'filter.demand_walk' not in read.flat()
 
 
 def test_contact_laws_are_those_of_the_physics():

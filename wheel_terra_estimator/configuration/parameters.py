@@ -5,7 +5,7 @@
 To add a parameter, add an entry to ``parameters.yaml``: the reader then accepts and checks the key,
 the node declares it, ``configuration.<section>.<name>`` has its value, and
 ``python tools/document_parameters.py`` writes it to ``docs/parameters.md``
-(a test says when that was forgotten).
+(a test says when that was forgotten). A key that goes moves to ``retired``, with what became of it.
 
 The keys ``effects.<name>.enabled``, ``effects.<name>.form`` (where there are several),
 ``effects.<name>.<parameter>`` and ``effects.<name>.<parameter>_std`` come from the catalogue of
@@ -80,13 +80,19 @@ def plain_table(path: Path) -> dict[str, Any]:
     return table
 
 
-def read_table(path: Path) -> tuple[Parameter, ...]:
-    """Return the parameters that a YAML file declares; `parameters.yaml` says what stands in it."""
-    found: list[Parameter] = []
-    for name, entry in plain_table(path).items():
+def read_table(path: Path) -> tuple[tuple[Parameter, ...], dict[str, str]]:
+    """Read a table of declarations.
+
+    ``path``: YAML file; `parameters.yaml` says what stands in it. Returns the parameters in the
+    order of the file, and retired keys -> what became of them.
+    """
+    table = plain_table(path)
+    retired = table.pop('retired', {})
+    found = []
+    for name, entry in table.items():
         inside = {name: entry} if 'type' in entry else {f'{name}.{k}': e for k, e in entry.items()}
         found += [parameter(key, **fields) for key, fields in inside.items()]
-    return tuple(found)
+    return tuple(found), retired
 
 
 def parameter(
@@ -120,8 +126,8 @@ def parameter(
     )
 
 
-DECLARED = read_table(Path(__file__).with_name('parameters.yaml'))
-"""The parameters, without the effects."""
+DECLARED, RETIRED = read_table(Path(__file__).with_name('parameters.yaml'))
+"""The parameters, without the effects; keys of earlier versions -> what became of them."""
 
 
 def declared() -> dict[str, Parameter]:

@@ -18,6 +18,7 @@ from typing import Any
 from wheel_terra_estimator.configuration import ros_yaml, shipped
 from wheel_terra_estimator.configuration.configuration import Configuration, law
 from wheel_terra_estimator.configuration.parameters import (
+    RETIRED,
     Parameter,
     by_spelling,
     declared,
@@ -168,6 +169,9 @@ def _checked(
     seen: dict[tuple[str, str], str] = {}
     for key, source, value in sourced:
         if key in STANDARD_PARAMETERS or key.startswith(STANDARD_PREFIXES):
+            continue
+        if key in RETIRED:
+            _warn(f'{source}: {key} no longer exists and is left out: {RETIRED[key]}')
             continue
         parameter = spellings.get(key)
         if parameter is None:

@@ -25,7 +25,9 @@ from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Patch
 
 DEFAULT = 'climb_soft_patch'
 
-DECLARED = {item.key: item for item in read_table(Path(__file__).with_name('scenario_keys.yaml'))}
+DECLARED = {
+    item.key: item for item in read_table(Path(__file__).with_name('scenario_keys.yaml'))[0]
+}
 """What a scenario may state, by key."""
 
 WHEEL_FAULTS = {
