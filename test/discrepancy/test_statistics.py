@@ -35,6 +35,7 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
     CommonError,
     build_problem,
     kernel,
+    over_covariance,
     slip_features,
 )
 from wheel_terra_estimator.discrepancy.report.words import _repeatability
@@ -548,11 +549,12 @@ def test_precision_is_the_inverse_of_the_conditioned_covariance(rng):
     np.testing.assert_allclose(np.linalg.inv(found), after, rtol=1e-10)
 
 
-def test_inverse_covariance_is_the_inverse(rng):
+def test_what_is_over_a_covariance_is_over_the_dense_one(rng):
     variance, jacobian = rng.uniform(0.2, 4.0, 8), rng.standard_normal((8, 2))
-    whole = np.diag(variance) + jacobian @ jacobian.T
-    found = outliers.inverse_covariance(variance, jacobian)
-    np.testing.assert_allclose(found @ whole, np.eye(8), atol=1e-12)
+    prior, vectors = np.array([0.3, 2.0]), rng.standard_normal((8, 3))
+    whole = np.diag(variance) + (jacobian / prior) @ jacobian.T
+    found = over_covariance(vectors, variance, jacobian, prior)
+    np.testing.assert_allclose(whole @ found, vectors, atol=1e-12)
 
 
 def test_a_cell_set_apart_is_the_evidence_of_its_wider_noise(rng):

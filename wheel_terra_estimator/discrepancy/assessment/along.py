@@ -14,7 +14,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.fitting.noise import inverse_covariance
+from wheel_terra_estimator.discrepancy.fitting.problem import over_covariance
 from wheel_terra_estimator.discrepancy.numbers import number, plain
 from wheel_terra_estimator.discrepancy.selection.weights import Setting
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
@@ -54,8 +54,8 @@ def changed_stretch(
     time, problem = table.columns['time'], setting.problem
     place = {c.name: i for i, c in enumerate(fitted.coordinates) if c.owner == 'soil'}
     columns = fitted.sensitivity[:, [place[name] for name in _FIELDS]]
-    inverse = inverse_covariance(variance, fitted.jacobian / np.sqrt(fitted.prior))
-    inverse = problem.rotation.T @ inverse @ problem.rotation
+    jacobian = fitted.jacobian / np.sqrt(fitted.prior)
+    inverse = problem.rotation.T @ over_covariance(problem.rotation, variance, jacobian)
     target = problem.wanted - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
     # Sums over the cells of each time; those of a stretch are differences of running sums.
     times = np.unique(time)

@@ -116,10 +116,8 @@ def _cell_noise(findings: Findings) -> FloatArray:
     """(N, 4) noise of the cells, with what uncertain slips and leaving angles add."""
     problem = findings.setting.problem
     std = findings.noise.std.copy()
-    cells = problem.std
-    if (problem.block < 0).any():
-        cells = np.sqrt((np.linalg.inv(problem.rotation) ** 2).sum(axis=1))
-    std[problem.row, problem.quantity] = cells
+    square = np.linalg.inv(problem.rotation) ** 2
+    std[problem.row, problem.quantity] = np.sqrt(square.sum(axis=1))
     return std
 
 

@@ -17,7 +17,11 @@ from scipy.special import bdtrc, chdtrc
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.fitting.problem import OUTLIER_FACTOR, Problem
+from wheel_terra_estimator.discrepancy.fitting.problem import (
+    OUTLIER_FACTOR,
+    Problem,
+    over_covariance,
+)
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_COLUMNS,
@@ -136,11 +140,9 @@ def estimate_noise(
         target = here.residual + here.jacobian @ here.u
         for q in unknown:
             cells = problem.quantity == q
-            mine = problem.block == q
-            if not mine.any():
-                mine = cells  # slip errors mix the axes: the cells stand for them
+            # Where slip errors mix the axes, those at the places of the cells stand for them.
             value, count, score = _white_part(
-                target[mine], here.jacobian[mine], problem.roughness[mine], _LEAST / _FIRST_GUESS
+                target[cells], here.jacobian[cells], problem.roughness[cells], _LEAST / _FIRST_GUESS
             )
             score -= float(np.log(problem.std[cells]).sum())
             if score < best[q] + _CLEARLY:
@@ -203,7 +205,7 @@ def find_outliers(
         sizes.append(np.maximum(amplitude, _ROBUST_FLOOR))
     best, found, chosen = -np.inf, [], None
     for variance in map(problem.variance, sizes):
-        inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
+        inverse = problem.rotation.T @ over_covariance(problem.rotation, variance, jacobian)
         score, cells = _rejected_cells(problem, inverse, target)
         if score > best:
             best, found, chosen = score, cells, inverse
@@ -279,10 +281,3 @@ def _rejected_cells(
         share = extra[worst] / (1.0 + extra[worst] / own[worst])
         inverse = inverse - share * np.outer(column, column)
     return score, found
-
-
-def inverse_covariance(variance: FloatArray, jacobian: FloatArray) -> FloatArray:
-    """Invert diag(variance) + J J' for an (m, P) J with few columns (Woodbury)."""
-    weighted = jacobian / variance[:, None]
-    precision = jacobian.T @ weighted + np.eye(jacobian.shape[1])
-    return np.diag(1.0 / variance) - weighted @ np.linalg.solve(precision, weighted.T)

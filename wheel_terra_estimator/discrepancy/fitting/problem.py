@@ -108,6 +108,19 @@ class CommonError:
     group: IndexArray  # (N,) rows of the same number share one reading
 
 
+def over_covariance(
+    vectors: FloatArray, variance: FloatArray, jacobian: FloatArray, prior: ArrayLike = 1.0
+) -> FloatArray:
+    """Multiply (m, ...) vectors by the inverse of diag(variance) + J diag(1 / prior) J'.
+
+    J is (m, P) with few columns, ``prior`` the precision of what it stands for (Woodbury).
+    """
+    weighted = jacobian / variance[:, None]
+    precision = weighted.T @ jacobian + np.eye(jacobian.shape[1]) * prior
+    scaled = (vectors.T / variance).T
+    return np.asarray(scaled - weighted @ np.linalg.solve(precision, weighted.T @ vectors))
+
+
 def kernel(inputs: FloatArray) -> FloatArray:
     """(N, N) correlation of a structural error between rows.
 
@@ -158,39 +171,25 @@ def build_problem(
     if group is not None:
         correlation = correlation * (group[:, None] == group[None, :])
     m = len(row)
-    if not common:
-        rotation, roughness = np.zeros((m, m)), np.empty(m)
-        block = np.empty(m, dtype=np.intp)
-        at = 0
-        for q in range(len(scale)):
-            mine = np.flatnonzero(quantity == q)
-            if not mine.size:
-                continue
-            part = slice(at, at + mine.size)
-            relative = scale[q] / deviation[mine]
-            smooth = correlation[np.ix_(row[mine], row[mine])] * np.outer(relative, relative)
-            values, vectors = np.linalg.eigh(smooth)
-            rotation[part, mine] = vectors.T / deviation[mine]
-            roughness[part] = np.maximum(values, 0.0)
-            block[part] = q
-            at += mine.size
-        log_std = float(np.log(deviation).sum())
-    else:
-        noise = np.diag(deviation**2)
-        for error in common:
-            size = error.slope[row, quantity] * error.std[row]
-            together = error.group[row][:, None] == error.group[row][None, :]
-            noise += np.where(together, np.outer(size, size), 0.0)
-        lower = np.linalg.cholesky(noise)
-        # Structural errors of the quantities are independent.
-        alike = quantity[:, None] == quantity[None, :]
-        sizes = np.outer(scale[quantity], scale[quantity])
-        smooth = np.where(alike, correlation[np.ix_(row, row)] * sizes, 0.0)
+    noise = np.diag(deviation**2)
+    for error in common:
+        size = error.slope[row, quantity] * error.std[row]
+        together = error.group[row][:, None] == error.group[row][None, :]
+        noise += np.where(together, np.outer(size, size), 0.0)
+    # Structural errors of the quantities are independent, and their noise unless inputs err.
+    alike = quantity[:, None] == quantity[None, :]
+    sizes = np.outer(scale[quantity], scale[quantity])
+    smooth = np.where(alike, correlation[np.ix_(row, row)] * sizes, 0.0)
+    block = np.full(m, -1, dtype=np.intp) if common else quantity
+    rotation, roughness, log_std = np.zeros((m, m)), np.empty(m), 0.0
+    for part in np.unique(block):
+        mine = np.flatnonzero(block == part)
+        square = np.ix_(mine, mine)
+        lower = np.linalg.cholesky(noise[square])
         whitening = np.linalg.inv(lower)
-        values, vectors = np.linalg.eigh(whitening @ smooth @ whitening.T)
-        rotation, roughness = vectors.T @ whitening, np.maximum(values, 0.0)
-        block = np.full(m, -1, dtype=np.intp)
-        log_std = float(np.log(np.diag(lower)).sum())
+        values, vectors = np.linalg.eigh(whitening @ smooth[square] @ whitening.T)
+        rotation[square], roughness[mine] = vectors.T @ whitening, np.maximum(values, 0.0)
+        log_std += float(np.log(np.diag(lower)).sum())
     observed = measured[row, quantity]
     return Problem(
         observed,

@@ -17,11 +17,12 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import BED_SCATTER, C
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
-from wheel_terra_estimator.discrepancy.fitting.noise import find_outliers, inverse_covariance
+from wheel_terra_estimator.discrepancy.fitting.noise import find_outliers
 from wheel_terra_estimator.discrepancy.fitting.problem import (
     CommonError,
     Problem,
     build_problem,
+    over_covariance,
     slip_features,
 )
 from wheel_terra_estimator.discrepancy.result import Noise
@@ -288,10 +289,9 @@ class _Builder:
         self.by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, nothing.angle)
         problem = self.build(noise_std, ())
         here = nothing.within(problem)
-        inverse = problem.rotation.T @ inverse_covariance(
-            problem.variance(_LATENT_FLOOR), here.jacobian
-        )
-        cells = inverse @ (here.residual + here.jacobian @ here.u)
+        target = here.residual + here.jacobian @ here.u
+        variance = problem.variance(_LATENT_FLOOR)
+        cells = problem.rotation.T @ over_covariance(target, variance, here.jacobian)
         pull = np.bincount(
             self._group[problem.row],
             problem.flat(self.by_slip) * std[problem.row] * cells,

@@ -17,7 +17,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem, over_covariance
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 
@@ -43,14 +43,10 @@ class Signature:
 def against_soil(fitted: Fit, variance: FloatArray, vectors: FloatArray) -> FloatArray:
     """Multiply rotated (m, ...) vectors by the inverse covariance of the cells, soil free.
 
-    The soil's tangent space enters with its prior: (V + J J')^-1 (Woodbury).
+    The soil's tangent space enters with its prior.
     """
     soil = [i for i, c in enumerate(fitted.coordinates) if c.owner not in fitted.names]
-    jacobian = fitted.jacobian[:, soil]
-    weighted = jacobian / variance[:, None]
-    precision = weighted.T @ jacobian + np.eye(len(soil))
-    scaled = (vectors.T / variance).T
-    return scaled - weighted @ np.linalg.solve(precision, weighted.T @ vectors)
+    return over_covariance(vectors, variance, fitted.jacobian[:, soil])
 
 
 def unavailable(effect: Effect, table: SteadyTable, lug_height: FloatArray) -> str:

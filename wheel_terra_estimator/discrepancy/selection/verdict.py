@@ -16,7 +16,7 @@ from scipy.special import chdtrc  # scipy.stats takes longer to load than a diag
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem, over_covariance
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 
@@ -88,12 +88,10 @@ def chi_square_p_value(fitted: Fit, variance: FloatArray) -> float:
     however many soil parameters were fitted; an effect's strength takes one.
     """
     target = fitted.residual + fitted.jacobian @ fitted.u
-    weighted = fitted.jacobian / variance[:, None]
     strength = np.array([c.role == 'strength' for c in fitted.coordinates])
-    precision = weighted.T @ fitted.jacobian + np.diag(np.where(strength, 1e-9, 1.0))
-    right = weighted.T @ target
-    square = float(target @ (target / variance) - right @ np.linalg.solve(precision, right))
-    return float(chdtrc(len(target) - strength.sum(), square))
+    prior = np.where(strength, 1e-9, 1.0)
+    square = target @ over_covariance(target, variance, fitted.jacobian, prior)
+    return float(chdtrc(len(target) - strength.sum(), float(square)))
 
 
 def largest_z_score(fitted: Fit) -> float:
