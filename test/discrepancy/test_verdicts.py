@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -200,7 +199,7 @@ def test_rows_of_two_soils_in_turn_are_called_scattered_where_no_noise_is_stated
     stiff = solve(rows, replace(soil, frictional_modulus=5.0 * soil.frictional_modulus))
     every_second = np.arange(40) % 2 == 1
     mixed = {k: np.where(every_second, stiff[k], v) if k in stiff else v for k, v in table.items()}
-    found = run(mixed, values)
+    found = run(mixed, values, options=FEW)
     assert found.verdict == 'agrees'
     assert re.search('too scattered.* [23]. % of the range of the sinkage', found.sentence)
 
@@ -301,29 +300,46 @@ def test_a_patchwork_of_doubtful_names_is_not_given(monkeypatch):
     assert min(effect.confidence_of_set for effect in patched.effects) < 0.5
 
 
-@pytest.mark.parametrize(
-    ('column', 'factor', 'units'),
-    [
-        ('sinkage', 10.0, 'mm in place of cm'),
-        pytest.param('sinkage', 0.1, 'cm in place of mm', marks=pytest.mark.slow),
-        ('torque', 0.1, 'kgf m in place of N m'),
-        pytest.param('drawbar_pull', 0.2248089, 'lbf in place of N', marks=pytest.mark.slow),
-        ('drawbar_pull', 1.0 / 9.80665, 'kgf in place of N'),
-        pytest.param('normal_load', 0.2248089, 'lbf in place of N', marks=pytest.mark.slow),
-        ('normal_load', 2.0, 'of one wheel or of a pair?'),
-    ],
+LBF, KGF = 4.4482216, 9.80665
+KNOWN_NOISE = (
+    # Few effects may be named: powers of ten are asked for alone.
+    ({'sinkage': 10.0}, 'mm in place of cm', TWO),
+    ({'torque': 0.1}, 'kgf m in place of N m', TWO),
+    ({'drawbar_pull': 1.0 / KGF}, 'kgf in place of N', None),
+    ({'normal_load': 2.0}, 'of one wheel or of a pair?', None),
 )
-def test_a_wrong_unit_is_said_before_any_effect(few_known, column, factor, units):
-    campaign = make_campaign(92_510_001, 'sweep40', Plan(hide='none'))
-    for name in {column, f'{column}_std'} & campaign.table.keys():
-        campaign.table[name] = factor * campaign.table[name]
-    options = TWO if math.log10(factor).is_integer() else Options()  # few effects: tens alone
-    found = run(campaign.table, campaign.settings(), options=options)
-    assert found.verdict == 'unexplained'
-    assert not found.effects
-    assert not found.proposal
-    assert list(found.misread) == [column]
-    assert f'The unit of {column.replace("_", " ")} looks wrong ({units})' in found.sentence
+UNKNOWN_NOISE = (
+    ({'sinkage': 10.0, 'torque': 0.1}, 'and the unit of', TWO),
+    ({'drawbar_pull': 1.0 / KGF, 'torque': 1.0 / KGF}, 'and the unit of', None),
+    # Without a column of the pull
+    ({'normal_load': 1.0 / KGF, 'torque': 1.0 / KGF}, 'and the unit of', None),
+    (
+        {'normal_load': 1.0 / KGF, 'drawbar_pull': 1.0 / KGF, 'torque': 1.0 / KGF},
+        'and the unit of',
+        None,
+    ),
+    ({'normal_load': 1.0 / LBF}, 'lbf in place of N', None),
+)
+
+
+@pytest.mark.parametrize(
+    ('stds', 'factors', 'said', 'options'),
+    [(True, *case) for case in KNOWN_NOISE] + [(False, *case) for case in UNKNOWN_NOISE],
+)
+def test_a_wrong_unit_is_said_before_any_effect(few_known, stds, factors, said, options):
+    table, values, *_ = make('basic16', stds=stds)
+    if {'normal_load', 'torque'} == set(factors):
+        del table['drawbar_pull']
+    elif said == 'lbf in place of N':  # the soil is not known either
+        values['soil.frictional_modulus'] *= 3.0
+        assert 'normal_load' not in run(table, values).misread
+    for column, factor in factors.items():
+        for name in {column, f'{column}_std'} & table.keys():
+            table[name] = factor * table[name]
+    found = run(table, values, options=options)
+    assert (found.verdict, found.effects, found.proposal) == ('unexplained', (), None)
+    assert found.misread == {column: pytest.approx(1.0 / f) for column, f in factors.items()}
+    assert said in found.sentence and 'looks wrong' in found.sentence
 
 
 @pytest.mark.parametrize(
@@ -354,7 +370,7 @@ def test_a_unit_is_alike_within_the_deviation_of_a_gain():
     ('wrong', 'times', 'options'),
     [(('a.csv',), 10.0, TWO), (('b.csv',), 10.0, TWO), (('a.csv', 'b.csv'), 9.80665, Options())],
 )
-def test_a_unit_of_one_or_both_of_two_tables_is_asked_for(wrong, times, options):
+def test_a_unit_of_one_or_both_of_two_tables_is_asked_for(few_known, wrong, times, options):
     table, values, soil, rows = make('basic16')
     again = noisy(rows, solve(rows, soil), solve(rows, soil), np.random.default_rng(3))
     tables = {'a.csv': table, 'b.csv': again}
@@ -374,31 +390,6 @@ def test_a_column_of_zeros_may_be_what_a_law_is_proposed_for():
     assert found.verdict == 'unexplained'
 
 
-def test_two_columns_in_another_unit_are_both_asked_for(unproposed):
-    table, values, *_ = make('sweep40')
-    table |= {'sinkage': 10.0 * table['sinkage'], 'torque': 0.1 * table['torque']}
-    found = run({k: v for k, v in table.items() if not k.endswith('_std')}, values, options=TWO)
-    assert found.misread == {'sinkage': pytest.approx(0.1), 'torque': pytest.approx(10.0)}
-
-
-@pytest.mark.parametrize(
-    'columns',
-    [
-        ('drawbar_pull', 'torque'),
-        ('normal_load', 'drawbar_pull', 'torque'),
-        ('normal_load', 'torque'),  # without a column of the pull
-    ],
-)
-def test_forces_that_share_a_wrong_unit_are_asked_for_together(columns):
-    table, values, *_ = make('basic16', stds=False)
-    if 'drawbar_pull' not in columns:
-        del table['drawbar_pull']
-    table |= {column: table[column] / 9.80665 for column in columns}
-    found = run(table, values)
-    assert not found.effects
-    assert found.misread == dict.fromkeys(columns, pytest.approx(9.80665))
-
-
 def test_no_unit_is_asked_for_that_cannot_be_beside_the_one_of_the_title(tmp_path):
     """What is said to be in mm may be in cm, m, in or ft: metres for feet are impossible."""
     rows = ''.join(f'{0.1 * i},60,{3 + i}\n' for i in range(7))
@@ -414,24 +405,6 @@ def test_tables_that_are_read_as_one_keep_the_units_that_they_share():
     units = {'sinkage': 1e-3, 'torque': 1e-2}, {'sinkage': 1e-3, 'torque': 1.0, 'slope': 1.0}
     parts = [replace(check_table('t.csv', table), units=said) for said in units]
     assert concatenated('both', parts, ()).units == {'sinkage': 1e-3, 'slope': 1.0}
-
-
-@pytest.mark.parametrize(
-    ('design', 'factor', 'units'),
-    [
-        ('basic16', 1.0 / 4.4482216, 'lbf in place of N'),
-        pytest.param('sweep40', 2.0, 'of one wheel or of a pair?', marks=pytest.mark.slow),
-    ],
-)
-def test_a_wrong_load_is_found_where_neither_noise_nor_soil_is_known(
-    few_known, design, factor, units
-):
-    table, values, *_ = make(design, stds=False)
-    values['soil.frictional_modulus'] *= 3.0
-    assert 'normal_load' not in run(table, values).misread
-    found = run({**table, 'normal_load': factor * table['normal_load']}, values)
-    assert found.misread == {'normal_load': pytest.approx(1.0 / factor)}
-    assert not found.effects
 
 
 @pytest.mark.parametrize(
