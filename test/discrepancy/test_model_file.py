@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_workflow import make, noisy
+from test_workflow import FEW, make, noisy
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
@@ -114,11 +114,15 @@ def test_the_written_soil_is_that_of_the_table_where_a_reference_has_another_bed
     )
     again = noisy(rows, solve(rows, soil), solve(rows, softer), np.random.default_rng(3))
     configuration = reader.from_parameters(values, complete=False)
-    few = Options(effects=('bulldozing', 'cohesion'))
+    few = FEW
     reference = check_table('a.csv', table)
     found = diagnose(check_table('t.csv', again), configuration, reference, few)
     write_model(found, tmp_path / 'model.yaml')
     assert_errors(predicted(again, configuration, tmp_path, 'model.yaml'), again, found.gap)
+    assert (found.verdict, found.effects) == ('agrees', ())
+    assert any('0.87' in note and 'of that of the reference' in note for note in found.notes)
+    assert any('beds differ so' in note for note in found.notes)
+    assert 'reference again on a fresh bed' in found.next_measurement[0].what
     stiffness, friction = found.bed
     assert stiffness.after / stiffness.before == pytest.approx(0.87, abs=0.02)
     assert friction.after / friction.before == pytest.approx(0.96, abs=0.01)
