@@ -28,6 +28,7 @@ from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.selection.verdict import Remainder
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.discrepancy.workflow import Options
+from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_lab.studies.campaigns import Plan, make_campaign
 
 
@@ -169,7 +170,7 @@ def test_numbers_are_those_of_the_diagnosis(page, named):
         assert item.what in parsed.text
     for name in named.not_visible:
         assert name.replace('_', ' ') in parsed.text
-    assert first.source in parsed.text
+    assert catalogue()[first.name].source in parsed.text
 
 
 def test_outliers_are_listed_with_their_line(page, named):

@@ -259,7 +259,7 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
         values['strength'] = _strength(fitted, key)
         alike = _known_alike(key, decision, known, table.units)
         values['alike'] = float(len(alike))
-        alone = float(np.logaddexp.reduce(selection.log_joint[selection.index((key,))]))
+        alone = float(selection.totals[selection.index((key,))])
         competitors = decision.verdict.ambiguity_groups[place]
         sure = confidences.confidence(values, len(alike))
         found.append((alone, Naming(key, competitors, sure, values, alike)))

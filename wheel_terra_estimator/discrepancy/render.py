@@ -113,7 +113,6 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
     found = []
     for naming in decision.names:
         key, name = naming.key, effect_of(naming.key)
-        competitors = tuple(map(effect_of, naming.competitors))
         found.append(
             NamedEffect(
                 name,
@@ -124,15 +123,9 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
                 },
                 naming.confidence.of_name,
                 naming.confidence.of_set,
-                competitors,
+                tuple(map(effect_of, naming.competitors)),
                 decision.verdict.left.noticeable,
                 known[key].claim,
-                known[key].source,
-                {
-                    competitor: known[key].confounded_with.get(competitor)
-                    or known[competitor].confounded_with.get(name, '')
-                    for competitor in competitors
-                },
                 naming.features,
                 known[key].form if len(known[name].forms) > 1 else '',
                 naming.alike,
@@ -189,7 +182,7 @@ def _candidates(decision: Decision) -> tuple[Candidate, ...]:
     shown = [h for h, e in enumerate(selection.explanations) if e.names][:_CANDIDATES_SHOWN]
     if verdict.index not in (nothing, *shown):
         shown.append(verdict.index)
-    totals = np.logaddexp.reduce(selection.log_joint, axis=1)
+    totals = selection.totals
     at_nothing = selection.explanations[nothing].log_evidence
     chosen = set(selection.explanations[verdict.index].names)
     return tuple(

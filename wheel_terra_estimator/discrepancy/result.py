@@ -40,7 +40,7 @@ class FittedParameter:
 class NamedEffect:
     """An effect that was added to the model."""
 
-    name: str  # as ``claim`` and ``source`` in the catalogue
+    name: str  # as ``claim`` in the catalogue
     parameters: Mapping[str, FittedParameter]  # parameter name -> fitted parameter
     confidence: float  # probability that the name is right, calibrated on synthetic campaigns
     confidence_of_set: float  # probability that the name or one of ``confounded_with`` is right
@@ -48,9 +48,6 @@ class NamedEffect:
     confounded_with: tuple[str, ...] = ()
     remainder: bool = False  # True where something smooth is left that it does not explain
     claim: str = field(default='', metadata=_ASIDE)
-    source: str = field(default='', metadata=_ASIDE)
-    # Confounded name -> what would separate the two, from the catalogue
-    separates: Mapping[str, str] = field(default_factory=dict, metadata=_ASIDE)
     # What the confidence was computed from (``confidence.FEATURES``)
     features: Mapping[str, float] = field(default_factory=dict, metadata=_ASIDE)
     form: str = ''  # which form of the effect; empty where it has one only

@@ -61,7 +61,7 @@ class Confidence:
 
 def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, float]:
     """Return the features of the name at ``place`` in the named set."""
-    total = np.array([log_sum(row) for row in selection.log_joint])
+    total = selection.totals
     name = selection.explanations[verdict.index].names[place]
     has = np.array([effect_of(name) in e.effects for e in selection.explanations])
     inside = {effect_of(key) for key in (name, *verdict.ambiguity_groups[place])}

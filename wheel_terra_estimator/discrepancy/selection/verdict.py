@@ -143,8 +143,7 @@ def choose(
     excluded: Collection[int] = (),  # explanations that may not be named: they are too doubtful
 ) -> Verdict:
     """Return the verdict on a selection."""
-    joint, unexplained = selection.log_joint, selection.unexplained
-    total = np.asarray(log_sum(joint, axis=1))
+    joint, unexplained, total = selection.log_joint, selection.unexplained, selection.totals
     nothing = selection.nothing
     left = remainder(selection, nothing, problem)
     agrees = float(log_sum(joint[nothing][~unexplained]))

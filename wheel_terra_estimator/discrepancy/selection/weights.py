@@ -247,15 +247,20 @@ class Selection:
         return np.array([floor.unexplained for floor in self.floors])
 
     @property
+    def totals(self) -> FloatArray:
+        """(H,) log of prior times evidence of each explanation, falling."""
+        return log_sum(self.log_joint, axis=1)
+
+    @property
     def best(self) -> float:
-        """Log of prior times evidence of the best explanation."""
-        return float(log_sum(self.log_joint[0]))
+        """That of the best one."""
+        return float(self.totals[0])
 
     @property
     def best_single(self) -> float:
-        """The same of the best one of at most one effect."""
+        """That of the best one of at most one effect."""
         few = [len(e.names) < 2 for e in self.explanations]
-        return float(log_sum(self.log_joint[few], axis=1).max())
+        return float(self.totals[few].max())
 
     @property
     def nothing(self) -> int:
