@@ -169,7 +169,7 @@ def with_errors(table, factors, zeros):
     [
         pytest.param({'sinkage': 0.7}, {}, {'sinkage_gain': 0.7}, marks=pytest.mark.slow),
         pytest.param({}, {'sinkage': 0.004}, {'sinkage_zero': 0.004}, marks=pytest.mark.slow),
-        ({}, {'torque': 0.6}, {'torque_zero': 0.6}),
+        pytest.param({}, {'torque': 0.6}, {'torque_zero': 0.6}, marks=pytest.mark.slow),
         pytest.param(
             {'torque': 1.3},
             {'sinkage': -0.003},

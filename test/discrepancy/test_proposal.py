@@ -253,6 +253,8 @@ def test_a_change_is_said_in_the_units_of_the_rows():
     assert words._size('drawbar_pull', 0.1, table, at) == '20 N (50 % of its mean)'
     assert words._size('torque', 0.1, table, at) == '4 N m (20 % of its mean)'
     assert words._size('sinkage', 0.1, table, at) == '20 mm (100 % of its mean)'
+    rows[:, 2] = 0.0  # a placeholder: no share of its mean
+    assert words._size('torque', 0.1, table, at) == '4 N m'
 
 
 @pytest.mark.parametrize(('lost', 'closed'), [(1.6, 1.0 - np.sqrt(7.6 / 15.0)), (1.9, 0.0)])

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The decision: which explanation is reported, from the findings of the search alone.
 
-One loop. Each round takes the best explanation that is still allowed, refits it under its own
-floor, predicts rows that the fit did not see, and either stands or bars itself from the next round.
+The best explanation is refitted under its own floor and predicts rows that the fit did not see:
+it stands, or the soil alone is reported.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from wheel_terra_estimator.discrepancy.selection.verdict import (
     chi_square_p_value,
     choose,
     largest_z_score,
+    unnamed,
 )
 from wheel_terra_estimator.discrepancy.selection.weights import FIT_FLOOR
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -45,7 +46,6 @@ _AT_NOISE = 1.2  # times the noise: a quantity that was never off
 _SURE = 2.0  # deviations within which a bias of the radius is the height of the lugs
 _RARE = 3.0  # deviations of its prior, beyond which a gain may as well be something else
 _LONG = 40  # iterations of a fit that may have to go far
-_MOST_TRIED = 3  # doubtful names, after which none is given
 # A name is given where it, or one of those that the rows cannot tell from it, is more likely right
 # than not; below the second figure a law has to do worse than the name.
 _LIKELY = 0.5
@@ -115,7 +115,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Decider:
-    """The loop, and what its rounds share."""
+    """What a decision is made from."""
 
     table: SteadyTable
     both: SteadyTable  # with the rows of a reference behind those of the table
@@ -127,29 +127,22 @@ class Decider:
     laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
 
     def decision(self) -> Decision:
-        """Go round until an explanation stands."""
-        off, tried, doubtful = False, list[int](), tuple[Naming, ...]()
+        """Return the best explanation, where it stands, else the soil alone."""
         selection, problem = self.findings.selection, self.findings.setting.problem
-        everything = frozenset(range(len(selection.explanations)))
-        while True:
-            enough = self.misread or len(tried) >= _MOST_TRIED
-            barred = everything if enough else frozenset(tried)
-            verdict = choose(selection, problem, off=off, excluded=barred)
-            if self.misread:
-                verdict = replace(verdict, status='unexplained')
+        nameless = unnamed(selection, problem)
+        verdict = nameless if self.misread else choose(selection, problem)
+        decision = self._judged(verdict)
+        agrees = verdict.status == 'agrees' and not self.beds_differ
+        if agrees and channels_off(decision.gap):
+            verdict = choose(selection, problem, off=True)
             decision = self._judged(verdict)
-            agrees = verdict.status == 'agrees' and not off and not self.beds_differ
-            if agrees and channels_off(decision.gap):
-                off = True
-                continue
-            if verdict.status != 'named':
-                return self._left_open(replace(decision, doubtful=doubtful))
-            tried.append(verdict.index)
-            names, likely = self._against_law(decision, _names(self.table, decision))
-            if likely and any(item.after < item.refit for item in decision.gap.values()):
-                share = _OF_SEVERAL if len(names) >= _SEVERAL else 1.0
-                return replace(decision, names=_as_sure(names, share))
-            doubtful = doubtful or names
+        if verdict.status != 'named':
+            return self._left_open(decision)
+        names, likely = self._against_law(decision, _names(self.table, decision))
+        if likely and any(item.after < item.refit for item in decision.gap.values()):
+            share = _OF_SEVERAL if len(names) >= _SEVERAL else 1.0
+            return replace(decision, names=_as_sure(names, share))
+        return self._left_open(replace(self._judged(nameless), doubtful=names))
 
     def _law(self, decision: Decision, hold_soil: bool = False) -> Proposal | None:
         """Return the law for what a decision's refit of the soil leaves."""
@@ -171,10 +164,10 @@ class Decider:
         beyond_doubt = _least(names) >= _BEYOND_DOUBT
         if beyond_doubt and len(names) < _SEVERAL:
             return names, True
-        gap, more = self._gap(decision), len(names) > _SEVERAL
+        gap = self._gap(decision)
         unseen = gap.unseen(decision.after)
-        imitates = more and decision.verdict.left.noticeable
-        if len(names) >= _SEVERAL and (imitates or not gap.leaves_noise(unseen, alone=more)):
+        imitates = len(names) > _SEVERAL and decision.verdict.left.noticeable
+        if len(names) >= _SEVERAL and (imitates or not gap.leaves_noise(unseen)):
             return names, False
         if beyond_doubt:
             return names, True

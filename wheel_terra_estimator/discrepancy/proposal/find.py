@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
-from wheel_terra_estimator.discrepancy.assessment.held_out import TOO_FAR, hold_out, slip_groups
+from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
 from wheel_terra_estimator.discrepancy.fitting.coordinates import AS_THEY_ARE, narrowed
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal.words import law_in_words, limits_of_trust
@@ -46,7 +46,6 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import (
 )
 
 MOST_TERMS = 4
-_BRANCHES = 3  # first terms that are gone on from, where laws do not predict what was left out
 _TRIED = 6  # terms of the greatest expected gain that are fitted in each step
 _WORTH = 3.0  # nats by which a term must raise the evidence beyond those that say which it is
 _LEVELS = 6  # levels of an input that are left out one at a time, at most
@@ -104,16 +103,16 @@ class Gap:
         fits = [setting.fit([f.names], [f.u], f.angle, self.variance)[0] for f in (nothing, fitted)]
         return self.on_levels(setting, fits)
 
-    def leaves_noise(self, unseen: Mapping[str, Mapping[str, LeftOut]], *, alone: bool) -> bool:
-        """Return whether errors on left-out levels are noise; with allowed error unless `alone`.
+    def leaves_noise(self, unseen: Mapping[str, Mapping[str, LeftOut]]) -> bool:
+        """Return whether errors on left-out levels are noise, and what error is allowed.
 
         Three to five hidden effects ended at up to 1.7 times, sets that imitate other laws at 1.8,
         and 4.9 to 12.
         """
         return all(
-            item.law <= (TOO_FAR * (gap.noise or 1e-9) if alone else gap.limit)
+            item.law <= self.reported[name].limit
             for column, quantities in unseen.items()
-            for gap, item in ((self.reported[name], item) for name, item in quantities.items())
+            for name, item in quantities.items()
             if column != 'pass_number'  # without one of few passes their law is open
         )
 
@@ -198,20 +197,14 @@ def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
     nothing = setting.explain(plain)
     refit = setting.fit([()], [plain.u], plain.angle, variance)[0]
     best, most = None, _CLOSED
-    begun: list[str] = []  # first terms of laws that did not predict what was left out
-    while best is None and len(begun) < _BRANCHES:
-        laws = _search(setting, nothing, begun)
-        if not laws:
-            break
-        begun.append(laws[0].names[0])
-        for law in laws:
-            fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
-            if hold_soil and not _can_be_believed(fitted, findings):
-                continue
-            left_out = gap.on_levels(setting, [refit, fitted])
-            closed = gap.closed(left_out)
-            if closed > most:
-                best, most = (fitted, left_out), closed
+    for law in _search(setting, nothing):
+        fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
+        if hold_soil and not _can_be_believed(fitted, findings):
+            continue
+        left_out = gap.on_levels(setting, [refit, fitted])
+        closed = gap.closed(left_out)
+        if closed > most:
+            best, most = (fitted, left_out), closed
     if best is None:
         return None
     found = replace(_proposal(gap, setting, refit, *best), closed=most)
@@ -284,8 +277,8 @@ def _levels(table: SteadyTable, column: str) -> FloatArray:
     return np.unique(np.round(values[np.isfinite(values)], 9))
 
 
-def _search(setting: Setting, nothing: Explanation, begun: Sequence[str]) -> list[Explanation]:
-    """Return laws of one, two, ... terms, each with the greatest evidence, not with `begun`."""
+def _search(setting: Setting, nothing: Explanation) -> list[Explanation]:
+    """Return laws of one, two, ... terms, each with the greatest evidence."""
     price = _description_lengths(setting.effects)
 
     def worth(law: Explanation) -> float:
@@ -293,7 +286,7 @@ def _search(setting: Setting, nothing: Explanation, begun: Sequence[str]) -> lis
 
     best, found = nothing, list[Explanation]()
     for _ in range(MOST_TERMS):
-        others = [name for name in setting.effects if name not in {*best.names, *begun}]
+        others = [name for name in setting.effects if name not in best.names]
         starts = linear_starts(setting, best.fitted, others)
         starts = sorted(starts, key=lambda s: price[s[1][0][-1]] - s[0])[:_TRIED]
         top = max(explained(setting, [s for _, s in starts]), key=worth, default=None)

@@ -7,8 +7,7 @@ The thresholds were chosen on campaigns apart from those that score them (docs/d
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc  # scipy.stats takes longer to load than a diagnosis
@@ -109,17 +108,13 @@ def largest_z_score(fitted: Fit) -> float:
 ODDS_TO_SPEAK = 3.5
 ODDS_OVER_FLOOR = 10.0
 SURE_OF_FLOOR = 0.95
-# "Unexplained" must beat all names together by these odds.
-ODDS_AGAINST_NAMES = 2.0
 # Members of the open set: tempered weights are added up to this mass.
 SET_MASS = 0.97
+# A named set that leaves something must at least have removed this share of the excess misfit.
+MOST = 0.9
 # Nats by which a competitor must at least beat the same set without it.
 BETTER_THAN_EMPTY = 1.0
 TEMPERATURE = 1.3
-
-
-# A named set that leaves something must at least have removed this share of the excess misfit.
-MOST = 0.9
 
 
 @dataclass(frozen=True)
@@ -133,6 +128,12 @@ class Verdict:
     left: Remainder  # what that explanation leaves
 
 
+def unnamed(selection: Selection, problem: Problem) -> Verdict:
+    """Return a verdict on the soil alone."""
+    nothing = selection.nothing
+    return Verdict('unexplained', nothing, (), remainder(selection, nothing, problem))
+
+
 def choose(
     selection: Selection,
     problem: Problem,
@@ -140,12 +141,11 @@ def choose(
     # Unseen rows are off by more than noise and the allowed model error: then a floor is no reason
     # to ask a name for higher odds, and nothing "agrees"
     off: bool = False,
-    excluded: Collection[int] = (),  # explanations that may not be named: they are too doubtful
 ) -> Verdict:
     """Return the verdict on a selection."""
     joint, unexplained, total = selection.log_joint, selection.unexplained, selection.totals
     nothing = selection.nothing
-    left = remainder(selection, nothing, problem)
+    alone = unnamed(selection, problem)
     agrees = float(log_sum(joint[nothing][~unexplained]))
     rest = float(log_sum(joint[nothing][unexplained]))
     named = [h for h, e in enumerate(selection.explanations) if e.names]
@@ -156,18 +156,13 @@ def choose(
     odds = ODDS_OVER_FLOOR if floor_is_sure else ODDS_TO_SPEAK
     if np.logaddexp(effects, rest) - agrees < np.log(odds):
         agreement = 'undecided' if off else 'agrees'
-        status = agreement if left.accounted_for else 'unexplained'
-        return Verdict(status, nothing, (), left)
-    named = [h for h in named if h not in excluded]
-    if not named or rest - effects > np.log(ODDS_AGAINST_NAMES):
-        return Verdict('unexplained', nothing, (), left)
+        return replace(alone, status=agreement) if alone.left.accounted_for else alone
+    if not named:
+        return alone
     best = _best_set(selection, total, named)
-    behind = total[nothing] - total[best]
-    if excluded and behind > -np.log(ODDS_TO_SPEAK):
-        return Verdict('unexplained', nothing, (), left)  # what is left to name is no better
     after = remainder(selection, best, problem)
     if after.significant and _explained(selection, nothing, best) < MOST:
-        return Verdict('unexplained', nothing, (), left)
+        return alone
     names = selection.explanations[best].names
     ambiguity_groups = tuple(_competitors(selection, total, names, name) for name in names)
     return Verdict('named', best, ambiguity_groups, after)
