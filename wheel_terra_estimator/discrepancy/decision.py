@@ -264,13 +264,11 @@ def _known_alike(
 ) -> tuple[str, ...]:
     """Return what looks like a name and was not tried: effects, another unit or radius."""
     findings, fitted = decision.findings, decision.after
-    deviations = np.sqrt(np.diag(fitted.covariance()))
     points, found = findings.setting.forward.points, list[str]()
     heights = points.wheel.lug_height / points.wheel.radius
     lug = float(np.max(heights)) if np.ptp(heights) == 0.0 else 0.0
     due = {'rim': -lug / (1.0 + lug), 'lug_tip': lug}.get(points.slip_radius, 0.0)
-    for c, u, std in zip(fitted.coordinates, fitted.u, deviations, strict=True):
-        value, scatter = float(c.value(u)), c.deviation(u, std)
+    for c, u, value, scatter, _ in fitted.numbers():
         if c.key == f'{name}.bias' == 'wheel_radius_bias.bias' and due:
             other = 'rim' if points.slip_radius == 'lug_tip' else 'lug_tip'
             if abs(value - due) < _SURE * scatter:
@@ -338,10 +336,8 @@ def _curves(
     configured = setting.forward.solve([nuisance], [np.zeros(len(nuisance))], jacobian=False)
     fits = [findings.nothing.outputs, after.outputs]
     refit, fitted = setting.predicted(fits, problem.variance(floor))
-    # Where slips are latent the model stands at the most probable slip; a curve is compared with
-    # what was read, so that it goes back along the tangent (cells that were not measured stay).
     before, refit, fitted, held_refit, held_after, alone = (
-        (model - problem.moved)[:rows]
+        model[:rows]
         for model in (
             configured.outputs[0], refit, fitted, held_out[0], held_out[-1], after.outputs
         )

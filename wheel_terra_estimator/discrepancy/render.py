@@ -138,18 +138,11 @@ def _parameters(
     fitted: Fit, covariance: FloatArray | None = None, *, base: bool = False
 ) -> dict[str, FittedParameter]:
     """Return the parameters of the effects of a fit, or of those that were on before."""
-    of_u = fitted.covariance() if covariance is None else covariance
-    found = {}
-    for index, c in enumerate(fitted.coordinates):
-        if c.owner not in ('soil', BED) and (c.owner in fitted.names) != base:
-            u, std = float(fitted.u[index]), float(np.sqrt(of_u[index, index]))
-            found[c.key] = FittedParameter(
-                float(c.value(u)),
-                c.deviation(u, std),
-                c.unit,
-                c.meaning,
-            )
-    return found
+    return {
+        c.key: FittedParameter(value, std, c.unit, c.meaning)
+        for c, _, value, std, _ in fitted.numbers(covariance)
+        if c.owner not in ('soil', BED) and (c.owner in fitted.names) != base
+    }
 
 
 def _proposal(decision: Decision) -> Proposal | None:
@@ -242,47 +235,42 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
 
 def _shifts(findings: Findings, after: Fit, *owners: str) -> tuple[SoilShift, ...]:
     """Return the configured numbers of the soil, or of effects that were on, before and after."""
-    covariance, found = after.covariance(), []
-    for index, c in enumerate(after.coordinates):
-        if c.owner not in owners or c.role != 'believed':
-            continue
-        u = float(after.u[index])
-        found.append(
-            SoilShift(
-                c.name if c.owner == 'soil' else f'effects.{c.key}',
-                float(c.value(0.0)),
-                c.deviation(0.0, 1.0 / c.stated),
-                float(c.value(findings.nothing.u[index])),  # it has the same ones, first
-                float(c.value(u)),
-                c.deviation(u, float(np.sqrt(covariance[index, index]))),
-                c.stated * u,
-                c.unit,
-                c.source,
-            )
+    before = findings.nothing.numbers()  # it has the same ones, first
+    return tuple(
+        SoilShift(
+            c.name if c.owner == 'soil' else f'effects.{c.key}',
+            float(c.value(0.0)),
+            c.deviation(0.0, 1.0 / c.stated),
+            refit.value,
+            value,
+            std,
+            c.stated * u,
+            c.unit,
+            c.source,
         )
-    return tuple(found)
+        for (c, u, value, std, _), refit in zip(after.numbers(), before, strict=False)
+        if c.owner in owners and c.role == 'believed'
+    )
 
 
 def _beds(findings: Findings, after: Fit) -> tuple[SoilShift, ...]:
     """Return soil numbers of the bed under diagnosis, ``before`` on that of the reference."""
-    covariance = after.covariance()
-    place = {c.key: k for k, c in enumerate(after.coordinates)}
+    covariance, numbers, before = after.covariance(), after.numbers(), findings.nothing.numbers()
+    place = {number.coordinate.key: k for k, number in enumerate(numbers)}
     found = []
-    for index, c in enumerate(after.coordinates):
+    for index, (c, u, times, _, _) in enumerate(numbers):
         if c.owner != BED:
             continue
         of_soil = place[f'soil.{c.name}']
-        soil, u = after.coordinates[of_soil], float(after.u[index])
-        usual, times = float(soil.value(float(after.u[of_soil]))), float(c.value(u))
-        refit = soil.value(findings.nothing.u[of_soil]) * c.value(findings.nothing.u[index])
+        soil, u_of_soil, usual, *_ = numbers[of_soil]
         both = [of_soil, index]  # the product is better known than either
-        slope = np.array([times * soil.deviation(float(after.u[of_soil]), 1.0),
-                          usual * c.deviation(u, 1.0)])  # fmt: skip
+        slope = times * soil.deviation(u_of_soil, 1.0), usual * c.deviation(u, 1.0)
         std = float(np.sqrt(slope @ covariance[np.ix_(both, both)] @ slope))
         prior_std = usual * c.deviation(0.0, 1.0 / c.stated)
+        refit = before[of_soil].value * before[index].value
         found.append(
             SoilShift(
-                c.name, usual, prior_std, float(refit), usual * times, std, c.stated * u, soil.unit,
+                c.name, usual, prior_std, refit, usual * times, std, c.stated * u, soil.unit,
                 'beds differ so',
             )
         )  # fmt: skip

@@ -21,10 +21,13 @@ _REFITS = 7  # iterations of a fit without a group; it starts at the fit to all 
 
 def slip_groups(table: SteadyTable) -> IndexArray:
     """Return (N,) group of each row: neighbouring slips together, equal ones never apart."""
-    slip = np.round(table.columns['slip'], 3)
-    levels = np.unique(slip)
-    rank = np.searchsorted(levels, slip)
-    return np.minimum(rank * GROUPS // max(len(levels), 1), GROUPS - 1).astype(np.intp)
+    return level_groups(table.columns['slip'], GROUPS, 3)
+
+
+def level_groups(values: FloatArray, most: int, decimals: int = 9) -> IndexArray:
+    """Return (N,) group of each row: neighbouring levels together, in no more than ``most``."""
+    levels, rank = np.unique(np.round(values, decimals), return_inverse=True)
+    return (np.ravel(rank) * min(most, len(levels)) // len(levels)).astype(np.intp)
 
 
 def hold_out(

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,16 @@ from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 _LONGEST_STEP = 2.0  # prior standard deviations
 _CLOSE_ENOUGH = 0.02  # in the objective
 _LEAST_DAMPING = 1e-6  # share of the precision that is added to its diagonal, at the start
+
+
+class Number(NamedTuple):
+    """A fitted number: its coordinate with value and deviation, and those of u."""
+
+    coordinate: Coordinate
+    u: float
+    value: float
+    std: float
+    std_of_u: float
 
 
 @dataclass
@@ -48,6 +59,14 @@ class Fit:
     def covariance(self) -> FloatArray:
         """Posterior covariance of u."""
         return np.asarray(np.linalg.inv(self.precision()), dtype=float)
+
+    def numbers(self, covariance: FloatArray | None = None) -> list[Number]:
+        """Return the fitted numbers, by the posterior covariance of u (or another one)."""
+        std = np.sqrt(np.diag(self.covariance() if covariance is None else covariance))
+        return [
+            Number(c, u, float(c.value(u)), c.deviation(u, s), s)
+            for c, u, s in zip(self.coordinates, self.u.tolist(), std.tolist(), strict=True)
+        ]
 
     def within(self, problem: Problem) -> Fit:
         """Return the same fit seen through other noise: same cells, another rotation."""
@@ -132,7 +151,7 @@ def fit(
             residual = problem.residual(state.outputs[index])
             weighted = residual / variance
             if kept is not None:
-                residual = problem.wanted - problem.flat(state.outputs[index])
+                residual = problem.observed - problem.flat(state.outputs[index])
                 weighted = kept[b] @ residual
             better = way.is_better(float(residual @ weighted))
             if better:

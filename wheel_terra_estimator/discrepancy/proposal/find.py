@@ -18,7 +18,11 @@ from functools import cached_property
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
-from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
+from wheel_terra_estimator.discrepancy.assessment.held_out import (
+    hold_out,
+    level_groups,
+    slip_groups,
+)
 from wheel_terra_estimator.discrepancy.fitting.coordinates import AS_THEY_ARE, narrowed
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal.words import law_in_words, limits_of_trust
@@ -120,8 +124,6 @@ class Gap:
     def measured(self) -> FloatArray:
         """(N, 4) cells that the model has to match; nan where they were rejected."""
         measured, rows = self.table.measured.copy(), len(self.table)
-        # Where slips are latent the model stands at the most probable one.
-        measured += self.findings.setting.problem.moved[:rows]
         for row, column, _ in self.findings.outliers:
             if row < rows:
                 measured[row, column] = np.nan
@@ -152,10 +154,7 @@ class Gap:
         found = {}
         for name in _LEVEL_INPUTS:
             if name in varying:
-                values = np.round(np.nan_to_num(self.table.columns[name], nan=-1.0), 9)
-                levels = np.unique(values)
-                rank = np.searchsorted(levels, values)
-                groups = rank * min(_LEVELS, len(levels)) // len(levels)
+                groups = level_groups(np.nan_to_num(self.table.columns[name], nan=-1.0), _LEVELS)
                 found[name] = self.left_out(setting, fits, groups)
         return found or {'slip': self.left_out(setting, fits, slip_groups(self.table))}
 
@@ -313,11 +312,8 @@ def _proposal(
     gap: Gap, setting: Setting, refit: Fit, law: Fit, left_out: Mapping[str, Mapping[str, LeftOut]]
 ) -> Proposal:
     by_slip = gap.left_out(setting, [refit, law], slip_groups(gap.table))
-    covariance = law.covariance()
-    places = [k for k, c in enumerate(law.coordinates) if c.owner == NAME]
-    terms = [law.coordinates[k] for k in places]
-    names = [c.name for c in terms]
-    values = [float(c.value(law.u[k])) for c, k in zip(terms, places, strict=True)]
+    terms = [number for number in law.numbers() if number.coordinate.owner == NAME]
+    names, values = [t.coordinate.name for t in terms], tuple(t.value for t in terms)
     gaps = {
         quantity: replace(
             gap.reported[quantity],
@@ -332,11 +328,8 @@ def _proposal(
         law_in_words(names, values, gap.table, setting.forward.points),
         tuple(pair_of(name)[0] for name in names),
         tuple(pair_of(name)[1] for name in names),
-        tuple(values),
-        tuple(
-            c.deviation(float(law.u[k]), float(np.sqrt(covariance[k, k])))
-            for c, k in zip(terms, places, strict=True)
-        ),
+        values,
+        tuple(t.std for t in terms),
         gaps,
         _resembling(gap.findings, refit, law),
         limits_of_trust(gap.table),

@@ -289,16 +289,13 @@ def fresh_bed(probability: float, table: SteadyTable) -> tuple[NextMeasurement, 
 
 def another_bed(fitted: Fit) -> str:
     """Return how the bed differs from that of the reference; empty where the rows are not sure."""
-    std = np.sqrt(np.diag(fitted.covariance()))
     sure = [
-        (c, float(u))
-        for c, u, s in zip(fitted.coordinates, fitted.u, std, strict=True)
-        if c.owner == BED and abs(u) > _SURE * s
+        (c, u, value)
+        for c, u, value, _, std_of_u in fitted.numbers()
+        if c.owner == BED and abs(u) > _SURE * std_of_u
     ]
-    factors = ' and '.join(
-        f'{number(float(c.value(u)), 3)} times the {OF_BEDS[c.name]}' for c, u in sure
-    )
-    farthest = max((c.stated * abs(u) for c, u in sure), default=0.0)
+    factors = ' and '.join(f'{number(v, 3)} times the {OF_BEDS[c.name]}' for c, _, v in sure)
+    farthest = max((c.stated * abs(u) for c, u, _ in sure), default=0.0)
     so = 'more than beds usually differ' if farthest > _USUAL_OF_BEDS else 'beds differ so'
     usual = ' and '.join(map(percent, BED_SCATTER.values()))
     return factors and f'the bed has {factors} of that of the reference: {so} ({usual} are usual)'

@@ -22,7 +22,6 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
     CommonError,
     Problem,
     build_problem,
-    over_covariance,
     slip_features,
 )
 from wheel_terra_estimator.discrepancy.result import Noise
@@ -60,7 +59,6 @@ _BEHIND = 3.0  # nats behind the best of all, up to which that is done
 _KEPT = 30  # best sets that are weighed again, where beds differ
 _ROUNDS = 2  # of adding and swapping
 _NEAR = 2.0  # nats behind the best one, up to which that is done
-_FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 
 
 @dataclass(frozen=True)
@@ -91,12 +89,10 @@ def search(
     noise = noises.stated_noise(table, builder.scale, builder.trials, builder.reference)
     problem, nothing = builder.fit_nothing(noise.std, (), None)
     if (table.slip_std > 0.0).any():
-        builder.linearise(nothing, noise.std)
+        builder.let_err('slip', table.slip_std, _shared_readings(table.columns['slip']), nothing)
         problem, nothing = builder.fit_nothing(noise.std, (), nothing)
     if table.leaving_angle_std.any():
-        builder.by_angle = builder.forward.by_input(
-            'leaving_angle', nothing.coordinates, nothing.u, nothing.angle
-        )
+        builder.let_err('leaving_angle', table.leaving_angle_std, np.arange(len(table)), nothing)
     noise = builder.estimate(noise, nothing, ())
     _, nothing = builder.fit_nothing(noise.std, (), nothing)
     # A smooth misfit of any size is allowed here, so that an effect does not look like outliers.
@@ -251,8 +247,16 @@ def _joined_by(setting: Setting, selection: Selection, more: list[Explanation]) 
     return weigh(tuple(known.values()), setting.floors, setting.effects)
 
 
+def _shared_readings(slip: FloatArray) -> IndexArray:
+    """Return (N,) reading of each row: those that are equal to the last digit, but no set value."""
+    group = np.ravel(np.unique(slip, return_inverse=True)[1])
+    nominal = np.abs(slip - np.round(slip, 2)) < 1e-9
+    own = group.max() + 1 + np.arange(len(slip))
+    return np.where(nominal, own, group).astype(np.intp)
+
+
 class _Builder:
-    """Makes problems of one table, with the recorded slip as a latent variable where needed."""
+    """Makes problems of one table, with uncertain inputs where there are some."""
 
     def __init__(
         self, table: SteadyTable, forward: Forward, nuisance: tuple[Coordinate, ...]
@@ -264,46 +268,17 @@ class _Builder:
         self.inputs = table.scaled_inputs()
         names = table.varying()
         self.narrow = slip_features(self.inputs, names.index('slip') if 'slip' in names else None)
-        # (N, 4) derivatives of the outputs by slip and leaving angle, where these are uncertain
-        self.by_slip: FloatArray | None = None
-        self.by_angle: FloatArray | None = None
+        self.by_input: list[CommonError] = []
         self.by_bed: list[CommonError] = []
         # What differs between trials, each on its bed, or from a reference is no noise.
         self.trials = np.zeros(len(table)) if table.sweeps() is None else table.trials()
         self.reference = None if forward.active is None else ~forward.active
         self.apart = self.trials if forward.active is None else 2.0 * self.trials + forward.active
-        self._moved: FloatArray | None = None
-        # Rows share a reading of the slip that is equal to the last digit and no set value.
-        slip = table.columns['slip']
-        group = np.ravel(np.unique(slip, return_inverse=True)[1])
-        nominal = np.abs(slip - np.round(slip, 2)) < 1e-9
-        own = group.max() + 1 + np.arange(len(slip))
-        self._group = np.where(nominal, own, group).astype(np.intp)
 
-    def linearise(self, nothing: Fit, noise_std: FloatArray) -> None:
-        """Linearise the slip errors around the most probable slips, given all quantities.
-
-        Where the curves bend within an error of the slip, a tangent at the reading is not enough.
-        """
-        slip, std = self.table.columns['slip'], self.table.slip_std
-        self.by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, nothing.angle)
-        problem = self.build(noise_std, ())
-        here = nothing.within(problem)
-        target = here.residual + here.jacobian @ here.u
-        variance = problem.variance(_LATENT_FLOOR)
-        cells = problem.rotation.T @ over_covariance(target, variance, here.jacobian)
-        pull = np.bincount(
-            self._group[problem.row],
-            problem.flat(self.by_slip) * std[problem.row] * cells,
-            minlength=self._group.max() + 1,
-        )
-        moved = np.clip(pull[self._group], -_FARTHEST, _FARTHEST) * std
-        moved = np.clip(slip + moved, -0.97, 0.97) - slip
-        self.forward = self.forward.at(replace(self.forward.points, slip=slip + moved))
-        angle = self.forward.solve([nothing.coordinates], [nothing.u], jacobian=False).angle[0]
-        self.by_slip = self.forward.by_input('slip', nothing.coordinates, nothing.u, angle)
-        # The reading lies off the point of linearisation: the tangent takes the cells along.
-        self._moved = self.by_slip * moved[:, None]
+    def let_err(self, name: str, std: FloatArray, group: IndexArray, nothing: Fit) -> None:
+        """Take an input of the model for uncertain, linearly around a fit."""
+        slope = self.forward.by_input(name, nothing.coordinates, nothing.u, nothing.angle)
+        self.by_input.append(CommonError(slope, std, group))
 
     def part_beds(self, beds: IndexArray, problem: Problem, nothing: Fit) -> None:
         """Let stiffness and strength of the beds differ, linearly around a fit."""
@@ -317,16 +292,11 @@ class _Builder:
 
     def build(self, std: FloatArray, outliers: Outliers, *, free: bool = False) -> Problem:
         """Return the problem without some cells; ``free``: trials share no structural error."""
-        common = list(self.by_bed)
-        if self.by_slip is not None:
-            common.append(CommonError(self.by_slip, self.table.slip_std, self._group))
-        if self.by_angle is not None:
-            rows = np.arange(len(self.table), dtype=np.intp)
-            common.append(CommonError(self.by_angle, self.table.leaving_angle_std, rows))
+        common = [*self.by_bed, *self.by_input]
         rejected = [(row, quantity) for row, quantity, _ in outliers]
         group = self.apart if free else None
         return build_problem(
-            self.table.measured, std, self.inputs, self.scale, rejected, common, self._moved, group
+            self.table.measured, std, self.inputs, self.scale, rejected, common, group
         )
 
     def fit_nothing(
