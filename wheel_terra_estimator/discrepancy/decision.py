@@ -22,7 +22,7 @@ from wheel_terra_estimator.discrepancy.assessment.held_out import (
     slip_groups,
 )
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.proposal.find import Gap, effects_said, gain_on_top, propose
+from wheel_terra_estimator.discrepancy.proposal.find import Gap, effects_said, propose
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
@@ -132,13 +132,11 @@ class Decider:
         nameless = unnamed(selection, problem)
         verdict = nameless if self.misread else choose(selection, problem)
         decision = self._judged(verdict)
-        agrees = verdict.status == 'agrees' and not self.beds_differ
-        if agrees and channels_off(decision.gap):
-            verdict = choose(selection, problem, off=True)
-            decision = self._judged(verdict)
+        if verdict.status == 'agrees' and not self.beds_differ and channels_off(decision.gap):
+            decision = replace(decision, verdict=replace(verdict, status='undecided'))
         if verdict.status != 'named':
             return self._left_open(decision)
-        names, likely = self._against_law(decision, _names(self.table, decision))
+        names, likely = self._against_law(decision, _names(self.table.units, decision))
         if likely and any(item.after < item.refit for item in decision.gap.values()):
             share = _OF_SEVERAL if len(names) >= _SEVERAL else 1.0
             return replace(decision, names=_as_sure(names, share))
@@ -239,18 +237,16 @@ def _least(names: tuple[Naming, ...], odds: float = 1.0) -> float:
     return min(confidences.confidence(name.features, odds=odds).of_set for name in names)
 
 
-def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
+def _names(units: Mapping[str, float], decision: Decision) -> tuple[Naming, ...]:
     """Return the named effects with their confidence; first the one that alone explains more."""
     findings, fitted, known = decision.findings, decision.after, catalogue()
     selection = findings.selection
     shown = _what_rows_show(findings, fitted, decision.gap)
-    expected_gain = gain_on_top(table, findings.setting, fitted)
-    shown['law'] = float(np.log1p(max(expected_gain, 0.0)))
     found = []
     for place, key in enumerate(fitted.names):
         values = confidences.features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
-        alike = _known_alike(key, decision, known, table.units)
+        alike = _known_alike(key, decision, known, units)
         values['alike'] = float(len(alike))
         alone = float(selection.totals[selection.index((key,))])
         competitors = decision.verdict.ambiguity_groups[place]
@@ -336,12 +332,7 @@ def _curves(
     configured = setting.forward.solve([nuisance], [np.zeros(len(nuisance))], jacobian=False)
     fits = [findings.nothing.outputs, after.outputs]
     refit, fitted = setting.predicted(fits, problem.variance(floor))
-    before, refit, fitted, held_refit, held_after, alone = (
-        model[:rows]
-        for model in (
-            configured.outputs[0], refit, fitted, held_out[0], held_out[-1], after.outputs
-        )
-    )  # fmt: skip
     left = floor if setting.forward.active is None else 0.0  # what a reference shows is in them
     band = np.sqrt(findings.noise.std**2 + (left * problem.scale) ** 2)
-    return Curves(before, refit, fitted, held_refit, held_after, alone, band[:rows])
+    whole = (configured.outputs[0], refit, fitted, held_out[0], held_out[-1], after.outputs, band)
+    return Curves(*(values[:rows] for values in whole))

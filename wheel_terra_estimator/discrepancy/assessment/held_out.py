@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
+from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
 from wheel_terra_estimator.discrepancy.result import Curves, QuantityGap
 from wheel_terra_estimator.discrepancy.selection.search import Findings
@@ -88,31 +88,37 @@ def gaps(
 
     ``allowed_error``: model error that is no reason for doubt [share of the range].
     """
-    std = _cell_noise(findings)
-    measured = table.measured.copy()
-    for row, column, _ in findings.outliers:
-        if row < len(table):
-            measured[row, column] = np.nan
+    std, measured = _cell_noise(findings)[: len(table)], kept_cells(table, findings)
     found: dict[str, QuantityGap] = {}
     for q, quantity in enumerate(QUANTITIES):
         mine = np.isfinite(measured[:, q])
         if not mine.any():
             continue
-        noise = float(np.sqrt(np.mean(std[: len(table)][mine, q] ** 2)))
+        noise = float(np.sqrt(np.mean(std[mine, q] ** 2)))
         allowed = allowed_error * findings.setting.problem.scale[q]
-
-        def error(values: FloatArray, q: int = q, mine: BoolArray = mine) -> float:
-            return float(np.sqrt(np.mean((values - measured)[mine, q] ** 2)))
-
         found[quantity] = QuantityGap(
-            before=error(curves.before),
-            refit=error(curves.held_out_refit),
-            after=error(curves.held_out_after),
+            before=error(curves.before, measured, q),
+            refit=error(curves.held_out_refit, measured, q),
+            after=error(curves.held_out_after, measured, q),
             noise=noise,
-            fitted=error(curves.alone),
+            fitted=error(curves.alone, measured, q),
             limit=TOO_FAR * float(np.hypot(noise, allowed)),
         )
     return found
+
+
+def kept_cells(table: SteadyTable, findings: Findings) -> FloatArray:
+    """(N, 4) measured cells of the table; nan where they were rejected."""
+    measured = table.measured.copy()
+    for row, column, _ in findings.outliers:
+        if row < len(table):
+            measured[row, column] = np.nan
+    return measured
+
+
+def error(outputs: FloatArray, measured: FloatArray, q: int) -> float:
+    """Root mean square of what outputs leave of the cells (N, 4) of a quantity."""
+    return float(np.sqrt(np.nanmean((outputs[: len(measured)] - measured)[:, q] ** 2)))
 
 
 def _cell_noise(findings: Findings) -> FloatArray:

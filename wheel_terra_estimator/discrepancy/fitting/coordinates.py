@@ -67,7 +67,6 @@ WIDENING = 2.5
 WORSE_SHARE = 0.15  # prior probability of the wider one
 # (width in units of the coordinates, prior probability): as stated, and worse.
 BELIEVED_WIDTHS = ((1.0 / WIDENING, 1.0 - WORSE_SHARE), (1.0, WORSE_SHARE))
-AS_THEY_ARE = ((1.0, 1.0),)  # of coordinates that are held on purpose
 # The same for the strength of an effect: small, large and very large ones (the catalogue cannot
 # know the size of the machine) are weighed against each other, with these shares.
 EFFECT_SCALES = (0.3, 2.0, 10.0)
@@ -102,15 +101,10 @@ class Coordinate:
     unit: str = '-'
     meaning: str = ''
     source: str = ''  # where the deviation of a configured number comes from
-
-    @property
-    def stated(self) -> float:
-        """Stated deviations in one unit of the coordinate [-].
-
-        An effect that is on is held by 0.4 of its deviation: wider it takes what is missing (CMU's
-        smooth wheel with its own fit, HIT's lugs against the smooth twin).
-        """
-        return WIDENING if self.owner in ('soil', BED) else 1.0
+    # Stated deviations in one unit of the coordinate [-]. An effect that is on is held by 0.4 of
+    # its deviation: wider it takes what is missing (CMU's smooth wheel with its own fit, HIT's lugs
+    # against the smooth twin).
+    stated: float = 1.0
 
     @property
     def key(self) -> str:
@@ -175,7 +169,16 @@ def soil_coordinates(
         lower, upper = (least - centre) / scale, (most - centre) / scale
         found.append(
             Coordinate(
-                'soil', name, centre, scale, lower, upper, n.logarithmic, unit=n.unit, source=said
+                'soil',
+                name,
+                centre,
+                scale,
+                lower,
+                upper,
+                n.logarithmic,
+                unit=n.unit,
+                source=said,
+                stated=WIDENING,
             )
         )
     return tuple(found)
@@ -185,7 +188,7 @@ def bed_coordinates() -> tuple[Coordinate, ...]:
     """Return the factors by which the bed under diagnosis differs from that of a reference."""
     farthest = _FARTHEST_BED / WIDENING
     return tuple(
-        Coordinate(BED, name, 0.0, WIDENING * std, -farthest, farthest, logarithmic=True)
+        Coordinate(BED, name, 0.0, WIDENING * std, -farthest, farthest, True, stated=WIDENING)
         for name, std in BED_SCATTER.items()
     )
 
@@ -193,7 +196,13 @@ def bed_coordinates() -> tuple[Coordinate, ...]:
 def narrowed(coordinates: Sequence[Coordinate], factor: float) -> tuple[Coordinate, ...]:
     """Return the coordinates with the priors of configured numbers so many times narrower."""
     return tuple(
-        replace(c, scale=c.scale / factor, lower=factor * c.lower, upper=factor * c.upper)
+        replace(
+            c,
+            scale=c.scale / factor,
+            lower=factor * c.lower,
+            upper=factor * c.upper,
+            stated=c.stated / factor,
+        )
         if c.role == 'believed'
         else c
         for c in coordinates

@@ -9,7 +9,6 @@ the share of the posterior inside them over the share of the prior.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,12 +61,10 @@ def evidence(
     problem: Problem,
     fitted: Fit,
     floors: tuple[Floor, ...],
-    believed_widths: Sequence[tuple[float, float]] = BELIEVED_WIDTHS,
 ) -> Posterior:
     """Return the evidence of a fit for every floor.
 
-    It is the mean over soil as good as stated or worse (``believed_widths``: widths of the priors
-    in units of their coordinates, with their probabilities), and effects small or large.
+    It is the mean over soil as good as stated or worse, and effects small or large.
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u
@@ -76,7 +73,7 @@ def evidence(
     weighted = jacobian[None] / variance[:, :, None]
     information = np.swapaxes(weighted, 1, 2) @ jacobian  # (F, P, P)
     right = (target / variance) @ jacobian
-    priors, weights = _prior_precisions(fitted, believed_widths)  # (S, P), (S,)
+    priors, weights = _prior_precisions(fitted)  # (S, P), (S,)
     precision = information[None] + priors[:, None, :, None] * np.eye(len(fitted.u))
     covariance = np.asarray(np.linalg.inv(precision), dtype=float)
     mean = np.einsum('sfpq,fq->sfp', covariance, right)
@@ -100,15 +97,13 @@ def evidence(
     )
 
 
-def _prior_precisions(
-    fitted: Fit, believed_widths: Sequence[tuple[float, float]]
-) -> tuple[FloatArray, FloatArray]:
+def _prior_precisions(fitted: Fit) -> tuple[FloatArray, FloatArray]:
     """(S, P) prior precisions of u for all combinations of scales; (S,) their shares."""
     believed = np.array([c.role == 'believed' for c in fitted.coordinates])
     strength = np.array([c.role == 'strength' for c in fitted.coordinates])
     sizes = list(zip(EFFECT_SCALES, EFFECT_SHARES, strict=True)) if strength.any() else [(1.0, 1.0)]
     combinations, weights = [], []
-    for width, share in believed_widths:
+    for width, share in BELIEVED_WIDTHS:
         for size, part in sizes:
             scale = np.where(believed, width, np.where(strength, size, 1.0))
             combinations.append(scale**-2)

@@ -19,11 +19,13 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.assessment.held_out import (
+    error,
     hold_out,
+    kept_cells,
     level_groups,
     slip_groups,
 )
-from wheel_terra_estimator.discrepancy.fitting.coordinates import AS_THEY_ARE, narrowed
+from wheel_terra_estimator.discrepancy.fitting.coordinates import narrowed
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal.words import law_in_words, limits_of_trust
 from wheel_terra_estimator.discrepancy.result import LeftOut, Proposal, QuantityGap
@@ -40,8 +42,6 @@ from wheel_terra_estimator.discrepancy.selection.weights import (
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
-    BANDS,
-    BENT_READING,
     EFFECT,
     FEATURES,
     NAME,
@@ -123,17 +123,7 @@ class Gap:
     @cached_property
     def measured(self) -> FloatArray:
         """(N, 4) cells that the model has to match; nan where they were rejected."""
-        measured, rows = self.table.measured.copy(), len(self.table)
-        for row, column, _ in self.findings.outliers:
-            if row < rows:
-                measured[row, column] = np.nan
-        return measured
-
-    def error(self, outputs: FloatArray, q: int) -> float:
-        """Root mean square of what (N, 4) outputs leave of a quantity."""
-        mine = np.isfinite(self.measured[:, q])
-        left = (outputs[: len(self.table)] - self.measured)[mine, q]
-        return float(np.sqrt(np.mean(left**2)))
+        return kept_cells(self.table, self.findings)
 
     def left_out(
         self, setting: Setting, fits: Sequence[Fit], groups: IndexArray
@@ -143,7 +133,7 @@ class Gap:
         groups = np.concatenate([groups, reference]).astype(np.intp)
         outputs = hold_out(setting, fits, self.variance, groups)
         return {
-            quantity: LeftOut(*(self.error(out, q) for out in outputs))
+            quantity: LeftOut(*(error(out, self.measured, q) for out in outputs))
             for q, quantity in enumerate(QUANTITIES)
             if np.isfinite(self.measured[:, q]).any()
         }
@@ -188,17 +178,16 @@ def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
     setting = replace(findings.setting, effects=_terms(gap.table), floors=floors)
     plain = setting.fit([()], [findings.nothing.u], findings.nothing.angle)[0]
     for factor in _HOLDS if hold_soil else ():
-        if _can_be_believed(plain, findings):
+        if _can_be_believed(plain):
             break
-        narrow = narrowed(findings.setting.nuisance, factor)
-        setting = replace(setting, nuisance=narrow, believed_widths=AS_THEY_ARE)
+        setting = replace(setting, nuisance=narrowed(findings.setting.nuisance, factor))
         plain = setting.fit([()], [np.zeros(len(plain.u))], findings.nothing.angle)[0]
     nothing = setting.explain(plain)
     refit = setting.fit([()], [plain.u], plain.angle, variance)[0]
     best, most = None, _CLOSED
     for law in _search(setting, nothing):
         fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
-        if hold_soil and not _can_be_believed(fitted, findings):
+        if hold_soil and not _can_be_believed(fitted):
             continue
         left_out = gap.on_levels(setting, [refit, fitted])
         closed = gap.closed(left_out)
@@ -206,10 +195,8 @@ def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
             best, most = (fitted, left_out), closed
     if best is None:
         return None
-    found = replace(_proposal(gap, setting, refit, *best), closed=most)
-    if not hold_soil:
-        return found
-    return replace(found, soil_held=True, fit=_widened(best[0], findings))
+    found = _proposal(gap, setting, refit, *best)
+    return replace(found, closed=most, soil_held=hold_soil)
 
 
 def effects_said(law: Proposal) -> frozenset[str]:
@@ -218,39 +205,8 @@ def effects_said(law: Proposal) -> frozenset[str]:
     return frozenset(_SAME[term] for term in terms) if set(terms) <= set(_SAME) else frozenset()
 
 
-def _can_be_believed(fitted: Fit, findings: Findings) -> bool:
-    return largest_z_score(_widened(fitted, findings)) < LARGEST_Z_SCORE
-
-
-def _widened(fitted: Fit, findings: Findings) -> Fit:
-    """Return a fit whose soil was held in the usual, wide coordinates."""
-    wide = findings.setting.nuisance
-    factor = np.ones(len(fitted.u))
-    factor[: len(wide)] = [
-        c.scale / w.scale for c, w in zip(fitted.coordinates, wide, strict=False)
-    ]
-    return replace(
-        fitted,
-        coordinates=(*wide, *fitted.coordinates[len(wide) :]),
-        u=fitted.u * factor,
-        sensitivity=fitted.sensitivity / factor,
-        jacobian=fitted.jacobian / factor,
-        prior=fitted.prior / factor**2,
-    )
-
-
-def gain_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
-    """Return the nats that the best term of an unlisted law promises on top of a fit.
-
-    Near zero where the fit leaves noise alone; several nats where what is left has the shape of
-    some closure. The confidence that this is a feature of was fitted without bands of slip,
-    products and a bent reading.
-    """
-    late = {*BANDS, *BENT_READING, *PRODUCTS}
-    found = {name: term for name, term in _terms(table).items() if pair_of(name)[1] not in late}
-    terms = replace(setting, effects=found)
-    starts = linear_starts(terms, fitted, tuple(terms.effects))
-    return max((expected_gain for expected_gain, _ in starts), default=0.0)
+def _can_be_believed(fitted: Fit) -> bool:
+    return largest_z_score(fitted) < LARGEST_Z_SCORE
 
 
 def _terms(table: SteadyTable) -> dict[str, Effect]:
@@ -319,7 +275,7 @@ def _proposal(
             gap.reported[quantity],
             refit=by_slip[quantity].refit,
             after=by_slip[quantity].law,
-            fitted=gap.error(law.outputs, q),
+            fitted=error(law.outputs, gap.measured, q),
         )
         for q, quantity in enumerate(QUANTITIES)
         if quantity in by_slip

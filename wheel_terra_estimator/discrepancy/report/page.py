@@ -58,9 +58,6 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
             for key in keys
             if key in new and shown(old.get(key)) != shown(new[key])
         ],
-        separates=lambda one, other: (
-            known[one].confounded_with.get(other) or known[other].confounded_with.get(one, '')
-        ),
         sources=[(plain(name), known[name].source) for name in used if name in known],
         sentence=diagnosis.sentence.replace('+-', '±'),
         soil_line=soil_line(diagnosis),

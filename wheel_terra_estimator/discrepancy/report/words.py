@@ -77,7 +77,7 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
             'open': ['What the column holds: model.yaml is fitted to it as it stands.'],
             'next': ['Correct the column, and diagnose again.'],
         }
-    still_off = channels_off(diagnosis.gap)
+    still_off, known = channels_off(diagnosis.gap), catalogue()
     left = [
         f'{plain(name)} is still off by more than noise and the allowed model error.'
         for name in still_off
@@ -85,9 +85,11 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
     if any(effect.remainder for effect in diagnosis.effects):
         left.append('Something is left that the named effect does not explain.')
     for effect in diagnosis.effects:
-        if effect.confounded_with:
-            competitors = ', '.join(map(plain, effect.confounded_with))
-            left.append(f'These rows cannot tell {plain(effect.name)} from {competitors}.')
+        for name in effect.confounded_with:
+            by = known[effect.name].confounded_with.get(name)
+            by = by or known[name].confounded_with.get(effect.name)
+            what = f'; what separates them: {by}' if by else ''
+            left.append(f'These rows cannot tell {plain(effect.name)} from {plain(name)}{what}.')
     if diagnosis.verdict in OPEN and not still_off:
         left.append('Why these rows need another soil, or more scatter, than was stated.')
     settled = not left

@@ -39,7 +39,6 @@ FEATURES = (
     'misfit',  # improbability of the residual,
     'pull',  # largest pull of a soil number beyond what soils usually need
     'strength',  # in deviations of the prior
-    'law',  # what the best term of an unlisted law promises on top, compressed
 )
 
 

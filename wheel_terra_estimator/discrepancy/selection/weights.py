@@ -19,7 +19,6 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
-    BELIEVED_WIDTHS,
     Coordinate,
     effect_coordinates,
     loose_precision,
@@ -66,8 +65,6 @@ class Setting:
     effects: Mapping[str, Effect]  # the visible effects
     floors: tuple[Floor, ...]
     deepest: float  # greatest rim sinkage of the baseline [m]
-    # Of the priors of configured numbers, as in ``evidence``
-    believed_widths: Sequence[tuple[float, float]] = BELIEVED_WIDTHS
 
     def coordinates(self, names: Iterable[str]) -> tuple[Coordinate, ...]:
         """Return nuisance coordinates followed by those of the effects."""
@@ -109,7 +106,7 @@ class Setting:
 
     def explain(self, fitted: Fit) -> Explanation:
         """Weigh a fit."""
-        posterior = evidence(self.problem, fitted, self.floors, self.believed_widths)
+        posterior = evidence(self.problem, fitted, self.floors)
         return Explanation(fitted, posterior, float(log_sum(posterior.log_joint)))
 
 
