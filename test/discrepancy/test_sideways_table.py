@@ -77,7 +77,9 @@ FEW = 'side_bulldozing', 'bulldozing', 'cohesion'
 def test_what_the_flank_does_is_named_from_the_lateral_force(capsys, effects):
     flank = ('-p', 'effects.side_bulldozing.enabled:=true', '-p', 'effects.side_bulldozing.ks:=2.0')
     noise = ('--noise', '0.0003,0.5,0.1,0.3', '--seed', '4')
-    rows = predicted(capsys, '--slip=0:0.6:4', *GRID[1:], '--load', '60,110', *flank, *noise)
+    rows = predicted(
+        capsys, '--slip=0:0.6:4', '--slip-angle', '-0.2,0.3,0.6', '--load', '60,110', *flank, *noise
+    )
     found = diagnose(rows, ('hit_wh3', 'hit_fit'), effects=effects)
     assert [effect.name for effect in found.effects] == ['side_bulldozing']
     assert found.effects[0].parameters['ks'].value == pytest.approx(2.0, abs=0.5)

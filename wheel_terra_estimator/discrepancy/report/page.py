@@ -116,12 +116,12 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
         figure.set_layout_engine('none')  # laid out once, for both formats
         return picture(figure)
 
-    residuals = [
-        (plain(name), keep(f'residuals_by_{name}', pictures.residuals(diagnosis, name)))
-        for name in pictures.colour_inputs(diagnosis)
-    ]
-    curves = keep('curves_over_slip', pictures.curves_over_slip(diagnosis))
-    return {'curves': curves, 'residuals': residuals}
+    colour = pictures.colour_input(diagnosis)
+    return {
+        'curves': keep('curves_over_slip', pictures.curves_over_slip(diagnosis)),
+        'residuals': keep(f'residuals_by_{colour}', pictures.residuals(diagnosis, colour)),
+        'colour': plain(colour),
+    }
 
 
 def _parameter(name: str, item: FittedParameter) -> str:

@@ -166,12 +166,13 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     return figure
 
 
-def colour_inputs(diagnosis: Diagnosis) -> list[str]:
-    """Return the inputs by which residuals are coloured: where the gap is, load, slope, any."""
+def colour_input(diagnosis: Diagnosis) -> str:
+    """Return the input by which residuals are coloured: where the gap is, load, slope, any."""
     varying = diagnosis.table.varying()
     box = [side.input for side in diagnosis.where.box]
     wanted = dict.fromkeys((*box, 'normal_load', 'slope', *varying))
-    return [name for name in wanted if name in varying and name != 'slip'][:2] or ['normal_load']
+    found = (name for name in wanted if name in varying and name != 'slip')
+    return next(found, 'normal_load')
 
 
 def _panels(
