@@ -56,7 +56,7 @@ _CELLS = 8  # measured cells for each effect of a set, at least
 _FIRST_SEEDS = 4  # best single effects to which a second one is added
 _SEEDS = 3  # sets of each size to which one effect more is added
 _BEHIND = 3.0  # nats behind the best of all, up to which that is done
-_KEPT = 12  # best sets that are weighed again, where beds differ
+_KEPT = 30  # best sets that are weighed again, where beds differ
 _ROUNDS = 2  # of adding and swapping
 _NEAR = 2.0  # nats behind the best one, up to which that is done
 
@@ -149,7 +149,7 @@ def apart(findings: Findings, beds: IndexArray) -> Findings:
         setting = replace(setting, problem=builder.build(std, findings.outliers))
         nothing = setting.fit([()], [nothing.u], nothing.angle)[0]
     ranked = enumerate(e.fitted for e in findings.selection.explanations)
-    best = [f for place, f in ranked if f.names and place < _KEPT]
+    best = [f for place, f in ranked if len(f.names) == 1 or (f.names and place < _KEPT)]
     fits = setting.fit(
         [f.names for f in best], [f.u for f in best], np.array([f.angle for f in best])
     )
