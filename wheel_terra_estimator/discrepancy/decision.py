@@ -195,7 +195,7 @@ class Decider:
         exact = 'estimated' not in self.findings.noise.origin.values()
         variance = setting.problem.variance(0.0 if exact else FIT_FLOOR)
         # Far from the configured soil, and without a floor, the fit goes along a bent valley.
-        nothing = setting.fit([()], [nothing.u], nothing.angle, variance, _LONG)[0]
+        nothing = setting.refit(nothing, variance, _LONG)
         return replace(decision, proposal=law, **self._predicted([nothing], variance, 0.0))
 
     def _judged(self, verdict: Verdict) -> Decision:
@@ -211,7 +211,7 @@ class Decider:
     def _predicted(self, fits: list[Fit], variance: FloatArray, floor: float) -> dict[str, Any]:
         """Refit nothing and what was chosen (the last), and predict rows that no fit saw."""
         setting = self.findings.setting
-        fits = [setting.fit([f.names], [f.u], f.angle, variance)[0] for f in fits]
+        fits = [setting.refit(f, variance) for f in fits]
         findings = replace(self.findings, nothing=fits[0])
         beside = setting.problem.variance(floor)
         rows = len(self.table)

@@ -166,21 +166,12 @@ def soil_coordinates(
         if n.logarithmic:
             centre, least, most = map(math.log, (centre, least, most))
         scale = WIDENING * deviation
-        lower, upper = (least - centre) / scale, (most - centre) / scale
         found.append(
             Coordinate(
-                'soil',
-                name,
-                centre,
-                scale,
-                lower,
-                upper,
-                n.logarithmic,
-                unit=n.unit,
-                source=said,
-                stated=WIDENING,
+                'soil', name, centre, scale, (least - centre) / scale, (most - centre) / scale,
+                n.logarithmic, unit=n.unit, source=said, stated=WIDENING,
             )
-        )
+        )  # fmt: skip
     return tuple(found)
 
 

@@ -104,7 +104,7 @@ class Gap:
     def unseen(self, fitted: Fit) -> dict[str, dict[str, LeftOut]]:
         """Return the errors on left-out levels of the refit and of a set of effects."""
         setting, nothing = self.findings.setting, self.findings.nothing
-        fits = [setting.fit([f.names], [f.u], f.angle, self.variance)[0] for f in (nothing, fitted)]
+        fits = [setting.refit(f, self.variance) for f in (nothing, fitted)]
         return self.on_levels(setting, fits)
 
     def leaves_noise(self, unseen: Mapping[str, Mapping[str, LeftOut]]) -> bool:
@@ -176,17 +176,17 @@ def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
     # A large smooth error would take up what the law is to say.
     floors = tuple(floor for floor in findings.setting.floors if floor.largest <= _SMALL_FLOOR)
     setting = replace(findings.setting, effects=_terms(gap.table), floors=floors)
-    plain = setting.fit([()], [findings.nothing.u], findings.nothing.angle)[0]
+    plain = setting.refit(findings.nothing)
     for factor in _HOLDS if hold_soil else ():
         if _can_be_believed(plain):
             break
         setting = replace(setting, nuisance=narrowed(findings.setting.nuisance, factor))
         plain = setting.fit([()], [np.zeros(len(plain.u))], findings.nothing.angle)[0]
     nothing = setting.explain(plain)
-    refit = setting.fit([()], [plain.u], plain.angle, variance)[0]
+    refit = setting.refit(plain, variance)
     best, most = None, _CLOSED
     for law in _search(setting, nothing):
-        fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
+        fitted = setting.refit(law.fitted, variance)
         if hold_soil and not _can_be_believed(fitted):
             continue
         left_out = gap.on_levels(setting, [refit, fitted])

@@ -138,7 +138,7 @@ class Columns:
         """Return the readings that soil alone fits best, by one fit each, likeliest first."""
         setting, plain = self.findings.setting, self.findings.nothing
         variance = setting.problem.variance(_ROUGH)
-        nothing = setting.fit([()], [plain.u], plain.angle, variance)[0]
+        nothing = setting.refit(plain, variance)
         ranked = []
         for reading in self._readings():
             cells = reading.scale[setting.problem.quantity]

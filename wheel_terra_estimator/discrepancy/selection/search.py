@@ -147,7 +147,7 @@ def apart(findings: Findings, beds: IndexArray) -> Findings:
     for _ in range(2):  # one bed may end far from where several do
         builder.part_beds(beds, setting.problem, nothing)
         setting = replace(setting, problem=builder.build(std, findings.outliers))
-        nothing = setting.fit([()], [nothing.u], nothing.angle)[0]
+        nothing = setting.refit(nothing)
     ranked = enumerate(e.fitted for e in findings.selection.explanations)
     best = [f for place, f in ranked if len(f.names) == 1 or (f.names and place < _KEPT)]
     fits = setting.fit(

@@ -94,6 +94,10 @@ class Setting:
             iterations,
         )
 
+    def refit(self, fitted: Fit, variance: FloatArray | None = None, iterations: int = 10) -> Fit:
+        """Fit a set anew, from where it is."""
+        return self.fit([fitted.names], [fitted.u], fitted.angle, variance, iterations)[0]
+
     def predicted(self, outputs: Sequence[FloatArray], variance: FloatArray) -> FloatArray:
         """(K, N, 4) outputs with the structural error that a reference shows beside each."""
         problem, values = self.problem, np.array(outputs)
