@@ -549,6 +549,15 @@ def test_precision_is_the_inverse_of_the_conditioned_covariance(rng):
     np.testing.assert_allclose(np.linalg.inv(found), after, rtol=1e-10)
 
 
+def test_a_number_at_its_bound_is_the_bound():
+    """0.3 * 3.3 - 0.99 is 0, but for a rounding below it."""
+    own = Coordinate('soil', 'cohesion', -0.99, 0.3, 3.3), Coordinate('soil', 'cohesion', 2.0, 0.1)
+    assert float(own[0].value(3.3)) < 0.0
+    fitted = Fit((), own, np.array([3.3, 5.0]), *[np.zeros(0)] * 6, 0.0, np.ones(2))
+    values = [number.value for number in fitted.numbers(np.eye(2))]
+    assert str(values) == '[0.0, 2.5]'
+
+
 def test_what_is_over_a_covariance_is_over_the_dense_one(rng):
     variance, jacobian = rng.uniform(0.2, 4.0, 8), rng.standard_normal((8, 2))
     prior, vectors = np.array([0.3, 2.0]), rng.standard_normal((8, 3))

@@ -21,6 +21,7 @@ from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 
 _LONGEST_STEP = 2.0  # prior standard deviations
 _CLOSE_ENOUGH = 0.02  # in the objective
+_DECIMALS = 12  # what stands at a bound is off by rounding; no cohesion is below 0, nor -0
 _LEAST_DAMPING = 1e-6  # share of the precision that is added to its diagonal, at the start
 
 
@@ -64,7 +65,7 @@ class Fit:
         """Return the fitted numbers, by the posterior covariance of u (or another one)."""
         std = np.sqrt(np.diag(self.covariance() if covariance is None else covariance))
         return [
-            Number(c, u, float(c.value(u)), c.deviation(u, s), s)
+            Number(c, u, round(float(c.value(u)), _DECIMALS) + 0.0, c.deviation(u, s), s)
             for c, u, s in zip(self.coordinates, self.u.tolist(), std.tolist(), strict=True)
         ]
 

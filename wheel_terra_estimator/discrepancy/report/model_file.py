@@ -25,7 +25,6 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 
 # Effects that are an error of a reading and nothing else: name -> its parameter.
 _GAINS = {'torque': 'torque_gain', 'sinkage': 'sinkage_gain'}
-_DECIMALS = 12  # a fit that stands at a bound is off by rounding, and no file may be
 _SINKAGE_ZERO, _TORQUE_ZERO = 'sinkage_offset', 'drivetrain_friction'
 
 
@@ -49,8 +48,7 @@ def corrected(
     fitted, believed = proposal or diagnosis, diagnosis.configuration
     changes: dict[str, Any] = {}
     for shift in (*fitted.soil, *fitted.bed):  # of the table's bed, not of the reference's
-        after = round(shift.after, _DECIMALS)
-        changes |= _soil_keys(shift.name, after, shift.after_std, believed.soil)
+        changes |= _soil_keys(shift.name, shift.after, shift.after_std, believed.soil)
     for key, parameter in fitted.refitted.items():  # of effects that were on already
         owner, name = key.split('.', 1)
         changes |= _stated(f'effects.{effect_of(owner)}.{name}', parameter)
@@ -83,7 +81,7 @@ def corrected(
 
 def _stated(key: str, parameter: FittedParameter) -> dict[str, float]:
     """Return the keys of a fitted parameter of an effect and of its deviation."""
-    return {key: round(float(parameter.value), _DECIMALS), f'{key}_std': float(parameter.std)}
+    return {key: parameter.value, f'{key}_std': parameter.std}
 
 
 def _sensor_keys(
