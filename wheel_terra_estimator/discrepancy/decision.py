@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The decision: which explanation is reported, from the findings of the search alone.
 
-The best explanation is refitted under its own floor and predicts rows that the fit did not see:
-it stands, or the soil alone is reported.
+The best explanation is refitted under its own floor and predicts rows that the fit did not see: it
+stands, or the next one is tried, and in the end the soil alone is reported.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ _USUAL_Z_SCORE = 2.5  # stated deviations: a larger shift lowers the confidence 
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
 _SURE = 2.0  # deviations within which a bias of the radius is the height of the lugs
 _RARE = 3.0  # deviations of its prior, beyond which a gain may as well be something else
+_MOST_TRIED = 3  # doubtful names, after which none is given
 _LONG = 40  # iterations of a fit that may have to go far
 # A name is given where it, or one of those that the rows cannot tell from it, is more likely right
 # than not; below the second figure a law has to do worse than the name.
@@ -127,20 +128,23 @@ class Decider:
     laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
 
     def decision(self) -> Decision:
-        """Return the best explanation, where it stands, else the soil alone."""
+        """Return the best explanation that stands, else the soil alone."""
         selection, problem = self.findings.selection, self.findings.setting.problem
-        nameless = unnamed(selection, problem)
-        verdict = nameless if self.misread else choose(selection, problem)
-        decision = self._judged(verdict)
-        if verdict.status == 'agrees' and not self.beds_differ and channels_off(decision.gap):
-            decision = replace(decision, verdict=replace(verdict, status='undecided'))
-        if verdict.status != 'named':
-            return self._left_open(decision)
-        names, likely = self._against_law(decision, _names(self.table.units, decision))
-        if likely and any(item.after < item.refit for item in decision.gap.values()):
-            share = _OF_SEVERAL if len(names) >= _SEVERAL else 1.0
-            return replace(decision, names=_as_sure(names, share))
-        return self._left_open(replace(self._judged(nameless), doubtful=names))
+        tried, doubtful = list[int](), tuple[Naming, ...]()
+        while True:
+            enough = self.misread or len(tried) >= _MOST_TRIED
+            verdict = unnamed(selection, problem) if enough else choose(selection, problem, tried)
+            decision = self._judged(verdict)
+            if verdict.status == 'agrees' and not self.beds_differ and channels_off(decision.gap):
+                decision = replace(decision, verdict=replace(verdict, status='undecided'))
+            if verdict.status != 'named':
+                return self._left_open(replace(decision, doubtful=doubtful))
+            tried.append(verdict.index)
+            names, likely = self._against_law(decision, _names(self.table.units, decision))
+            if likely and any(item.after < item.refit for item in decision.gap.values()):
+                share = _OF_SEVERAL if len(names) >= _SEVERAL else 1.0
+                return replace(decision, names=_as_sure(names, share))
+            doubtful = doubtful or names
 
     def _law(self, decision: Decision, hold_soil: bool = False) -> Proposal | None:
         """Return the law for what a decision's refit of the soil leaves."""

@@ -7,6 +7,7 @@ The thresholds were chosen on campaigns apart from those that score them (docs/d
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -131,8 +132,8 @@ def unnamed(selection: Selection, problem: Problem) -> Verdict:
     return Verdict('unexplained', nothing, (), remainder(selection, nothing, problem))
 
 
-def choose(selection: Selection, problem: Problem) -> Verdict:
-    """Return the verdict on a selection."""
+def choose(selection: Selection, problem: Problem, barred: Collection[int] = ()) -> Verdict:
+    """Return the verdict on a selection; barred explanations were too doubtful to be named."""
     joint, unexplained, total = selection.log_joint, selection.unexplained, selection.totals
     nothing = selection.nothing
     alone = unnamed(selection, problem)
@@ -142,9 +143,12 @@ def choose(selection: Selection, problem: Problem) -> Verdict:
     effects = float(log_sum(total[named])) if named else -np.inf
     if np.logaddexp(effects, rest) - agrees < np.log(ODDS_TO_SPEAK):
         return replace(alone, status='agrees') if alone.left.accounted_for else alone
+    named = [h for h in named if h not in barred]
     if not named:
         return alone
     best = _best_set(selection, total, named)
+    if barred and total[nothing] - total[best] > -np.log(ODDS_TO_SPEAK):
+        return alone  # what is left to name is no better
     after = remainder(selection, best, problem)
     if after.significant and _explained(selection, nothing, best) < MOST:
         return alone
