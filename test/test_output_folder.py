@@ -182,7 +182,7 @@ def test_only_leftovers_of_what_a_folder_lists_are_removed(tmp_path):
     with working_folder(run, False, True, ['a/']):
         assert [p.name for p in run.glob('.?.*')] == ['.b.wheel-terra-1']
     with (
-        pytest.raises(UserError, match='holds nothing that this command can go on with'),
+        pytest.raises(UserError, match='holds nothing that this command can resume'),
         working_folder(run, False, True, ['b/']),
     ):
         pass
@@ -205,7 +205,7 @@ def test_a_working_folder_goes_on_or_starts_anew(tmp_path):
         assert not run.exists()
     with pytest.raises(KeyboardInterrupt):
         fill(False, False, '0.npz')
-    with pytest.raises(UserError, match='--resume goes on with it, --overwrite replaces it'):
+    with pytest.raises(UserError, match='--resume continues it, --overwrite replaces it'):
         fill(False, False)
     with pytest.raises(KeyboardInterrupt):
         fill(False, True)

@@ -118,7 +118,7 @@ def test_no_number_of_processes(text, capsys):
     with pytest.raises(SystemExit):
         parser.parse_args([f'--jobs={text}'])
     said = capsys.readouterr().err
-    assert 'is no number of processes; give 1 or more' in said
+    assert 'is not a number of processes; give 1 or more' in said
     assert len(said) < 300
 
 

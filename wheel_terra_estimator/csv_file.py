@@ -153,9 +153,9 @@ def is_number(cell: Any, decimal_comma: bool = False) -> bool:
 def _cure(cell: str) -> str:
     """Return what to do about a cell that is no number."""
     if _DECIMAL_COMMA.fullmatch(cell):
-        return 'use a point as decimal mark, without marks between thousands'
+        return 'use a point as decimal mark, no thousands separators'
     if is_number(cell.replace(',', '')) or is_number(cell.replace('.', ''), decimal_comma=True):
-        return 'take out the marks between thousands'
+        return 'remove the thousands separators'
     if is_number(cell.rstrip('% ')):
         return 'give the ratio, without a percent sign'
     if is_number(cell.replace('\u2212', '-').replace('\u2013', '-')):

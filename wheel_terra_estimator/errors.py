@@ -51,7 +51,7 @@ def outside_cause(error: BaseException) -> str | None:
     words = f'{type(error).__name__}: {error}'
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         if str(frame.f_globals.get('__name__')).startswith(EFFECT_FILE_MODULE):
-            return f'{frame.f_code.co_filename}, line {line}: {words}; mend that file of effects'
+            return f'{frame.f_code.co_filename}, line {line}: {words}; correct that effect file'
     if isinstance(error, MemoryError):
         return f'not enough memory ({error})'
     if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:

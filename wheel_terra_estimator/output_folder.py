@@ -200,13 +200,11 @@ def working_folder(
         _refuse_place(path, inputs)
         if not earlier and not (path.is_dir() and not any(path.iterdir())):
             raise UserError(
-                f'{path}: exists and holds nothing that this command can go on with; choose '
+                f'{path}: exists and holds nothing that this command can resume; choose '
                 'another path or give --overwrite'
             )
     elif path.exists() and not overwrite:
-        raise UserError(
-            f'{path}: exists already; --resume goes on with it, --overwrite replaces it'
-        )
+        raise UserError(f'{path}: exists already; --resume continues it, --overwrite replaces it')
     else:
         check_folder(path, overwrite, inputs)
     path = _absolute(path)

@@ -90,7 +90,7 @@ def _on_this_machine(
         with worker_pool(1) as pool:
             outcome = _outcome(pool.submit(function, tasks[index]))
         if isinstance(outcome, BrokenProcessPool):
-            outcome = UserError('its process was killed twice; is there enough memory?')
+            outcome = UserError('its process was killed twice; not enough memory?')
         yield index, outcome
 
 
@@ -105,7 +105,7 @@ def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
         pool = ProcessPoolExecutor(processes, initializer=_watch, initargs=(receiver,))
     except (OSError, ImportError) as error:  # its semaphores are files there
         raise UserError(
-            f'processes side by side need shared memory: {error}; look at df -h /dev/shm and make '
+            f'parallel processes need shared memory: {error}; look at df -h /dev/shm and make '
             'room (in a container: --shm-size)'
         ) from None
     try:
@@ -177,7 +177,7 @@ def _client(address: str) -> Any:
         asyncio.run(asyncio.wait_for(greet(), CONNECT_TIMEOUT))
         client = Client(address, timeout=CONNECT_TIMEOUT)
     except Exception as error:
-        said = str(error) or f'it is silent for {CONNECT_TIMEOUT} s'
+        said = str(error) or f'no answer for {CONNECT_TIMEOUT} s'
         raise UserError(
             f'--scheduler {address}: no Dask scheduler answers there ({said}); '
             'start one with: dask scheduler'
@@ -204,7 +204,9 @@ def _outcome(future: Any) -> Any:
 
 def _count(text: str) -> int:
     if not (text.isdecimal() and len(text) <= _MOST_DIGITS and int(text) > 0):
-        raise argparse.ArgumentTypeError(f"'{text[:20]}' is no number of processes; give 1 or more")
+        raise argparse.ArgumentTypeError(
+            f"'{text[:20]}' is not a number of processes; give 1 or more"
+        )
     return int(text)
 
 

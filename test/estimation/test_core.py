@@ -77,7 +77,7 @@ def test_a_failing_filter_is_held_said_and_started_anew(how):
     (held,) = core.add(odometry(0.2, rate=9.0))
     assert held.stamp == stamp_at(0.2)
     assert (held.slip_class == SlipClass.UNKNOWN).all()
-    assert 'started anew' in held.faults['filter']
+    assert 'restarted' in held.faults['filter']
     np.testing.assert_array_equal(held.slip_std, 1.0)
     np.testing.assert_array_equal(held.sinkage_std, config.wheels.radius)
     assert held.slip[0] == good[-1].slip[0] == 0.25
@@ -212,6 +212,6 @@ def test_health_names_topic_and_reason():
     health = core.health()
     assert health['odom_used'] == 2
     assert health['imu/data_used'] == 1, 'its angular rate is good'
-    assert health['imu/data_rejected: specific force not finite or absurd'] == 1
+    assert health['imu/data_rejected: specific force not finite or implausible'] == 1
     assert health['sinkage_rejected: sinkage infinite or larger than the wheel radius'] == 1
     assert health['fake_steps'] >= 2

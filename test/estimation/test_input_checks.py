@@ -64,7 +64,10 @@ def test_one_bad_wheel_leaves_the_other(checks, bad):
     m = check(checks, WheelOdometry(stamp_at(0.0), np.array([bad, 2.0]), np.array([1.0, bad])))
     np.testing.assert_array_equal(m.rate, [NAN, 2.0])
     np.testing.assert_array_equal(m.torque, [1.0, NAN])
-    assert reasons(checks) == ['wheel rate infinite or absurd', 'torque infinite or absurd']
+    assert reasons(checks) == [
+        'wheel rate infinite or implausible',
+        'torque infinite or implausible',
+    ]
     assert sum(checks.refused) == 0
 
 
@@ -170,5 +173,5 @@ def test_a_single_sample_that_no_body_makes_is_dropped_and_counted(checks):
     assert not passes(10, 80.0) and passes(11, 0.2)
     assert not passes(12, 0.2, turn=20.0) and passes(13, 0.2)
     assert checks.refused[inertial] == 2
-    assert checks.rejected[inertial] == {'a wild single sample, as no rover moves': 2}
+    assert checks.rejected[inertial] == {'a single outlier, impossible motion of a rover': 2}
     assert not passes(14, 90.0) and passes(15, 88.0), 'two alike are no single sample'

@@ -86,7 +86,7 @@ def test_release_of_a_warning_or_a_stop_opens_a_crawl_then_what_is_known_decides
     stopped.drive(1.0, 0.1, **near)
     warned.state, words = after_release(warned.state, warned.now)
     assert words.startswith('still stuck') and '10 s' in words
-    assert warned.command(0.1).reason.endswith('0.30 for 10 s more')
+    assert warned.command(0.1).reason.endswith('0.30 for another 10 s')
     stopped.state, _ = after_release(stopped.state, stopped.now)
     for rover, state in ((warned, 'stuck'), (stopped, 'stopped')):
         assert rover.drive(9.9, 0.1, **near)[:2] == (0.3, 'released')

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from wheel_terra_estimator.messages.convert import imu_mounting, stamp_of
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-NONE = 'none of the configured wheels in it'
+NONE = 'contains none of the configured wheels'
 LENGTHS = 'velocity and name differ in length'
 
 
@@ -108,7 +108,7 @@ def test_wheels_that_come_no_more_under_their_names_are_told(converter, factory)
         message = factory.joint_state(factory.header(stamp), (name,), velocity=(1.0,))
         converter.convert('joint_states', message)
     ((topic, reason),) = converter.rejected
-    assert 'in it but wheel_1; wheels.names: left, right' in converter.in_words(topic, reason)
+    assert 'wheels, but wheel_1; wheels.names: left, right' in converter.in_words(topic, reason)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_wheels_that_come_no_more_under_their_names_are_told(converter, factory)
 def test_odd_names_stay_in_one_short_line(joints, converter, names, words):
     joints(names, velocity=(0.0,) * len(names))
     ((topic, reason),) = converter.rejected
-    assert f'in it but {words}; wheels.names' in converter.in_words(topic, reason)
+    assert f'wheels, but {words}; wheels.names' in converter.in_words(topic, reason)
 
 
 def test_effort_of_another_length_costs_the_torque_only(joints, converter):
@@ -323,4 +323,4 @@ def test_a_pose_alone_is_no_velocity(converter, factory):
     ]
     assert [f and f.forward for f in found] == [0.0, 0.0, None, None, 0.0, 0.1]
     ((topic, why),) = converter.rejected
-    assert topic == 'reference_odom' and why.startswith('holds a pose alone')
+    assert topic == 'reference_odom' and why.startswith('holds a pose only')

@@ -72,12 +72,12 @@ def test_levels_follow_class_and_warning():
 
 def test_a_sensor_that_was_never_there_is_no_fault_one_that_fell_silent_is():
     diagnostics = Diagnostics(NAMES)
-    lacking = {'sinkage': 'no sinkage: held by its model'}
+    lacking = {'sinkage': 'no sinkage reading: sinkage from its model'}
     assert levels(diagnostics.due(at(0.0, faults=lacking)))[0] == OK
     assert diagnostics.now(at(0.0, faults=lacking))[0].message == 'waiting for sinkage'
     found = diagnostics.due(at(1.0, faults=lacking))
     assert levels(found)[0] == OK
-    assert found[0].message == 'sinkage: no sinkage: held by its model'
+    assert found[0].message == 'sinkage: no sinkage reading: sinkage from its model'
     assert not diagnostics.due(at(1.1))  # the sensor is heard
     assert levels(diagnostics.due(at(1.2, faults=lacking)))[0] == WARN
 
@@ -94,7 +94,7 @@ def test_the_first_second_waits_for_inputs_and_for_nothing_else():
     assert diagnostics.due(at(1.0, faults=faults))[0].message == 'imu: no IMU'
 
 
-LOST = 'messages lost on the way so far'
+LOST = 'messages lost in transport so far'
 
 
 def once(faults: Any) -> Any:
@@ -137,10 +137,10 @@ def test_a_fault_seen_again_is_one_fault_with_its_latest_count():
 
 
 def test_two_faults_of_a_topic_are_both_told():
-    both = [('odom', 'silent for 2.1 s'), ('odom', f'7 {LOST}')]
+    both = [('odom', 'no message for 2.1 s'), ('odom', f'7 {LOST}')]
     assert (
         Diagnostics(NAMES, faults=once(both)).due(at(0.0))[0].message
-        == f'odom: silent for 2.1 s; odom: 7 {LOST}'
+        == f'odom: no message for 2.1 s; odom: 7 {LOST}'
     )
 
 
@@ -164,7 +164,7 @@ def test_what_is_left_out_of_the_inputs_is_counted_once_whoever_left_it_out_and_
     pipeline.hear(TOPIC, joints(40, (math.inf, math.inf)))  # core, refused
     message = pipeline.diagnostics.stale('no estimates')[0].message
     assert f'{TOPIC}: damaged (1 so far)' in message
-    assert 'wheel rate infinite or absurd (1 so far)' in message
+    assert 'wheel rate infinite or implausible (1 so far)' in message
     reasons = {reason: n for (topic, reason), n in pipeline.rejected.items() if topic == TOPIC}
     assert reasons.pop('damaged') == 1
     assert reasons.pop('velocity and name differ in length') == 1

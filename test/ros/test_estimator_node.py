@@ -74,7 +74,7 @@ def test_a_quality_of_service_that_cannot_be_is_named(policy, good, bad):
 
 
 def test_a_failure_while_it_is_configured_is_logged():
-    """By a life cycle manager it is told nothing but that it failed."""
+    """By a lifecycle manager it is told nothing but that it failed."""
     from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
 
     def fails():
@@ -185,7 +185,7 @@ class TestOneNode:
         other = node.create_publisher(ros.Twist, '/drive/joints', 10)
         offered = ros.QoSProfile(depth=10, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
         node.create_publisher(ros.Odometry, 'reference_odom', offered)
-        until(lambda: said('geometry_msgs/msg/Twist comes there, needed is sensor_msgs/msg/Joint'))
+        until(lambda: said('geometry_msgs/msg/Twist is published there, sensor_msgs/msg/Joint'))
         until(lambda: said('/reference_odom: nothing comes from /listener: best effort publisher'))
         node.destroy_publisher(other)  # a participant has one type on a topic
 
@@ -199,7 +199,7 @@ class TestOneNode:
             return any(words in m.status[0].message for m in diagnostics)
 
         mast = wheel_message(['mast'], 100.0)
-        until(lambda: said_after(mast, 'it but mast; wheels.names: front_left_wheel_joint'))
+        until(lambda: said_after(mast, 'wheels, but mast; wheels.names: front_left_wheel_joint'))
         until(lambda: said_after(wheel_message(['front_left_wheel_joint'], 0.0), 'stamp is zero'))
 
 
@@ -212,7 +212,7 @@ def test_a_file_whose_section_is_for_another_name_is_told(executor, tmp_path, ot
     path = tmp_path / 'named.yaml'
     path.write_text('wheel_terra_estimator:\n  ros__parameters:\n    output_rate: 5.0\n')
     arguments = [*ROVER, str(path), '-r', '__ns:=/rover1', *others]
-    words = f"{path}: sections there: 'wheel_terra_estimator:'; none is for the node /rover1{NODE}"
+    words = f"{path}: sections there: 'wheel_terra_estimator:'; none applies to node /rover1{NODE}"
     if others:
         EstimatorNode(context=executor.context, cli_args=arguments).destroy_node()
         assert words in capfd.readouterr().err

@@ -18,7 +18,7 @@ def test_rate_age_and_silence_after_three_periods():
     assert values['reference_odom_delay_s'] == pytest.approx(0.5)
     assert watch.faults(0.5) == []
     assert [topic for topic, _ in watch.faults(103.9)] == ['imu/data']
-    assert ('reference_odom', 'silent for 6.1 s') in watch.faults(104.1)
+    assert ('reference_odom', 'no message for 6.1 s') in watch.faults(104.1)
 
 
 def test_the_rate_of_the_first_messages_is_that_of_their_mean_gap():
@@ -39,7 +39,7 @@ def test_loss_by_the_publishers_own_count_is_told_whatever_comes_next():
     assert watch.values(0.1)['joint_states_lost'] == 2
     for i in range(1000):
         watch.received('joint_states', 0.1 + 0.01 * i, 0.0, None)
-    assert watch.faults(10.1) == [('joint_states', '2 messages lost on the way so far')]
+    assert watch.faults(10.1) == [('joint_states', '2 messages lost in transport so far')]
     assert watch.faults(10.1) == [], 'told: whoever asked keeps it'
 
 
@@ -89,12 +89,12 @@ def test_a_process_that_is_late_calls_no_topic_silent_and_says_by_how_much():
     assert watch.faults(2.1) == []
     assert watch.faults(4.0) == [], 'messages may wait'
     watch.looked(4.0, 0.05)
-    late = ('inputs', 'taken 1.9 s late: this process lacks processor time')
+    late = ('inputs', 'read 1.9 s late: this process lacks processor time')
     assert watch.faults(4.0) == [late], 'the middleware hands over what it has a little later'
     for now in (4.25, 4.5, 4.75):
         assert watch.faults(now) == []
         watch.looked(now, 0.25)
-    assert watch.faults(5.0) == [('joint_states', 'silent for 3.0 s')]
+    assert watch.faults(5.0) == [('joint_states', 'no message for 3.0 s')]
 
 
 def test_a_process_that_is_always_late_still_tells_a_silent_topic():
@@ -106,7 +106,7 @@ def test_a_process_that_is_always_late_still_tells_a_silent_topic():
             if now < 10.0:
                 watch.received('joint_states', now + 0.05 * (number - 18), 0.0, None)
         watch.looked(now, 0.25)
-        told |= {topic for topic, words in watch.faults(now) if 'silent' in words}
+        told |= {topic for topic, words in watch.faults(now) if 'no message' in words}
     assert told == {'joint_states'}
 
 

@@ -45,7 +45,7 @@ def test_a_process_that_stood_and_lost_nothing_is_behind_and_no_topic_silent(
     until(lasts(1.5))
     process.send_signal(signal.SIGCONT)
     sets, said = rover.sets, set()
-    until(lambda: re.search(r'inputs: taken [1-9]\d*\.\d s late', rover.said))
+    until(lambda: re.search(r'inputs: read [1-9]\d*\.\d s late', rover.said))
     over = lasts(2.5)  # seconds in which each status is looked at
     until(lambda: said.add(rover.said) or over())
     slow = any('left out' in words for words in said)  # of a machine too busy for the node

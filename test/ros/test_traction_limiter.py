@@ -197,7 +197,7 @@ def test_publishers_that_bypass_it_or_are_not_heard_are_told_in_diagnostics_and_
         words = said[-1].message
         return said[-1].level == b'\x01' and all(fault in words for fault in faults)
 
-    other_type = f'{checked}: geometry_msgs/msg/TwistStamped comes there'
+    other_type = f'{checked}: geometry_msgs/msg/TwistStamped is published there'
     other = node.create_publisher(ros.TwistStamped, checked, 1)
     until(lambda: told(other_type))
     node.destroy_publisher(other)  # a participant has one type on a topic

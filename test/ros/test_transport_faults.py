@@ -177,5 +177,5 @@ def test_loss_is_told_and_counted(heard, node_here, publishers):
     else:  # their counts cannot be told apart: what the middleware counts
         estimator._on_message_lost('joint_states', SimpleNamespace(total_count_change=7))
         until(lambda: wheels.figure('lost') >= 7)
-    words = 'messages lost on the way'
+    words = 'messages lost in transport'
     until(lambda: wheels.send() and any(words in s.message and s.level[0] for s in statuses))

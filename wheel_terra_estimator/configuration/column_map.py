@@ -107,11 +107,11 @@ def entry_of(value: Any, where: str) -> Entry:
     if isinstance(value, str):
         return Entry(value)
     if not isinstance(value, Mapping):
-        raise UserError(f'{where}: give column, unit and, if turned round, sign')
+        raise UserError(f'{where}: give column, unit and, if the sign is inverted, sign')
     unknown = ', '.join(repr(key) for key in value if key not in ('column', 'unit', 'sign'))
     if unknown or 'column' not in value:
         stray = f' (unknown: {unknown})' if unknown else ''
-        raise UserError(f'{where}: give column, unit and, if turned round, sign{stray}')
+        raise UserError(f'{where}: give column, unit and, if the sign is inverted, sign{stray}')
     sign = value.get('sign', 1)
     if sign not in (1, -1):
         raise UserError(f'{where}: sign must be 1 or -1')

@@ -289,7 +289,7 @@ def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]
     else:
         value = float(value)
     if value and not LEAST <= abs(value) <= MOST:
-        raise refuse(f'{value!r} is no quantity ({LEAST} to {MOST})')
+        raise refuse(f'{value!r} is not a plausible value ({LEAST} to {MOST})')
     too_low = value <= parameter.lower if parameter.open_lower else value < parameter.lower
     if too_low or value > parameter.upper:
         unit = parameter.unit

@@ -74,7 +74,7 @@ def rover_file(sketch: RoverSketch) -> str:
         mark = f'{A_GUESS}: ' if key in sketch.guessed else ''
         notes[key] = f'{mark}{table[key].meaning}' + (f' [{unit}]' if unit not in ('', '-') else '')
     lines = [as_text(values, comment, notes)]
-    lines += ['    # Worth stating where known (the values are the defaults):']
+    lines += ['    # Worth stating if known (values shown are the defaults):']
     for key in _WORTH_STATING:
         parameter = table[key]
         default = parameter.default

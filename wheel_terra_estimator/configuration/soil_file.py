@@ -21,7 +21,7 @@ _LATEST_STAMP = 2**63 - 1  # [ns]
 HEADER = 'Learned by the estimator on the drive; read at its next start.'
 """First line, as a comment, of every soil file."""
 STATE = '.state.json'  # behind the name of a soil file: the file that keeps the warning
-_COMMENT = f'{HEADER}\nWritten anew each time: keep nothing of your own in it.'
+_COMMENT = f'{HEADER}\nOverwritten each time: keep nothing of your own in it.'
 _SECTIONS = ('soil.', 'sensors.')  # of the keys that are written
 
 
@@ -54,7 +54,7 @@ def why_foreign(path: Path) -> str:
     try:
         first, _, _ = read_text(path).partition('\n')
     except UserError as error:
-        return f'cannot be told to be a soil file ({error})'
+        return f'is not recognised as a soil file ({error})'
     if first.strip() != f'# {HEADER}':
         return f"does not begin with '# {HEADER}', as the soil files of this program do"
     try:
@@ -92,7 +92,7 @@ def read_state(path: Path) -> StuckState:
         found = json.loads(read_text(path))
         stuck, reason, stamp = found['stuck'], str(found['reason']), found['stamp']
     except (ValueError, TypeError, KeyError, RecursionError):
-        raise UserError(f'{path}: is no state of the estimator; remove it') from None
+        raise UserError(f'{path}: is not a state file of the estimator; remove it') from None
     if not isinstance(stuck, bool):
         raise UserError(f'{path}: stuck is neither true nor false; remove the file')
     usable = isinstance(stamp, int) and 0 <= stamp <= _LATEST_STAMP
@@ -157,7 +157,7 @@ class KeptSoil:
             kept = read_values(self.path)
             configuration.replace(kept)
         except UserError as error:
-            self._unusable = f'not used, and not written to before it is removed: {error}'
+            self._unusable = f'not used, and not written to until it is removed: {error}'
             self.fault = self._unusable
             return {}
         return kept

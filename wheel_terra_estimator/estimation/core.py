@@ -280,7 +280,7 @@ ReferenceVelocity
         elif fate is Fate.TOO_OLD:
             self._checks.refuse(channel, 'stamp older than `history` (raise it, or set its clock)')
         elif fate is Fate.FULL:
-            self._checks.refuse(channel, 'more inputs than can be sorted')
+            self._checks.refuse(channel, 'more inputs than can be held for sorting')
         return [] if due is None else [self._published(due)]
 
     def _estimated(self, due: Due) -> EstimateSet | Exception:
@@ -323,14 +323,14 @@ ReferenceVelocity
         if self._deferred:
             self._deferred = False
             faults['late inputs'] = (
-                f'more than {self._settings.rerun_rate:.0f} steps a second would be run again '
-                '(filter.rerun_rate): fused with delay'
+                f'more than {self._settings.rerun_rate:.0f} steps a second would be repeated '
+                '(filter.rerun_rate): fused late'
             )
         if self._clock_stepped:
             self._clock_stepped = False
             faults['clock'] = (
                 f'stamps went back, {self._clock_steps} times so far: a new run begins, soil is '
-                'kept (a looped recording, a clock that was set, or two sources of other clocks)'
+                'kept (a looped recording, a clock that was set, or sources of different clocks)'
             )
         for channel, by in self._lags.apart.items():
             where = 'ahead of wheels and IMU' if by > 0 else f'behind {names[INERTIAL - channel]}'
@@ -340,9 +340,9 @@ ReferenceVelocity
             )
         if silent:
             name, every = names[WHEEL_ODOMETRY], self._timeline.slow_odometry
-            words = f'{name} silent: wheel rates unknown'
+            words = f'no messages on {name}: wheel rates unknown'
             if every:
-                words = f'{name} comes every {every:.1f} s -> filter.silence: {2.5 * every:.1f}'
+                words = f'{name} arrives every {every:.1f} s -> filter.silence: {2.5 * every:.1f}'
             faults['wheel_odometry'] = words
         return faults
 

@@ -47,7 +47,7 @@ class OutputGuard:
                 outcome = replace(outcome, stamp=stamp)
             self._good = outcome
             return outcome, False
-        return self._held(stamp, self._mended(outcome), 'an estimate was not a number'), True
+        return self._held(stamp, self._mended(outcome), 'an estimate was NaN'), True
 
     def _mended(self, estimates: EstimateSet) -> EstimateSet:
         changes: dict[str, Any] = {}
@@ -77,7 +77,7 @@ class OutputGuard:
             estimates,
             stamp=stamp,
             slip_class=blank.slip_class,
-            faults={**estimates.faults, 'filter': f'started anew: {words}'},
+            faults={**estimates.faults, 'filter': f'restarted: {words}'},
             reasons=blank.reasons,
             forward_velocity_variance=blank.forward_velocity_variance,
             yaw_rate_variance=blank.yaw_rate_variance,

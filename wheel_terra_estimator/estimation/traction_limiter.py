@@ -169,10 +169,12 @@ def after_direction(state: LimiterState, direction: int) -> LimiterState:
 def after_release(state: LimiterState, now: float) -> tuple[LimiterState, str]:
     """Return the state after ``~/release``, and in words what it opens."""
     if state.interlock is Interlock.FREE:
-        return state, 'nothing is stopped'
+        return state, 'nothing to release'
     released = after_event(state, Event.RELEASE)
     what = 'released' if released.interlock is Interlock.FREE else 'still stuck'
-    words = f'{what} ({state.reason}): a crawl passes every way for {RELEASE_TIME:.0f} s'
+    words = (
+        f'{what} ({state.reason}): crawling is allowed in every direction for {RELEASE_TIME:.0f} s'
+    )
     return replace(released, released_until=now + RELEASE_TIME), words
 
 
@@ -227,12 +229,14 @@ def after_estimates(
 def decide(state: LimiterState, now: float, command: Velocity, tuning: LimiterTuning) -> Decision:
     """Return what is to pass of a command that comes now; the first line that applies."""
     if command == ZERO:
-        return Decision(1.0, 'zero', 'command is zero: passes')
+        return Decision(1.0, 'zero', 'zero command: passes')
     free = state.interlock is Interlock.FREE
     if now < state.released_until:
         share = min(tuning.creep_scale, _decide_free(state, now, tuning).scale if free else 1.0)
         left = state.released_until - now
-        return Decision(share, 'released', f'~/release: crawl at {share:.2f} for {left:.0f} s more')
+        return Decision(
+            share, 'released', f'~/release: crawl at {share:.2f} for another {left:.0f} s'
+        )
     if free:
         return _decide_free(state, now, tuning)
     return _decide_closed(state, now, _sign(command[0]), tuning)
@@ -333,7 +337,7 @@ def _after_unknown(
     if any(now - wheel.at <= tuning.stale_after for wheel in state.wheels):
         return state  # the last known classes count on
     scale = min(tuning.stale_scale, state.judgement.scale)
-    words = f'slip of no wheel known: cut to {scale:.2f}'
+    words = f'slip of all wheels unknown: cut to {scale:.2f}'
     return replace(state, judgement=Decision(scale, 'unknown', words))
 
 
@@ -379,7 +383,7 @@ def _decide_free(state: LimiterState, now: float, tuning: LimiterTuning) -> Deci
         return state.judgement
     scale = min(tuning.stale_scale, state.judgement.scale)
     come = now - state.judged_at <= tuning.stale_after
-    old = f' (they come {_late(state):.1f} s old)' if come else ''
+    old = f' (they arrive {_late(state):.1f} s old)' if come else ''
     words = f'no fresh estimate{old}: cut to {scale:.2f}'
     return Decision(scale, 'no estimate', words)
 
@@ -392,13 +396,15 @@ def _decide_closed(
         turned = state.way * forward < 0 and _still_time(state, now) < TURN_BACK_TIME
         if not turned:
             return Decision(share, 'backing out', f'direction unknown: crawl at {share:.2f}')
-        words = f'direction unknown: the other way after {TURN_BACK_TIME:.0f} s of standing'
+        words = (
+            f'direction unknown: reversing is allowed after {TURN_BACK_TIME:.0f} s at standstill'
+        )
         return Decision(0.0, state.interlock.value, words)
     if forward != state.direction:
         return Decision(share, 'backing out', f'backing out at {share:.2f} ({state.reason})')
     way = 'forward' if forward > 0 else 'backward'
     words = (
-        f'{state.reason}: nothing passes {way}; back out, ~/release, or ~/reset of the estimator'
+        f'{state.reason}: no driving {way}; back out, call ~/release, or ~/reset of the estimator'
     )
     return Decision(0.0, state.interlock.value, words)
 

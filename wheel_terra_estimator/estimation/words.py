@@ -11,15 +11,15 @@ from wheel_terra_estimator.estimation.judgement.slip import WheelSlip
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment
 
 COST = {
-    'wheel_odometry': 'no wheel odometry: slip held',
-    'imu': 'no IMU: loads of level ground, turning from the wheels, no balance of forces',
+    'wheel_odometry': 'no wheel odometry: slip keeps its last value',
+    'imu': 'no IMU: loads as on level ground, yaw rate from the wheels, no force balance',
     'acceleration': (
-        'no acceleration: no balance of forces, loads of level ground or by the orientation'
+        'no acceleration: no force balance, loads as on level ground or by the orientation'
     ),
-    'angular_rate': 'no angular rate: turning from the wheels',
+    'angular_rate': 'no angular rate: yaw rate from the wheels',
     'orientation': 'no orientation: slope from gyro and specific force',
-    'torque': 'no torque: pull from the balance of forces and the soil model',
-    'sinkage': 'no sinkage: held by its model',
+    'torque': 'no torque: pull from the force balance and the soil model',
+    'sinkage': 'no sinkage reading: sinkage from its model',
     'reference': 'no reference velocity: slip from forces and soil model',
 }
 """Input that may be missing at a stamp -> that it is, and what that costs."""

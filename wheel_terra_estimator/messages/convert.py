@@ -43,7 +43,7 @@ INPUT_TYPES = {
 
 _FASTEST = 30.0  # lateral speed that no rover has [m/s]
 DAMAGED = 'damaged message'  # why bytes are refused that are no message of their type
-_NO_WHEEL = 'none of the configured wheels in it'
+_NO_WHEEL = 'contains none of the configured wheels'
 _GONE = 1_000_000_000  # other joints alone for so long [ns] are reported
 _MOST_LETTERS = 300  # of the names of joints in one line of words
 
@@ -102,7 +102,7 @@ class InputConverter:
         if reason != _NO_WHEEL:
             return reason
         there = names_in_words(self._unknown_names[topic])
-        return f'{reason} but {there}; wheels.names: {", ".join(self.wheels.names)}'
+        return f'{reason}, but {there}; wheels.names: {", ".join(self.wheels.names)}'
 
     def _joint_states(self, message: Message) -> WheelOdometry | None:
         """Wheel rates, torques and steering angles; what the message does not hold is nan."""
@@ -120,7 +120,7 @@ class InputConverter:
             torque = np.full(self.wheels.count, math.nan)
         unknown = np.count_nonzero(np.isnan(values))
         if unknown and unknown > len(values) - len(set(self._columns_of(message.names)[1])):
-            self.rejected['joint_states', 'velocity of a wheel is nan (taken as unknown)'] += 1
+            self.rejected['joint_states', 'velocity of a wheel is NaN (treated as unknown)'] += 1
         if self._reversed:
             with np.errstate(invalid='ignore'):  # a damaged nan may be a signalling one
                 values, torque = values * self.wheels.direction, torque * self.wheels.direction
@@ -147,7 +147,7 @@ class InputConverter:
             rim_speed = forward - turn * self.wheels.y
             rate = rim_speed / self.wheels.slip_radius
         if np.isnan(rim_speed).any():
-            self.rejected['odom', 'velocity is nan (taken as unknown)'] += 1
+            self.rejected['odom', 'velocity is NaN (treated as unknown)'] += 1
         return WheelOdometry(message.stamp, rate, np.full_like(rim_speed, math.nan))
 
     def _imu(self, message: Message) -> InertialReading | None:
@@ -158,7 +158,7 @@ class InputConverter:
         given = of_force[0] != -1.0, of_rate[0] != -1.0  # REP 145
         for words, there in zip(('linear acceleration', 'angular velocity'), given, strict=True):
             if not there:
-                self.rejected['imu/data', f'says that it has no {words} (covariance -1)'] += 1
+                self.rejected['imu/data', f'states that it has no {words} (covariance -1)'] += 1
         force, rate = (
             np.array(vector) if there else np.full(3, math.nan)
             for vector, there in zip((forces, rates), given, strict=True)
@@ -200,7 +200,7 @@ class InputConverter:
         before, self._place = self._place, place
         if place != before and before is not None and not any(values):
             self.rejected[
-                'reference_odom', 'holds a pose alone: twist and its covariance are 0'
+                'reference_odom', 'holds a pose only: twist and its covariance are 0'
             ] += 1
             return None
         forward, lateral, covariance = values[0], values[1], values[6:]

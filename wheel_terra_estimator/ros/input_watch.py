@@ -126,18 +126,23 @@ class InputWatch:
         """Return topics that are silent, losses and delays since this was last asked, in words."""
         found = []
         if self._worst > BEHIND:
-            words = f'taken {self._worst:.1f} s late: this process lacks processor time'
+            words = f'read {self._worst:.1f} s late: this process lacks processor time'
             found.append(('inputs', words))
         self._worst = 0.0
         found += self._ahead(now)
         for topic, state in self._topics.items():
             if state.lost != state.reported:
-                found.append((topic, f'{state.lost} messages lost on the way so far'))
+                found.append((topic, f'{state.lost} messages lost in transport so far'))
                 state.reported = state.lost
             if state.twice:
-                found.append((topic, 'two publishers send the same: end one (see ros2 topic info)'))
+                found.append(
+                    (
+                        topic,
+                        'two publishers send the same messages: stop one (see ros2 topic info -v)',
+                    )
+                )
             if self.is_silent(topic, now):
-                found.append((topic, f'silent for {now - state.last_time:.1f} s'))
+                found.append((topic, f'no message for {now - state.last_time:.1f} s'))
         return found
 
     def _ahead(self, now: float) -> list[tuple[str, str]]:
@@ -149,7 +154,7 @@ class InputWatch:
         ahead = {topic: by for topic, by in current.items() if by > AHEAD}
         if len(ahead) > 1 and len(ahead) == len(current):
             ahead = {'inputs': max(ahead.values())}
-        words = 'stamps {:.0f} s ahead of the clock here: set the clocks, or stamp in the driver'
+        words = 'stamps {:.0f} s ahead of the local clock: set the clocks, or stamp in the driver'
         return [(topic, words.format(by)) for topic, by in ahead.items()]
 
     def values(self, now: float) -> Mapping[str, Any]:

@@ -69,7 +69,7 @@ MESSAGE_TYPES = {topic: _message_class(name) for topic, name in INPUT_TYPES.item
 
 WATCH_PERIOD = 0.25  # [s]
 BEHIND = 500_000_000  # [ns] that a message waited, from which on this process is behind
-OVERLOADED = 'left out: this process cannot keep up'
+OVERLOADED = 'dropped: this process cannot keep up'
 DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing arrives
 SILENCE = 1.5  # [s] of the steady clock without a set
 START = 1.0  # [s] in which the node says what it waits for, and not what is missing
@@ -145,10 +145,9 @@ class EstimatorNode(LifecycleNode):
             transition = request.transition
             _, state = self._state_machine.current_state
             alone = self._given.get('autostart', True) is not False
-            remedy = '; with a life cycle manager set autostart to false' if alone else ''
+            remedy = '; with a lifecycle manager set autostart to false' if alone else ''
             self.get_logger().error(
-                f'life cycle: no transition {transition.label or transition.id} '
-                f'from {state}{remedy}'
+                f'lifecycle: no transition {transition.label or transition.id} from {state}{remedy}'
             )
             response.success = False
             return response
@@ -398,7 +397,7 @@ class EstimatorNode(LifecycleNode):
             self._kept.forget_warning()
         self._publisher.publish_stuck(False, 0, again=True)  # so that listeners hear of the reset
         response.success = True
-        response.message = 'state forgotten, parameters kept'
+        response.message = 'state reset, parameters kept'
         self.get_logger().info('reset')
         return response
 
@@ -423,7 +422,9 @@ class EstimatorNode(LifecycleNode):
     ) -> SetBool.Response:
         self._enabled = bool(request.data)
         response.success = True
-        response.message = 'estimates are published' if self._enabled else 'estimates are stopped'
+        response.message = (
+            'estimates are published' if self._enabled else 'estimates are not published'
+        )
         if not self._active:
             response.message += ' once the node is active'
         self.get_logger().info(response.message)
@@ -523,7 +524,7 @@ class EstimatorNode(LifecycleNode):
 
     def _stopped_in_words(self) -> str:
         if not self._active:
-            return 'inactive: estimates go on but are not published'
+            return 'inactive: estimates continue but are not published'
         return '' if self._enabled else 'disabled by ~/set_enabled: estimates are not published'
 
     def _transport_faults(self) -> list[tuple[str, str]]:
@@ -542,14 +543,14 @@ class EstimatorNode(LifecycleNode):
             words = f'never received ({self._publishers_in_words(wheels)})'
             faults.append((self.resolve_topic_name(wheels), words))
         if self._same_name:
-            words = f'another node is called /{self._full_name}: both publish estimates'
+            words = f'another node is also called /{self._full_name}: both publish estimates'
             faults.append(('name', words))
         if self._kept is not None and self._kept.fault:
             faults.append(('soil_file', self._kept.fault))
         simulated = bool(self.get_parameter('use_sim_time').value)
         no_clock = simulated and self.get_clock().now().nanoseconds == 0
         if no_clock and now - self._started > DISCOVERY:
-            faults.append(('clock', 'use_sim_time is true, but nothing comes on /clock'))
+            faults.append(('clock', 'use_sim_time is true, but nothing arrives on /clock'))
         return faults
 
     def _watch_names(self) -> None:
@@ -586,7 +587,7 @@ class EstimatorNode(LifecycleNode):
             if age is None:
                 words.append(f'{name}: never received ({self._publishers_in_words(topic)})')
             elif age > SILENCE and not self._watch_inputs.is_silent(topic, now):  # a fault
-                words.append(f'{name}: silent for {age:.0f} s')
+                words.append(f'{name}: no message for {age:.0f} s')
         for (topic, reason), count in (self._pipeline.rejected - self._rejected).items():
             reason = self._pipeline.converter.in_words(topic, reason)
             words.append(f'{self.resolve_topic_name(topic)}: rejected: {reason} ({count} messages)')

@@ -61,7 +61,7 @@ class TractionLimiter(Node):
         super().__init__('traction_limiter', **options)
         self._tuning = LimiterTuning(**{f.name: self._number(f) for f in fields(LimiterTuning)})
         self._stamped = self._take(parameter('stamped', 'flag', True, 'TwistStamped, not Twist'))
-        words = 'file that keeps a stop over a restart of this node; empty: none does'
+        words = 'file that keeps a stop across a restart of this node; empty: none'
         name = self._take(parameter('state_file', 'text', '', words))
         self._refuse_unknown()
         self._file = Path(name).expanduser() if name else None
@@ -161,10 +161,10 @@ class TractionLimiter(Node):
             self._say()
         if (state.clock_offset is None) != (before.clock_offset is None):
             self.get_logger().warning(
-                f'stamps of the estimates and the clock here differ by {state.delay:.1f} s: their '
+                f'stamps of the estimates and the local clock differ by {state.delay:.1f} s: their '
                 'age is by how much later than the quickest they come'
                 if before.clock_offset is None
-                else 'stamps of the estimates and the clock here agree again'
+                else 'stamps of the estimates and the local clock agree again'
             )
 
     def _send(self, state: LimiterState, decision: limiter.Decision) -> None:
@@ -216,7 +216,7 @@ class TractionLimiter(Node):
         """Return what is wrong with the publishers of commands and of the warning."""
         faults = []
         if (count := len(self.get_publishers_info_by_topic(f'{NODE}/stuck'))) > 1:
-            faults.append(f'{count} publishers of ~/stuck: end all but one')
+            faults.append(f'{count} publishers of ~/stuck: stop all but one')
         drivers = self.get_publishers_info_by_topic('cmd_vel_in')
         kind = 'TwistStamped' if self._stamped else 'Twist'
         if words := other_type(drivers, f'geometry_msgs/msg/{kind}'):
@@ -227,7 +227,7 @@ class TractionLimiter(Node):
         with suppress(ValueError):
             others.remove(self.get_fully_qualified_name())
         if others:
-            past = 'its commands go past this node'
+            past = 'its commands bypass this node'
             faults.append(f'{self._output.topic_name}: {", ".join(others)} publishes too: {past}')
         return faults
 

@@ -58,7 +58,7 @@ def unread(files: Iterable[Path], node: Node) -> str:
         if keys and not any(map(node.has_parameter, keys)):
             there = ', '.join(f"'{section}:'" for section in ros_yaml.sections(path))
             return (
-                f'{path}: sections there: {there}; none is for the node '
+                f'{path}: sections there: {there}; none applies to node '
                 f"{node.get_fully_qualified_name()}, so nothing of it counts; use '/**:'"
             )
     return '' if node.has_parameter('wheels.names') else refused

@@ -18,7 +18,7 @@ def name_of(publisher: TopicEndpointInfo) -> str:
 def other_type(publishers: Iterable[TopicEndpointInfo], kind: str) -> str:
     """Say which types come on a topic instead of that which is needed; empty: none."""
     others = sorted({p.topic_type for p in publishers} - {kind})
-    return f'{", ".join(others)} comes there, needed is {kind}' if others else ''
+    return f'{", ".join(others)} is published there, {kind} is needed' if others else ''
 
 
 def other_quality(publishers: Iterable[TopicEndpointInfo], asked: QoSProfile) -> str:

@@ -39,7 +39,7 @@ HEALTH = 4.0  # [s] between two faults at least
 RECOVERY = 17.0  # [s]: a fault is told of for 10 s
 SETTLED = 600.0  # [s] after which memory must not grow
 GROWTH = 2.0  # [MB]
-LOST = 'messages lost on the way so far'
+LOST = 'messages lost in transport so far'
 AHEAD = 'set the clocks, or stamp in the driver'  # as the clock of the rover here may be
 
 FAULTS = (
@@ -228,7 +228,7 @@ class Soak:
         lost = {
             key: n for key, n in self.rover.values.items() if key.endswith('_lost') and n != '0'
         }
-        lines.append(f'lost on the way, of the last process: {lost or "nothing"}')
+        lines.append(f'lost in transport, of the last process: {lost or "nothing"}')
         lines += [f'PROBLEM: {problem}' for problem in self.problems]
         return '\n'.join(lines)
 

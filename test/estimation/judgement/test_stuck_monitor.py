@@ -89,7 +89,7 @@ def test_without_a_speed_wheels_that_are_read_to_bury_themselves(
     assert found[-1].buried == warned
     if warned:
         raised = next(a for a in found if a.stuck)
-        assert 'of their radius deep' in raised.reason
+        assert '% of their radius' in raised.reason
 
 
 HOLDS = [[wheel(min(0.1 + 0.001 * i, 0.6))] * 6 for i in range(800)]

@@ -51,7 +51,7 @@ CHANNELS: dict[type, int] = {
 WHEEL_ODOMETRY, INERTIAL, SINKAGE, LEAVING_ANGLE, REFERENCE = range(5)
 
 _TOO_DEEP = 'sinkage infinite or larger than the wheel radius'
-_VOID = 'variance says that nothing is known'
+_VOID = 'variance states that the value is unknown'
 REMEDIES = {
     _TOO_DEEP: 'buried, or millimetres? multiply position by 0.001 in the driver (m)',
     _VOID: 'a placeholder? send the variance, or 0 and state sensors.reference_std',
@@ -139,8 +139,12 @@ class InputChecks:
         if len(m.rate) != self._count or len(m.torque) != self._count:
             self.refuse(WHEEL_ODOMETRY, 'wrong number of wheels')
             return None
-        rate = self._within(WHEEL_ODOMETRY, m.rate, self._rates, 'wheel rate infinite or absurd')
-        torque = self._within(WHEEL_ODOMETRY, m.torque, self._torques, 'torque infinite or absurd')
+        rate = self._within(
+            WHEEL_ODOMETRY, m.rate, self._rates, 'wheel rate infinite or implausible'
+        )
+        torque = self._within(
+            WHEEL_ODOMETRY, m.torque, self._torques, 'torque infinite or implausible'
+        )
         if rate is not m.rate or torque is not m.torque:
             m = replace(m, rate=rate, torque=torque)
         return m if m.steering is None else self._steered(m, m.steering)
@@ -174,7 +178,7 @@ class InputChecks:
                 angular_rate=_UNKNOWN if bad_rate else m.angular_rate,
             )
         if self._is_wild(m):
-            self.refuse(INERTIAL, 'a wild single sample, as no rover moves')
+            self.refuse(INERTIAL, 'a single outlier, impossible motion of a rover')
             return None
         return m if m.orientation is None else self._oriented(m, m.orientation)
 
@@ -194,9 +198,9 @@ class InputChecks:
         if silent:
             self.reject(INERTIAL, 'specific force exactly zero (sensor not running)')
         elif bad_force and not np.isnan(m.specific_force).all():
-            self.reject(INERTIAL, 'specific force not finite or absurd')
+            self.reject(INERTIAL, 'specific force not finite or implausible')
         if bad_rate and not np.isnan(m.angular_rate).all():
-            self.reject(INERTIAL, 'angular rate not finite or absurd')
+            self.reject(INERTIAL, 'angular rate not finite or implausible')
 
     def _oriented(self, m: InertialReading, orientation: FloatArray) -> InertialReading:
         """Return the message with a unit quaternion, or without orientation."""
@@ -205,7 +209,7 @@ class InputChecks:
         if abs(norm - 1.0) < 1e-6:
             return m
         if not 0.9 < norm < 1.1:
-            self.reject(INERTIAL, 'orientation is no unit quaternion (left out)')
+            self.reject(INERTIAL, 'orientation is not a unit quaternion (left out)')
             return replace(m, orientation=None)
         return replace(m, orientation=orientation / norm)
 
@@ -227,13 +231,13 @@ class InputChecks:
 
     def _reference(self, m: ReferenceVelocity) -> ReferenceVelocity | None:
         if not abs(m.forward) <= GREATEST_SPEED:
-            self.refuse(REFERENCE, 'velocity not finite or absurd')
+            self.refuse(REFERENCE, 'velocity not finite or implausible')
             return None
         if m.variance > GREATEST_VARIANCE:
             self.refuse(REFERENCE, _VOID)
             return None
         if not m.variance >= 0.0:
-            self.reject(REFERENCE, 'variance negative or nan (taken as not stated)')
+            self.reject(REFERENCE, 'variance negative or NaN (treated as not stated)')
             return replace(m, variance=0.0)
         return m
 

@@ -152,7 +152,7 @@ def _in_words(s: Situation, ahead: Outlook, settings: StuckSettings, held: list[
     elif held[1]:
         text = f'wheels slowed to {s.rim:.2f} m/s near their torque limit'
     elif held[2]:
-        text = f'most wheels {s.depth:.0%} of their radius deep'
+        text = f'most wheels sunk to {s.depth:.0%} of their radius'
     elif s.slip > ENTRAPPED_SLIP:
         text = f'median slip {s.slip:.2f}: entrapment under way'
     elif ahead.probability <= settings.threshold:
