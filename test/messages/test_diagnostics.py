@@ -94,6 +94,15 @@ def test_the_first_second_waits_for_inputs_and_for_nothing_else():
     assert diagnostics.due(at(1.0, faults=faults))[0].message == 'imu: no IMU'
 
 
+def test_after_a_reset_inputs_are_waited_for_as_at_a_start():
+    diagnostics = Diagnostics(NAMES)
+    assert levels(diagnostics.due(at(0.0)) + diagnostics.due(at(5.0)))[::3] == [OK, OK]
+    diagnostics.begin_anew()
+    assert not diagnostics.due(at(5.1, faults={'imu': 'no IMU', 'sinkage': 'no sinkage'}))
+    assert diagnostics.due(at(6.0))[0].message == 'running'
+    assert levels(diagnostics.due(at(6.2, faults={'sinkage': 'no sinkage'})))[0] == WARN
+
+
 LOST = 'messages lost in transport so far'
 
 

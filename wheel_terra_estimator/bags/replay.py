@@ -162,7 +162,7 @@ def events(
         if count == 0:
             yield Event(log_time)
         if name == RESET:
-            pipeline.core.reset()
+            pipeline.reset()
             yield Event(log_time)
             continue
         if name == TUNE:

@@ -127,6 +127,10 @@ class Diagnostics:
         self._lacking: set[str] | None = None  # subjects with a fault in every set so far
         self._awaited: set[str] = set()  # inputs that may be on their way
 
+    def begin_anew(self) -> None:
+        """Wait for inputs as at the start: no input of before counts."""
+        self._begun = None
+
     def look(self, stamp: int = 0) -> None:
         """Ask for the faults that the sets do not know of."""
         self._log.note(self._faults(), self.clock(stamp))

@@ -77,6 +77,11 @@ class Pipeline:
         self._published += len(sets)
         return sets
 
+    def reset(self) -> None:
+        """Forget the state, keep the parameters; inputs are waited for as at a start."""
+        self.core.reset()
+        self.diagnostics.begin_anew()
+
     def retune(self, configuration: Configuration) -> None:
         """Go on with other tuning; wheels, sensors and soil must be the same."""
         self.configuration = configuration

@@ -389,7 +389,7 @@ class EstimatorNode(LifecycleNode):
             response.success, response.message = False, 'not configured: there is no state'
             return response
         self._arrival.write(RESET)
-        self._pipeline.core.reset()
+        self._pipeline.reset()
         self._latest = None
         self._started = self._seconds()
         self._warned = self._pipeline.core.warning.state
