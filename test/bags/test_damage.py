@@ -118,21 +118,6 @@ def test_channels_from_the_summary_and_chunks_behind_the_damage(read_mcap, codec
     assert f'lost: {(len(lost) + 1) // 2} of 45 on /joint_states' in notes[0]
 
 
-def test_records_behind_a_damage_within_a_chunk_are_found(read_mcap):
-    made = make(samples(), TYPES, Layout(100_000))
-    at = made.content.index(struct.pack('<Q', 40) * 8)
-    content = made.content[: at - 3] + b'\xff' * 8 + made.content[at + 5 :]
-    found, notes = read_mcap(content)
-    # Only the values are damaged: the message is there, and that its chunk is doubtful is said.
-    assert len(found) == 90
-    assert '90 of them stand in a chunk with a wrong checksum' in notes[0]
-    head = at - 4 - 31
-    content = made.content[:head] + bytes(31) + made.content[head + 31 :]
-    found, notes = read_mcap(content)
-    assert found == [s for i, s in enumerate(samples()) if i != 40]
-    assert 'lost: 1 of 45 on /joint_states; from 0.4 s to 0.4 s' in notes[0]
-
-
 def test_damaged_names_are_no_traceback(read_mcap):
     made = make(samples(), TYPES, Layout(900, summary=False))
     content = made.content.replace(b'/imu/data', b'/imu\xff\xfe\xfa\xf0a')
