@@ -157,7 +157,7 @@ def test_column_names_alone_are_no_table(tmp_path):
         ('abc', ('line 5', 'torque', 'abc', 'not a number')),
         ('inf', ('line 5', 'torque', 'not finite')),
         ('"1,25"', ('line 5', 'torque', 'point as decimal')),
-        ('"1,234.5"', ('line 5', 'between thousands')),
+        ('"1,234.5"', ('line 5', 'thousands separators')),
         ('12 %', ('line 5', 'without a percent sign')),
         ('-1.8 N', ('line 5', 'into the title')),
         ('00:12.5', ('line 5', 'in s, ms')),
