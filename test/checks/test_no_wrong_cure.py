@@ -200,22 +200,16 @@ def test_a_second_between_turns_tells_no_sign_of_a_torque():
     assert 'torque_sign' not in faults(report)
 
 
-@pytest.mark.parametrize(('axis', 'name'), [(0, 'x'), (1, 'y')])
-def test_a_reversed_axis_of_the_accelerometer_is_no_turned_imu(axis, name):
-    """No rotation reverses one horizontal axis: starts are felt along x, curves along y."""
+@pytest.mark.parametrize(
+    ('order', 'signs'),
+    [([0, 1, 2], [-1, 1, 1]), ([0, 1, 2], [1, -1, 1]), ([1, 0, 2], [1, 1, 1])],
+)
+def test_axes_of_the_accelerometer_that_no_rotation_gives_are_no_turned_imu(order, signs):
+    """Starts are felt along x, curves along y: one of them reversed, or both exchanged."""
     whole = rolling.recording(rolling.starts_and_curves())
-    force = whole.imu.force * np.where(np.arange(3) == axis, -1.0, 1.0)
+    force = whole.imu.force[:, order] * signs
     (finding,) = checked(whole=whole, imu=replace(whole.imu, force=force)).findings
-    assert finding.fault == 'force_mirrored' and f'linear_acceleration.{name} ' in finding.words
-
-
-@pytest.mark.parametrize('sign', [1.0, -1.0])
-def test_exchanged_axes_of_the_accelerometer_are_no_turned_imu(sign):
-    """Starts are felt along y as those of an IMU turned by 90 degrees, curves along x are not."""
-    whole = rolling.recording(rolling.starts_and_curves())
-    force = whole.imu.force[:, [1, 0, 2]] * [sign, sign, 1.0]
-    (finding,) = checked(whole=whole, imu=replace(whole.imu, force=force)).findings
-    assert finding.fault == 'force_exchanged' and ('negate' in finding.cure) == (sign < 0.0)
+    assert finding.fault == 'force_axes'
 
 
 def test_without_curves_a_reversed_axis_is_told_beside_a_turned_imu():
@@ -248,11 +242,8 @@ def test_a_track_that_no_second_gyro_bears_out_is_told_with_its_rival():
 
 def test_radii_of_one_side_are_not_shared_out():
     """The file has the left wheels 10 % too large: the gyro sees a straight drive straight."""
-    radii = [1.1 * rolling.RADIUS, rolling.RADIUS] * 2
-    (finding,) = checked(rolling.rover(**{'wheels.radius': radii})).findings
-    told = [float(r) for r in finding.cure.partition('[')[2].partition(']')[0].split(',')]
-    assert finding.fault == 'radius' and 'left and right' in finding.words
-    np.testing.assert_allclose(told, rolling.RADIUS, rtol=0.02)
+    report = checked(rolling.rover(**{'wheels.radius': [1.1 * rolling.RADIUS, rolling.RADIUS] * 2}))
+    assert not report.findings and 'wheels turn up to 9 %' in str(report.not_checked)
 
 
 def test_one_odd_wheel_of_a_tricycle_is_no_radius_of_a_side():
@@ -263,7 +254,7 @@ def test_one_odd_wheel_of_a_tricycle_is_no_radius_of_a_side():
     places = {'wheels.x': [0.1, 0.1, -0.1, -0.2], 'wheels.y': [half, -half, 0.0, 0.0]}
     rover = rolling.rover(**{'wheels.radius': radii}, **places)
     report = checked(rover, joints=replace(WHOLE.joints, rate=rate))
-    assert not report.findings and 'one wheel turns up to 7 %' in str(report.not_checked)
+    assert not report.findings and 'wheels turn up to 7 %' in str(report.not_checked)
 
 
 def test_a_diameter_for_a_radius_is_one_finding():
@@ -398,30 +389,16 @@ def test_a_gyro_that_no_rest_tells_the_zero_of_exchanges_no_wheels():
 
 @pytest.mark.parametrize('angle', [90.0, 15.0, pytest.param(-140.0, marks=pytest.mark.slow)])
 def test_a_reference_that_points_aside_is_no_reversed_one(angle):
-    forward, a = WHOLE.reference.velocity[:, 0], math.radians(angle)
+    forward, a = 1.1 * WHOLE.reference.velocity[:, 0], math.radians(angle)
     aside = np.column_stack([forward * math.cos(a), forward * math.sin(a), 0.0 * forward])
     report = checked(reference=replace(WHOLE.reference, velocity=aside))
-    (told,) = report.findings
-    assert told.fault == 'reference_turned' and told.confidence > 0.8
+    if angle == 15.0:  # a slide down a cross slope does it: no scale, no radius
+        assert not report.findings
+        assert any('15 degrees aside' in entry.reason for entry in report.not_checked)
+        return
+    (told,) = (f for f in report.findings if f.kind == 'mounting')
+    assert told.fault == 'reference_turned' and 'world' in told.words and told.confidence <= 0.5
     assert told.value == pytest.approx(angle, abs=3.0)
-    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
-    either = checked(whole=straight, reference=replace(straight.reference, velocity=aside))
-    rivals = ['world frame' in f.words for f in either.findings if f.kind == 'mounting']
-    assert rivals == [True] * (angle > 30.0 or angle < 0.0)
-    scale = replace(straight.reference, velocity=aside * 1.1)  # or the radius, or cos 15 degrees
-    left = checked(whole=straight, reference=scale).findings
-    assert angle != 15.0 or left == []
-
-
-def test_an_orientation_that_hardly_turns_tells_degrees_per_second():
-    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
-    imu = straight.imu
-    yaw = 0.04 * np.sin(0.5 * imu.seconds)
-    half = 0.5 * np.cumsum(yaw) * imu.period
-    attitude = np.column_stack([0 * half, 0 * half, np.sin(half), np.cos(half)])
-    rate = np.degrees(imu.rate + np.outer(yaw, [0.0, 0.0, 1.0]))
-    told = faults(checked(whole=straight, imu=replace(imu, rate=rate, orientation=attitude)))
-    assert told == ['gyro_degrees']
 
 
 def test_a_specific_force_a_little_off_gravity_is_reported():
@@ -452,7 +429,7 @@ def test_a_turn_on_the_spot_reverses_no_axis_of_the_accelerometer():
     whole = rolling.recording(rolling.Motion(time, speed + 0.03 * (yaw > 0), yaw, 0.0 * time))
     force = whole.imu.force.copy()
     force[:, 1] -= 8.0 * 0.03 * np.interp(whole.imu.seconds, time, yaw)
-    assert 'force_mirrored' not in faults(checked(whole=whole, imu=replace(whole.imu, force=force)))
+    assert 'force_axes' not in faults(checked(whole=whole, imu=replace(whole.imu, force=force)))
 
 
 @pytest.mark.parametrize('factor', [pytest.param(1.0, marks=pytest.mark.slow), math.degrees(1.0)])
@@ -461,16 +438,6 @@ def test_wild_samples_of_a_gyro_are_told_in_any_unit(factor):
     rate[500::2500] += 20.0 * factor
     told = [f for f in checked(imu=replace(WHOLE.imu, rate=rate)).findings if f.fault == 'imu_wild']
     assert [f.words.split()[0] for f in told] == ['6'] and 'rad/s' in told[0].words
-
-
-def test_a_coarse_rate_that_stays_is_frozen():
-    """Three counts in a period, and a little noise: all rates repeat themselves now and then."""
-    rate = np.round(
-        WHOLE.joints.rate / 0.4 + 0.3 * np.random.default_rng(3).standard_normal((3000, 4))
-    )
-    rate[2000:, 3] = rate[2000, 3]
-    told = checked(joints=replace(WHOLE.joints, rate=0.4 * rate)).findings
-    assert [f.wheel for f in told if f.fault == 'rate_frozen'] == ['rear_right']
 
 
 def test_torques_of_an_instant_at_starts_and_stops_are_not_wild():
@@ -681,27 +648,6 @@ def test_places_of_wheels_in_another_unit():
     assert faults(checked(rolling.rover(**places))) == ['places']
 
 
-@pytest.mark.parametrize('aside', [-0.25, pytest.param(0.0, marks=pytest.mark.slow)])
-def test_a_reference_beside_base_link_is_told_by_turns(aside):
-    reference = WHOLE.reference
-    velocity = reference.velocity - np.outer(reference.yaw_rate * aside, [1.0, 0.0, 0.0])
-    beside = replace(reference, velocity=velocity)
-    told = checked(reference=beside).findings
-    assert [f.fault for f in told] == ['reference_place'] * (aside != 0.0)
-    dead = WHOLE.joints.rate * [1.0, 0.0, 1.0, 1.0]
-    uneven = checked(reference=beside, joints=replace(WHOLE.joints, rate=dead)).findings
-    assert ('reference_place' in {f.fault for f in uneven}) == (aside != 0.0)
-    assert all(f.value == pytest.approx(aside, abs=0.03) for f in told)
-
-
-def test_base_link_beside_the_middle_of_the_wheels_moves_no_reference():
-    aside = [y + 0.15 for y in rolling.PARAMETERS['wheels.y']]
-    reference = WHOLE.reference
-    velocity = reference.velocity + np.outer(reference.yaw_rate * 0.15, [1.0, 0.0, 0.0])
-    rover = rolling.rover(**{'wheels.y': aside})
-    assert not faults(checked(rover, reference=replace(reference, velocity=velocity)))
-
-
 @pytest.mark.parametrize(('noise', 'told'), [(1e-4, False), (1e-2, True)])
 def test_a_simulation_without_noise_and_slip_has_no_reference_of_its_wheels(noise, told):
     motion, y = rolling.ten_minute_drive(), np.array(rolling.PARAMETERS['wheels.y'])
@@ -714,14 +660,6 @@ def test_a_simulation_without_noise_and_slip_has_no_reference_of_its_wheels(nois
         reference=replace(WHOLE.reference, velocity=velocity),
     )
     assert ('reference_wheels' in faults(report)) == told
-
-
-def test_slip_that_differs_in_turns_is_no_place():
-    """Half of the way is lost, ten per cent more of it in turns to the left."""
-    reference = WHOLE.reference
-    left = 0.5 * (1.0 - 0.1 * (reference.yaw_rate > 0.1))
-    told = checked(reference=replace(reference, velocity=reference.velocity * left[:, None]))
-    assert 'reference_place' not in faults(told)
 
 
 @pytest.mark.parametrize(
@@ -842,15 +780,6 @@ def test_wheels_of_a_side_that_hang_on_one_encoder_are_no_copies():
     reverse = replace(joints, rate=joints.rate * [-1, 1, 1, 1])
     reverse = replace(reverse, torque=joints.torque * [-1, 1, 1, 1])
     assert [f.fault for f in checked(joints=reverse).findings] == ['backwards']
-
-
-def test_an_unlike_wheel_moves_no_reference():
-    """Half of the drive without a sign: the rims of its side tell no speed in turns."""
-    rate = WHOLE.joints.rate.copy()
-    rate[:, 3] = np.where(WHOLE.joints.seconds > 300.0, 0.3 * rate[:, 3], rate[:, 3])
-    assert 'reference_place' not in {
-        f.fault for f in checked(joints=replace(WHOLE.joints, rate=rate)).findings
-    }
 
 
 def test_counts_that_come_and_go_are_no_second_publisher():

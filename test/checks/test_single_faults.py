@@ -129,7 +129,6 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (REFERENCE, {'variance': lambda v: 0.0 * v + 1e6}, 'covariance', None, None, ''),
     (*stays(REFERENCE, 'velocity'), 'reference_frozen', None, None, FROZEN),
     (SINKAGE, {'sinkage': by(1000.0)}, 'sinkage_unit', None, approx(0.001), ''),
-    (SINKAGE, {'sinkage': lambda v: rolling.RADIUS - v}, 'sinkage_height', None, None, ''),
     (SINKAGE, {'sinkage': plus(0.0, 0.04, 0.0, 0.0)}, 'sinkage_zero', FR,
      approx(0.04, abs=0.002), ''),
     (*stays(SINKAGE, 'sinkage', 1), 'sinkage_frozen', FR, None, FROZEN),

@@ -63,7 +63,7 @@ def test_an_odd_wheel_hides_no_radius_that_all_wheels_have_wrong():
     assert faults(checked(rolling.rover(**{'wheels.radius': radii.tolist()}))) == ['radius']
     radii = rolling.RADIUS * np.array([1.07, 1.0, 1.0, 1.0])
     alone = checked(rolling.rover(**{'wheels.radius': radii.tolist()}))
-    assert faults(alone) == [] and 'one wheel turns up to 7 %' in reasons(alone, 'radius')
+    assert faults(alone) == [] and 'wheels turn up to 7 %' in reasons(alone, 'radius')
 
 
 @pytest.mark.parametrize(('percent', 'told'), [(4, False), (7, True)])
@@ -74,7 +74,7 @@ def test_the_middle_wheel_of_a_tricycle_is_as_odd_as_it_is(percent, told):
     places = {'wheels.x': [0.1, 0.1, -0.1, -0.2], 'wheels.y': [half, -half, 0.0, 0.0]}
     rover = rolling.rover(**{'wheels.radius': radii}, **places)
     report = checked(rover, joints=replace(WHOLE.joints, rate=rate))
-    assert (f'one wheel turns up to {percent} %' in reasons(report, 'radius')) == told
+    assert (f'wheels turn up to {percent} %' in reasons(report, 'radius')) == told
 
 
 def test_an_imu_too_late_to_be_seen_is_left_open_for_that():

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray, IntArray
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome, found, of_offset, untold
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
@@ -372,11 +372,6 @@ LONGEST_SILENCE = 5.0  # of an input at an end of a recording in which others co
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
 GAP_SHARE = 0.05  # share of missing messages of a stuttering channel
-PAUSE = 5.0  # between bursts, over the median step, at least [-]
-IN_PAUSES = 0.8  # share of the time that passes between bursts, at least [-]
-LEAST_BURSTS, LEAST_IN_A_BURST = 10, 3
-READ_AT_ONCE, READ_SHARE = 2e6, 0.1  # step within a burst [ns], over the period: less than this
-LONGEST_WAIT = 2.0  # for a burst, over the median; beyond it is a pause, or a step of the clock
 SHORT = 0.1  # share of the steps between messages that are shorter than a usual short one [-]
 IN_A_ROW = 0.2  # share of the steps over which two messages or more are lost, at least [-]
 SEVERAL = 10  # messages over which a period is taken where stamps jitter
@@ -392,6 +387,7 @@ ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
 MOST_LATE = 40.0  # beyond which a history is no cure [s]
 QUARTERS, UNEVEN = 4, 0.5  # parts of a drive; unlike gains of a drift over their mean, at most [-]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
+IN_BURSTS, LEAST_BURSTS = 0.05, 10  # usual step over the mean one of messages read in bursts [-]
 LONGEST_WAY = 10.0  # of a message into the log [s]
 
 
@@ -400,8 +396,6 @@ def check_transport(
 ) -> tuple[list[Outcome], Recording]:
     """Return what is wrong with the stamps, and the recording with that mended by log time."""
     outcomes = _silent(recording)
-    read, recording = _from_buffer(recording, facts)
-    outcomes += read
     late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
     mended: dict[str, Any] = {}
     quarters = dict[str, list[float]]()  # usual log time less stamp in parts of the drive [s]
@@ -409,8 +403,14 @@ def check_transport(
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
             continue
-        most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
         one = of_one_wheel(channel, facts.names)
+        if one is channel and (even := _evenly(channel)) is not None:
+            wait = 1e-9 * float(np.abs(even.stamp - channel.stamp).max())
+            if wait > LEAST_OFFSET:
+                how = f'they come in bursts, stamped up to {wait:.2g} s late when they are read'
+                outcomes.append(found('order', channel.topic, 0.99, how=how))
+            mended[name] = channel = one = even
+        most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
         order, jumps = _order(one, most_back), _steps(channel)
         step = float(jumps[np.argmax(np.abs(jumps))])
         outcomes += order
@@ -430,7 +430,7 @@ def check_transport(
             continue  # its age is honest
         others = [one for other, one in quarters.items() if other != name]
         if drift := _drift(by_time, others):
-            channel = getattr(recording, name)
+            channel = mended.get(name, getattr(recording, name))
             how = f'its stamps drift by {drift:+.2g} s over the drive against their arrival'
             outcomes.append(found('order', channel.topic, 0.97, how=how))
             share = np.linspace(0.0, 1.0, channel.stamp.size)
@@ -483,47 +483,18 @@ def _clocks(
     return outcomes, replace(recording, **mended, moved=moved)
 
 
-def _from_buffer(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome], Recording]:
-    """Return inputs read in bursts, and the recording with these spread evenly up to their ends."""
-    outcomes, mended = list[Outcome](), dict[str, Any]()
-    for name in CHECKED:
-        if (channel := getattr(recording, name)) is None:
-            continue
-        one = of_one_wheel(channel, facts.names)
-        stamp = one.ascending
-        ends = _bursts(stamp)
-        if ends is None:
-            continue
-        count, wait = np.median(np.diff(ends)), np.median(np.diff(stamp[ends]))
-        # Up to the end of each burst, and over no pause or step that is longer than others.
-        waits = np.diff(stamp[ends], prepend=stamp[ends[0]] - wait)
-        period = np.minimum(waits, LONGEST_WAIT * wait) / np.diff(ends, prepend=ends[0] - count)
-        row = np.arange(stamp.size)
-        end = np.minimum(np.searchsorted(ends, row), ends.size - 1)
-        even = stamp[ends[end]] - period[end] * (ends[end] - row)
-        off = np.where(channel.stamp > 0, np.interp(channel.stamp, stamp, stamp - even), 0.0)
-        shift = np.round(off).astype(np.int64)
-        mended[name] = replace(shifted(channel, shift), log_time=channel.log_time - shift)
-        if wait * 1e-9 > LEAST_OFFSET:
-            how = f'they come in bursts of {count:.0f} every {wait * 1e-9:.2g} s, stamped when read'
-            outcomes.append(found('order', channel.topic, 0.99, how=how))
-    return outcomes, replace(recording, **mended)
-
-
-def _bursts(stamp: IntArray) -> IntArray | None:
-    """Return the last message of each burst of ascending stamps (k,) [ns]; None: no bursts.
-
-    A buffer is read in no time, and as many messages come as time has passed.
-    """
-    step = np.diff(stamp)
-    ends = np.flatnonzero(step > PAUSE * np.median(step)) if step.size else step
-    if ends.size < LEAST_BURSTS or step[ends].sum() < IN_PAUSES * step.sum():
+def _evenly(channel: Channel) -> Channel | None:
+    """Return messages that were read in bursts spread evenly up to their ends; None: no bursts."""
+    step = np.diff(channel.stamp)
+    if step.min() <= 0 or np.median(step) > IN_BURSTS * step.mean():
         return None
-    count = np.diff(ends)
-    period = np.diff(stamp[ends]) / count
-    regular = robust_std(period) < OFF_PERIOD * np.median(period)
-    regular &= np.median(step) < min(READ_AT_ONCE, READ_SHARE * float(np.median(period)))
-    return ends if regular and np.median(count) >= LEAST_IN_A_BURST else None
+    ends = np.flatnonzero(step > step.mean())
+    if ends.size < LEAST_BURSTS:
+        return None
+    since = channel.stamp - channel.stamp[0]
+    even = np.interp(np.arange(since.size), ends, since[ends]).round().astype(np.int64)
+    late = since - even
+    return replace(channel, stamp=channel.stamp - late, log_time=channel.log_time - late)
 
 
 def _drift(late: list[float], others: list[list[float]]) -> float:

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks import imu, turning
+from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.clocks import SMOOTHED_BY
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, Mask, once
+from wheel_terra_estimator.checks.evidence import Evidence, Mask, once
 from wheel_terra_estimator.checks.finding import (
     LEAST_TURN_RATE,
     SKID_TRACKS,
@@ -39,7 +39,7 @@ from wheel_terra_estimator.checks.wheel_rates import OF_RADII, rounding
 
 LEAST_RADIUS_ERROR = 0.025  # share by which a radius is wrong before it is a finding [-]
 RADIUS_SIGMAS, UNCLEAR_SIGMAS = 4.0, 2.0  # from which it is a finding, or left open [-]
-LEAST_OF_SIDES = 0.05  # difference of the sides' radii, at least [-]; a cross slope makes slip
+LEAST_UNLIKE = 0.05  # difference of wheels that slip makes none, on one side [-]
 OUTRUN_STD = 0.01  # slip that is left open where a rover outruns its wheels [-]
 PRIOR_OF_RADIUS = 0.85  # probability that it is the radius, not the scale of the reference [-]
 SURE = 0.97  # probability beside its rival from which a fault is named alone [-]
@@ -258,37 +258,29 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     radius = float(np.mean(facts.radius))
     evidence.figures['rover.rolling_radius_m'] = round(radius * ratio.value, 5)
     evidence.figures['rover.rolling_radius_std_m'] = round(radius * ratio.std, 5)
-    sides = _of_sides(evidence)
-    lopsided = abs(sides.value) > max(LEAST_OF_SIDES, RADIUS_SIGMAS * sides.std)
-    sigmas = sides.sigmas_from(0.0) if lopsided else ratio.sigmas_from(1.0)
-    unlike = _unlike(evidence)
+    sigmas, unlike = ratio.sigmas_from(1.0), _unlike(evidence)
     # One wheel of n that is off by u moves the mean by u/n: more than that is another's.
     of_one = 0.5 * facts.side.size * abs(ratio.value - 1.0)
-    if not lopsided and unlike > max(LEAST_OF_SIDES, of_one):
+    if unlike > max(LEAST_UNLIKE, of_one):
         return [untold('radius', 'one_wheel', unlike=100.0 * unlike)], evidence
-    if not lopsided and (abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < UNCLEAR_SIGMAS):
+    if abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < UNCLEAR_SIGMAS:
         return [], evidence
     if sigmas < RADIUS_SIGMAS:
         return [untold('radius', 'unclear', ratio=ratio.value, std=ratio.std)], evidence
-    if not (trial.falls or lopsided):
+    if not trial.falls:
         return [untold('radius', 'halves')], evidence
-    apart = sides.value * facts.side if lopsided else np.zeros(facts.side.size)
-    scale, wheels = ratio.value * (1.0 + 0.5 * apart), facts.configuration.wheels
+    scale, wheels = ratio.value, facts.configuration.wheels
     rims = facts.radius * scale - (wheels.slip_radius - wheels.radius)  # lugs stay
-    share = 1.0 if lopsided else _share_of_radius(evidence, ratio)
+    share = _share_of_radius(evidence, ratio)
     soft = MOST_SOFT < ratio.value < 1.0 and _depth(evidence) is FIRM_DEPTH
     unsure = evidence.force is None or both_ways(evidence) is None
     slips = soft or (unsure and MOST_HIDDEN < ratio.value < 1.0)
-    sure = confidence(sigmas) * (SURE if lopsided else 0.5 if slips else 1.0)
+    sure = confidence(sigmas) * (0.5 if slips else 1.0)
     evidence.figures['rover.radius_ratio'] = round(ratio.value, 4)
     words: dict[str, Any] = {'ratio': ratio.value, 'off': ratio.std}
     words['trial'] = trial.words('off by', 'of the speed')
     alone = max(share, 1.0 - share) > SURE
-    if lopsided:
-        words['rival'] = (
-            f', left and right {100 * abs(sides.value):.0f} % unlike (or their encoders)'
-        )
-    elif not alone:
+    if not alone:
         words['rival'] = ': the radius of the wheels, or the scale of the reference'
         hides = 'soft ground makes' if soft else 'torques off zero hide'
         words['rival'] += f', or {hides} slip' if slips else ''
@@ -307,41 +299,22 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return found[:1], replace(evidence, facts=replace(facts, radius=facts.radius * scale))
 
 
-def _of_sides(evidence: Evidence) -> Estimate:
-    """Return true over stated radius of the left wheels less that of the right ones [-].
-
-    On the straight the sides differ by what the gyro sees, times the track that turns need.
-    """
-    rows, turns = evidence.straight, told_track(evidence)
-    unknown = not evidence.facts.has_sides() or (
-        isinstance(turns, NotChecked) and turning.skids(evidence)
-    )
-    if unknown or not evidence.rested or rows.sum() < LEAST_MOVING_ROWS:
-        return Estimate(0.0, math.inf)
-    track = stated_track(evidence) * (1.0 if isinstance(turns, NotChecked) else turns.ratio.value)
-    apart = (evidence.side_difference - track * evidence.yaw)[rows]
-    rim = evidence.rim[rows]
-    trial = tried(lambda part: block_fit(rim[part, None], apart[part])[0].value, 0.0, rim**2)
-    told, bias = block_fit(rim[:, None], apart)[0], imu.gyro_bias(evidence)
-    open_to = 0.0 if bias is None else track * float(bias[1][2] / np.median(np.abs(rim)))
-    told = Estimate(told.value, math.hypot(told.std, open_to))
-    alike = _unlike(evidence) < 0.5 * abs(told.value)  # else it is one wheel
-    return told if trial.falls and alike else Estimate(0.0, math.inf)
-
-
 def _unlike(evidence: Evidence) -> float:
-    """Return by how much the speeds of the wheels differ on the straight beside that of sides [-].
+    """Return by how much the speeds of the wheels differ on the straight, sides included [-].
 
     Half-way between the sides are the wheels on the centre line: else one of the three is odd.
     """
-    shares = evidence.speed[evidence.straight] / evidence.rim[evidence.straight, None]
+    rows = evidence.straight
+    shares = evidence.speed[rows] / evidence.rim[rows, None]
     usual, side = np.nanmedian(shares, axis=0), evidence.facts.side
     left, right, middle = (usual[(side == s) & np.isfinite(usual)] for s in (1.0, -1.0, 0.0))
     if not left.size or not right.size:
         return 0.0
+    turned = stated_track(evidence) * evidence.yaw
+    apart = np.nanmedian((evidence.side_difference - turned)[rows] / evidence.rim[rows])
     threes = [sorted((left.mean(), right.mean(), one)) for one in middle]
     odd = [low - 2.0 * between + high for low, between, high in threes]
-    return float(np.abs([np.ptp(left), np.ptp(right), *odd]).max())
+    return float(np.abs([np.ptp(left), np.ptp(right), apart, *odd]).max())
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import (
     EVEN_GROUND_STD,
     LEAST_YAW,
@@ -51,7 +51,6 @@ from wheel_terra_estimator.checks.statistics import (
     step_of,
 )
 from wheel_terra_estimator.checks.turning import (
-    IN_DEGREES,
     gyro_unit_known,
     ordinary_track,
     track_ratio,
@@ -67,8 +66,6 @@ UPSIDE_TILT = math.radians(35.0)  # mean tilt that no rover drives at [rad]
 STEEPEST_MEAN = math.radians(20.0)  # mean slope of a drive, at most [rad]
 LEAST_SHOWN = 0.01  # change of an angle [deg] below which a cure leaves it out
 LEAST_MOUNTING = math.radians(1.5)  # mounting errors below this [rad] are left to calibration
-SLOPE_TIME = 2.0  # forces are averaged over this to tell a slope [s]
-CLEAR_SLOPE = 0.5  # correlation with a slope that is one [-]
 LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
 LEAST_TURN = 4.5  # heading that a drive has to cover for the mounting to be told from a slope [rad]
 FLAT_TURN_STD = math.radians(0.1)  # unevenness of the ground leaves open [rad]
@@ -154,7 +151,6 @@ def check_imu(state: ImuState) -> Judged:
         (_gravity, 'force'),
         (_wild, 'force', 'rate'),
         (_up_by_orientation, 'force'),
-        (_against_orientation, 'rate'),
     ):
         if all(map(state.has, needed)):
             told, state = check(state)
@@ -182,7 +178,8 @@ def _up_by_orientation(state: ImuState) -> Judged:
     turned_round = apart > math.pi - UP_APART and not upright  # see `check_upside`
     if not apart >= UP_APART or turned_round:
         return [], state
-    told = state.found('orientation_tilt', 0.97, apart=math.degrees(apart))
+    how = f'its up and that of linear_acceleration lie {math.degrees(apart):.0f} degrees apart'
+    told = state.found('orientation', 0.97, how=how)
     return [told], state.with_values(orientation=np.full_like(imu.orientation, np.nan))
 
 
@@ -283,63 +280,6 @@ def _gravity(state: ImuState) -> Judged:
 def _scale_of_force(state: ImuState, size: float) -> Finding:
     value = round(state.gravity / size, 4)
     return state.found('force_scale', 0.9, value=value, size=size, gravity=state.gravity)
-
-
-def _against_orientation(state: ImuState) -> Judged:
-    """Compare the gyro with the turning of the orientation, axis by axis.
-
-    Where they differ about x or y, the specific force shows which of them tells the slope.
-    """
-    imu = state.imu
-    time, q = imu.stamp * 1e-9, imu.orientation
-    if not np.isfinite(q).all(axis=1).mean() > 0.9 or imu.stamp.size < 200:
-        return [], state
-    step = max(round(0.5 / max(float(np.median(np.diff(time))), 1e-3)), 1)
-    known = np.isfinite(q).all(axis=1) & (np.linalg.norm(np.nan_to_num(q), axis=1) > 0.0)
-    dt = time[step:] - time[:-step]
-    good = known[:-step] & known[step:] & (dt > 0.0)
-    if not good.any():
-        return [], state
-    turn = Rotation.from_quat(q[:-step][good]).inv() * Rotation.from_quat(q[step:][good])
-    seen = turn.as_rotvec() / dt[good, None]
-    total = np.vstack([np.zeros(3), np.cumsum(imu.rate, axis=0)])
-    told = ((total[step:] - total[:-step]) / step)[: good.size][good]
-    seen, told = seen - np.median(seen, axis=0), told - np.median(told, axis=0)
-    factor, degrees = np.ones(3), []
-    outcomes: list[Outcome] = []
-    for axis, name in enumerate('xyz'):
-        x, y = seen[:, axis], told[:, axis]
-        fit = correlation(x, y)
-        if abs(fit) < 0.6:
-            continue
-        if fit < 0.0:
-            if axis < 2 and _slopes_alike(state, known, 1 - axis) < -CLEAR_SLOPE:
-                told_of = state.found('orientation_frame', 0.97)
-                return [told_of], state.with_values(orientation=np.full_like(q, np.nan))
-            factor[axis] = -1.0
-            words = {'value': -1.0, 'axis': name, 'against': 'the orientation'}
-            outcomes.append(state.found('gyro_reversed', confidence(6.0 * abs(fit)), **words))
-        times = abs(float(x @ y) / float(x @ x))
-        if IN_DEGREES[0] < times < IN_DEGREES[1]:
-            degrees.append(times)
-    if degrees:
-        factor *= math.radians(1.0)
-        words = {'times': degrees[0], 'how': 'turning of the orientation'}
-        outcomes.append(state.found('gyro_degrees', 0.99, value=math.radians(1.0), **words))
-    half_turn = _up_apart(imu) > math.pi - UP_APART  # in the specific force as well
-    if (factor < 0.0).sum() > 1 and half_turn:
-        told_of = state.found('orientation_frame', 0.97)
-        return [told_of], state.with_values(orientation=np.full_like(q, np.nan))
-    return outcomes, state.with_values(rate=imu.rate * factor) if outcomes else state
-
-
-def _slopes_alike(state: ImuState, known: BoolArray, axis: int) -> float:
-    """Return the correlation of up by orientation and by specific force along an axis [-]."""
-    imu = state.imu
-    up = Rotation.from_quat(imu.orientation[known]).inv().apply([0.0, 0.0, 1.0])[:, axis]
-    width = round(SLOPE_TIME / imu.period)
-    force = np.nan_to_num(imu.force[known, axis])
-    return correlation(up - up.mean(), moving_mean(force - force.mean(), width))
 
 
 # With the wheels ---------------------------------------------------------------------------------
@@ -479,12 +419,8 @@ def _is_mounting(tilt: FloatArray, floor: float, turns: FloatArray, gyro: FloatA
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return an IMU whose x axis does not point forward, and the evidence with that mended."""
     starts, curves = felt_senses(evidence)
-    axis = 'x' if starts < 0 else 'y'
-    mirrored = starts * curves < 0 and _turns_upright(evidence) > CLEAR_AGREEMENT
-    if mirrored and evidence.force is not None:
-        signs = np.array([-1.0 if name == axis else 1.0 for name in 'xyz'])
-        told_of = evidence.found('force_mirrored', 0.95, value=-1.0, axis=axis)
-        return [told_of], replace(evidence, force=evidence.force * signs)
+    if starts * curves < 0 and _turns_upright(evidence) > CLEAR_AGREEMENT:
+        return [evidence.found('force_axes', 0.95)], replace(evidence, force=None)
     seen, quick = felt_yaw(evidence), felt_yaw(evidence, 0.5 * DRIFT)
     if seen is None or quick is None:
         return [untold('mounting', 'no_starts')], evidence
@@ -500,13 +436,9 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words: dict[str, Any] = {'angle': -math.degrees(seen.value), 'off': math.degrees(seen.std)}
     sure, aside = 0.97, math.sin(seen.value)
     curves = felt_senses(mended)[1]  # turned round or exchanged, starts feel the same
-    exchanged = abs(aside) > ALONG_AXIS and curves < 0 and evidence.force is not None
+    exchanged = abs(aside) > ALONG_AXIS and curves < 0
     if exchanged and _turns_upright(evidence) > CLEAR_AGREEMENT:
-        assert evidence.force is not None
-        told = '' if aside > 0.0 else ', and negate both'
-        told_of = evidence.found('force_exchanged', 0.95, signs=told)
-        signs = np.array([math.copysign(1.0, aside)] * 2 + [1.0])
-        return [told_of], replace(evidence, force=signs * evidence.force[:, [1, 0, 2]])
+        return [evidence.found('force_axes', 0.95)], replace(evidence, force=None)
     if (curves == 0 or exchanged) and max(abs(aside), -math.cos(seen.value)) > ALONG_AXIS:
         rival = ' and y are exchanged' if abs(aside) > ALONG_AXIS else ' has the wrong sign'
         words['rival'] = f', or linear_acceleration.x{rival}: drive circles'

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import difflib
 import itertools
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,11 +13,10 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.checks.finding import Finding, Outcome, found, untold
-from wheel_terra_estimator.checks.rover_facts import RoverFacts, in_words, side_of, wheel_names
+from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 
 IMU = 'sensor_msgs/msg/Imu'
-_BETWEEN = re.compile(r'[\W_]+|wheel|drive|steer')  # the words of a name that tell its place
 LONGEST_SILENCE = 2.0  # of all wheels at the end, while other joints are told [s]
 
 DEFAULT_TOPICS = {
@@ -140,21 +138,7 @@ def _steering(joints: JointSeries, facts: RoverFacts) -> list[Outcome]:
     steering = [name for name in joints.names if 'steer' in name.lower()]
     if not steering or any(facts.configuration.wheels.steering_joints):
         return []
-    of_wheels = _at_places_of(facts.names, steering)
-    told = [joint for joint in of_wheels if joint]
-    plain = told and len({*told}) == len(told)
-    cure = ', '.join(joint or "''" for joint in of_wheels) if plain else 'ONE PER WHEEL'
-    return [found('steering', joints.topic, 0.9, listed=', '.join(steering), joints=cure)]
-
-
-def _at_places_of(wheels: Sequence[str], steering: Sequence[str]) -> list[str]:
-    """Return the joint that steers each wheel: its name holds what tells the wheel; '': none."""
-    words = {name: {*_BETWEEN.split(in_words(name))} for name in (*wheels, *steering)}
-    shared = set.intersection(*(words[wheel] for wheel in wheels))
-    return [
-        next((joint for joint in steering if words[wheel] - shared <= words[joint]), '')
-        for wheel in wheels
-    ]
+    return [found('steering', joints.topic, 0.9, listed=', '.join(steering))]
 
 
 def proposal(recording: Recording) -> dict[str, Any]:

@@ -15,9 +15,7 @@ from wheel_terra_estimator.checks.evidence import NO_NOISE, Evidence, Mask, nois
 from wheel_terra_estimator.checks.finding import Outcome, untold
 from wheel_terra_estimator.checks.series import VelocitySeries, nearest
 from wheel_terra_estimator.checks.statistics import (
-    Estimate,
     bend_noise,
-    block_fit,
     integrated,
     lonely,
     moving_mean,
@@ -38,17 +36,12 @@ LEAST_STD = 1e-4  # standard deviation [m/s] that is proposed at least
 AHEAD = 0.3  # mean of the rims over the usual size of one, above which the rover goes ahead [-]
 CLEAR_HEADING = 1.0  # turn in which a frame of the world is told from one of the rover [rad]
 STEADY = 0.9  # length of the mean direction of a velocity that keeps to a frame [-]
-TURNED_SIGMAS, TURNED_STD = 4.0, math.radians(1.0)  # of the direction on straights, at least [rad]
-LEAST_ASIDE, ASIDE_SIGMAS = 0.1, 6.0  # distance of a place beside base_link [m], in deviations
-UNLIKE_WHEELS = 0.5  # difference of the wheels of a side over the speed, at most [-]
-UNLIKE_SLIP = 0.2  # difference of the slip in turns to either side, over its mean [-]
 ASIDE = 'reference.aside_deg'
 FAR_ASIDE = math.radians(12.0)  # direction in which 2 % of a speed along x are lost [rad]
-MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
-"""Speed over that without slip of a rover that slips much, and error of the ratio without slip."""
+MOST_SLIPPING, USUAL_SLIP = 1.0 / 3.0, (0.75, 1.1)
+"""Speed over that without slip of a rover that slips much, and of one that slips as usual."""
+WITHOUT_SLIP = 0.06  # error of the ratio without slip, beside which no unit asks for much [-]
 LEAST_UNIT_RATIO = 1.3  # speed over rim speed below which it may be the radius, not the unit [-]
-USUAL_SLIP = (0.75, 1.1)  # the same that lets a unit be a rival of one that fits without slip [-]
-NEAR_WEIGHT = 2.0  # likelihood of a unit without slip over one with a usual slip [-]
 NO_SCALE = 30.0  # speed over rim speed that is a unit, however much the rover slips [-]
 MOSTLY = 0.4  # mean over median rim speed of wheels most of which turn one way [-]
 CLEAR_SPEED = 5.0  # speed over the noise of the reference that a ratio of speeds needs [-]
@@ -153,48 +146,18 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         return [evidence.found('reference_world', 0.95)], mended
     if in_body < STEADY:
         return [untold('mounting', 'reference_frame')] if _sideways(reference) else [], evidence
-    turns, (off, several) = np.ptp(psi) > CLEAR_HEADING, _off_straights(evidence, reference)
-    told = reference.points_aside or (turns and several)
-    angle, usual = off.value, float(np.angle(direction.mean()))  # whatever jumps there are
-    if off.sigmas_from(0.0) < TURNED_SIGMAS or not (told or abs(usual) > FAR_ASIDE):
+    aside = float(np.angle(direction.mean()))  # whatever jumps there are
+    if abs(aside) < FAR_ASIDE:
         return [], evidence
-    if not told:  # a rover that keeps its heading may slide aside on a cross slope
-        evidence.figures[ASIDE] = round(math.degrees(usual), 1)  # and tells no unit, no radius
-        return [untold('mounting', 'reference_aside', angle=math.degrees(usual))], evidence
-    turned = velocity * np.exp(-1j * angle)
+    angle = math.degrees(aside)
+    if not reference.points_aside:  # a rover that keeps to a cross slope may slide aside on it
+        evidence.figures[ASIDE] = round(angle, 1)  # and tells no unit, no radius
+        return [untold('mounting', 'reference_aside', angle=angle)], evidence
+    turned = velocity * np.exp(-1j * aside)
     mended = evidence.with_channel(
         'reference', velocity=np.column_stack([turned.real, turned.imag, 0.0 * rim])
     )
-    rival = '' if turns else ', or it is given in the world frame: drive a circle'
-    if all(evidence.facts.configuration.wheels.steered):
-        turns, rival = False, f'{rival}, or all wheels are steered aside, or read so'
-    sure, words = 0.9 if turns else 0.5, {'angle': math.degrees(angle), 'rival': rival}
-    return [evidence.found('reference_turned', sure, value=words['angle'], **words)], mended
-
-
-def _off_straights(evidence: Evidence, reference: VelocitySeries) -> tuple[Estimate, bool]:
-    """Return by which angle a velocity points off where the wheels roll on the straight [rad].
-
-    And whether they roll several ways there: what slides aside on a cross slope does so down it.
-    """
-    steered = np.tan(np.nan_to_num(evidence.steering))
-    wheels = np.nan_to_num(evidence.speed * (1.0 + 1j * steered)).mean(axis=1)
-    wheels, turn = (evidence.rim_at(reference.stamp, one) for one in (wheels, evidence.yaw))
-    rows = evidence.rim_at(reference.stamp, evidence.straight.astype(float)) > 0.99
-    if rows.sum() < LEAST_REFERENCES:
-        return Estimate(0.0, math.inf), False
-    velocity = (reference.velocity[:, 0] + 1j * reference.velocity[:, 1]) * np.conj(wheels)
-    velocity, turn = velocity[rows] / np.abs(wheels[rows]), turn[rows]
-    angle = float(np.angle(velocity.sum()))
-    velocity = velocity * np.exp(-1j * angle)
-    heading = integrated(evidence.time, evidence.yaw)
-    psi = np.interp(evidence.seconds(reference), evidence.time, heading)[rows]
-    way = np.exp(1j * (psi + np.angle(wheels[rows])))
-    several = bool(abs(way.mean()) < math.cos(0.5 * CLEAR_HEADING))
-    slides = [velocity.real * way.real, velocity.real * way.imag] if several else []
-    # A velocity of another place has its distance times the turn aside.
-    rest = block_fit(np.column_stack([velocity.real, turn, *slides]), velocity.imag)[0]
-    return Estimate(angle + rest.value, math.hypot(rest.std, TURNED_STD)), several
+    return [evidence.found('reference_turned', 0.5, value=angle, angle=angle)], mended
 
 
 def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[FloatArray, Mask]:
@@ -226,21 +189,16 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if ratio < LEAST_UNIT_RATIO:
         return [], evidence
     fitting = units_of_reference(ratio, (MOST_SLIPPING, 1.25))
-    near = [unit for unit, one in fitting.items() if abs(ratio * one['value'] - 1.0) < WITHOUT_SLIP]
-    if near:  # else how much of it is slip is not known
+    if any(abs(ratio * one['value'] - 1.0) < WITHOUT_SLIP for one in fitting.values()):
         least, most = USUAL_SLIP
         fitting = {u: one for u, one in fitting.items() if least < ratio * one['value'] < most}
-    # The slip hides which of several it is.
-    weight = {unit: NEAR_WEIGHT if unit in near else 1.0 for unit in fitting}
-    told = sorted(fitting, key=weight.__getitem__, reverse=True)
     findings: list[Outcome] = [
-        evidence.found('reference_unit', 0.9 * weight[unit] / sum(weight.values()), **fitting[unit])
-        for unit in told
+        evidence.found('reference_unit', 0.9 / len(fitting), **one) for one in fitting.values()
     ]
-    if not findings or (len(told) > 1 and not near):
+    if len(findings) != 1:  # the slip hides which of several it is
         return findings, evidence
-    times = fitting[told[0]]['value']
-    velocity, variance = reference.velocity * times, reference.variance * times**2
+    (one,) = fitting.values()
+    velocity, variance = reference.velocity * one['value'], reference.variance * one['value'] ** 2
     return findings, evidence.with_channel('reference', velocity=velocity, variance=variance)
 
 
@@ -308,37 +266,3 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     noise = max(noise, LEAST_STD)
     told = {'noise': noise, 'variance': noise**2, 'stated': usual}
     return [evidence.found('covariance', 0.9, value=float(f'{noise:.2g}'), **told)]
-
-
-def check_place(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return a reference of a place beside base_link, which turns move, and it mended."""
-    reference = evidence.recording.reference
-    if reference is None or evidence.gyro is None or ASIDE in evidence.figures:
-        return [], evidence
-    there = np.isfinite(evidence.rate).any(axis=0)  # more of them may be on one side
-    side, lateral = evidence.facts.side[there], evidence.facts.lateral[there]
-    apart = [np.ptp(evidence.speed[:, there][:, side == one], axis=1) for one in np.unique(side)]
-    if np.nanquantile(apart, 0.9) > UNLIKE_WHEELS * np.nanquantile(np.abs(evidence.rim), 0.9):
-        return [], evidence  # the rims tell no speed of a side
-    middle = evidence.rim + 0.5 * evidence.side_difference * side.mean()
-    if {-1.0, 1.0} <= set(side):  # base_link may lie beside the middle between the sides
-        middle = middle + evidence.yaw * 0.5 * sum(lateral[side == one].mean() for one in (-1, 1))
-    rim, yaw = (evidence.rim_at(reference.stamp, one) for one in (middle, evidence.yaw))
-    forward = reference.velocity[:, 0]
-    rows = np.isfinite(rim) & np.isfinite(yaw) & np.isfinite(forward)
-    least = 0.5 * float(np.quantile(np.abs(yaw[rows]), 0.95)) if rows.any() else 0.0
-    if min((yaw[rows] > least).sum(), (yaw[rows] < -least).sum()) < LEAST_REFERENCES:
-        return [], evidence
-    # What turns cost slows the rover both ways round, unlike a place.
-    design = np.column_stack([rim, np.abs(yaw), yaw])[rows]
-    ratio, _, aside = block_fit(design, forward[rows])
-    slip = UNLIKE_SLIP * (1.0 - ratio.value) * float(np.median(np.abs(rim[rows]))) / least
-    aside = Estimate(aside.value, math.hypot(aside.std, slip))
-    if abs(aside.value) < LEAST_ASIDE or aside.sigmas_from(0.0) < ASIDE_SIGMAS:
-        return [], evidence
-    where = 'left' if aside.value < 0.0 else 'right'
-    told = {'value': -aside.value, 'std': aside.std, 'aside': abs(aside.value), 'side': where}
-    velocity = reference.velocity.copy()
-    velocity[:, 0] -= aside.value * np.nan_to_num(yaw)
-    mended = evidence.with_channel('reference', velocity=velocity)
-    return [evidence.found('reference_place', 0.9, **told)], mended

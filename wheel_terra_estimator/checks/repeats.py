@@ -49,9 +49,9 @@ def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             if dead := stays(evidence, evidence.seconds(imu), readings):
                 outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
                 evidence = replace(evidence, **{name: None})  # type: ignore[arg-type]
-    torques, evidence = _torques(evidence)
+    joints, evidence = _joints(evidence)
     held, evidence = _held(evidence)
-    return [*outcomes, *torques, *deep, *held], evidence
+    return [*outcomes, *joints, *deep, *held], evidence
 
 
 def _held(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -100,16 +100,20 @@ def _reference(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [*told], replace(evidence, recording=replace(evidence.recording, reference=left))
 
 
-def _torques(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    outcomes: list[Outcome] = []
-    torque = evidence.torque.copy()
-    greatest = float(np.nanmax(np.abs(torque), initial=0.0))
-    for i, name in enumerate(evidence.facts.names):
-        dead = stays(evidence, evidence.time, evidence.torque[:, i : i + 1])
-        if dead is not None and abs(dead.value) < greatest:  # else a drive at its limit
-            outcomes.append(evidence.found('torque_frozen', 0.97, wheel=name, how=dead.how))
-            torque[:, i] = np.nan
-    return outcomes, evidence.with_rate(evidence.rate, torque)
+def _joints(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return wheels whose rate or torque stays the same, and the evidence without these."""
+    outcomes, left = list[Outcome](), [evidence.rate.copy(), evidence.torque.copy()]
+    for table, fault in zip(left, ('rate_frozen', 'torque_frozen'), strict=True):
+        greatest, dead = float(np.nanmax(np.abs(table), initial=0.0)), dict[str, str]()
+        for i, name in enumerate(evidence.facts.names):
+            told = stays(evidence, evidence.time, table[:, i : i + 1])
+            # Else a wheel that stands, or a drive at its limit.
+            if told is not None and told.value and abs(told.value) < greatest:
+                dead[name], table[:, i] = told.how, np.nan
+        if dead:
+            how = next(iter(dead.values()))
+            outcomes.append(evidence.found(fault, 0.97, wheel=', '.join(dead), how=how))
+    return outcomes, evidence.with_rate(*left)
 
 
 def _sinkage(evidence: Evidence, sinkage: SinkageSeries) -> tuple[list[Outcome], Evidence]:

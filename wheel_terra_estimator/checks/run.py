@@ -52,7 +52,6 @@ LEAST_LOST = 0.01  # share of messages that are lost, or with nan, that is told 
 LEAST_RIM_SPEED = 0.005  # rim speed that no drive stays below [m/s]
 LEAST_GOING = 0.02  # mean of half a minute that no wander of a satellite's position makes [m/s]
 LEAST_TURNING = 0.05  # mean of a second that no gyro of a standing rover shows [rad/s]
-ORIENTATION = 'the orientation'  # what a gyro is said to turn against
 _LOGGER = logging.getLogger(__name__)
 Result = TypeVar('Result')
 Given = TypeVar('Given')
@@ -79,7 +78,7 @@ def examine(
         evidence = run_apart(
             report, 'sign', None, lambda: _examined(recording, configuration, remapped, report)
         )
-    report.findings = _one_cause(_without_following(report))
+    report.findings = _without_following(report)
     report.findings.sort(key=lambda finding: RANK.get(finding.fault, 0))
     return report, evidence
 
@@ -92,20 +91,6 @@ def _without_following(report: CheckReport) -> list[Finding]:
     if not radius or apart > 3.0 * figures.get('torque.gain_std', 0.0):
         return findings
     return [f for f in findings if f.fault not in ('torque_gain', 'mass')]
-
-
-def _one_cause(findings: list[Finding]) -> list[Finding]:
-    """Name the orientation alone where gyro and wheels agree with each other, not with it."""
-    reversed_ = [f for f in findings if f.fault == 'gyro_reversed' and ORIENTATION in f.words]
-    if reversed_:  # steered wheels then seem to turn against the gyro as well
-        findings = [f for f in findings if f.fault != 'steering_sign']
-    by_wheels = [f for f in findings if f.fault in ('swapped_sides', 'gyro_reversed')]
-    swapped = [f for f in by_wheels if f not in reversed_]
-    if not swapped or not reversed_:
-        return findings
-    told = found('orientation_frame', reversed_[0].topic, swapped[0].confidence)
-    following = ('gyro_reversed', 'swapped_sides', 'force_mirrored')
-    return [*(f for f in findings if f.fault not in following), told]
 
 
 def run_apart(
@@ -223,9 +208,9 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('mounting', imu, 'check_upside', DRIVING),
     ('jumps', wheel_rates, 'check_zeros'),
     ('jumps', wheel_rates, 'check_limits', DRIVING),
+    ('frozen', repeats, 'check_repeats', DRIVING),
     ('missing_wheel', wheel_rates, 'check_dead_wheels', DRIVING),
     ('frozen', wheel_rates, 'check_copies', DRIVING),
-    ('frozen', repeats, 'check_repeats', DRIVING),
     ('jumps', wheel_rates, 'check_wild'),
     ('unit', turning, 'check_steering_unit'),
     ('radius', wheel_rates, 'check_scales'),
@@ -243,7 +228,6 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('mounting', imu, 'check_yaw', DRIVING),
     ('jumps', reference, 'check_jumps', DRIVING),
     ('delay', clocks, 'check_clocks', DRIVING),
-    ('mounting', reference, 'check_place'),
     ('covariance', reference, 'check_covariance'),
     ('gain', turning, 'check_gyro_scale'),
     ('zero', imu, 'check_noise_and_zero'),

@@ -5,18 +5,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import Evidence, row_medians
+from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import Finding, Outcome, listed, untold
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import SinkageSeries
-from wheel_terra_estimator.checks.statistics import bend_noise, correlation, halves
-from wheel_terra_estimator.checks.torque import thrust
+from wheel_terra_estimator.checks.statistics import bend_noise, halves
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors
 
 DEEPEST = 1.2  # sinkage over radius that no wheel gets out of [-]
@@ -26,8 +23,6 @@ ANOTHER_UNIT = 30.0  # noise over the stated one from which it may be another un
 USUAL_RADIUS = 0.15  # wheels below this [m] have smaller limits, as their radii are
 DEEP_SPELL = 0.004  # highest readings [m] from which what is below the ground is no sign
 BELOW_ZERO = 0.006  # median above the ground that no sinkage has [m] (lugs carry less)
-BURIED = 0.5  # depth over radius that no drive has all the time [-]
-DRAGS = 0.3  # correlation of depth and thrust that tells that deep wheels are dragged [-]
 ALIKE_SHARE = 0.4  # change of an offset over a drive that is still a zero, as a share [-]
 DEEP_STD = 0.02  # deviation of a zero of all wheels: their true sinkage [m]
 ODD_ZERO = 0.01  # A wheel that reads this much less or more than every other of its side [m] is odd
@@ -61,10 +56,9 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes += [*unit, *told]
     known = sinkage.sinkage
     for finding in told:
-        if isinstance(finding, Finding):  # a zero is left unknown, as what may be one is
+        if isinstance(finding, Finding):  # a zero is left unknown, as what may be a sign is
             wrong = [finding.wheel in (None, name) for name in sinkage.names]
-            sign = finding.fault == 'sinkage_sign' and len(told) == 1
-            known = known * np.where(wrong, -1.0 if sign else np.nan, 1.0)
+            known = np.where(wrong, np.nan, known)
     return outcomes, evidence.with_channel('sinkage', sinkage=known)
 
 
@@ -103,9 +97,6 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
         told['rival'] = ''.join(f', or in {other}' for other, _ in others)
         finding = evidence.found('sinkage_unit', 0.97 / len(off), value=factor, **told)
         return [finding], table * factor
-    if float(np.nanquantile(table, 0.02)) > BURIED * radius:
-        told = {'level': level, 'radius': radius, 'height': float(np.nanquantile(table, 0.98))}
-        return [evidence.found('sinkage_height', 0.8, **told)], table
     return [], table
 
 
@@ -122,17 +113,10 @@ def _sign_and_zero(
     limit, usual = BELOW_ZERO * small + lugs, float(np.nanquantile(middle, 0.5, method='higher'))
     if usual < -limit:  # most wheels
         top = float(np.nanmedian(np.nanquantile(table, 0.98, axis=0)))
-        dragged = _dragged_where_deep(evidence, table)
-        told: dict[str, Any] = {'reading': 1000 * usual, 'others': '', 'of': ''}
-        how = f'median sinkage {1000 * usual:.0f} mm: the wheels would float'
-        zero = _zero(evidence, names, usual, DEEP_STD * small, how)
-        if top > DEEP_SPELL * small or dragged > DRAGS:
-            return [zero]
-        if dragged < -DRAGS:
-            return [evidence.found('sinkage_sign', 0.9, value=-1.0, **told)]
-        told['others'] = ' without a deep spell (or its zero is off)'
-        either = evidence.found('sinkage_sign', 0.5, value=-1.0, **told)
-        return [either, replace(zero, confidence=0.45)]
+        if top > DEEP_SPELL * small:
+            how = f'median sinkage {1000 * usual:.0f} mm: the wheels would float'
+            return [_zero(evidence, names, usual, DEEP_STD * small, how)]
+        return [evidence.found('sinkage_sign', 0.5, value=-1.0, reading=1000 * usual)]
     outcomes: list[Outcome] = []
     if np.nanmedian(np.abs(middle)) < limit:
         outcomes.append(untold('sign', 'sinkage_shallow'))
@@ -144,30 +128,12 @@ def _sign_and_zero(
         far = own - typical
         spread = max(float(np.nanmax(others) - np.nanmin(others)), 0.1 * abs(far))
         how = f'reads {1000 * far:+.0f} mm off the other wheels all the time'
-        odd = max(ODD_ZERO * small, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
-        if (abs(far) > odd or own < -limit) and _lasting(table, index, far):
-            if abs(far) > NO_DEPTH * _radius(evidence):  # none of a sinkage
-                told = {'wheel': name, 'level': own, 'radius': _radius(evidence)}
-                outcomes.append(evidence.found('sinkage_none', 0.97, **told))
-            else:
-                outcomes.append(_zero(evidence, [name], far, spread, how))
+        least = max(ODD_ZERO * small, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
+        odd = abs(far) > least or own < -limit
+        odd &= abs(far) < NO_DEPTH * _radius(evidence)  # else none of a sinkage
+        if odd and _lasting(table, index, far):
+            outcomes.append(_zero(evidence, [name], far, spread, how))
     return outcomes
-
-
-def _dragged_where_deep(evidence: Evidence, table: FloatArray) -> float:
-    """Return how well readings (k, p) follow the thrust of straights [-].
-
-    What a wheel sinks by costs thrust: a reversed sign follows it downwards.
-    """
-    sinkage = evidence.recording.sinkage
-    assert sinkage is not None
-    effort = np.abs(thrust(evidence))
-    depth, there = row_medians(table), np.isfinite(table).any(axis=1)
-    rows = there & (evidence.rim_at(sinkage.stamp, evidence.unturned.astype(float)) > 0.99)
-    if rows.sum() < LEAST_READINGS:
-        return 0.0
-    seen = evidence.rim_at(sinkage.stamp, effort)[rows]
-    return correlation(seen - seen.mean(), depth[rows] - depth[rows].mean())
 
 
 def _lasting(table: FloatArray, index: int, far: float) -> bool:

@@ -59,7 +59,7 @@ TRIAL_ROWS = 1000  # rows, spread over the drive, that hypotheses are compared o
 MOST_STEERING = 3.3  # steering angle that no wheel has [rad]
 AS_TURNED, STILL = 0.5, 0.3  # share of the turn that a wheel is steered by, or not [-]
 LEAST_STEERING_ZERO = math.radians(5.0)  # beyond what wheels slip aside [rad]
-LEAST_ACROSS = math.radians(1.5)  # the same of two that are exchanged
+LEAST_ACROSS = math.radians(1.5)  # the same of two of an axle that are off to both sides
 LEAST_ASKED = 0.1  # speed aside in turns over that ahead, of a wheel that has to steer [-]
 LEAST_HEADINGS = 1.0  # turn in a drive that is not all on one cross slope [rad]
 MOST_WHEELS = 10  # wheels for which all combinations of signs are tried
@@ -70,8 +70,7 @@ CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
 SLIDES_BACK = 0.15  # slope against the wheels from which a rover may slide back on them [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
-IN_DEGREES = (30.0, 110.0)  # gyro over orientation if in degrees per second [-]
-IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # the same over wheels, which slip and skid in turns [-]
+IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
 LEAST_TURNED = 0.1  # turn in that time, which no rolling of a pitched body is [rad]
 LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
@@ -265,59 +264,39 @@ def check_steering_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 
 def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return wheels that are not steered as the rover turns, and the evidence mended."""
-    facts, track, steering = evidence.facts, track_ratio(evidence), evidence.steering
-    gain, zero = _steered_as_turned(evidence, steering)
-    wrong, right, still = gain < -AS_TURNED, gain > AS_TURNED, np.abs(gain) < STILL
-    outcomes: list[Outcome] = []
-    order = [facts.names.index(name) for name in _sides_exchanged(facts)]
-    if still.any() and not right.any():
-        outcomes.append(untold('frozen', 'steering'))
-    elif (dead := still & ~still[order]).any():  # both of an axle may be held straight
-        outcomes.append(evidence.found('steering_frozen', 0.9, wheel=facts.named(dead)))
-        steering = np.where(dead, np.nan, steering)
-    ahead = np.nan_to_num(steering[evidence.unturned])
+    """Return wheels that are not steered as the rover turns, and the evidence without them."""
+    facts, track = evidence.facts, track_ratio(evidence)
+    gain, zero = _steered_as_turned(evidence)
+    still, order = np.abs(gain) < STILL, _sides_exchanged(facts)
+    if still.any() and not (gain > AS_TURNED).any():
+        return [untold('frozen', 'steering')], evidence
+    ahead = np.nan_to_num(evidence.steering[evidence.unturned])
     # One angle that is published for two wheels is off in turns alone.
     stays = (np.median(ahead, axis=0) if ahead.size else 0.0) * zero > 0.5 * zero**2
-    off = right & stays & (np.abs(zero) > LEAST_STEERING_ZERO)
+    wrong = stays & (np.abs(zero) > LEAST_STEERING_ZERO)
+    wrong |= still & ~still[order]  # both of an axle may be held straight
     # Of joints that are exchanged the inner one turns too little, to either side.
-    across = right & (np.abs(zero) > LEAST_ACROSS) & (zero * zero[order] < 0.0)
-    across &= across[order]
-    crossed = np.where(across, steering[:, order], steering)
-    left = np.abs(_steered_as_turned(evidence, crossed)[1]) if across.any() else zero
-    if across.any() and (left < LEAST_FALL * np.abs(zero))[across].all():
-        joints = facts.configuration.wheels.steering_joints
-        names = ', '.join(joints[j if across[i] else i] or "''" for i, j in enumerate(order))
-        told_of = {'wheel': facts.named(across), 'names': names}
-        outcomes.append(evidence.found('steering_exchanged', 0.9, **told_of))
-        steering = crossed
-    elif off.any():
-        zeros = {'zeros': listed(zero[off], '.3f'), 'degrees': listed(np.degrees(zero[off]), '.0f')}
-        outcomes.append(evidence.found('steering_zero', 0.9, wheel=facts.named(off), **zeros))
-        steering = steering - np.where(off, zero, 0.0)
-    if track is None or track < 0.0 or not wrong.any():
-        return outcomes, replace(evidence, steering=steering)
-    sure, rival = 0.95, ''
-    if not right.any():
-        sure, rival = 0.75, ', or wheels.x has the wrong sign (positive ahead)'
-    columns = (np.repeat(one[:, None], wrong.size, axis=1) for one in steering.T[wrong])
-    by_one_another = [_steered_as_turned(evidence, column)[0][wrong] for column in columns]
-    if (np.nanmax(by_one_another, axis=0) > AS_TURNED).all():
-        sure, rival = 0.5, f'{rival}, or these joints go by the names of one another'
-    told = {'wheel': facts.named(wrong), 'value': -1.0, 'rival': rival}
-    separate = '; turn one joint to the left by hand first and look at what is published'
-    told['separate'] = separate if rival else ''
-    outcomes.append(evidence.found('steering_sign', sure, **told))
-    return outcomes, replace(evidence, steering=steering * np.where(wrong, -1.0, 1.0))
+    crossed = _steered_as_turned(replace(evidence, steering=evidence.steering[:, order]))[1]
+    across = (zero * zero[order] < 0.0) & (np.abs(crossed) < LEAST_FALL * np.abs(zero))
+    wrong |= across & (np.abs(zero) > LEAST_ACROSS)
+    if track is not None and track > 0.0:
+        wrong |= gain < -AS_TURNED
+    if not wrong.any():
+        return [], evidence
+    told = {'wheel': facts.named(wrong), 'share': listed(100.0 * gain[wrong], '.0f')}
+    told['degrees'] = listed(np.degrees(zero[wrong]), '.0f')
+    left = replace(evidence, steering=np.where(wrong, np.nan, evidence.steering))
+    return [evidence.found('steering_angle', 0.9, **told)], left
 
 
-def _steered_as_turned(evidence: Evidence, steering: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     """Return the share of its turn by the gyro that each wheel is steered by, and its zero [rad].
 
     Without slip a wheel moves aside with ``v_y + w_z x``, where a wheel that does not steer does
-    not. Not a number where the angles (k, n) or the drive tell none.
+    not. Not a number where the angles or the drive tell none.
     """
-    x, steered = evidence.facts.configuration.wheels.x, np.isfinite(evidence.steering).any(axis=0)
+    x, steering = evidence.facts.configuration.wheels.x, evidence.steering
+    steered = np.isfinite(steering).any(axis=0)
     gain, zero = np.full((2, x.size), np.nan)
     rows, heading = evidence.moving, integrated(evidence.time, evidence.yaw)
     if evidence.turning.sum() < LEAST_TURNING_ROWS or np.ptp(heading) < LEAST_HEADINGS:
@@ -326,8 +305,7 @@ def _steered_as_turned(evidence: Evidence, steering: FloatArray) -> tuple[FloatA
     told = speed * np.tan(np.nan_to_num(evidence.steering[rows]))
     others = ~steered if not steered.all() else steered
     aside = np.median((told * steered - yaw * x)[:, others], axis=1, keepdims=True) + yaw * x
-    there = np.isfinite(steering).any(axis=0) & np.isfinite(evidence.rate).any(axis=0)
-    for i in np.flatnonzero(there & (steered | ~steered.any())):
+    for i in np.flatnonzero(steered & np.isfinite(evidence.rate).any(axis=0)):
         seen = speed[:, i] * np.tan(np.nan_to_num(steering[rows, i]))
         share, off = block_fit(np.column_stack([aside[:, i], speed[:, i]]), seen)
         asked = np.quantile(np.abs(aside[:, i]), 0.9) > LEAST_ASKED * np.abs(speed[:, i]).mean()
@@ -337,15 +315,14 @@ def _steered_as_turned(evidence: Evidence, steering: FloatArray) -> tuple[FloatA
 
 
 def check_axes(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return x and y of the wheels that stand in each other's place, and the evidence mended."""
+    """Return x and y in each other's place by the sides in the names, and the evidence mended."""
     facts, wheels = evidence.facts, evidence.facts.configuration.wheels
     if not facts.known or len(facts.names) != wheels.x.size:
         return [], evidence
-    by_name = np.array([side_of(name) for name in facts.names])
-    turned = replace(facts, lateral=wheels.x, side=np.sign(wheels.x))
-    as_stated, left = left_in_turns(evidence), left_in_turns(replace(evidence, facts=turned))
-    if (by_name * wheels.x < 0.0).any() or not left < min(LEAST_FALL * as_stated, MOST_LEFT):
+    sides = np.array([side_of(name) for name in facts.names])
+    if not (sides * wheels.x > 0.0).all() or (sides * wheels.y > 0.0).all():
         return [], evidence
+    turned = replace(facts, lateral=wheels.x, side=np.sign(wheels.x))
     places = {'wheels.x': wheels.y.tolist(), 'wheels.y': wheels.x.tolist()}
     turned = replace(turned, configuration=facts.configuration.replace(places))
     told = {'x': listed(wheels.y, '.3f'), 'y': listed(wheels.x, '.3f')}
@@ -490,16 +467,15 @@ def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         mended = replace(evidence, gyro=evidence.gyro * [1.0, 1.0, -1.0])
         return [evidence.found('gyro_reversed', 0.9, **told)], mended
     mended = replace(evidence, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
-    names = _sides_exchanged(facts)
+    order = _sides_exchanged(facts)
     if np.isfinite(evidence.steering).any():  # steering joints are named as before, or with it
-        order = [facts.names.index(name) for name in names]
         both = mended, replace(mended, steering=mended.steering[:, order])
         mended = min(both, key=left_in_turns)
     sides = evidence.found(
         'swapped_sides',
         0.97 if sense else 0.5,
         rival='' if sense else ', or the gyro counts yaw to the right',
-        names=', '.join(names),
+        names=', '.join(facts.names[i] for i in order),
     )
     if sense:
         return [sides], mended
@@ -514,10 +490,12 @@ def _sense_of_gyro(evidence: Evidence) -> tuple[str, int]:
     assert imu is not None
     starts, curves = felt_senses(evidence)
     curves = max(curves, 0) if starts < 1 else curves  # else the IMU may be turned round
-    if curves or _turns_as_oriented(evidence, imu):
-        return 'curves', curves or 1
+    if curves:
+        return 'curves', curves
+    if oriented := _turns_as_oriented(evidence, imu):
+        return 'orientation', oriented
     # The yaw rate of a reference may be made of the wheels or of the gyro: it tells neither.
-    gain, _ = _steered_as_turned(evidence, evidence.steering)
+    gain, _ = _steered_as_turned(evidence)
     senses = set(np.sign(gain[np.abs(gain) > AS_TURNED]).astype(int).tolist())
     return ('steering', senses.pop()) if len(senses) == 1 else ('', 0)
 
@@ -543,14 +521,18 @@ def _most(turns: FloatArray) -> float:
     return float(np.quantile(np.abs(turns), 0.95)) if turns.size else 0.0
 
 
-def _turns_as_oriented(evidence: Evidence, imu: ImuSeries, least: float = 0.0) -> bool:
-    """Return whether the gyro turns as its orientation does, by ``least`` [rad] in a while."""
+def _turns_as_oriented(evidence: Evidence, imu: ImuSeries, least: float = 0.0) -> int:
+    """Return 1 where the gyro turns as its orientation does, -1 against it, 0 for not clear.
+
+    It has to turn by ``least`` [rad] in a while.
+    """
     heading = _heading(evidence, imu)
     if heading is None:
-        return False
+        return 0
     seen = _turns(evidence, heading)
-    gyro = _turns(evidence, integrated(evidence.time, evidence.yaw))
-    return _most(seen) >= least and correlation(seen, gyro) > LEAST_CORRELATION
+    alike = correlation(seen, _turns(evidence, integrated(evidence.time, evidence.yaw)))
+    clear = _most(seen) >= least and abs(alike) > LEAST_CORRELATION
+    return int(np.sign(alike)) * clear
 
 
 def _heading(evidence: Evidence, imu: ImuSeries) -> FloatArray | None:
@@ -567,6 +549,9 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     imu = evidence.recording.imu
     if imu is None or evidence.gyro is None:
         return [], evidence
+    if _turns_as_oriented(evidence, imu, LEAST_TURNED) < 0:  # the gyro turns as the wheels do here
+        how = 'it turns against gyro and wheels'
+        return [evidence.found('orientation', 0.97, how=how)], evidence
     axes = (*evidence.gyro[:, :2].T, evidence.yaw)
     aside, across, gyro = (_turns(evidence, integrated(evidence.time, axis)) for axis in axes)
     headings = {
@@ -595,16 +580,16 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [], evidence
 
 
-def _sides_exchanged(facts: RoverFacts) -> list[str]:
-    """Return the names with each left wheel in the place of the right one beside it."""
-    names, forward = list(facts.names), facts.configuration.wheels.x
+def _sides_exchanged(facts: RoverFacts) -> list[int]:
+    """Return the wheels in order, each left one in the place of the right one beside it."""
+    order, forward = list(range(len(facts.names))), facts.configuration.wheels.x
     left, right = (
         sorted(np.flatnonzero(facts.side == side).tolist(), key=lambda i: -float(forward[i]))
         for side in (1.0, -1.0)
     )
     for i, j in zip(left, right, strict=False):
-        names[i], names[j] = names[j], names[i]
-    return names
+        order[i], order[j] = order[j], order[i]
+    return order
 
 
 def _exchanged(evidence: Evidence, chosen: _Chosen) -> tuple[Finding, Evidence]:
@@ -662,7 +647,7 @@ def gyro_unit_known(evidence: Evidence) -> bool:
     if track_ratio(evidence) is not None:
         return True
     imu = evidence.recording.imu
-    return imu is not None and _turns_as_oriented(evidence, imu, LEAST_TURNED)
+    return imu is not None and _turns_as_oriented(evidence, imu, LEAST_TURNED) != 0
 
 
 def skids(evidence: Evidence) -> bool:

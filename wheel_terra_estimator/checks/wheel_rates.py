@@ -13,7 +13,6 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import (
-    BEND_OF_NOISE,
     LEAST_MOVING_ROWS,
     NO_NOISE,
     Evidence,
@@ -27,7 +26,6 @@ from wheel_terra_estimator.checks.reference import (
     hardly_moves,
     units_of_reference,
 )
-from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import (
     correlation,
     lonely,
@@ -63,7 +61,6 @@ LEAST_COUNTS = 0.2  # speed of a wheel with fewer counts over the others', at le
 WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0  # wild change over the greatest and usual value [-]
 LEAST_WILD, MOST_WILD = 3, 0.1  # number and share of single wild values that are told
 LONG_FROZEN_TIME = 10.0  # time that a coarse encoder does not repeat itself [s]
-FAR_LONGER, MOST_FROZEN = 10.0, 0.75  # so many times longer, for so much of the driving [-]
 HELD_TORQUE = 1.5  # torque of a held wheel over that of the others, at least [-]
 DRAGGED_TORQUE = 0.5  # the same against theirs, of one that the others drag [-]
 NOISE_FACTOR = 5.0
@@ -82,18 +79,17 @@ LEAST_STEP_SHARE = 0.02  # noise by steps that matters, over the working rate [-
 
 def check_limits(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return rates that end at a number, again and again or of several wheels, and what is left."""
-    rate, noisy = np.abs(evidence.rate), NO_NOISE * BEND_OF_NOISE * evidence.working_rate
+    rate, noisy = np.abs(evidence.rate), NO_NOISE * evidence.working_rate
     most = np.nanmax(rate, axis=0, initial=0.0)
     at = rate == most
     for index, ends in enumerate(at.T):
-        below, bend = rate[~ends, index], np.abs(np.diff(evidence.rate[:, index], 4))
-        bend = bend[np.lib.stride_tricks.sliding_window_view(~ends, 5).all(axis=1)]
+        below, free = rate[~ends, index], evidence.rate[~ends, index]
         often = len(runs(ends)) >= LEAST_ENDS or (most == most[index]).sum() > 1
         often &= bool(ends.sum() > ENDS * evidence.moving.sum())
         below = below[below > 0.0]  # that are not rounded
-        fine = min(np.unique(below).size, bend.size) > FINE
+        fine = np.unique(below).size > FINE
         fine &= bool(np.mean(np.diff(below) == 0.0) < SELDOM_SAME)
-        at[:, index] &= often and fine and robust_std(bend) > noisy
+        at[:, index] &= often and fine and noise_of(free) > noisy
     if not at.any():
         return [], evidence
     told = {'wheel': evidence.facts.named(at.any(axis=0)), 'most': float(np.nanmax(rate[at]))}
@@ -106,18 +102,16 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     moving = evidence.moving
     if moving.sum() < LEAST_MOVING_ROWS or evidence.rate.shape[1] < 2:
         return [], evidence
-    outcomes: list[Outcome] = []
-    for look in (_stands, _stays):  # beside a dead one none is frozen
-        rate, dead = evidence.rate.copy(), dict[str, float]()
-        for index, name in enumerate(evidence.facts.names):
-            if longest := look(evidence, index):
-                dead[name] = longest
-                rate[:, index] = np.nan
-        if dead:
-            how = f'does not follow the others for up to {max(dead.values()):.1f} s of driving'
-            outcomes.append(evidence.found('rate_frozen', 0.97, wheel=', '.join(dead), how=how))
-            evidence = evidence.with_rate(rate)
-    return outcomes, evidence
+    rate, dead = evidence.rate.copy(), dict[str, float]()
+    for index, name in enumerate(evidence.facts.names):
+        if longest := _stands(evidence, index):
+            dead[name] = longest
+            rate[:, index] = np.nan
+    if not dead:
+        return [], evidence
+    how = f'does not follow the others for up to {max(dead.values()):.1f} s of driving'
+    told = evidence.found('rate_frozen', 0.97, wheel=', '.join(dead), how=how)
+    return [told], evidence.with_rate(rate)
 
 
 def _stands(evidence: Evidence, index: int) -> float:
@@ -149,30 +143,6 @@ def _stands(evidence: Evidence, index: int) -> float:
         ):
             longest = max(longest, rows.size * evidence.period)
     return longest
-
-
-def _stays(evidence: Evidence, index: int) -> float:
-    """Return how long a rate stays the same, but for 0, where the torque decides."""
-    dead = stays(evidence, evidence.time, evidence.rate[:, index : index + 1])
-    longest = dead.longest if dead is not None and dead.value != 0.0 else 0.0
-    longest = max(longest, _stays_once(evidence, index))
-    return longest if longest > LONG_FROZEN_TIME else 0.0
-
-
-def _stays_once(evidence: Evidence, index: int) -> float:
-    """Return how long a coarse rate stays, if far longer than it or the others' do else [s]."""
-    rate = evidence.rate[evidence.moving]
-
-    def stretches(one: FloatArray) -> list[int]:
-        same = (np.diff(one) == 0.0) & (one[1:] != 0.0)
-        return sorted([0, 0, *(last - first for first, last in runs(same))])
-
-    *_, second, longest = stretches(rate[:, index])
-    if not LONG_FROZEN_TIME / evidence.period < longest < MOST_FROZEN * rate.shape[0]:
-        return 0.0
-    others = [stretches(one)[-1] for one in np.delete(rate, index, axis=1).T]
-    usual = max(second, float(np.median(others)), 1.0)
-    return longest * evidence.period if longest > FAR_LONGER * usual else 0.0
 
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:
