@@ -61,13 +61,13 @@ def rolling_radius():
     return RADIUS * front / np.sin(front)
 
 
-def ten_minute_drive(turns=True):
+def ten_minute_drive(turns=True, until=220.0):
     """Rest, forward, back, over a hill, then a circle to each side."""
-    time = np.arange(0.0, 300.0, 1.0 / RATE)
-    knots = [0, 15, 16, 60, 61, 65, 66, 100, 101, 105, 106, 300]
+    time = np.arange(0.0, until, 1.0 / RATE)
+    knots = [0, 15, 16, 60, 61, 65, 66, 100, 101, 105, 106, until]
     speed = np.interp(time, knots, [0, 0, 0.3, 0.3, 0, 0, -0.3, -0.3, 0, 0, 0.3, 0.3])
     yaw = np.interp(
-        time, [160, 161, 220, 221, 225, 226, 285, 286], [0, 0.2, 0.2, 0, 0, -0.2, -0.2, 0]
+        time, [130, 131, 164, 165, 170, 171, 204, 205], [0, 0.2, 0.2, 0, 0, -0.2, -0.2, 0]
     )
     hill = np.interp(time, [20, 22, 38, 40, 42, 58], [0, 0.12, 0.12, -0.12, -0.12, 0])
     back = np.interp(time, [70, 72, 95], [0, -0.1, 0])
@@ -113,7 +113,7 @@ def _recorded(m, seed):
         '/joint_states', stamp, arrival, NAMES,
         rate + noise(rate.shape, 0.004), torque + noise(rate.shape, 0.2),
     )  # fmt: skip
-    fine = np.arange(0.0, m.time[-1], 0.02)
+    fine = np.arange(0.0, m.time[-1], 0.04)
     at = lambda values: np.interp(fine, m.time, values)  # noqa: E731
     imu_stamp = START + np.round(fine * 1e9).astype(np.int64)
     force = np.column_stack([
@@ -135,6 +135,6 @@ def _recorded(m, seed):
         m.yaw_rate[every], np.full(velocity.shape[0], 1e-4),
     )  # fmt: skip
     depth = DEPTH + 0.002 * np.sin(0.3 * m.time)[:, None] * np.ones(4)
-    sinkage = SinkageSeries('/sinkage', stamp, arrival, NAMES, depth + noise(depth.shape, 0.002))
+    sinkage = SinkageSeries('/sinkage', stamp, arrival, NAMES, depth + noise(depth.shape, 0.0022))
     topics = (('/joint_states', 'sensor_msgs/msg/JointState', stamp.size),)
     return Recording('drive', topics, joints, imu, sinkage, reference, None)

@@ -87,7 +87,7 @@ def test_zeros_of_a_gyro_are_in_the_frame_that_is_written():
 def test_nothing_is_told_from_where_there_is_no_imu():
     """It comes up in a circle at 0.2 rad/s, which is no bias at rest."""
     imu = rolling.recording().imu
-    calibration, _ = calibrated(imu=rows_of(imu, imu.seconds > 170.0))
+    calibration, _ = calibrated(imu=rows_of(imu, imu.seconds > 140.0))
     told = {change.key: change.after for change in calibration.changes}
     bias = told.get('sensors.angular_rate_bias', [0.0, 0.0, 0.0])
     assert bias == pytest.approx([0.0, 0.0, 0.0], abs=0.002)

