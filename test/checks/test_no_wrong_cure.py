@@ -336,24 +336,6 @@ def test_encoders_that_read_nought_all_along_are_told_and_break_no_check(other):
     assert not any('internal error' in entry.reason for entry in report.not_checked)
 
 
-def test_wheels_wound_up_otherwise_at_each_stop_have_no_zero():
-    """Only forward, with stops; one torque holds 25 N m at rest, this way round or that."""
-    time = np.arange(0.0, 100.0, 1.0 / rolling.RATE)
-    speed = 0.3 * (time % 20.0 > 8.0)
-    truth = rolling.Motion(time, speed, 0.0 * time, 0.0 * time)
-    whole = rolling.recording(truth)
-    rest = np.abs(truth.speed) < 1e-9
-    stop = np.cumsum(np.diff(rest.astype(int), prepend=0) > 0)
-
-    def with_torque(size):
-        torque = whole.joints.torque.copy()
-        torque[rest, 1] += np.broadcast_to(size, rest.shape)[rest]
-        return checked(whole=whole, joints=replace(whole.joints, torque=torque))
-
-    assert 'torque_zero' in faults(with_torque(25.0))
-    assert 'torque_zero' not in faults(with_torque(25.0 * (-1.0) ** stop))
-
-
 @pytest.mark.parametrize('degrees', [True, False])
 def test_exchanged_wheels_are_no_gyro_in_degrees(degrees):
     """The sides turn next to alike where two wheels across are exchanged; rear ones are larger."""
@@ -408,17 +390,6 @@ def test_a_specific_force_a_little_off_gravity_is_reported():
         told = [f for f in told if f.kind in ('gravity', 'unit', 'zero')]
         assert [f.fault for f in told] == ['force_scale'] and told[0].parameter is None
         assert 'z zero' in told[0].words and 'rover.gravity' in told[0].words
-
-
-def test_a_crawl_below_the_noise_of_the_rates_is_no_standstill_that_tells_a_zero():
-    """One wheel rubs with 5 N m while the rover drives, part of the time at a crawl."""
-    time = np.arange(0.0, 90.0, 0.1)
-    speed = np.interp(time, [2, 3, 30, 31, 60, 61], [0.0, 0.3, 0.3, 0.05, 0.05, 0.3])
-    crawls = rolling.recording(rolling.Motion(time, speed, 0.0 * time, 0.0 * time))
-    noise = 0.7 * np.random.default_rng(1).standard_normal(crawls.joints.rate.shape)
-    rubs = crawls.joints.torque + np.outer(speed > 0.0, [0.0, 5.0, 0.0, 0.0])
-    joints = replace(crawls.joints, rate=crawls.joints.rate + noise, torque=rubs)
-    assert 'torque_zero' not in faults(checked(whole=crawls, joints=joints))
 
 
 def test_a_turn_on_the_spot_reverses_no_axis_of_the_accelerometer():

@@ -134,9 +134,9 @@ def test_joints_across_that_are_exchanged():
     yaw = np.interp(time, [0.0, 10.0, 11.0], [0.0, 0.0, 0.3]) * np.sign(np.sin(0.3 * time))
     weaves = rolling.Motion(time, np.interp(time, [3.0, 4.0], [0.0, 0.3]), yaw, 0.0 * time)
     report = steered(lambda angle: angle[:, [1, 0, 2, 3]], motion=weaves)
-    assert [
-        f.wheel for f in report.findings if f.fault == 'steering_angle'
-    ] == ['front_left, front_right']
+    assert [f.wheel for f in report.findings if f.fault == 'steering_angle'] == [
+        'front_left, front_right'
+    ]
 
 
 def test_steering_angles_in_degrees():

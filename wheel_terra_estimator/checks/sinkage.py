@@ -129,9 +129,8 @@ def _sign_and_zero(
         spread = max(float(np.nanmax(others) - np.nanmin(others)), 0.1 * abs(far))
         how = f'reads {1000 * far:+.0f} mm off the other wheels all the time'
         least = max(ODD_ZERO * small, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
-        odd = abs(far) > least or own < -limit
-        odd &= abs(far) < NO_DEPTH * _radius(evidence)  # else none of a sinkage
-        if odd and _lasting(table, index, far):
+        # What is far beyond that is none of a sinkage.
+        if least < abs(far) < NO_DEPTH * _radius(evidence) and _lasting(table, index, far):
             outcomes.append(_zero(evidence, [name], far, spread, how))
     return outcomes
 

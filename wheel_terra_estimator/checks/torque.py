@@ -26,7 +26,6 @@ from wheel_terra_estimator.checks.statistics import (
     block_fit,
     confidence,
     moving_mean,
-    runs,
     tried,
 )
 
@@ -69,7 +68,7 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if unsigned:
         blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
         return [*unsigned, *_not_told('no_sign')], blank
-    outcomes, evidence, unsure = _signs(evidence)
+    outcomes, evidence = _signs(evidence)
     if not evidence.facts.known or evidence.force is None:
         return outcomes, evidence
     if not known.all():
@@ -83,7 +82,7 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes += scale
     if any(isinstance(o, Finding) for o in scale):
         return outcomes, without
-    wrong = _zeros(evidence, zeros, unsure)
+    wrong = _zeros(evidence, zeros)
     if any(isinstance(o, Finding) for o in wrong) and zeros is not None:
         evidence = without
     return [*outcomes, *_gain(evidence), *wrong], evidence
@@ -93,7 +92,7 @@ def _not_told(why: str, **figures: float) -> list[Outcome]:
     return [untold(kind, why, **figures) for kind in ('gain', 'mass')]
 
 
-def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence, bool]:
+def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return torques of the wrong sign: by what slopes, starts and stops change in them.
 
     The mean alone does not tell: a wheel whose radius is a little smaller is dragged by the others.
@@ -102,7 +101,7 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence, bool]:
     if told is not None and _fight(evidence, told):
         told = None
     if told is None:
-        return [untold('sign', 'torque_no_change')], evidence, False
+        return [untold('sign', 'torque_no_change')], evidence
     usual = float(np.median([abs(answer.value) for answer, _ in told]))
     agree = all(answer.value * level.value > 0.0 for answer, level in told)
     wrong, unsure = [], []
@@ -117,13 +116,13 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence, bool]:
     why = untold('sign', 'torque_unsure', wheels=', '.join(unsure))
     outcomes: list[Outcome] = [why] if unsure else []
     if not wrong:
-        return outcomes, evidence, bool(unsure)
+        return outcomes, evidence
     torque = evidence.torque.copy()
     torque[:, wrong] *= -1.0
     sure = confidence(min(max(one.sigmas_from(0.0) for one in told[i]) for i in wrong))
     names = ', '.join(facts.names[i] for i in wrong)
     outcomes.append(evidence.found('torque_sign', sure, wheel=names, value=-1.0))
-    return outcomes, evidence.with_rate(evidence.rate, torque), bool(unsure)
+    return outcomes, evidence.with_rate(evidence.rate, torque)
 
 
 def _fight(evidence: Evidence, told: list[tuple[Estimate, Estimate]]) -> bool:
@@ -359,38 +358,21 @@ def _unsigned(evidence: Evidence) -> list[Outcome]:
     return [evidence.found('torque_unsigned', 0.9)]
 
 
-def _zeros(evidence: Evidence, zeros: list[Estimate] | None, unsure: bool) -> list[Outcome]:
-    """Return zeros that are off; standing tells none where a sign is ``unsure``."""
-    facts, rest, where = evidence.facts, evidence.at_rest, 'driving both ways'
+def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
+    """Return zeros that are off."""
+    if zeros is None:
+        return [untold('zero', 'torque_one_way')]
+    facts = evidence.facts
     stated = max(float(facts.sensors.torque_zero_std), 1e-3)
     driving = float(np.nanmedian(np.abs(evidence.torque[evidence.moving])))
-    if zeros is None:
-        if rest.sum() < LEAST_MOVING_ROWS or unsure:
-            return [untold('zero', 'torque_no_rest')]
-        # Standing wheels are wound up against each other, otherwise at each stop; only an odd one
-        # out is told.
-        stops = [np.nanmedian(evidence.torque[i:j], axis=0) for i, j in runs(rest)]
-        apart = np.array([stop - np.nanmedian(stop) for stop in stops])
-        level = np.median(apart, axis=0)
-        wound = np.std(apart, axis=0) / math.sqrt(len(stops))
-        spread = max(1.5 * float(np.nanmedian(np.abs(level))), stated)
-        # A wheel that turns more slowly than the noise of the rates shows takes what driving does.
-        hidden = evidence.rest_rate / max(evidence.working_rate, evidence.rest_rate)
-        spread = math.hypot(spread, driving * hidden)
-        zeros = [
-            Estimate(float(v), max(spread, float(w))) for v, w in zip(level, wound, strict=True)
-        ]
-        where = 'standing'
     least = max(ZERO_FACTOR * stated, 0.5 * driving)
     wrong = [i for i, z in enumerate(zeros) if abs(z.value) > max(least, ZERO_SIGMAS * z.std)]
     if not wrong:
         return []
     whole = whole_zeros(evidence, zeros)
     pitch = like_a_pitch(evidence, zeros)  # a slope that is none is in all of them
-    sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong))
-    sure *= 0.5 if pitch or where == 'standing' else 1.0
-    told: dict[str, Any] = {'where': where}
-    told['rival'] = ', or the IMU is pitched: drive a level circle' if pitch else ''
+    sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong)) * (0.5 if pitch else 1.0)
+    told: dict[str, Any] = {'rival': ', or the IMU is pitched: drive a level circle' * pitch}
     told['left'] = listed((zeros[i].value for i in wrong), '.2f')
     told['zeros'] = listed((zero.value for zero in whole), '.2f')
     told['wheel'] = ', '.join(facts.names[i] for i in wrong)
