@@ -29,30 +29,9 @@ def held(channel, field, since, until, column=...):
 WHOLE = rolling.recording()
 
 
-def test_a_vector_that_is_the_same_all_along_is_not_said_to_be_zero():
-    dead = next(f for f in found(imu=held(WHOLE.imu, 'force', -1.0, np.inf)) if f.kind == 'frozen')
-    assert 'linear_acceleration is the same in every message' in dead.words
-
-
 @pytest.mark.parametrize('name, field', [('reference', 'velocity'), ('sinkage', 'sinkage')])
 def test_nothing_is_frozen_while_the_rover_stands(name, field):
     assert found(**{name: held(getattr(WHOLE, name), field, 0.0, 15.0)}) == []
-
-
-def test_rounded_readings_repeat_themselves():
-    coarse = {
-        'reference': ('velocity', 0.05),
-        'sinkage': ('sinkage', 0.005),
-        'joints': ('torque', 1.0),
-    }
-    changes = {
-        name: replace(
-            getattr(WHOLE, name),
-            **{field: step * np.round(getattr(getattr(WHOLE, name), field) / step)},
-        )
-        for name, (field, step) in coarse.items()
-    }
-    assert 'frozen' not in {f.kind for f in found(**changes)}
 
 
 def test_a_coarse_gyro_on_a_straight_and_a_simulation_without_noise():
@@ -115,14 +94,6 @@ def test_a_seldom_reference_that_stays_for_six_readings():
     reference = rows_of(WHOLE.reference, np.arange(WHOLE.reference.stamp.size) % 2 == 0)
     (finding,) = found(reference=held(reference, 'velocity', 120.0, 127.5))
     assert finding.fault == 'reference_frozen'
-
-
-@pytest.mark.parametrize('times', [2, pytest.param(5, marks=pytest.mark.slow)])
-def test_rates_that_are_sent_more_often_than_measured(times):
-    rows = np.arange(WHOLE.joints.stamp.size) // times * times
-    joints = replace(WHOLE.joints, rate=WHOLE.joints.rate[rows], torque=WHOLE.joints.torque[rows])
-    told = next(f for f in found(joints=joints) if f.fault == 'rates_held')
-    assert told.words.startswith(f'each value comes {times} times')
 
 
 @pytest.mark.parametrize('ratio', [0.4, 0.2])

@@ -90,6 +90,8 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, {'rate': lambda v: np.where(TENTH, 0.0, v)}, 'rate_zeros', ALL, None, 'publisher'),
     (JOINTS, {'rate': lambda v: np.where(TENTH & [[0, 1, 0, 0]], 0.0, v)}, 'rate_zeros', FR, None,
      ''),
+    (*stays(JOINTS, 'rate'), 'rate_frozen', ALL, None, FROZEN),
+    (JOINTS, both(lambda v: v[np.arange(len(v)) // 2 * 2]), 'rates_held', None, None, '2 times'),
     (JOINTS, {'rate': by([1, 1, 0.5, 1])}, 'wheel_counts', RL, None, ''),
     (JOINTS, {'rate': by([1, 1, 1.2, 1])}, 'wheel_scale', RL, approx(0.2 / 1.2, rel=0.01), ''),
     (JOINTS, {'torque': np.abs}, 'torque_unsigned', None, None, ''),
@@ -103,6 +105,10 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (IMU, {'force': by(1.0 / G)}, 'force_unit', None, approx(G), ''),
     (IMU, {'force': by(1000.0 / G)}, 'force_unit', None, approx(G / 1000.0), ''),
     (IMU, {'force': plus(0.0, 0.0, -G)}, 'gravity_off', None, None, ''),
+    (IMU, {'force': plus(1.0, 0.0, -G)}, 'gravity_off', None, None, 'REP 145'),  # on a slope
+    (IMU, {'force': by(1.62 / G)}, 'planet', None, approx(1.62), 'rover.gravity: 1.62'),
+    (IMU, {'force': plus(0.6, 0.0, 0.0)}, 'force_bias', None, approx(0.6, abs=0.05), 'bias: [0.6'),
+    (IMU, {'force': np.round}, 'imu_noise', None, approx(1.0 / math.sqrt(12.0), rel=0.1), ''),
     (IMU, {'force': np.negative}, 'force_reversed', None, None, 'linear_acceleration'),
     (IMU, {'rate': np.degrees}, 'gyro_degrees', None, approx(math.radians(1.0)), ''),
     (IMU, {'rate': by(0.0)}, 'force_zero', None, None, ''),
@@ -117,6 +123,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (IMU, {'rate': by(1.15)}, 'gyro_scale', None, approx(1.0 / 1.15, rel=0.01), ''),
     (IMU, {'force': one_number(2.6, 2.0, 2.4), 'rate': one_number(0.01, 0.01, 0.01)},
      'sensor_frozen', None, None, ''),  # far from what gravity is, but that is not told
+    (IMU, {'force': lambda v: 0.0 * v + v[0]}, 'sensor_frozen', None, None, 'in every message'),
     (*stays(IMU, 'force'), 'sensor_frozen', None, None, FROZEN),
     (*stays(IMU, 'rate'), 'sensor_frozen', None, None, FROZEN),
     (REFERENCE, {'velocity': np.negative}, 'reference_reversed', None, None, ''),
@@ -127,6 +134,8 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (REFERENCE, units(100.0), 'reference_unit', None, approx(0.01), ''),
     (REFERENCE, units(1000.0), 'reference_unit', None, approx(0.001), ''),
     (REFERENCE, {'variance': lambda v: 0.0 * v + 1e6}, 'covariance', None, None, ''),
+    (REFERENCE, {'variance': lambda v: 1e-4 * v * np.linspace(0.5, 2.0, len(v))},
+     'covariance', None, approx(0.01, rel=0.3), ''),
     (*stays(REFERENCE, 'velocity'), 'reference_frozen', None, None, FROZEN),
     (SINKAGE, {'sinkage': by(1000.0)}, 'sinkage_unit', None, approx(0.001), ''),
     (SINKAGE, {'sinkage': plus(0.0, 0.04, 0.0, 0.0)}, 'sinkage_zero', FR,
@@ -150,3 +159,66 @@ def test_the_fault_is_the_only_finding(channel, changes, fault, wheel, size, sai
     if said == FROZEN:
         assert float(finding.words.split(said)[1].split(' s')[0]) == approx(40.0, abs=0.5)
     assert finding.confidence >= 0.8
+
+
+def rounded(step):
+    return lambda values: step * np.round(values / step)
+
+
+def scattered(size):
+    return lambda v: v + size * np.random.default_rng(3).standard_normal(v.shape)
+
+
+def counted(rate):
+    """Counts of an encoder come and go: between them the rate is nought."""
+    turned = np.cumsum(rate, axis=0) / rolling.RATE
+    return np.diff(np.floor(turned / 0.25), axis=0, prepend=0.0) * 0.25 * rolling.RATE
+
+
+def one_dead_among_coarse(rate):
+    return np.where([False, False, True, False], 0.7, rounded(0.05)(rate))
+
+
+def jerks(torque):
+    """A hundred newton metres for an instant at starts and stops."""
+    starts = np.searchsorted(WHOLE.joints.seconds, [15.0, 65.0, 105.0])
+    return torque + 100.0 * np.isin(np.arange(len(torque)), starts)[:, None]
+
+
+def wandered(rate):
+    """A bias until the first start."""
+    return rate + np.outer(WHOLE.imu.seconds < 12.0, [0.0, 0.0, 0.05])
+
+
+ALIKE = [  # channel, what its fields become, the only faults that may be told, what is not told
+    (JOINTS, {'rate': rounded(0.1)}, {'rate_steps'}, ''),
+    (JOINTS, {'rate': rounded(0.02)}, set(), ''),
+    (JOINTS, {'rate': counted}, {'rate_steps'}, ''),
+    (JOINTS, {'rate': one_dead_among_coarse}, {'rate_frozen', 'rate_steps'}, ''),
+    (JOINTS, {'torque': jerks}, set(), ''),
+    (JOINTS, {'torque': rounded(1.0)}, set(), ''),
+    (IMU, {'rate': scattered(0.1)}, {'imu_noise'}, ''),
+    (IMU, {'rate': wandered}, set(), ''),
+    (REFERENCE, {'velocity': rounded(0.05)}, {'covariance'}, ''),
+    (SINKAGE, {'sinkage': rounded(0.005)}, set(), ''),
+    (SINKAGE, {'sinkage': scattered(0.06)}, set(), ''),
+    (SINKAGE, {'sinkage': lambda v: scattered(0.2)(0.0 * v + 0.05)}, set(), 'another unit'),
+]
+
+
+@pytest.mark.parametrize(('channel', 'changes', 'allowed', 'untold'), ALIKE)
+def test_what_looks_like_a_fault_is_none(channel, changes, allowed, untold):
+    sensor = getattr(WHOLE, channel)
+    changed = {field: change(getattr(sensor, field)) for field, change in changes.items()}
+    report = rolling.checked(**{channel: replace(sensor, **changed)})
+    assert {finding.fault for finding in report.findings} <= allowed
+    assert not untold or any(untold in entry.reason for entry in report.not_checked)
+    frozen = {finding.wheel for finding in report.findings if finding.fault == 'rate_frozen'}
+    assert frozen == ({RL} if 'rate_frozen' in allowed else set())
+
+
+def test_inches_of_sinkage_are_not_surely_centimetres():
+    depth = replace(WHOLE.sinkage, sinkage=WHOLE.sinkage.sinkage / 0.0254)
+    (told,) = rolling.checked(sinkage=depth).findings
+    assert told.fault == 'sinkage_unit' and told.confidence < 0.8
+    assert 'inches' in told.words and 'centimetres' in told.words
