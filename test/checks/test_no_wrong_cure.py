@@ -228,17 +228,6 @@ def test_a_track_that_no_second_gyro_bears_out_is_told_with_its_rival():
     assert finding.value == pytest.approx(2.0 * rolling.HALF_TRACK, rel=0.03)
 
 
-def test_one_odd_wheel_of_a_tricycle_is_no_radius_of_a_side():
-    """One wheel on each side and one, in two joints, on the centre line."""
-    rate, half = WHOLE.joints.rate.copy(), rolling.HALF_TRACK
-    rate[:, 2:] = rate[:, :2].mean(axis=1, keepdims=True)
-    radii = [1.07 * rolling.RADIUS, *[rolling.RADIUS] * 3]
-    places = {'wheels.x': [0.1, 0.1, -0.1, -0.2], 'wheels.y': [half, -half, 0.0, 0.0]}
-    rover = rolling.rover(**{'wheels.radius': radii}, **places)
-    report = checked(rover, joints=replace(WHOLE.joints, rate=rate))
-    assert not report.findings and 'wheels turn up to 7 %' in str(report.not_checked)
-
-
 @pytest.mark.parametrize('reversed_wheel', [False, True])
 def test_a_wheel_that_the_others_drag_keeps_the_sign_of_its_torque(reversed_wheel):
     """On firm ground a smaller radius brakes both ways by more than rolling costs."""
@@ -362,14 +351,6 @@ def test_a_turn_on_the_spot_reverses_no_axis_of_the_accelerometer():
     force = whole.imu.force.copy()
     force[:, 1] -= 8.0 * 0.03 * np.interp(whole.imu.seconds, time, yaw)
     assert 'force_axes' not in faults(checked(whole=whole, imu=replace(whole.imu, force=force)))
-
-
-@pytest.mark.parametrize('factor', [pytest.param(1.0, marks=pytest.mark.slow), math.degrees(1.0)])
-def test_wild_samples_of_a_gyro_are_told_in_any_unit(factor):
-    rate = factor * WHOLE.imu.rate
-    rate[500::900] += 20.0 * factor
-    told = [f for f in checked(imu=replace(WHOLE.imu, rate=rate)).findings if f.fault == 'imu_wild']
-    assert [f.words.split()[0] for f in told] == ['6'] and 'rad/s' in told[0].words
 
 
 def test_a_steering_joint_stands_in_for_no_wheel():
@@ -646,16 +627,6 @@ def test_a_yaw_that_a_shaky_imu_leaves_open_is_said_to_be_open():
     noise = 0.4 * np.random.default_rng(8).standard_normal(WHOLE.imu.force.shape)
     report = checked(imu=replace(WHOLE.imu, force=WHOLE.imu.force + noise))
     assert any(e.reason.startswith('yaw of the IMU below') for e in report.not_checked)
-
-
-def test_sides_that_are_swapped_have_one_cure():
-    """Mirrored places would mirror what another finding says of them."""
-    swapped = replace(
-        WHOLE.joints, rate=WHOLE.joints.rate[:, [1, 0, 3, 2]],
-        torque=WHOLE.joints.torque[:, [1, 0, 3, 2]],
-    )  # fmt: skip
-    told = [f for f in checked(joints=swapped).findings if f.fault == 'swapped_sides']
-    assert told and 'wheels.y' not in told[0].cure
 
 
 def test_wheels_of_a_side_that_hang_on_one_encoder_are_no_copies():

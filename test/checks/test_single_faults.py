@@ -222,3 +222,11 @@ def test_inches_of_sinkage_are_not_surely_centimetres():
     (told,) = rolling.checked(sinkage=depth).findings
     assert told.fault == 'sinkage_unit' and told.confidence < 0.8
     assert 'inches' in told.words and 'centimetres' in told.words
+
+
+def test_wild_samples_of_a_gyro_are_told_in_any_unit():
+    rate = np.degrees(WHOLE.imu.rate)
+    rate[500::900] += math.degrees(20.0)
+    told = rolling.checked(imu=replace(WHOLE.imu, rate=rate)).findings
+    (finding,) = (f for f in told if f.fault == 'imu_wild')
+    assert finding.words.startswith('6 samples') and 'rad/s' in finding.words
