@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The estimator core: typed measurements in, sets of estimates out; no ROS, no file format.
 
-A measurement loses the stated errors of its sensor, passes the checks of its values, then the watch
-over the clock, then the timeline, which orders by stamps and says when a set is due. Then estimator
-and judge of the inputs step side by side through the log; the judge has its say on the estimates,
-and the set passes the guard. The node and the replay differ in nothing but who calls ``add``, and
-the same calls give the same numbers.
+A measurement is corrected for the configured errors of its sensor, its values are checked, then its
+clock; the timeline sorts by stamp and decides when an output is due. Estimator and input monitor
+(`InputJudge`) then step through the log together; the monitor may change the estimates, and the
+output guard checks them. Node and replay differ only in who calls ``add``: the same calls give
+the same numbers.
 """
 
 from __future__ import annotations
@@ -47,17 +47,17 @@ from wheel_terra_estimator.estimation.timing.step_grid import StepGrid
 from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline, TimeSettings
 
 _FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
-"""What a step of the estimator may end with."""
+"""Numerical errors that a step may raise; they are caught and reported."""
 
 
 class InputJudge(Stepped, Protocol):
-    """What looks at the inputs beside the estimator, and has its say on the estimates."""
+    """Monitor of the inputs that runs beside the estimator and may change its estimates."""
 
     def judged(self, estimates: EstimateSet, health: Mapping[str, Any]) -> EstimateSet:
         """Return the estimates as they may be published."""
 
     def retune(self, configuration: Configuration) -> None:
-        """Go on with other tuning."""
+        """Continue with other tuning."""
 
 
 class EstimatorCore:
@@ -68,14 +68,14 @@ class EstimatorCore:
     configuration : Configuration
         Rover, soil, sensors, filter.
     estimator : Estimator, optional
-        What runs through the inputs; default: ``WheelSoilEstimator``.
+        Processes the inputs; default: ``WheelSoilEstimator``.
     judged_by : callable, optional
-        Makes of a configuration what judges the inputs, beside the estimator.
+        Creates the monitor of the inputs from a configuration.
 
     Attributes
     ----------
     warning : StuckMemory
-        The stuck warning, which stands over a new beginning of the estimator but not over `reset`.
+        The stuck warning; it survives a restart of the estimator but not `reset`.
     """
 
     def __init__(
@@ -109,13 +109,13 @@ class EstimatorCore:
         self._resets = 0
 
     def add(self, measurement: Measurement) -> list[EstimateSet]:
-        """Take a measurement and return the sets that it completed, oldest first.
+        """Process a measurement and return the estimates that became due, oldest first.
 
         Parameters
         ----------
         measurement : WheelOdometry, InertialReading, SinkageReading, LeavingAngleReading or \
 ReferenceVelocity
-            What came, in the order of arrival.
+            In the order of arrival.
         """
         channel = CHANNELS[type(measurement)]
         self._received[channel] += 1
@@ -125,16 +125,16 @@ ReferenceVelocity
         return self._follow(self._watch.judge(channel, checked, self._lags.present))
 
     def process_pending(self) -> None:
-        """Make the steps that the next set would have to make, while nobody waits for it.
+        """Compute pending steps in idle time, so that the next output has less to do.
 
-        Changes no number: a step that fails is made again, and reported, at the next set.
+        Changes no number: a step that fails is repeated, and reported, at the next output.
         """
         if self._timeline.released:
             with suppress(*_FAILURES), np.errstate(all='ignore'):
                 self._log.process_pending(self._timeline.released - 1)
 
     def flush(self) -> list[EstimateSet]:
-        """Return the sets that were held back for late inputs: no more will come."""
+        """Return the estimates held back for late inputs, at the end of the data."""
         sets = self._follow(self._watch.finish())
         return sets + self._flushed()
 
@@ -147,7 +147,7 @@ ReferenceVelocity
         self._end_run(keep_soil=False)
 
     def retune(self, configuration: Configuration) -> None:
-        """Go on from the present state with other tuning (``filter.*``, rates, lag, history).
+        """Continue from the present state with other tuning (``filter.*``, rates, lag, history).
 
         What is held back is released first. Wheels, sensors and soil must be the same.
         """
@@ -166,7 +166,7 @@ ReferenceVelocity
         self._timeline.retune(self._settings)
 
     def learned(self) -> dict[str, Any]:
-        """Return what was learned of soil and sensors: configuration key -> value, ``_std`` too.
+        """Return identified soil and sensor parameters: key -> value; ``_std`` = deviation.
 
         Empty where there were no estimates yet.
         """
@@ -175,25 +175,25 @@ ReferenceVelocity
         return dict(getattr(self._estimator, 'learned', dict)())
 
     def taught(self) -> tuple[Taught, ...]:
-        """Return what the drive has taught of soil and sensors; empty before estimates."""
+        """Return the information gained on soil and sensors; empty before estimates."""
         if self._latest is None:
             return ()
         return tuple(getattr(self._estimator, 'taught', tuple)())
 
     @property
     def rejected(self) -> Counter[tuple[str, str]]:
-        """Messages, or parts of them, that were left out, by (input topic, reason in words)."""
+        """Number of rejected messages, or parts of them, by (input topic, reason)."""
         counted = zip(self._checks.names, self._checks.rejected, strict=True)
         return Counter({(name, why): n for name, counts in counted for why, n in counts.items()})
 
     @property
     def repeated(self) -> dict[str, int]:
-        """Messages whose stamp was given before and that were merged, by input topic."""
+        """Number of messages merged because their stamp is repeated, by input topic."""
         counted = zip(self._checks.names, self._log.repeated, strict=True)
         return {name: count for name, count in counted if count}
 
     def health(self) -> dict[str, Any]:
-        """Return counters and words for diagnostics: key (with unit where it has one) -> value."""
+        """Return counters and texts for diagnostics: key (with its unit, if any) -> value."""
         result: dict[str, Any] = {}
         checks, log = self._checks, self._log
         for channel, name in enumerate(checks.names):
@@ -209,7 +209,7 @@ ReferenceVelocity
         result['clock_steps_back'] = self._clock_steps
         result['resets'] = self._resets
         own = self._estimator.health()
-        # The filter starts itself anew, or the core does it: both count.
+        # Restarts by the filter itself and by the core both count.
         own['filter_restarts'] = own.get('filter_restarts', 0) + result['filter_restarts']
         taught = {f'taught {each.name}': each.in_words() for each in self.taught()}
         return result | own | taught
@@ -248,12 +248,12 @@ ReferenceVelocity
         return sets
 
     def _flushed(self) -> list[EstimateSet]:
-        """Return the sets that were held back, not those of a clock that is ahead."""
+        """Return the estimates held back, except stamps of a clock that is ahead."""
         end = (self._lags.present or 0) + LONGEST_HOLD
         return [self._published(due) for due in self._timeline.flush(end)]
 
     def _ran_on(self) -> bool:
-        """Run to the last input, so that what is kept is the same whatever was run before."""
+        """Process all released inputs, so that the state is independent of earlier calls."""
         try:
             with np.errstate(all='ignore'):
                 if self._timeline.released:
@@ -284,7 +284,7 @@ ReferenceVelocity
         return [] if due is None else [self._published(due)]
 
     def _estimated(self, due: Due) -> EstimateSet | Exception:
-        """Bring estimator and judge to a set that is due, and ask both."""
+        """Advance estimator and input monitor to a due output; return estimates or error."""
         try:
             with np.errstate(all='ignore'):  # the guard looks at the result, number by number
                 self._log.run_to(due.entry)
@@ -296,7 +296,7 @@ ReferenceVelocity
             return error
 
     def _published(self, due: Due) -> EstimateSet:
-        """Return the set that is due as it goes out."""
+        """Return the estimates that are due, as published."""
         stamp, silent = due.stamp, due.silent
         estimates, failed = self._guard.repaired(stamp, self._estimated(due))
         faults = self._faults(silent)
@@ -318,7 +318,7 @@ ReferenceVelocity
         return estimates
 
     def _faults(self, silent: bool) -> dict[str, str]:
-        """Return what became of the inputs since the last set, in words."""
+        """Return faults of the inputs since the last output: name -> message."""
         faults, names = {}, self._checks.names
         if self._deferred:
             self._deferred = False

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Filter, classes and warnings of one rover: one step per stamp, estimates on demand.
 
-Between two cycles of the filter (``filter.period``) only sums are kept and the speed is carried on,
-so that wheel odometry at 100 Hz costs little more than at 10 Hz. `WheelSoilEstimator.run_cycle`
-reads top to bottom: predict, fuse what came since the last cycle, work out the outputs.
+Between two cycles of the filter (``filter.period``) readings are only summed and the speed is
+extrapolated, so that wheel odometry at 100 Hz costs little more than at 10 Hz. A cycle is
+`WheelSoilEstimator._run_cycle`: predict, fuse the readings since the last one, compute outputs.
 """
 
 from __future__ import annotations
@@ -100,21 +100,21 @@ from wheel_terra_estimator.estimation.words import COST
 _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
 _TURN = 0.1
-"""Lateral motion above which the yaw balance constrains the pulls [-]."""
+"""Lateral speed ratio above which the yaw moment balance constrains the pulls [-]."""
 _SHARP_TURN = 0.3
-"""The same above which slip comes from turning and says nothing of an entrapment."""
-_ANGLE_KNOWN = 0.6  # deviation of slip angles up to which they tell the lateral forces [rad]
+"""Lateral speed ratio above which slip is due to turning, so no symptom of entrapment [-]."""
+_ANGLE_KNOWN = 0.6  # slip angle std up to which lateral forces are used [rad]
 
 
 class Instant(NamedTuple):
-    """What `WheelSoilEstimator` judged at a stamp and a smoother judges anew."""
+    """Inputs of the outputs at one stamp, from which a smoother recomputes them."""
 
     time: float  # [s] since the start of the run
     motion: BodyMotion
     sources: Sources
-    """Speed as filtered; mean and covariance left out: they are the smoother's business."""
+    """Speed as filtered; mean and covariance are empty: the smoother supplies its own."""
     cycle: SpeedAndVariance  # of the filter at its last cycle
-    usual: SpeedAndVariance | None  # by the slip that is usual at such torques
+    usual: SpeedAndVariance | None  # by the typical slip at the measured torques
 
 
 class _Clock(NamedTuple):
@@ -128,9 +128,9 @@ class _Clock(NamedTuple):
 
 
 class WheelSoilEstimator:
-    """Estimator of one rover; sees stamps in order and only checked numbers.
+    """Estimator of one rover; stamps must be in order and measurements checked.
 
-    `buffer` keeps what a smoother needs.
+    `buffer` records the states and transitions that a smoother needs.
     """
 
     def __init__(self, configuration: Configuration, buffer: HistoryBuffer | None = None) -> None:
@@ -200,7 +200,7 @@ class WheelSoilEstimator:
     # -- Runs and snapshots ----------------------------------------------------------------------
 
     def begin_run(self, stamp: int, keep_soil: bool) -> None:
-        """Start anew at a stamp [ns]; with `keep_soil` soil and biases are kept, widened."""
+        """Restart at a stamp [ns]; `keep_soil` keeps soil and biases with inflated covariance."""
         soil, gyro = self._ekf.snapshot(), self._zero_velocity.snapshot()
         rejected = self._reference.state.rejected, self._sinkage.state.rejected
         stated = self._inertial.stated
@@ -216,7 +216,7 @@ class WheelSoilEstimator:
             self._sinkage.state = self._sinkage.state._replace(rejected=rejected[1])
 
     def snapshot(self) -> tuple[Any, ...]:
-        """Return what `restore` needs to come back to this state."""
+        """Return a copy of the complete state, for `restore`."""
         return self._clock, tuple([part.snapshot() for part in self._parts])
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
@@ -265,7 +265,7 @@ class WheelSoilEstimator:
                 self._steering.update(inputs.wheel_odometry.steering)
 
     def _begin_with(self, stated: StatedNoise, before: StatedNoise = NOTHING_STATED) -> None:
-        """Start from what the messages of the IMU state of their noise."""
+        """Reset the variance of the gravity bias to the orientation noise that the IMU reports."""
         if stated.orientation_std != before.orientation_std:
             std = gravity_bias_std(self._rover, self._sensors, stated.orientation_std)
             self._ekf.set(GRAVITY_BIAS, float(self._ekf.mean[GRAVITY_BIAS]), std**2)
@@ -277,7 +277,7 @@ class WheelSoilEstimator:
     # -- One cycle of the filter -----------------------------------------------------------------
 
     def _run_cycle(self, time: float, reference: ReferenceVelocity | None) -> None:
-        """Predict to a time [s], fuse what came since the last cycle, work out the outputs."""
+        """Predict to a time [s], fuse the readings since the last cycle, compute the outputs."""
         ekf, layout = self._ekf, self._layout
         cycle = self._begin_cycle(time)
         sinkage_before = ekf.mean[layout.sinkage].copy()
@@ -298,7 +298,7 @@ class WheelSoilEstimator:
         self._unloaded.update(cycle)
         forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
         if cycle.still:
-            # They form anew.
+            # Contacts form again after a standstill.
             self._contact_age.stop()
             self._linearisation.reset()
             self._sinkage_process.forget_slopes()
@@ -462,16 +462,16 @@ class WheelSoilEstimator:
         self._ekf.predict(prediction.mean, prediction.F, prediction.Q)
 
     def _trusted(self, window: InertialWindow, time: float) -> InertialWindow:
-        """Return the IMU readings that may move the speed: none where nothing else shows slip.
+        """Return the IMU readings that may change the speed: none if slip is not observable.
 
-        An accelerometer alone cannot tell slip from its own drift: at 0.02 m/s^2 it takes seconds
-        to make a rover at 5 cm/s stand.
+        Without references and torques slip cannot be separated from accelerometer drift:
+        0.02 m/s^2 would stop a rover at 5 cm/s within seconds.
         """
         shown = self._reference.known(time) or self._wheels.torque_known(time)
         return window if shown else InertialWindow()
 
     def _note_ruts(self, dt: float) -> None:
-        """Note how deep the ground is pressed that the wheels meet, after `dt` [s]."""
+        """Record the rut depths along the travel of the last `dt` [s], for following wheels."""
         x = self._ekf.mean
         speed = float(x[SPEED])
         self._ruts.advance(
@@ -499,7 +499,7 @@ class WheelSoilEstimator:
     def _force_rows(
         self, cycle: Cycle
     ) -> tuple[ContactForces, SumOfPulls | None, Floats, list[Row]]:
-        """Return forces, what is known of their sum, pulls of standing wheels, and the rows."""
+        """Return contact forces, measured sum of pulls, pulls of locked wheels, and the rows."""
         ekf = self._ekf
         forces = self._linearisation.update(ekf.mean, cycle, self._ruts.state.depth)
         speed_std = math.sqrt(float(ekf.covariance[SPEED, SPEED]))
@@ -529,7 +529,7 @@ class WheelSoilEstimator:
         return forces, total, pulls, [*rows, balance]
 
     def _depth_read(self, time: float) -> bool:
-        """Say whether sensors tell the sinkage of most wheels."""
+        """Return whether the sinkage of most wheels is measured."""
         return 2 * len(self._sinkage.unread(time)) < self._rover.wheel_count
 
     # -- What it means ---------------------------------------------------------------------------
@@ -563,7 +563,7 @@ class WheelSoilEstimator:
                     wheel.std,
                     rim,
                     abs(rim) > rover.rest_speed and not wheel.resting,
-                    # A wheel that stands is held, or dragged, in the direction of the others.
+                    # A locked wheel is driven, or dragged, in the direction of the others.
                     driving_share(torque, limit, rim if abs(rim) > rover.rest_speed else onward),
                     sinkage[i],
                     rover.rim_radius[i],
@@ -597,7 +597,7 @@ class WheelSoilEstimator:
     def _learn_slopes(
         self, time: float, slips: tuple[WheelSlip, ...], rims: Floats, lateral_motion: float
     ) -> None:
-        """Learn what slopes cost, from the wheels that turn straight on settled contacts."""
+        """Update slip as a function of slope, while driving straight on steady contacts."""
         since = time - self._slopes.state.time
         inertial = self._inertial.state
         turning = [
@@ -619,7 +619,7 @@ class WheelSoilEstimator:
         )
 
     def _follow_sideways(self, time: float, body: BodyMotion, rims: Floats) -> None:
-        """Follow how the rover slides sideways."""
+        """Update the lateral motion (side slip) from loads, pulls and soil strength."""
         loads, ekf, soil = self._loads.state, self._ekf, self._configuration.soil
         strength = math.exp(float(ekf.mean[SHEAR_STRENGTH]))
         self._sideways.update(
@@ -652,7 +652,7 @@ class WheelSoilEstimator:
         return sideways
 
     def _instant(self, time: float, body: BodyMotion) -> Instant:
-        """Return what a smoother judges anew."""
+        """Return what a smoother needs to recompute the outputs of a stamp."""
         ekf, nothing = self._ekf, np.empty(0)
         rims = self._yaw_compensated(self._wheels.rim_speeds(time))
         speed, variance = self._filtered_speed(rims)
@@ -673,7 +673,7 @@ class WheelSoilEstimator:
         return RimSpeeds.of(rims, self._turning.state.yaw_rate, self._steering.state.headings)
 
     def _filtered_speed(self, rims: RimSpeeds) -> SpeedAndVariance:
-        """Return speed [m/s] and variance of the filter, carried on from its last cycle."""
+        """Return speed [m/s] and variance of the filter, extrapolated from the last cycle."""
         time = self._clock.time
         window = self._trusted(self._inertial.state.window, time)
         slip_known = self._reference.known(time)
@@ -682,10 +682,10 @@ class WheelSoilEstimator:
         )
 
     def _usual_speed(self, rims: RimSpeeds) -> SpeedAndVariance | None:
-        """Return speed [m/s] and variance by the slip that is usual at such torques.
+        """Return speed [m/s] and variance by the typical slip at the measured torques.
 
-        None with a reference velocity, without torques, where wheels do not roll on straight or
-        the ground holds the rover.
+        None with a reference velocity, without torques, in turns, on forming contacts, or while
+        the stuck assessment says that the ground holds the rover.
         """
         time, turns = self._clock.time, self._turning.state.lateral_motion > _SHARP_TURN
         straight = self._contact_age.settled and not turns
@@ -701,7 +701,7 @@ class WheelSoilEstimator:
     # -- Outputs ---------------------------------------------------------------------------------
 
     def estimates(self) -> EstimateSet:
-        """Return all outputs at the present stamp; nothing changes."""
+        """Return all outputs at the present stamp; the state is not changed."""
         time = self._clock.time
         inertial = self._inertial.state
         silent = time - inertial.time > self._rover.silence
@@ -719,7 +719,7 @@ class WheelSoilEstimator:
         return self._outputs.estimate_set(self._sources(), faults)
 
     def _sources(self) -> Sources:
-        """Return what the outputs of the present stamp follow from."""
+        """Return the quantities from which the outputs of the present stamp are computed."""
         time, loads = self._clock.time, self._loads.state
         rims = self._wheels.rim_speeds(time)
         speed, variance = self._clock.speed or self._present_speed(rims)
@@ -744,13 +744,13 @@ class WheelSoilEstimator:
         )
 
     def learned(self) -> dict[str, Any]:
-        """Return what was learned: configuration key -> value, deviations ``_std`` too."""
+        """Return identified parameters: configuration key -> value; ``_std`` = deviation."""
         ekf = self._ekf
         zero, climbed = self._zero_velocity.state.zero, self._climb.state
         return self._learned.values(ekf.mean, ekf.covariance, zero, climbed)
 
     def taught(self) -> tuple[Taught, ...]:
-        """Return what the drive has taught of each parameter so far."""
+        """Return the information gained on each parameter in this drive so far."""
         ekf = self._ekf
         return self._teaching.judged(with_model_errors(ekf.mean, ekf.covariance, self._layout))
 

@@ -1,12 +1,12 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether innovations are as large as foreseen, and how many cycles see the same ground."""
+"""Consistency of innovations (NIS), and number of cycles with correlated model errors."""
 
 from __future__ import annotations
 
 from wheel_terra_estimator.estimation.scalars import TINY, clipped, known
 
-_GAIN = 0.05  # of the mean per reading: it goes over the last 20
+_GAIN = 0.05  # of the running mean, per reading: a memory of 20 readings
 _LARGEST = 100.0  # NIS that enters the mean: one outlier does not fill it
 CONSISTENT = 1.0
 """Normalised innovation squared (NIS) of a scalar reading, on average, in a filter that is right
@@ -17,22 +17,22 @@ _MOST_CYCLES = 100.0
 
 
 def smoothed_nis(mean: float | None, nis: float, gain: float = _GAIN) -> float:
-    """Return the running mean of the NIS of a channel; None = nothing was read before."""
+    """Return the running mean of the NIS of a channel; None = no reading before."""
     old = CONSISTENT if mean is None else mean
     return (1.0 - gain) * old + gain * min(nis, _LARGEST)
 
 
 def excess(mean_nis: float | None) -> float:
-    """Return by how much innovations are larger than foreseen, 1 = not at all (Birge 1932)."""
+    """Return the mean NIS (observed over predicted variance), at least 1 (Birge 1932)."""
     return CONSISTENT if mean_nis is None else max(mean_nis, CONSISTENT)
 
 
 def correlated_cycles(rims: tuple[float, ...], dt: float) -> float:
-    """Return how many cycles of length `dt` [s] are one piece of information.
+    """Return how many cycles of length `dt` [s] share the model error of the same ground.
 
-    Taken as many, each linearised anew at its own noisy state, they leave T(s) = const no ridge:
-    strength, K and slip run along it to anywhere (the inconsistency known from EKF-SLAM, Julier and
-    Uhlmann 2001).
+    Fused as independent, each linearised at another noisy state, they give spurious information
+    along the unobservable direction T(s) = const, in which strength, K and slip then drift (the
+    inconsistency known from EKF-SLAM, Julier and Uhlmann 2001).
     """
     travel = dt * max((abs(rim) for rim in known(rims)), default=0.0)
     return clipped(SAME_GROUND / max(travel, TINY), 1.0, _MOST_CYCLES)

@@ -21,27 +21,27 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 # Tuned on simulated drives, seeds 1000 to 1019.
-_WEIGHT_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
-_GROUND_STD = 0.04  # of the weight in a cycle: noise beyond it is that of no ground
+_WEIGHT_STD = 0.005  # of the weight: error of curvature, ruts and mass
+_GROUND_STD = 0.04  # of the weight, per cycle: noise beyond it is vibration, not ground
 _SIDE_SHARE = 0.5
 """Of the load: the side force that a steered wheel may give, which acts along the body by the
 sine of its angle (friction angle of sand)."""
-_MODEL_SHARE = 0.1  # of the load: pull that a doubt of a shear model leaves open
+_MODEL_SHARE = 0.1  # of the load: pull error at a shear-model deviation of 1
 
 
 class SumOfPulls(NamedTuple):
-    """What the specific force says of the sum of the pulls."""
+    """Sum of the pulls by the accelerometer (mass times specific force)."""
 
     along: float  # [N] if the body lay along the ground
-    weight: float  # [N] that a tilt of the body by its ruts turns into it
+    weight: float  # [N] of which a tilt of the body by its ruts adds a component
     variance: float  # [N^2]
-    vibration: float  # part of it that is new in each cycle, also over the same ground
+    vibration: float  # part of it that is white, independent from cycle to cycle
 
 
 class ForceBalance(Component['float | None']):
     """Turns the balance of forces along the ground into a row of the update.
 
-    Keeps the running mean of its NIS, None = none came yet.
+    Keeps the running mean of its NIS, None = no reading yet.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class ForceBalance(Component['float | None']):
         self._rover, self._sensors, self._layout = rover, sensors, layout
 
     def sum_of_pulls(self, cycle: Cycle, curvature: float) -> SumOfPulls:
-        """Return what the mean specific force of a cycle says of the pulls.
+        """Return the sum of the pulls by the mean specific force of a cycle.
 
         On curved ground (slope per travel, [rad/m]) the wheels' own slopes differ from the body's.
         """
@@ -86,10 +86,10 @@ class ForceBalance(Component['float | None']):
         model_variance: float,
         repeats: float,
     ) -> Row:
-        """Return the row of a cycle; the forces were worked out at the state of the filter.
+        """Return the row of a cycle; `forces` are evaluated at the present state of the filter.
 
-        `stationary` has None for a wheel that turns; `model_variance` is that of the shear model,
-        over its square [-]; `repeats` cycles are one piece of information.
+        `stationary` has None for a wheel that turns; `model_variance` is the relative variance of
+        the shear model [-]; the errors of `repeats` cycles are one and the same (same ground).
         """
         headings, loads = cycle.headings, cycle.loads.load
         if headings.steered:
@@ -120,6 +120,6 @@ class ForceBalance(Component['float | None']):
 
 
 def rut_tilt(rover: Rover, layout: StateLayout, mean: FloatArray) -> float:
-    """Return by how much ruts of unequal depth pitch the body up against the ground [rad]."""
+    """Return the nose-up pitch of the body against the ground by unequal ruts [rad]."""
     sinkage = mean[layout.sinkage].tolist()
     return sum(gain * z for gain, z in zip(rover.rut_tilt, sinkage, strict=True))

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Update with a reference velocity; the state is opened to references that keep disagreeing."""
+"""Update with a reference velocity; inflates the speed variance if outliers agree."""
 
 from __future__ import annotations
 
@@ -20,48 +20,48 @@ from wheel_terra_estimator.estimation.scalars import clipped
 
 _LEAST_GAP = 0.01  # between references [s]
 _RISE = 1.76
-"""By which a limit of chi square (one degree of freedom) rises for each e-th part of what exceeds
-it by chance, from 5 to 0.05 % [-]."""
+"""Rise of the chi-square quantile (one degree of freedom) for each factor of e by which the false
+alarm rate falls, between 5 and 0.05 % [-]."""
 
 # Tuned on simulated drives, seeds 1000 to 1019, and the nine snow immobilisations.
 _KNOWN_TIME = 5.0
 """Age [s] up to which a reference separates slip from soil; after that the soil is held."""
 _FRESH_TIME = 10.0
-"""Age [s] up to which the speed rests on more than a guess, for the stuck warning."""
+"""Age [s] up to which the stuck warning takes the speed as measured."""
 _LONGEST_GAP = 10.0  # between references that is remembered [s]
 _GAP_GAIN = 0.3  # smoothing of it, per reference
-_MOVING_STD = 3.0  # deviations from 0 of a reference that moves
+_MOVING_STD = 3.0  # deviations from 0 of a reference that shows motion
 _MOVING_REST = 2.0  # times ``rest_speed``
-_SLIDE_GAPS = 2.0  # gaps for which a slide on standing wheels is believed
+_SLIDE_GAPS = 2.0  # gaps for which a slide on locked wheels is assumed to last
 _SHORTEST_SLIDE = 1.0  # [s]
 _MEAN_COUNT = 6.0
 """References over which their innovations' mean is taken."""
-_MOST_DEVIATIONS = 3.0  # deviations that one reference counts for in it
+_MOST_DEVIATIONS = 3.0  # limit of one normalised innovation in that mean
 _MOST_VARIANCE_FACTOR = 100.0
 _RUN_EXCESS = 4.0
-"""Square of that mean over its variance above which the references run to one side."""
+"""Square of that mean over its variance above which the innovations are biased [-]."""
 _BEYOND_RIM = 1.5  # times the fastest rim speed: no rover drives faster than its wheels
 _BEYOND_STD = 5.0
 _SAME_STD = 4.0  # deviations within which two references disagree by the same amount
-_COUNT_BEYOND = 4  # references beyond the rim speed that must agree to be believed
-_COUNT = 2  # references that must agree to be believed
-_GATE = 4.0  # to which an outlier is weakened (squared deviations)
+_COUNT_BEYOND = 4  # consistent outliers beyond the rim speed that are accepted
+_COUNT = 2  # consistent outliers that are accepted
+_GATE = 4.0  # to which the NIS of an outlier is reduced
 _GATE_BEYOND = 0.01
 
 
 class ReferenceState(NamedTuple):
-    """What is remembered of the references."""
+    """Memory of past references."""
 
     time: float = -math.inf  # of the last one [s]
     slip_time: float = -math.inf
     """Of the last one that shows slip [s]: wheels turned, and it was not rejected."""
     slip_time_before: float = -math.inf  # of the one before it [s]
     gap: float = 10.0  # between them, smoothed [s]
-    sliding_until: float = -1.0  # a slide on standing wheels is believed until then [s]
+    sliding_until: float = -1.0  # a slide on locked wheels is assumed until then [s]
     rejected: int = 0
     rejected_in_a_row: int = 0
     last_rejected: float = 0.0  # innovation of the last rejected one [m/s]
-    nis: float | None = None  # running mean; None = none came yet
+    nis: float | None = None  # running mean; None = no reading yet
     mean_innovation: float = 0.0
     """Running mean of the innovations, each over its deviation."""
 
@@ -78,13 +78,13 @@ class ReferenceUpdate(Component[ReferenceState]):
     ) -> None:
         super().__init__(ReferenceState())
         self._error = layout.reference_error
-        self._reading = np.zeros(layout.size)  # of speed and of the error that lasts
+        self._reading = np.zeros(layout.size)  # row h: speed plus lasting (correlated) error
         self._reading[SPEED if self._error is None else [SPEED, self._error]] = 1.0
         self._gate = float(configuration.filter.gate)
         self._rover, self._sensors = rover, sensors
 
     def predict(self, prediction: Prediction, dt: float) -> None:
-        """Add the error that lasts to a prediction over `dt` [s], if there is one."""
+        """Predict the lasting error over `dt` [s] as a Gauss-Markov process, if in the state."""
         if self._error is None:
             return
         mean, F, Q = prediction
@@ -95,7 +95,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         Q[entry, entry] = sensors.reference_wander_std**2 * (1.0 - hold * hold)
 
     def innovation(self, ekf: GatedFilter, reference: ReferenceVelocity) -> tuple[float, float]:
-        """Return what a reading says beyond the state [m/s], and the variance of the state's."""
+        """Return the innovation [m/s] and the variance h P h' of its prediction."""
         if self._error is None:
             state, variance = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
         else:
@@ -104,26 +104,25 @@ class ReferenceUpdate(Component[ReferenceState]):
         return reference.forward - state, variance
 
     def known(self, time: float) -> bool:
-        """Say whether a reference that shows slip is recent enough to separate it from the soil."""
+        """Return whether the last reference that shows slip is younger than `_KNOWN_TIME`."""
         return time - self.state.slip_time < _KNOWN_TIME
 
     def known_twice(self, time: float) -> bool:
-        """Say whether two such references are recent: a mean over a start is the first one."""
+        """Return whether the last two are; the first may average over a start."""
         return time - self.state.slip_time_before < _KNOWN_TIME
 
     def fresh(self, time: float) -> bool:
-        """Say whether the present speed rests on a reference."""
+        """Return whether the last reference is younger than `_FRESH_TIME`."""
         return time - self.state.time < _FRESH_TIME
 
     @property
     def model_variance_factor(self) -> float:
         """Factor on the variance of the wheel-soil models [-]: 1 while the references scatter.
 
-        Innovations of a filter that is right are white. Where they keep to one side for several
-        references, the models hold the speed against them; a gate on single ones cannot see it.
-        The running mean of white innovations has variance 1 / (2 n - 1) over n. Where references
-        come faster than one a second it counts less, so that white ones pass the limit of a run as
-        seldom a second as slow ones do.
+        Innovations of a consistent filter are white. If several keep one sign, model errors bias
+        the speed, which a gate on single innovations cannot detect.
+        The running mean of white innovations has variance 1 / (2 n - 1) over n. Above one
+        reference a second the limit rises, so that the rate of false alarms per second is kept.
         """
         square = self.state.mean_innovation**2 * (2.0 * _MEAN_COUNT - 1.0)
         gap = clipped(self.state.gap, _LEAST_GAP, 1.0)
@@ -140,10 +139,10 @@ class ReferenceUpdate(Component[ReferenceState]):
         fastest_rim: float,
         variance: float,
     ) -> bool:
-        """Fuse a reference velocity at a time [s]; return whether the speed was opened to it.
+        """Fuse a reference velocity at a time [s]; return whether its variance was inflated.
 
-        `still`: all wheels stand; `fastest_rim` is the greatest rim speed [m/s], `variance` that of
-        the reading as stated, or more where more is seen [(m/s)^2].
+        `still`: no wheel turns; `fastest_rim` is the greatest rim speed [m/s], `variance` that of
+        the reading, as stated or, if greater, as observed [(m/s)^2].
         """
         state = self.state
         if state.time > -math.inf:
@@ -159,7 +158,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         score = clipped(residual / math.sqrt(total), -most, most)
         state = self.state
         state = state._replace(nis=smoothed_nis(state.nis, nis))
-        if nis <= self._gate or state.rejected_in_a_row:  # a single wild one is no bias
+        if nis <= self._gate or state.rejected_in_a_row:  # a single outlier is no bias
             mean = state.mean_innovation
             state = state._replace(mean_innovation=mean + (score - mean) / _MEAN_COUNT)
         opened = False
@@ -191,16 +190,16 @@ class ReferenceUpdate(Component[ReferenceState]):
         return opened
 
     def variance(self, reference: ReferenceVelocity) -> float:
-        """Return the variance of a reading, the sensor's where it states none [(m/s)^2]."""
+        """Return the variance that a reading states, by default the sensor's [(m/s)^2]."""
         sensors = self._sensors
         stated = reference.variance
         variance = stated if stated > 0.0 else sensors.reference_std**2
         return max(variance, sensors.reference_std_floor**2)
 
     def _note_slide(self, ekf: GatedFilter, time: float, forward: float, variance: float) -> None:
-        """Wheels that stand: the references agree with rest, or the rover slides on them.
+        """With all wheels at rest, decide between standstill and a slide on locked wheels.
 
-        A single one that moves may be wild: the slide is believed from the second in a row.
+        One reference that shows motion may be an outlier: two in a row make a slide.
         """
         noise = _MOVING_STD * math.sqrt(variance)
         until = time

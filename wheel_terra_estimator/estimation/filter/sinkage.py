@@ -47,7 +47,7 @@ class SinkageUpdate(Component[SinkageUpdateState]):
         self._layout = layout
 
     def unread(self, time: float) -> list[int]:
-        """Return the wheels whose sinkage was not read of late."""
+        """Return the indices of the wheels without a sinkage reading in the last `_AGE`."""
         return [i for i, when in enumerate(self.state.time) if time - when >= _AGE]
 
     def update(
@@ -58,10 +58,10 @@ class SinkageUpdate(Component[SinkageUpdateState]):
         reading_variance: float,
         open_std: FloatArray,
     ) -> list[Row]:
-        """Return the rows of the readings of a cycle; opens the state where spikes are none.
+        """Return the rows of the readings of a cycle; inflates the covariance if outliers repeat.
 
-        `reading_variance` is that of one reading [m^2], `open_std` (n,) what digging leaves open
-        of the sinkages, beyond the state [m].
+        `reading_variance` is that of one reading [m^2], `open_std` (n,) the deviation of the
+        sinkages by unmodelled slip-sinkage, not in the covariance [m].
         """
         if not any(sums.readings):
             return []

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How each sinkage goes on: it relaxes over travel to where the bearing law carries the load."""
+"""Process model of sinkage: it relaxes over travel to where the bearing law carries the load."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ _FIRST_RATE_STD = 1.0  # [m/s], before anything is known
 
 
 class SinkageState(NamedTuple):
-    """What the prediction of the sinkages remembers."""
+    """Memory of the prediction of the sinkages."""
 
     slopes: FloatArray
     """(2, n) smoothed derivatives of ln(load carried) by v / rim speed and by n1; nan = none."""
     rate: Floats  # of each wheel [m/s]
     rate_std: Floats
     dug: FloatArray
-    """(n,) what digging, of which the law knows nothing, leaves open of each sinkage [m]."""
+    """(n,) deviation of each sinkage by slip-sinkage that the bearing law does not model [m]."""
 
 
 class _Motion(NamedTuple):
@@ -89,7 +89,7 @@ class SinkageProcess(Component[SinkageState]):
         self._leaving_angle_std = leaving_angle_std
 
     def forget_slopes(self) -> None:
-        """Take the derivatives anew: the wheels stand."""
+        """Reset the smoothed derivatives, when the wheels stand."""
         self.state = self.state._replace(slopes=self._start.slopes)
 
     def predict(self, prediction: Prediction, x: FloatArray, cycle: Cycle) -> float:
@@ -149,7 +149,7 @@ class SinkageProcess(Component[SinkageState]):
             [np.log(carried[0] / carried[1]) / _RATIO_STEP, np.abs(slip) * log_depths[0]]
         )
         slopes = smoothed_slopes(self.state.slopes, raw, _SLOPE_KEEP)
-        # What the law does not know: a share of the sinkage per contact length, and digging.
+        # Model error: a share of the sinkage per contact length, and unmodelled slip-sinkage.
         spun = np.maximum(slip, 0.0) ** 2 * rim * dt
         dug = (self.state.dug + _OPEN_DIGGING * spun) * np.exp(-np.abs(speed) * dt / length)
         self.state = self.state._replace(
@@ -177,7 +177,7 @@ class SinkageProcess(Component[SinkageState]):
     ) -> None:
         """Keep the rate of change since `before`, the (n,) sinkages at the start of the cycle.
 
-        What digging leaves open is so of the wheels whose sinkage is `unread`.
+        The deviation by unmodelled slip-sinkage is kept for wheels whose sinkage is `unread`.
         """
         dug = np.zeros(len(before))
         dug[unread] = self.state.dug[unread]

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How soil and errors of the shear model go on: they change with travel, not with time."""
+"""Process model of soil and shear-model errors: they change with travel, not with time."""
 
 from __future__ import annotations
 

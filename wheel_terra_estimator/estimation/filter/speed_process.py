@@ -1,15 +1,15 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How body speed goes on between reference velocities: with the wheels and the accelerometer.
+"""Process model of the body speed: propagated with the wheels and with the accelerometer.
 
 Two predictions of the change of speed over a step, each with its own variance, are combined by
 their inverse variances:
 
-* with the wheels: v / rim speed changes only with the terrain: by what the ground asks more, times
-  the learned slip per demand, and by a random walk per rim travel. Exact through ramps, stops and
-  restarts of a slow rover; poor where a fast rover's wheels spin up.
-* with the accelerometer: dv = (f_x - g_x - bias) dt. Good for fractions of a second; its error per
-  second is nothing to 1 m/s and everything to 5 cm/s.
+* with the wheels: v / rim speed changes only with the terrain: by the change of the required
+  traction coefficient times the slip per demand (state), and by a random walk over rim travel.
+  Exact through ramps, stops and restarts of a slow rover; poor where fast wheels spin up.
+* with the accelerometer: dv = (f_x - g_x - bias) dt. Good for fractions of a second; its error in a
+  second is negligible at 1 m/s but as large as a speed of 5 cm/s.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ change, the slip does."""
 _MOST_WALK = 0.6  # of it where contacts change [1/sqrt(m)]
 _WATCHED_SHARE = 0.5
 """Of ``filter.ratio_walk`` where sinkages would show such a change."""
-_DEMAND_ERROR = 0.3  # of what the demand changes, over that change [-]
+_DEMAND_ERROR = 0.3  # error of the slip due to a change of demand, over that slip [-]
 _SLIP_PER_DEMAND_WALK = 0.2  # [1/sqrt(m)]
 _INFLATION_RATE = 2.0
 """Process noise of a change of speed, over its square, per second [1/s]: it may come within
@@ -229,10 +229,10 @@ class SpeedProcess(Component[SpeedState]):
         )
 
     def follow_contacts(self, travel: float, digging: float, *, reference_known: bool) -> None:
-        """Note how far the slip may walk: farther where contacts change, `travel` [m] from a start.
+        """Set the random walk of v / rim speed, greater where contacts change.
 
-        `digging` is the sinkage that most wheels gain over rim travel [m/m]; nan = most are not
-        read. Without a reference the walk between changes is not narrowed.
+        `travel` is the travel since a start [m], `digging` the sinkage that most wheels gain over
+        rim travel [m/m], nan = not measured. Without a reference the steady walk is not reduced.
         """
         walk = self._walk
         start = _START_WALK * math.exp(-travel / _START_WALK_TRAVEL)
@@ -252,10 +252,10 @@ class SpeedProcess(Component[SpeedState]):
     def step(
         self, time: float, rims: RimSpeeds, window: InertialWindow, *, inflated: bool
     ) -> SpeedStep:
-        """Return how the speed goes on from the last cycle to a time [s].
+        """Return the prediction of the speed from the last cycle to a time [s].
 
-        `inflated`: changing contacts widen it. Without a reference velocity they must not: the
-        speed would follow soil models that are off by as much.
+        `inflated`: changing contacts inflate its variance. Not without a reference velocity: the
+        speed would then follow soil models whose errors are as large.
         """
         state = self.state
         by_wheels = self.by_wheels(
@@ -266,7 +266,7 @@ class SpeedProcess(Component[SpeedState]):
     def predict(self, prediction: Prediction, step: SpeedStep, cycle: Cycle) -> None:
         """Add speed, gravity bias and slip per demand to a prediction.
 
-        `step` says how the speed goes on without a change of what the ground asks.
+        `step` predicts the speed for an unchanged required traction coefficient (demand).
         """
         dt, rim, demand_change = cycle.dt, cycle.yaw_compensated.typical, cycle.demand_change
         mean, F, Q = prediction
@@ -292,13 +292,13 @@ class SpeedProcess(Component[SpeedState]):
         state = self.state
         before, now = state.rims.typical, rims.typical
         if isnan(before) or isnan(now):
-            # No wheels: hold the speed, open at the rate at which a rover may brake.
+            # No wheel rates: constant speed, with a variance that allows for braking.
             variance = (_COAST_DRIFT * dt) ** 2 + (_COAST_WALK**2) * dt
             return SpeedStep(1.0, 0.0, 0.0, variance)
         change = now - before
         mean = 0.5 * (abs(before) + abs(now))
         variance = mean * mean * state.ratio_walk**2 * mean * dt
-        # Sides against each other slip apart, and the body moves by half of the difference.
+        # Opposed sides slip independently; the body moves by half of the difference.
         magnitude = rims.magnitude
         opposed = max(magnitude**2 - now**2, 0.0)
         variance += 0.5 * opposed * _MOST_WALK**2 * magnitude * dt
@@ -319,20 +319,20 @@ class SpeedProcess(Component[SpeedState]):
         covered = window.duration
         if covered < _LEAST_COVERED * dt or dt <= 0.0:
             return None
-        # A vibrating rover is as noisy as it is seen to be, whatever its file states.
+        # Vibration: observed noise counts where it exceeds the configured one.
         stated, _ = self.acceleration_noise(window.stated)
         noise = max(stated, window.noise_density) * excess(self.state.felt_nis) ** 2
-        # A stretch that the IMU left out is filled with its mean.
+        # Gaps of the IMU are filled with the mean acceleration of the step.
         return window.speed_change * dt / covered, noise * dt
 
     def learn_bias(self, ekf: GatedFilter, cycle: Cycle, step: SpeedStep) -> float:
-        """Fuse that wheels and accelerometer tell of the same change of speed.
+        """Fuse the pseudo-measurement that wheels and accelerometer give the same change of speed.
 
-        `combined` weighs the two for a given speed and bias; how well they agree measures both:
-        most of all at rest, where the wheels know. `step` is the prediction without accelerometer.
-        Return the variance [(m/s)^2] that it lacks where the two differ by more than the gate: soil
-        that lets go or gives way is no random walk, and wheels do not see it. Where they differ for
-        longer, the accelerometer is doubted: its attitude is wrong.
+        Their difference observes speed and bias, best at rest, where the wheels are exact. `step`
+        is the prediction without accelerometer. Return the variance [(m/s)^2] to be added to it
+        where the difference exceeds the gate: soil that yields suddenly is no random walk, and
+        wheel rates do not show it. If the difference lasts, the attitude is taken to be wrong and
+        the accelerometer noise grows with the running NIS.
         """
         felt = self.felt(cycle.dt, cycle.window)
         if felt is None or isnan(self.state.rims.typical) or isnan(cycle.yaw_compensated.typical):
@@ -364,10 +364,10 @@ class SpeedProcess(Component[SpeedState]):
         )
 
     def disagreement(self, rims: RimSpeeds) -> float:
-        """Return by how much the wheels disagree on the change of rim speed since the cycle [m/s].
+        """Return the spread of the changes of rim speed among wheels since the last cycle [m/s].
 
-        Median deviation from the median: one wheel apart makes none, two that spin up beside two
-        that stand do. What the noise of the rates makes is taken off.
+        Median absolute deviation, less that of rate noise: a single outlying wheel does not count,
+        two that spin up beside two at rest do.
         """
         changes = [now - old for now, old in zip(rims.each, self.state.rims.each, strict=True)]
         return max(spread(changes) - self._rim_noise, 0.0)
@@ -375,11 +375,11 @@ class SpeedProcess(Component[SpeedState]):
     def towards_equilibrium_slip(
         self, step: SpeedStep, cycle: Cycle, direction: float, length: float, *, buried: bool
     ) -> SpeedStep:
-        """Without a reference velocity, let v / rim speed return to what such a slope takes.
+        """Without a reference velocity, revert v / rim speed to the equilibrium slip of the slope.
 
-        On deep or saturated contacts torque and pull hardly change with slip. There the posterior
-        is the prior, and a random walk is no prior: it ends anywhere. `length` is the rim travel
-        over which it returns [m]; wheels that are `buried` have no usual slip but the greatest.
+        On deep or saturated contacts torque and pull hardly change with slip. There slip
+        is unobservable and a random walk diverges; mean reversion (Ornstein-Uhlenbeck) bounds it.
+        `length` is its length in rim travel [m]; `buried` wheels revert to the greatest slip.
         """
         rim, demand = cycle.yaw_compensated.typical, direction * cycle.loads.slope_share
         if not abs(rim) >= self._rover.low_rim:
@@ -404,7 +404,7 @@ class SpeedProcess(Component[SpeedState]):
         *,
         inflated: bool,
     ) -> tuple[float, float]:
-        """Return speed and variance at a time [s], carried on from the last cycle."""
+        """Return speed [m/s] and variance extrapolated from the last cycle to a time [s]."""
         x, P = ekf.mean, ekf.covariance
         speed, variance = float(x[SPEED]), float(P[SPEED, SPEED])
         if self.since_cycle(time) < TIME_ROUNDING:
@@ -421,13 +421,13 @@ class SpeedProcess(Component[SpeedState]):
     # -- Corrections of the filter ---------------------------------------------------------------
 
     def begin(self, ekf: GatedFilter, rims: RimSpeeds) -> None:
-        """At the first sight of the wheels they may roll or spin, or be at rest."""
+        """Initialise the speed at the first wheel rates: the wheels may roll, spin or rest."""
         if isnan(self.state.rims.typical) and not isnan(rims.typical):
             spread = max(_FIRST_SIGHT_SHARE * abs(rims.typical), self._rover.rest_speed)
             ekf.set(SPEED, self.state.ratio * rims.typical, spread * spread)
 
     def remove_start_transient(self, ekf: GatedFilter, cycle: Cycle) -> None:
-        """Let a rover that starts without a reference velocity roll as it did before.
+        """At a start without a reference velocity, reset the speed to the slip of the last drive.
 
         A transient of the accelerometer weighs much while the wheels turn slowly; a rover that
         slides, or wheels that spin up at once, differ by more than it makes.
@@ -440,7 +440,7 @@ class SpeedProcess(Component[SpeedState]):
             ekf.set(SPEED, usual, (self.state.ratio_std * rim) ** 2)
 
     def keep_with_rims(self, ekf: GatedFilter, rims: RimSpeeds) -> None:
-        """Let a rover without a reference velocity stand where it would move against its wheels.
+        """Without a reference velocity, set the speed to 0 where it opposes the wheels.
 
         Only a slide does that, and no force of its wheels would ever end it.
         """
@@ -448,7 +448,7 @@ class SpeedProcess(Component[SpeedState]):
             _put_right(ekf, 0.0, rims)
 
     def keep_behind_driving_wheels(self, ekf: GatedFilter, cycle: Cycle) -> None:
-        """Let a rover without a reference velocity be no faster than a wheel that drives it.
+        """Without a reference velocity, bound the speed by that of the slowest driving wheel.
 
         The soil turns a wheel that it drags; one that stalls drives, however slowly it turns.
         """
@@ -467,7 +467,7 @@ class SpeedProcess(Component[SpeedState]):
             _put_right(ekf, way * slowest, rims)
 
     def keep_least_variance(self, ekf: GatedFilter, rims: Floats) -> None:
-        """Keep a least slip deviation."""
+        """Keep the deviation of v / rim speed above `LEAST_SLIP_STD`, by covariance inflation."""
         typical = sum(abs(rim) for rim in known(rims)) / len(rims)
         lacking = (typical * LEAST_SLIP_STD) ** 2 - float(ekf.covariance[SPEED, SPEED])
         if lacking > 0.0:
@@ -502,13 +502,13 @@ class SpeedProcess(Component[SpeedState]):
 
 
 def _put_right(ekf: GatedFilter, speed: float, rims: RimSpeeds) -> None:
-    """Set a speed [m/s] that cannot be to one that can, no surer than a first slip is."""
+    """Reset an impossible speed [m/s], with at least the variance of an initial slip."""
     least = (_FIRST_RATIO_STD * rims.typical) ** 2
     ekf.set(SPEED, speed, max(float(ekf.covariance[SPEED, SPEED]), least))
 
 
 def spread(changes: Sequence[float]) -> float:
-    """Return the median deviation of changes from their median; 0 where fewer than 3 are known."""
+    """Return the median absolute deviation of the known changes; 0 if fewer than 3."""
     there = known(changes)
     if len(there) < _LEAST_WHEELS:
         return 0.0

@@ -30,9 +30,9 @@ _LEAST_APART = 2  # wheels that can differ
 class TorqueUpdate(Component['tuple[float | None, ...]']):
     """Turns the torques of turning wheels into rows of the update.
 
-    Keeps the running mean of the NIS of each wheel, None = no torque came yet: one that the models
-    keep missing, by a stone or a failing drive, counts less, the others as before. A soil change
-    looks like an outlier: a row beyond the gate is weakened, not locked out.
+    Keeps the running mean of the NIS of each wheel, None = no torque came yet: a wheel whose
+    torque stays off the model, by a stone or a failing drive, gets a greater variance. A change
+    of soil looks like an outlier: a row beyond the gate is down-weighted, not rejected.
     """
 
     def __init__(self, configuration: Configuration, rover: Rover, layout: StateLayout) -> None:
