@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How far the rover has driven since its contacts formed: at a start, at a reversal."""
+"""Travel since the contacts began to form, at a start or a reversal."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import NamedTuple
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.rover import Rover
 
-# Doubt of the shear model behind a start; tuned on simulated drives, seeds 1000 to 1019.
-START_VARIANCE = 2.5  # over the square of the shear
+# Model error of the shear model after a start; tuned on simulated drives, seeds 1000 to 1019.
+START_VARIANCE = 2.5  # at one contact length, over the square of the shear
 DECAY = 2.0  # per contact length
 
 
@@ -30,9 +30,9 @@ class ContactAge(Component[ContactAgeState]):
         self._rover = rover
 
     def update(self, rim_speed: float) -> bool:
-        """Take the typical rim speed of a cycle [m/s], nan = unknown.
+        """Update with the typical rim speed of a cycle [m/s], nan = unknown.
 
-        Return whether the direction became the opposite one of a drive before.
+        Return whether the direction of the drive has reversed.
         """
         if not abs(rim_speed) >= self._rover.low_rim:
             return False
@@ -47,21 +47,21 @@ class ContactAge(Component[ContactAgeState]):
         self.state = self.state._replace(travel=self.state.travel + travel)
 
     def stop(self) -> None:
-        """Note that the wheels stand."""
+        """Reset the travel: the wheels are at rest."""
         self.state = self.state._replace(travel=0.0)
 
     @property
     def settled(self) -> bool:
-        """Whether the contacts are new no more."""
+        """Whether the contacts are fully formed."""
         return self.state.travel > self._rover.contact_length
 
     @property
     def forming(self) -> bool:
-        """Whether they are half formed: before that even a rover that will roll spins."""
+        """Whether they are in the second half of forming; before, even gripping wheels spin."""
         return 0.5 < self.state.travel / self._rover.contact_length <= 1.0
 
     @property
     def shear_variance(self) -> float:
-        """Variance of the shear model, over its square: shear builds up over a contact length."""
+        """Relative variance of the shear model [-]: shear builds up over a contact length."""
         lengths = self.state.travel / self._rover.contact_length
         return START_VARIANCE * math.exp(-DECAY * (lengths - 1.0))

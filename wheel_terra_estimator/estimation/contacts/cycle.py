@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a cycle of the filter knows of wheels and body before its update."""
+"""Kinematics, loads and torques of one filter cycle, inputs of its prediction and update."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _TOGETHER = 0.5  # least typical rim speed over their magnitude where the sides 
 
 
 class RimSpeeds(NamedTuple):
-    """Rim speeds without the share that turning and steering have in them [m/s]; nan = unknown."""
+    """Rim speeds with yaw rate and steering compensated [m/s]; nan = unknown."""
 
     each: Floats
     typical: float
@@ -24,7 +24,7 @@ class RimSpeeds(NamedTuple):
 
     @classmethod
     def of(cls, rims: Floats, yaw_rate: float, headings: Headings) -> RimSpeeds:
-        """Take turning [rad/s] and steering off: the body speed that each wheel asks for."""
+        """Compensate yaw rate [rad/s] and steering: the body speed that fits each rim speed."""
         if headings.steered:
             each = tuple([headings.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)])
         else:  # each rolls along with the body
@@ -38,9 +38,9 @@ class RimSpeeds(NamedTuple):
         return cls(each, median(measured) if measured else NAN)
 
     def along(self, least: float) -> bool:
-        """Tell whether the wheels drive the body along, faster than `least` [m/s].
+        """Return whether both sides drive the same way, faster than `least` [m/s].
 
-        In a turn on the spot the typical speed is what two sides leave: its changes are noise.
+        In a turn on the spot the sides nearly cancel: the typical speed is mostly noise.
         """
         return abs(self.typical) > max(least, _TOGETHER * self.magnitude)
 
@@ -51,7 +51,7 @@ class RimSpeeds(NamedTuple):
         return median([abs(rim) for rim in measured]) if measured else NAN
 
     def oppose(self, speed: float) -> bool:
-        """Tell whether all wheels turn against a speed of the body [m/s]; in a spin some do not."""
+        """Return whether all wheels turn against a body speed [m/s]; in a spot turn some do not."""
         measured = known(self.each)
         return bool(measured) and all(speed * rim < 0.0 for rim in measured)
 
@@ -68,10 +68,10 @@ class Cycle(NamedTuple):
     lateral_motion: float  # of the outer wheels over the fastest rim speed [-]
     headings: Headings
     still: bool  # all wheels stand
-    torque: Floats  # means since the last cycle [N m], nan = none came
+    torque: Floats  # means since the last cycle [N m], nan = no reading
     leaving_angles: Floats  # [rad], nan = unknown
     loads: LoadState
     turns: tuple[bool, ...]
     """Wheels for which the contact models hold: they turn under a load."""
-    reference_known: bool  # of late, before this cycle
-    demand_change: float  # by how much more the ground asks than at the last cycle [-]
+    reference_known: bool  # a recent reference showed the slip before this cycle
+    demand_change: float  # change of the required traction coefficient since the last cycle [-]

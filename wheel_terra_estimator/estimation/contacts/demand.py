@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the ground asks of the wheels, how it changes, and the most that it asked of a drive.
+"""Demand: required traction coefficient (pull over load), its change, and its maximum in a drive.
 
 The sum of the pulls is mass times the specific force along the body, whatever slope and
 acceleration make it (Newton). A rover that must pull more slips more, in the next contact length
@@ -19,7 +19,7 @@ from wheel_terra_estimator.estimation.scalars import NAN, gain_of
 SMOOTHING_TIME = 0.3
 """Time constant of the demand [s]: less than a contact length takes, more than vibration."""
 MEAN_TIME = 5.0
-"""Of the running means [s]: slip follows what is asked a contact length later."""
+"""Time constant of the running means [s]: slip lags the demand by a contact length."""
 
 
 class Demand(Component[float]):
@@ -29,7 +29,7 @@ class Demand(Component[float]):
         super().__init__(NAN)
 
     def update(self, demand: float, dt: float, *, settled: bool) -> float:
-        """Return the change of the demand over a cycle [-]; 0 where the contacts form anew.
+        """Return the change of the demand over a cycle [-]; 0 while contacts form.
 
         `demand` is the present one, in the direction of the drive; nan = not measured. Until the
         contacts are `settled`, slip and demand belong to no steady curve.
@@ -47,14 +47,14 @@ class Demand(Component[float]):
 class Climbed(NamedTuple):
     """What a soil that is kept has to carry."""
 
-    demand: float = 0.0  # the greatest mean of what was asked, as a share of the load [-]
+    demand: float = 0.0  # greatest running mean of the demand [-]
     slip: float = NAN  # its mean there [-]
     mean_demand: float = NAN  # present running means
     mean_slip: float = NAN
 
 
 class SteepestClimb(Component[Climbed]):
-    """Follows what is asked and the slip while a reference velocity shows the slip."""
+    """Tracks mean demand and slip while a reference velocity observes the slip."""
 
     def __init__(self) -> None:
         super().__init__(Climbed())

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Slip that goes with a torque on loose soil, whatever the soil: as of wheels that were measured.
+"""Typical slip at a torque on any loose soil, from single-wheel measurements.
 
 Over load and radius, the torque of wheels on very different soils follows one curve of the form of
 Janosi and Hanamoto (1961), u = u_max (1 - exp(-s / s_0)). HIT's smooth and lugged wheel (Ding et
@@ -24,7 +24,7 @@ _GREATEST_TORQUE_STD = 0.17  # [ln]
 _SLIP_SCALE = 0.17  # s_0 [-]
 _SLIP_SCALE_STD = 0.6  # [ln]
 _LEAST_STD = 0.04  # of the slip [-]: the torque of rolling without pull
-_MOST_MOBILISED = 0.9  # of the greatest torque: beyond, it says nothing of the slip
+_MOST_MOBILISED = 0.9  # of the greatest torque: beyond, the curve is flat and not used
 
 
 class SlipOfTorque(NamedTuple):
@@ -62,7 +62,7 @@ class SpeedAndVariance(NamedTuple):
 
 
 def pooled(one: SpeedAndVariance, other: SpeedAndVariance) -> SpeedAndVariance:
-    """Return what two estimates that rest on the same readings say together.
+    """Return the mixture (linear opinion pool) of two estimates from the same readings.
 
     The mean and variance of both, weighted by their inverse variances, as of two experts (linear
     opinion pool, Stone 1961): never below the variance of covariance intersection, consistent

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How deep the ground before each wheel has been pressed by the wheel before it.
+"""Depth of the rut that each wheel meets, left by the preceding wheel.
 
 Sinkage is measured from the undisturbed surface; a wheel that follows another one begins at the
 bottom of its rut. How much of that rut stays is learned (``RUT_SHARE`` of the state).
@@ -20,21 +20,21 @@ _LEAST_WAY = 1e-3  # [m], of a rover with one axle
 
 
 class RutState(NamedTuple):
-    """What the wheels meet."""
+    """Ruts that the wheels meet."""
 
-    depth: Floats  # of the wheel before, where this one rolls; 0 on virgin ground [m]
+    depth: Floats  # of the preceding wheel's rut where this wheel rolls; 0 if undisturbed [m]
     direction: float = 0.0  # of the drive: 1, -1, 0 = none yet
 
 
 class Ruts(Component[RutState]):
-    """Follows the depth of the ruts that the wheels meet."""
+    """Tracks the depth of the ruts that the wheels meet."""
 
     def __init__(self, rover: Rover) -> None:
         super().__init__(RutState((0.0,) * rover.wheel_count))
         self._rover = rover
 
     def advance(self, travel: float, direction: float, sinkage: Floats, curvature: float) -> None:
-        """Take the travel of the body in a cycle [m] along a path of a curvature [1/m].
+        """Update for a travel of the body [m] along a path of given curvature [1/m].
 
         `direction` is that of the drive: 1, -1, 0 = none yet; `sinkage` that of each wheel [m].
         """
@@ -42,7 +42,7 @@ class Ruts(Component[RutState]):
             return
         before, rover = self.state, self._rover
         if before.direction not in (direction, 0.0):
-            # What a wheel meets on the way back was last pressed by itself, or by one as deep.
+            # After a reversal a wheel first meets its own rut, or one as deep.
             self.state = RutState(sinkage, direction)
             return
         depths = []

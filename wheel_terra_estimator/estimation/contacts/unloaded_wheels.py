@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Wheels that carry nothing: found by their torque against that of the others."""
+"""Detection of unloaded (lifted) wheels by their torque, relative to the others."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ _LOADED_SHARE = 0.4  # with more it carries its load again
 _LEAST_RIM_SHARE = 0.95  # of the typical rim speed: a slower one is held
 _TELLING_TORQUE = 5.0
 """Typical torque over noise and zero of the sensors above which torques can be compared."""
-_MOST_LATERAL_MOTION = 0.1  # turns part the torques as well [-]
+_MOST_LATERAL_MOTION = 0.1  # in turns torques differ for other reasons [-]
 
 
 class UnloadedState(NamedTuple):
-    """Which wheels carry nothing; since when each seems to be otherwise [s], nan = it does not."""
+    """Unloaded wheels, and since when the torque of each indicates a change [s], nan = not."""
 
     unloaded: tuple[bool, ...]
     since: Floats
 
 
 class UnloadedWheels(Component[UnloadedState]):
-    """Finds wheels without load."""
+    """Detects wheels without load."""
 
     def __init__(self, rover: Rover, sensors: SensorFigures) -> None:
         n, self._low_rim = rover.wheel_count, rover.low_rim
@@ -39,7 +39,7 @@ class UnloadedWheels(Component[UnloadedState]):
         self._noise = sensors.torque_std + sensors.torque_zero_std
 
     def update(self, cycle: Cycle) -> UnloadedState:
-        """Judge the wheels in a cycle."""
+        """Update the classification with the torques of a cycle."""
         state, torque, rims, time = self.state, cycle.torque, cycle.rims, cycle.time
         rolling = [  # and its torque was read
             i
@@ -70,7 +70,7 @@ class UnloadedWheels(Component[UnloadedState]):
         return self.state
 
     def _seems_free(self, share: float, pace: float, *, telling: bool, unloaded: bool) -> bool:
-        """Say whether a wheel with a share of the typical torque and rim speed carries nothing."""
+        """Return whether shares of the typical torque and rim speed indicate no load."""
         if unloaded:
             return not telling or share < _LOADED_SHARE
         return telling and abs(share) < _FREE_SHARE and pace > _LEAST_RIM_SHARE

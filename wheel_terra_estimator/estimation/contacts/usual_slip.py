@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Slip at which the configured soil gives the pull that the ground asks: what is usual there."""
+"""Equilibrium slip: at it the configured soil gives the required traction coefficient."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _DEEPEST = 0.9  # of the radius
 
 
 class UsualSlip:
-    """Steady traction curve of the whole rover on the configured soil, read backwards.
+    """Inverse of the steady traction curve of the whole rover on the configured soil.
 
     Each wheel stands at the sinkage at which the bearing law carries its load on level ground, at
     each slip; its pull there holds its resistance already (closed form, Ding et al. 2015). The
@@ -38,9 +38,9 @@ class UsualSlip:
         self._configuration, self._rover = configuration, rover
 
     def at(self, demand: float, beyond: float) -> float:
-        """Return the slip for what is asked, as a share of the load [-].
+        """Return the slip [-] for a required traction coefficient (pull over load) [-].
 
-        `beyond` is the most that is returned, and what is where the soil does not give as much.
+        `beyond` is the upper limit, returned also where the soil cannot give this pull.
         """
         pulls, slips = self.curve
         after = bisect_left(pulls, demand)
@@ -60,7 +60,7 @@ class UsualSlip:
         shares = steady_pull(models, rover, all_slips)
         carries = np.interp(_MOST_ON_LEVEL, all_slips, shares) > 0.0
         if not (self._configuration.soil_stated or carries):
-            # Sand that nobody stated would hold this rover on the level: it is other ground.
+            # The default soil would immobilise this rover on level ground, so it does not apply.
             shares = torque_of_slip(all_slips) - _ROLLING_RESISTANCE
         pulls: list[float] = []
         slips: list[float] = []
