@@ -28,7 +28,7 @@ class LoadState(NamedTuple):
 
     @property
     def slope_share(self) -> float:
-        """What the ground asks of each wheel along the body, as a share of its load [-]."""
+        """Required traction coefficient (pull along the body over load) of each wheel [-]."""
         return self.force[0] / max(self.force[2], _LEAST_FORCE)
 
 

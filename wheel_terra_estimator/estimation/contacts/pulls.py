@@ -46,7 +46,7 @@ class PullEvidence(NamedTuple):
 
     forces: ContactForces | None
     """Of the turning wheels; None where all stand."""
-    total: SumOfPulls | None  # what the specific force says of their sum; None = nothing
+    total: SumOfPulls | None  # their sum by the accelerometer; None = unknown
     cycle: Cycle
     readings: Floats  # last torque of each wheel [N m], nan = never known
     stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
@@ -117,7 +117,7 @@ class Pulls(Component[PullState]):
                 std[i] = known * load + self._load_std * abs(share) + _FLOOR_STD
                 own[i] = std[i] ** 2
             else:
-                if not isnan(readings[i]):  # what its torque says beyond its model, smoothed
+                if not isnan(readings[i]):  # torque residual, smoothed
                     excess[i] += _EXCESS_GAIN * (readings[i] - torques[i] - excess[i])
                 beyond = self._believed(excess[i], readings[i])
                 if beyond and torque_by_strength[i]:

@@ -86,7 +86,7 @@ STRENGTH = STEPPED.index('strength')
 
 
 class Bearing(NamedTuple):
-    """What the bearing law says at a sinkage, (..., n) each."""
+    """Result of the bearing law at a sinkage, (..., n) each."""
 
     load: FloatArray  # that it carries [N]
     exponent: FloatArray  # N

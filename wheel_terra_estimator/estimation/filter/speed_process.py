@@ -127,7 +127,7 @@ class PastDrive(NamedTuple):
 
     ratio: float  # v / rim speed
     ratio_std: float
-    demand: float  # what the ground asked, as a share of the load [-]; nan = unknown
+    demand: float  # required traction coefficient [-]; nan = unknown
 
 
 class SpeedState(NamedTuple):
@@ -164,7 +164,7 @@ class SpeedProcess(Component[SpeedState]):
         self._rim_noise = _RATE_NOISE * sensors.wheel_rate_std * max(rover.slip_radius)
 
     def acceleration_noise(self, stated: StatedNoise) -> tuple[float, float]:
-        """Return what is stated of the noise of specific force less gravity, else the defaults.
+        """Return the noise of specific force less gravity, as the IMU reports it or by default.
 
         White noise [(m/s^2)^2 s], and how fast the bias walks, with gravity by errors of the
         attitude [(m/s^2)^2/s], both squared.

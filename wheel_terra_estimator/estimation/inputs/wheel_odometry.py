@@ -136,7 +136,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         )
 
     def _carried(self, rim: float, slope: float, age: float) -> float:
-        """Return a rim speed carried on over its age [s]: a ramp goes on, and smoothing lags."""
+        """Return a rim speed extrapolated over its age [s], to compensate the lag of smoothing."""
         if abs(slope) <= self._least_slope or age > _LONGEST_CARRIED:
             return rim
         return rim + slope * age

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Pull that the present soil can give each wheel beyond what the ground asks."""
+"""Pull margin of each wheel: greatest pull on the present soil less the required pull."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class PullMargin(Component[MarginState]):
         self._models = models
 
     def due(self, time: float) -> bool:
-        """Return whether margins are to be worked out anew at a time [s]."""
+        """Return whether the margins are to be recomputed at a time [s]."""
         return time - self.state.time >= _PERIOD
 
     def update(self, time: float, wheels: WheelStates, demand: float) -> None:

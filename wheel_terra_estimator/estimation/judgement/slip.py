@@ -31,7 +31,7 @@ class BodyMotion(NamedTuple):
     headings: Headings  # of the wheels
     lateral_motion: float  # of the outer wheels over the fastest rim speed [-]
     stopped: bool
-    """All wheels stand, and no reference velocity says that the rover slides on them."""
+    """All wheels stand, and no reference velocity shows a slide on them."""
 
 
 class WheelSlip(NamedTuple):
@@ -46,7 +46,7 @@ class WheelSlip(NamedTuple):
 
 
 class SlipJudge(Component[tuple[WheelSlip, ...]]):
-    """Judges the slip of all wheels."""
+    """Computes slip, its deviation and rest of all wheels."""
 
     def __init__(self, rover: Rover, sensors: SensorFigures) -> None:
         super().__init__((WheelSlip(),) * rover.wheel_count)
@@ -71,7 +71,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
             return before._replace(std=std, resting=False, judged=False)
         rest = self._rover.rest_speed
         if body.stopped and abs(body.speed) < rest and abs(rim) < rest:
-            # All wheels stand: what the gyro says beside them is noise.
+            # All wheels stand: the yaw rate of the gyro is noise.
             v, v_std = 0.0, 0.0
         else:
             headings = body.headings

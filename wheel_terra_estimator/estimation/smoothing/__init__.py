@@ -1,3 +1,3 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Fixed-interval smoothing: what a whole recording says of each of its instants."""
+"""Fixed-interval smoothing: estimates of each instant from the whole recording."""

@@ -106,7 +106,7 @@ class Transition(NamedTuple):
 
 
 class Mark(NamedTuple):
-    """Something of the forward pass that is to be worked out anew from the smoothed state."""
+    """An item of the forward pass that is recomputed from the smoothed state."""
 
     position: int  # transitions before it
     content: Any
@@ -136,7 +136,7 @@ class HistoryBuffer:
         )
 
     def cut(self) -> None:
-        """Keep that the filter was started anew."""
+        """Record a restart of the filter."""
         self._transitions.append(None)
 
     def transition(self, index: int) -> Transition | None:

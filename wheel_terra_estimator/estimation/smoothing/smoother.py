@@ -188,7 +188,7 @@ class _Judges:
 
     def moment(self, instant: Instant, now: Gaussian) -> Moment:
         """Return what is smoothed of an instant."""
-        # Between two cycles the speed is carried on from the state; so is its correction.
+        # Between two cycles the speed is extrapolated from the state, and so is its correction.
         given = instant.sources
         speed = given.speed + float(now.mean[SPEED]) - instant.cycle.speed
         carried = max(given.speed_variance - instant.cycle.variance, 0.0)

@@ -53,7 +53,7 @@ class Stepped(Protocol):
         """Return to a kept state."""
 
     def begin_run(self, stamp: int, keep_soil: bool) -> None:
-        """Start anew at `stamp` [ns]; soil and biases kept but widened, or forgotten."""
+        """Restart at `stamp` [ns]; soil and biases kept with inflated covariance, or reset."""
 
 
 class Estimator(Stepped, Protocol):

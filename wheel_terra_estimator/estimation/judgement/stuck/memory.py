@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The stuck warning over a new beginning: it stands until the rover has driven free of it.
+"""Keeps the stuck warning over a restart, until the rover has driven free.
 
 A new beginning is a restart of the node, a clock that stepped back, a filter that failed, or a late
 input that changed what the estimator remembers: it knows nothing of the warning any more, which
@@ -22,7 +22,7 @@ _LONGEST_GAP = 1.0  # [s] between two sets of one drive, or two of their periods
 
 
 class StuckMemory:
-    """Keeps a warning over a new beginning of the estimator; `state` is the one that stands.
+    """Keeps a warning over a restart of the estimator; `state` is the present one.
 
     ``filter.stuck_clear_slip`` and ``filter.stuck_clear_time`` say when the rover is free.
     """

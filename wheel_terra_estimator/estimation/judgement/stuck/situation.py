@@ -67,10 +67,10 @@ class RoverMotion(NamedTuple):
     """Whether the speed rests on more than a guess."""
     wheels: tuple[WheelMotion, ...]
     turning: bool = False
-    """Sharply: slip that comes from turning says nothing of what is ahead."""
+    """Sharply: slip due to turning does not predict entrapment."""
     depth_read: bool = True  # sensors tell the sinkage of most wheels
     slip_known: bool = False  # by two references of the last seconds, while wheels turned
-    demand: float = NAN  # what the ground asks in the direction of the drive, over the load [-]
+    demand: float = NAN  # required traction coefficient in the direction of the drive [-]
 
 
 class Memory(NamedTuple):
