@@ -136,7 +136,8 @@ class Decider:
             verdict = unnamed(selection, problem) if enough else choose(selection, problem, tried)
             decision = self._judged(verdict)
             if verdict.status == 'agrees' and not self.beds_differ and channels_off(decision.gap):
-                decision = replace(decision, verdict=replace(verdict, status='undecided'))
+                verdict = choose(selection, problem, tried, off=True)
+                decision = self._judged(verdict)
             if verdict.status != 'named':
                 return self._left_open(replace(decision, doubtful=doubtful))
             tried.append(verdict.index)

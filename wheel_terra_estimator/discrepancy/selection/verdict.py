@@ -104,8 +104,11 @@ def largest_z_score(fitted: Fit) -> float:
     return max((abs(c.stated * float(u)) for c, u in believed if c.role == 'believed'), default=0.0)
 
 
-# "Something is missing" must beat "nothing is missing" by these odds.
+# "Something is missing" must beat "nothing is missing" by these odds, and by more where agreement
+# itself is sure to need a model-error floor: a model with one error can have another.
 ODDS_TO_SPEAK = 3.5
+ODDS_OVER_FLOOR = 10.0
+SURE_OF_FLOOR = 0.95
 # Members of the open set: tempered weights are added up to this mass.
 SET_MASS = 0.97
 # A named set that leaves something must at least have removed this share of the excess misfit.
@@ -132,8 +135,14 @@ def unnamed(selection: Selection, problem: Problem) -> Verdict:
     return Verdict('unexplained', nothing, (), remainder(selection, nothing, problem))
 
 
-def choose(selection: Selection, problem: Problem, barred: Collection[int] = ()) -> Verdict:
-    """Return the verdict on a selection; barred explanations were too doubtful to be named."""
+def choose(
+    selection: Selection, problem: Problem, barred: Collection[int] = (), *, off: bool = False
+) -> Verdict:
+    """Return the verdict on a selection; barred explanations were too doubtful to be named.
+
+    ``off``: unseen rows are off by more than noise and the allowed model error: then a floor is no
+    reason to ask a name for higher odds, and nothing agrees.
+    """
     joint, unexplained, total = selection.log_joint, selection.unexplained, selection.totals
     nothing = selection.nothing
     alone = unnamed(selection, problem)
@@ -141,8 +150,12 @@ def choose(selection: Selection, problem: Problem, barred: Collection[int] = ())
     rest = float(log_sum(joint[nothing][unexplained]))
     named = [h for h, e in enumerate(selection.explanations) if e.names]
     effects = float(log_sum(total[named])) if named else -np.inf
-    if np.logaddexp(effects, rest) - agrees < np.log(ODDS_TO_SPEAK):
-        return replace(alone, status='agrees') if alone.left.accounted_for else alone
+    exact = np.array([floor.largest == 0.0 for floor in selection.floors])
+    floor_share = 1.0 - np.exp(log_sum(joint[nothing][exact]) - agrees)
+    odds = ODDS_OVER_FLOOR if floor_share > SURE_OF_FLOOR and not off else ODDS_TO_SPEAK
+    if np.logaddexp(effects, rest) - agrees < np.log(odds):
+        agreement = 'undecided' if off else 'agrees'
+        return replace(alone, status=agreement) if alone.left.accounted_for else alone
     named = [h for h in named if h not in barred]
     if not named:
         return alone
