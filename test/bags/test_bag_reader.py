@@ -145,7 +145,7 @@ def test_a_reference_of_another_type_is_told_how_to_become_one(make_bag, rover, 
         told = MeasurementReader(opened, {}, rover).notes[-1]
     assert '/dvl (geometry_msgs' in told and 'nav_msgs/msg/Odometry' in told
     assert '/cmd_vel' not in told
-    with pytest.raises(UserError, match=r'/dvl.*becomes a reference as nav_msgs/msg/Odometry'):
+    with pytest.raises(UserError, match=r'/dvl.*publish it as nav_msgs/msg/Odometry'):
         list(read(bag, {'reference_odom': '/dvl'}, rover))
 
 

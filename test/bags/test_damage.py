@@ -96,7 +96,7 @@ def test_every_command_says_what_is_damaged(make_bag, drive, config, tmp_path, c
         assert 'whole messages recovered' in said.out + said.err, command
         if command[0] == 'check' and '--json' not in command:
             _, note, finding, *_ = said.out.splitlines()
-            assert 'whole messages recovered' in note and 'of the recording are lost' in finding
+            assert 'whole messages recovered' in note and 'of the messages are lost' in finding
 
 
 @pytest.mark.parametrize('closed', [True, False])
@@ -213,7 +213,7 @@ def test_metadata_that_lie_are_set_aside_and_said(make_bag, old, new):
     metadata.write_text(lying(metadata.read_text(), old, new))
     found, notes = contents(folder)
     assert found == whole
-    assert 'metadata.yaml was set aside' in notes[0]
+    assert 'metadata.yaml was ignored' in notes[0]
 
 
 def test_a_chunk_above_the_limit_is_left_out_and_said(read_mcap, monkeypatch):

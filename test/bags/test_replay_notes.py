@@ -41,7 +41,8 @@ def test_wheel_odometry_that_counts_as_silent_most_of_the_time_is_told(
             state = factory.joint_state(header, ('left', 'right'), velocity=(2.0, -2.0))
             rows.append(('/joint_states', state, i))
     words = (
-        'note: joint_states comes so seldom that wheels are mostly unknown: filter.silence (0.5 s)'
+        'note: joint_states is so infrequent that wheels are mostly unknown: '
+        'raise filter.silence (0.5 s)'
     )
     assert (words in printed(['replay', str(make_bag(messages=rows)), *config])) is said
 
@@ -61,7 +62,7 @@ def test_a_failing_filter_is_said_in_summary_and_diagnostics(
     monkeypatch.setattr(WheelSoilEstimator, 'estimates', failing)
     with open_bag(make_bag(drive[:35])) as bag:
         result = replay(bag, rover, {}, tmp_path / 'out')
-    assert any('filter failed and was started anew once' in note for note in result.notes)
+    assert any('filter failed and restarted once' in note for note in result.notes)
     assert b'filter_restarts' in next((tmp_path / 'out').glob('*.mcap')).read_bytes()
 
 
@@ -72,12 +73,12 @@ def test_odometry_that_might_be_the_reference_is_named(tmp_path):
     with open_bag(recording) as bag:
         result = replay(bag, reader.load(['pathfinder']), {})
         (said,) = [note for note in result.notes if 'reference_odom:=' in note]
-        assert '/wheel/odometry: one that does not come from the wheels' in said
+        assert '/wheel/odometry: if one does not come from the wheels' in said
         used = dict(remap.split(':=') for remap in drive.remaps)
         assert set(used) == {'reference_odom'}
         with_reference = replay(bag, reader.load(drive.configuration), used)
     assert not [note for note in with_reference.notes if 'reference_odom:=' in note]
-    assert 'started anew' not in ' '.join((*with_reference.notes, *result.notes))
+    assert 'restarted' not in ' '.join((*with_reference.notes, *result.notes))
 
 
 def test_a_log_of_arrivals_holds_parameters_and_may_know_more_than_the_bag(tmp_path):
@@ -99,7 +100,7 @@ def test_a_log_of_arrivals_holds_parameters_and_may_know_more_than_the_bag(tmp_p
             '\n'.join([*early, *lines[:half], f'set {json.dumps(tuned)}', *lines[half:]])
         )
         result = replay(bag, rover, {}, options=Options(arrival=log, every_set=True))
-        assert any('order.txt: 1 messages of it are not in the bag' in n for n in result.notes)
+        assert any('order.txt: 1 of its messages are not in the bag' in n for n in result.notes)
         slip = np.array([estimates.slip for estimates in expected])
         np.testing.assert_array_equal(result.history.values['slip'], slip)
         with pytest.raises(UserError, match='tuning changes in it'):

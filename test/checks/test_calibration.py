@@ -69,7 +69,7 @@ def test_a_zero_of_the_accelerometer_is_written_and_what_stays_wrong_is_told():
     told = {change.key: change.after for change in calibration.changes}
     assert told['sensors.specific_force_bias'] == pytest.approx([0.6, 0.0, 0.0], abs=0.05)
     head = as_file(calibration, rover, 'drive').partition('/**')[0]
-    assert 'Still wrong' in head and 'linear.x runs against the wheels' in head
+    assert 'Still wrong' in head and 'linear.x has the opposite sign to the wheels' in head
 
 
 def test_zeros_of_a_gyro_are_in_the_frame_that_is_written():
@@ -195,7 +195,7 @@ def test_the_file_is_accepted_and_says_where_numbers_come_from(tmp_path):
         )
         - 1
     ]
-    assert 'before [0.188' in above and '+-' in above and '/reference_odom' in above
+    assert 'was [0.188' in above and '+-' in above and '/reference_odom' in above
     assert math.isfinite(radius[0])
 
 

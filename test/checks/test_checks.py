@@ -182,7 +182,7 @@ def test_sinkage():
     only(checked(sinkage=replace(sinkage, sinkage=deep - 0.025)), 'zero')
     for even in (-sinkage.sinkage, -deep, sinkage.sinkage - 0.02):  # which, nothing tells
         told = only(checked(sinkage=replace(sinkage, sinkage=even)), 'sign')
-        assert told.confidence <= 0.5 and 'or its zero is off' in told.words
+        assert told.confidence <= 0.5 and 'or a zero error' in told.words
     few = np.where([True, True, False, False], np.nan, sinkage.sinkage)
     few[:, 2] = -5.0  # a dead sensor, and one that is left
     only(checked(sinkage=replace(sinkage, sinkage=few)), 'frozen', 'rear_left')
@@ -356,7 +356,7 @@ def test_wheels_that_are_named_otherwise_half_way_are_told():
     (outcome,), _ = check_wheel_names(
         replace(WHOLE, joints=renamed), from_configuration(rolling.rover())
     )
-    assert 'but a, b, c, d' in outcome.words and outcome.wheel == ', '.join(rolling.NAMES)
+    assert 'only a, b, c, d' in outcome.words and outcome.wheel == ', '.join(rolling.NAMES)
 
 
 def test_both_imus_are_named_where_neither_is_listened_to():

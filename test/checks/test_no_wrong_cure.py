@@ -79,14 +79,14 @@ def test_without_slopes_a_ratio_of_speeds_below_one_is_no_radius():
     lean = replace(WHOLE.imu, force=WHOLE.imu.force - [0.0, 0.0, rolling.GRAVITY])
     report = checked(rolling.rover(**{'wheels.radius': [1.12 * rolling.RADIUS] * 4}), imu=lean)
     assert faults(report) == ['gravity_off']
-    assert any('no slopes' in e.reason for e in report.not_checked if e.kind == 'radius')
+    assert any('without slopes' in e.reason for e in report.not_checked if e.kind == 'radius')
 
 
 def test_a_noisy_gyro_may_be_one_in_degrees_where_nothing_turns():
     straight = rolling.recording(rolling.ten_minute_drive(turns=False))
     noise = 0.15 * np.random.default_rng(1).standard_normal(straight.imu.rate.shape)
     report = checked(whole=straight, imu=replace(straight.imu, rate=straight.imu.rate + noise))
-    assert faults(report) == ['imu_noise'] and 'another unit' in report.findings[0].words
+    assert faults(report) == ['imu_noise'] and 'a wrong unit' in report.findings[0].words
 
 
 def test_a_radius_beside_an_odd_wheel_keeps_the_odd_one():
@@ -224,7 +224,7 @@ def test_a_track_that_no_second_gyro_bears_out_is_told_with_its_rival():
     mute = replace(WHOLE.reference, yaw_rate=0.0 * WHOLE.reference.yaw_rate)
     wide = rolling.rover(**{'wheels.y': [1.3 * rolling.HALF_TRACK, -1.3 * rolling.HALF_TRACK] * 2})
     (finding,) = checked(wide, reference=mute).findings
-    assert finding.fault == 'track' and 'or the gyro has another scale' in finding.words
+    assert finding.fault == 'track' and 'or the gyro has a scale error' in finding.words
     assert finding.value == pytest.approx(2.0 * rolling.HALF_TRACK, rel=0.03)
 
 
@@ -486,7 +486,7 @@ def test_slip_that_loose_soil_makes_is_no_radius(costs, told):
     report = checked(joints=joints, reference=slower, sinkage=None)
     assert bool({*faults(report)} & {'radius', 'reference_scale'}) == told
     if not told:
-        assert any('torques ask for 0.17' in e.reason for e in report.not_checked)
+        assert any('torques are 0.17' in e.reason for e in report.not_checked)
 
 
 @pytest.mark.parametrize('dead', [False, True])

@@ -207,4 +207,4 @@ def test_slopes_to_one_side_alone_are_not_called_none():
     climb = replace(motion, slope=np.where(motion.speed > 0.0, 0.138, 0.0))
     report = rolling.checked(whole=rolling.recording(climb))
     (reason,) = {e.reason for e in report.not_checked if e.kind == 'gain'}
-    assert 'slopes to one side alone, by 7.9 degrees' in reason
+    assert 'slopes one way only, of 7.9 degrees' in reason

@@ -118,7 +118,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (REFERENCE, {'velocity': by(math.nan)}, 'reference_nan', None, None, 'NaN'),
     (JOINTS, {'rate': by([1, 1, math.nan, 1])}, 'missing_wheel', RL, None, 'velocity empty'),
     (JOINTS, {'rate': by([1, 1, math.nan, 1]), 'position': lambda _: 0.0 * WHOLE.joints.rate},
-     'missing_wheel', RL, None, 'position alone'),
+     'missing_wheel', RL, None, 'position only'),
     (IMU, {'rate': plus(0.0, 0.0, 0.03)}, 'gyro_bias', None, approx(0.03, abs=1e-3), ''),
     (IMU, {'rate': by(1.15)}, 'gyro_scale', None, approx(1.0 / 1.15, rel=0.01), ''),
     (IMU, {'force': one_number(2.6, 2.0, 2.4), 'rate': one_number(0.01, 0.01, 0.01)},
@@ -202,7 +202,7 @@ ALIKE = [  # channel, what its fields become, the only faults that may be told, 
     (REFERENCE, {'velocity': rounded(0.05)}, {'covariance'}, ''),
     (SINKAGE, {'sinkage': rounded(0.005)}, set(), ''),
     (SINKAGE, {'sinkage': scattered(0.06)}, set(), ''),
-    (SINKAGE, {'sinkage': lambda v: scattered(0.2)(0.0 * v + 0.05)}, set(), 'another unit'),
+    (SINKAGE, {'sinkage': lambda v: scattered(0.2)(0.0 * v + 0.05)}, set(), 'a wrong unit'),
 ]
 
 

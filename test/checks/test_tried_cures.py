@@ -54,7 +54,7 @@ def test_slopes_tell_whether_wheels_or_reference_run_backwards(what):
         joints = replace(joints, torque=-joints.torque)
     recording = replace(whole, joints=joints, reference=reference)
     findings = rolling.checked(whole=recording).findings
-    cures, unsure = [f.cure for f in findings], 'or all wheels count backwards'
+    cures, unsure = [f.cure for f in findings], 'or all wheels read negative'
     backwards, negated = 'wheels.direction: [-1, -1, -1, -1]', 'negate twist.linear.x'
     assert (backwards in cures) is (what == 'wheels')
     assert any(negated in cure for cure in cures) is (what != 'wheels')

@@ -99,7 +99,7 @@ NONE, STUCK = np.nan * WHOLE.sinkage.sinkage, 0.0 * WHOLE.sinkage.sinkage
 def test_without_a_depth_soft_ground_may_be_a_radius(sinkage):
     told = checked(SKIDS, reference=SLOWER, sinkage=sinkage).findings
     told = [f for f in told if f.fault in ('radius', 'reference_scale')]
-    assert told and all('soft ground makes slip' in f.words for f in told)
+    assert told and all('soft ground causes slip' in f.words for f in told)
     assert all(f.confidence <= 0.5 for f in told)
 
 

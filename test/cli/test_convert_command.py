@@ -115,7 +115,7 @@ def test_a_map_that_cannot_be_used(convert, example, capsys, old, new, words):
     ('log', 'words'),
     [
         (LOG.replace('.1,30', '.1,abc'), "line 3, column rpm_fl: 'abc' is not a number"),
-        (LOG.replace('100.0', '1.7e12'), 'column time: 1.7e+12 s is no time from 0 to 2038; is'),
+        (LOG.replace('100.0', '1.7e12'), 'column time: 1.7e+12 s is not from 0 to 2038; is'),
         ('', 'log.csv: empty; the first line must name the columns'),
         (LOG.replace('.', ','), 'line 2: 17 cells but 13 columns; use commas between'),
     ],
@@ -213,7 +213,7 @@ def test_positions_need_wheels_that_count_one_way(convert, tmp_path, capsys):
     rows = [f'{day + 50 * i},2.51,-2.5,{0.02 * i},0' for i in range(60)]
     log = '\n'.join(['t,left,right,x,y', *rows])
     assert convert(log, columns) == 2
-    assert 'sign: -1 for each that counts backwards' in capsys.readouterr().err
+    assert 'sign: -1 for each that reads negative' in capsys.readouterr().err
     assert not (tmp_path / 'bag').exists()
     columns['joint_states']['right']['velocity']['sign'] = -1
     told = convert(log, columns)

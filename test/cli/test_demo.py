@@ -32,7 +32,7 @@ def test_a_node_that_is_not_found_does_not_end_the_demo(monkeypatch, tmp_path, c
     }
     assert len({domain for *_, domain in ran}) == 2  # the nodes do not hear each other's drive
     said = capsys.readouterr().out
-    assert said.count('DDS has no way to the node') == 2
+    assert said.count('DDS does not reach the node') == 2
     assert said.index('entrapment ran') < said.index('pathfinder ran') < said.index('table')
 
 

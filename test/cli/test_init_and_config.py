@@ -118,7 +118,7 @@ def test_a_joint_as_low_as_the_wheels_is_told(init, capsys):
     rear = wheel('rear', '-0.4 0 0.2').replace('_wheel_joint', '_axle')
     turret = wheel('turret', '0 0 0.7').replace('_wheel_joint', '_joint')
     assert init(urdf=CART.replace('</robot>', f'{rear}{turret}</robot>')).wheels.count == 2
-    assert 'not taken for wheels by their names: rear_axle; if' in capsys.readouterr().out
+    assert 'not named like wheels: rear_axle; if' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize('recorded', [False, True])
@@ -253,7 +253,11 @@ def test_odometry_alone_then_checked(init, make_bag, factory, tmp_path, capsys):
     remap = re.search(r'--remap odom:=\S+', capsys.readouterr().out).group().split()
     main(['check', str(bag), '--config', str(tmp_path / 'rover.yaml'), *remap])
     said = capsys.readouterr().out
-    assert '/imu/data: no IMU' in said and 'no wheel rates' not in said and 'odom:=' not in said
+    assert (
+        '/imu/data: the recording has no IMU' in said
+        and 'no wheel rates' not in said
+        and 'odom:=' not in said
+    )
     assert init('--overwrite', '--wheels', 'left,right', *MEASURES).wheel_odometry != 'odom'
 
 
@@ -264,7 +268,7 @@ def test_a_turning_joint_that_is_left_out_is_told(init, tmp_path, capsys):
         return message
 
     init('--bag', changed(PATHFINDER, tmp_path / 'bag', rename), *MEASURES)
-    assert 'not taken for wheels by their names: nose; ' in capsys.readouterr().out
+    assert 'not named like wheels: nose; ' in capsys.readouterr().out
 
 
 def test_all_measures_that_are_missing_are_named_at_once(init, tmp_path, capsys):

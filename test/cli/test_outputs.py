@@ -114,7 +114,7 @@ def test_the_effect_file_of_a_rover_file_is_an_input(tmp_path, refused):
 
 def test_one_path_for_two_outputs_is_refused(tmp_path, refused):
     out = str(tmp_path / 'out.csv')
-    refused(['replay', 'bag', '--table', out, '--track', out], 'named for two outputs')
+    refused(['replay', 'bag', '--table', out, '--track', out], 'given for two outputs')
 
 
 def test_a_soil_file_replaces_no_file_of_another_kind(tmp_path, refused):
@@ -138,7 +138,8 @@ REFUSED = {
     'trial': 'trial --effect nobody -o',
     'soilbin run': 'soilbin run {bad} -o',
     'soilbin rows': 'soilbin rows --no-cache --sweep pull --seeds 1 --scheduler {silent} -o',
-    'reproduce': 'reproduce nakashima --run --part table7 --seeds 1 --no-cache --scheduler {silent} -o',
+    'reproduce': 'reproduce nakashima --run --part table7 --seeds 1 --no-cache '
+    '--scheduler {silent} -o',
     'evaluate': 'evaluate --kinds climb --first-seed -1 -o',
     'demo': 'demo --no-node -o',
 }

@@ -96,7 +96,7 @@ def test_smoothed_and_compared(simulated, live, tmp_path, printed, undrawn):
     ways = ['--track', str(tmp_path / 'way.csv')]
     smooth = ['--smooth', '--report', str(page), '--table', str(table), *ways]
     said = printed(['replay', str(simulated), *CONFIG, *smooth, '-o', str(tmp_path / 'smooth')])
-    assert 'note: smoothed: each estimate knows' in said
+    assert 'note: smoothed: each estimate uses' in said
     with open_bag(live[0] / 'out') as plain, open_bag(tmp_path / 'smooth') as smooth:
         assert plain.topics.keys() == smooth.topics.keys()
         for topic in plain.topics:
@@ -190,8 +190,8 @@ def test_wild_numbers_in_the_truth(simulated, tmp_path, capsys):
 
 def test_without_an_imu_the_first_finding_says_so(simulated, tmp_path, printed):
     bag = changed(simulated, tmp_path / 'bag', lambda topic, m: None if 'imu' in topic else m)
-    assert 'no IMU in the recording' in printed(['check', str(bag), *CONFIG], 1).splitlines()[1]
-    assert 'no IMU in the recording' in printed(['replay', str(bag), *CONFIG]).splitlines()[0]
+    assert 'the recording has no IMU' in printed(['check', str(bag), *CONFIG], 1).splitlines()[1]
+    assert 'the recording has no IMU' in printed(['replay', str(bag), *CONFIG]).splitlines()[0]
 
 
 def test_drive_gives_a_bag_a_report_and_a_summary(make_bag, config, tmp_path, printed):

@@ -197,7 +197,7 @@ def test_what_to_do_next_follows_from_what_stays_open(named):
     whole = replace(named, effects=(), next_measurement=(), proposal=None, gap={})
     said = in_words(whole)
     assert said['open'] == ['Nothing beyond noise and the allowed model error.']
-    assert said['next'] == ['Nothing; model.yaml is the model to go on with.']
+    assert said['next'] == ['Nothing; continue with model.yaml.']
     effect = replace(named.effects[0], remainder=True, confounded_with=())
     said = in_words(replace(whole, effects=(effect,)))
     assert 'does not explain' in said['open'][0]
@@ -298,7 +298,7 @@ def test_noise_of_a_cell_is_its_own_part_of_the_covariance():
 
 @pytest.mark.parametrize(
     ('probability', 'p_value', 'said'),
-    [(0.9, 0.5, 'smooth misfit'), (0.1, 1e-6, 'more scatter'), (0.1, 0.5, 'doubtful')],
+    [(0.9, 0.5, 'smooth misfit'), (0.1, 1e-6, 'more scatter'), (0.1, 0.5, 'uncertain')],
 )
 def test_a_candidate_that_was_not_named_leaves_what_it_leaves(probability, p_value, said):
     assert said in _leaves(Remainder(probability, probability, 0.1, p_value, 1.0))

@@ -180,7 +180,7 @@ def test_cells_that_are_no_numbers(tmp_path, cell, parts):
         ({'slip': np.linspace(0.1, 1.2, 8)}, ('slip', 'outside -1..1')),
         ({'slope': np.full(8, 15.0)}, ('slope', 'degrees')),
         ({'sinkage': np.linspace(5, 20, 8)}, ('sinkage', 'millimetres')),
-        ({'sinkage': np.r_[np.full(7, 0.01), -999.0]}, ('line 9', 'mark of no reading')),
+        ({'sinkage': np.r_[np.full(7, 0.01), -999.0]}, ('line 9', 'missing-value code')),
         ({'wheel_radius': np.full(8, 157.0)}, ('wheel_radius', 'millimetres')),
         ({'normal_load': np.full(8, -80.0)}, ('normal_load', 'not positive')),
         ({'normal_load': np.full(8, 0.08)}, ('normal_load', 'kN')),

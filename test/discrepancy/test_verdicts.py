@@ -230,7 +230,7 @@ def test_two_tables_with_other_lugs_share_one_soil_and_tell_more():
     assert any('2 tables share one soil' in note for note in found.notes)
     assert together(parts[:1]) is parts[0]
     copied = together([*parts, parts[0]])
-    assert len(copied) == len(both) and any('nothing new' in note for note in copied.notes)
+    assert len(copied) == len(both) and any('add nothing' in note for note in copied.notes)
 
 
 def test_a_name_leaves_room_for_an_effect_that_looks_like_it_and_was_not_tried():

@@ -102,7 +102,7 @@ def test_an_output_that_has_lost_a_file_is_made_anew(bags, config, tmp_path, und
     ('more', 'words'),
     [
         ([], 'add -o DIR'),
-        (['-o', 'taken'], 'holds nothing that this command can go on with; choose another path'),
+        (['-o', 'taken'], 'holds nothing that this command can resume; choose another path'),
         (['-o', 'o', '--report', 'there/r.html'], 'give a plain name such as r.html'),
         (['-o', 'o', '--jobs', '0'], 'give 1 or more'),
         (['-o', 'o', '--arrival', 'log'], 'belongs to one recording'),

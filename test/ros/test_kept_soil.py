@@ -114,7 +114,7 @@ def test_an_own_file_that_does_not_suit_the_rover_is_told_and_left_alone(path, c
     kept = KeptSoil(path)
     assert kept.values(configuration) == {}
     assert 'torque_zero' in kept.fault
-    with pytest.raises(UserError, match='before it is removed'):
+    with pytest.raises(UserError, match='until it is removed'):
         kept.save(LEARNED, STUCK)
     kept.save({}, STUCK)
     assert kept.fault, 'a warning that can be kept takes nothing back'
@@ -198,8 +198,8 @@ def test_a_damaged_state_is_told_and_the_soil_is_kept_all_the_same(path, tmp_pat
     state = write(tmp_path / 's.yaml.state.json', json.dumps(['no state']))
     kept = KeptSoil(path)
     assert kept.warning() == StuckState()
-    assert 'no state' in kept.fault
-    with pytest.raises(UserError, match='no state'):
+    assert 'is not a state' in kept.fault
+    with pytest.raises(UserError, match='no state of the'):
         kept.save(LEARNED, STUCK)
     assert path.exists()
     assert json.loads(state.read_text()) == ['no state']

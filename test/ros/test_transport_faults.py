@@ -59,8 +59,8 @@ def test_what_is_wrong_around_a_node_is_told_until_it_ends(start, heard, paramet
     assert not any('another node' in s.message for s in statuses)
     second = Node(NODE.strip('/'), context=node.context)
     faults = [
-        f'another node is called {NODE}: both publish estimates',
-        'nothing comes on /clock',
+        f'another node is also called {NODE}: both publish estimates',
+        'nothing arrives on /clock',
         f'soil_file: {nowhere}: ',
     ]
 

@@ -54,11 +54,11 @@ def read(folder: Path) -> Metadata:
         names = tuple(PurePath(_a(str, file)).name for file in files)
         return Metadata(names, dict(counts))
     except KeyError as error:
-        return Metadata(fault=f'{NAME} was set aside (it has no {error.args[0]})')
+        return Metadata(fault=f'{NAME} was ignored (it has no {error.args[0]})')
     except UserError as error:
-        return Metadata(fault=f'{NAME} was set aside ({str(error).removeprefix(f"{path}: ")})')
+        return Metadata(fault=f'{NAME} was ignored ({str(error).removeprefix(f"{path}: ")})')
     except (YAMLError, ValueError, TypeError, RecursionError):
-        return Metadata(fault=f'{NAME} was set aside (it cannot be understood)')
+        return Metadata(fault=f'{NAME} was ignored (it cannot be understood)')
 
 
 def _a(kind: type[Kind], value: Any) -> Kind:

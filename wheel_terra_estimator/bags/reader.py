@@ -37,7 +37,7 @@ def in_one_line(topics: Iterable[tuple[str, str]]) -> str:
     words = [f'{name} ({kind})' for name, kind in there if name not in estimates]
     if estimates:
         words.append(
-            f'{len(estimates)} topics of estimates ({NO_INPUTS[0]}...), which are no input'
+            f'{len(estimates)} topics of estimates ({NO_INPUTS[0]}...), which are not inputs'
         )
     return ', '.join(words)
 
@@ -72,7 +72,9 @@ class MeasurementReader:
         """What is not in the bag, and what that costs."""
         notes = [f'not in the bag: {", ".join(self.absent)}'] if self.absent else []
         if 'reference_odom' in self.absent:
-            notes.append('without a reference velocity slip can be wrong and overconfident')
+            notes.append(
+                'without a reference velocity slip can be wrong, beyond its stated deviation'
+            )
             notes += [others] if (others := other_references(self.bag)) else []
         return notes
 

@@ -39,7 +39,7 @@ _MOST_MISSING = 0.1  # share of a log that the bag may lack: recorder and node s
 TRUTH_TOPICS = ('/ground_truth/', '/truth/')
 """Topics that are compared with the estimates, never heard."""
 
-SMOOTHED = 'smoothed: each estimate knows the whole drive; warnings stay as they were given live'
+SMOOTHED = 'smoothed: each estimate uses the whole drive; warnings are those given live'
 
 
 class Event(NamedTuple):
@@ -208,9 +208,9 @@ def _notes(
     yield from bag.notes
     counters = pipeline.counters()
     if restarts := counters.get('filter_restarts', 0):
-        yield f'the filter failed and was started anew {_times(restarts)}; please report this drive'
+        yield f'the filter failed and restarted {_times(restarts)}; please report this drive'
     if steps := counters.get('clock_steps_back', 0):
-        yield f'the clock stepped back {_times(steps)}; the estimates start anew there'
+        yield f'the clock stepped back {_times(steps)}; the estimates restart there'
     yield from reader.notes
     used = set(reader.topics.values())
     unknown = [
@@ -221,8 +221,8 @@ def _notes(
     odometry = [t.name for t in unknown if t.type == ODOMETRY]
     if 'reference_odom' in reader.absent and odometry:
         yield (
-            f'no reference velocity; odometry there is {", ".join(odometry)}: one that does not '
-            'come from the wheels is named by --remap reference_odom:=TOPIC'
+            f'no reference velocity; there is odometry on {", ".join(odometry)}: if one does not '
+            'come from the wheels, use it with --remap reference_odom:=TOPIC'
         )
     if unknown:
         count = sum(topic.message_count for topic in unknown)
@@ -230,7 +230,7 @@ def _notes(
     wheels = pipeline.converter.wheel_odometry
     if history.whole and history.whole.sets > 2 * pipeline.received[wheels] > 0:
         yield (
-            f'{wheels} comes so seldom that wheels are mostly unknown: filter.silence '
+            f'{wheels} is so infrequent that wheels are mostly unknown: raise filter.silence '
             f'({pipeline.configuration.filter.silence:g} s) to twice the period of its messages'
         )
 
@@ -245,7 +245,7 @@ def _in_order_of(
     """Yield the messages of a bag in the order in which a live node heard them."""
     lines = read_text(arrival, LARGEST_ARRIVAL_LOG).splitlines()
     if smooth and any(line.startswith(TUNE) for line in lines):
-        raise UserError(f'{arrival}: tuning changes in it, over which a smoother cannot go')
+        raise UserError(f'{arrival}: tuning changes in it, which a smoother cannot follow')
     stored: dict[str, deque[tuple[int, str, Any]]] = defaultdict(deque)
     for log_time, name, message in reader.messages():
         stored[f'{name} {message.stamp}'].append((log_time, name, message))
@@ -258,7 +258,7 @@ def _in_order_of(
             'the log belongs to another bag'
         )
     if missing:
-        notes.append(f'{arrival}: {missing.total()} messages of it are not in the bag: left out')
+        notes.append(f'{arrival}: {missing.total()} of its messages are not in the bag: skipped')
     log_time = 0
     for line in lines:
         if line == RESET:

@@ -60,12 +60,12 @@ def read_series(
     garbage = Counter({c.topic: len(c.arrivals) - len(c.stamps) for c in collectors.values()})
     notes = [
         *bag.notes,
-        *(f'{n} damaged messages on {topic} were left out' for topic, n in garbage.items() if n),
+        *(f'{n} damaged messages on {topic} were skipped' for topic, n in garbage.items() if n),
     ]
     if first and end:
         minutes = (end - first) * 1e-9 / 60.0
-        notes.append(f'a long recording: judged by its first {minutes:.3g} minutes')
-    notes += [f'another rover in it: {options}' for options in other_rovers(bag, chosen)]
+        notes.append(f'a long recording: only its first {minutes:.3g} minutes were checked')
+    notes += [f'it also holds another rover: {options}' for options in other_rovers(bag, chosen)]
 
     def made(own: str) -> Any:
         collector = collectors.get(own)

@@ -103,7 +103,7 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
         try:
             if not bag.message_count and bag.notes:
                 raise UserError(
-                    f'{path}: not one message can be read; copy the bag anew from where it was '
+                    f'{path}: not one message can be read; copy the bag again from where it was '
                     'recorded'
                 )
             if not bag.message_count:
@@ -171,7 +171,7 @@ def _storage_files(path: Path, metadata: bag_metadata.Metadata, notes: list[str]
     missing = [name for name in metadata.files if name not in names]
     if missing or not metadata.files:
         lists = f'it lists {missing[0]}, which is not there' if missing else 'it lists no file'
-        notes.append(f'{bag_metadata.NAME} was set aside ({lists}); files read one by one')
+        notes.append(f'{bag_metadata.NAME} was ignored ({lists}); files read one by one')
         return regular
     listed = list(dict.fromkeys(metadata.files))
     notes += [
@@ -197,7 +197,7 @@ def _compare(metadata: bag_metadata.Metadata, sources: list[_Source], notes: lis
     for topic in sorted({*held, *stated}):
         if held[topic] != stated.get(topic, 0):
             notes.append(
-                f'{bag_metadata.NAME} was set aside (it states {stated.get(topic, 0)} messages on '
+                f'{bag_metadata.NAME} was ignored (it states {stated.get(topic, 0)} messages on '
                 f'{topic}, the files hold {held[topic]})'
             )
             return

@@ -91,8 +91,8 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
                 raise UserError(f'{table}: no rows below the header')
             if sender.one_way < ONE_WAY * sender.any_way:
                 raise UserError(
-                    f'{columns}: positions take their sense from the wheels, which count in both '
-                    'directions; sign: -1 for each that counts backwards, and wheels.direction 1'
+                    f'{columns}: forward is taken from the wheels, but their signs disagree; give '
+                    'sign: -1 for each that reads negative, and wheels.direction 1'
                 )
         return Converted(bag.counts, list(sender.short), held)
 
@@ -238,7 +238,7 @@ class _Sender:
         seconds = self.value(line, row, self.layout.time)
         if not 0.0 <= seconds < _LATEST:
             where = f'{self.table}, line {line}, column {self.layout.time.name}'
-            raise UserError(f'{where}: {seconds:g} s is no time from 0 to 2038; is its unit right?')
+            raise UserError(f'{where}: {seconds:g} s is not from 0 to 2038; is its unit right?')
         stamp = max(round(seconds * 1e6) * 1000, 1)  # of a date no more is held; 0 is no stamp
         joints = self.layout.joints
         rates, torques, angles = (

@@ -33,7 +33,7 @@ def other_references(bag: Bag) -> str:
     inputs = [t for t in _inputs(bag) if t.type in _OTHER_REFERENCES and 'cmd' not in t.name]
     there = ', '.join(f'{t.name} ({t.type})' for t in inputs)
     return there and (
-        f'{there}: what does not come from the wheels becomes a reference as '
+        f'{there}: to use a source other than the wheels as a reference, publish it as '
         f'{INPUT_TYPES["reference_odom"]} with twist.twist.linear.x, of positions their change '
         'over a second, forward positive; or log all to one table for wheel-terra convert'
     )

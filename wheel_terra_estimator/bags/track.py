@@ -130,7 +130,7 @@ class TrackRecorder:
         return Track(
             self._rows.stamps(),
             dict(zip(COLUMNS, columns, strict=True)),
-            f'reckoned from estimated velocity and {yaw}',
+            f'dead reckoning from estimated velocity and {yaw}',
         )
 
     def _attitude(self, stamp: int) -> tuple[float, float] | None:

@@ -54,7 +54,7 @@ def calibrate(
     """Return what a recording tells of the rover file; without wheel rates a `UserError`."""
     report, evidence = examine(recording, configuration, remapped)
     if evidence is None:
-        raise UserError(f'{recording.name}: no wheel rates in it to calibrate with')
+        raise UserError(f'{recording.name}: it has no wheel rates to calibrate with')
     changes = _Changes(configuration.flat())
     _directions(changes, report, configuration)
     for told in _sure(report):
@@ -120,7 +120,7 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evi
         if tilt.sigmas > CLEAR and tilt.sure > LEAST_SURE:
             rotation = tilt.taken_off(rotation)
         std = math.degrees(tilt.std)
-        source = f'specific force over {tilt.turn:.0f} rad of turning, slope taken off'
+        source = f'specific force over {tilt.turn:.0f} rad of turning, slope removed'
     for key, new in zip(imu.MOUNTING, imu.mounting_angles(rotation), strict=True):
         if abs(math.remainder(new - changes.number(key), 360.0)) > imu.LEAST_SHOWN:
             changes.add(key, round(new, 3), std, source)
@@ -229,7 +229,7 @@ def as_file(
     keys = [key for key in values if key in configuration.stated or key in changes]
     keys += [key for key in changes if key not in values]
     lines = [f'Calibrated from the recording {recording}.', '']
-    lines += ['Not seen in it, and left as it was:'] if calibration.not_seen else []
+    lines += ['Could not be determined from it, left unchanged:'] if calibration.not_seen else []
     lines += [f'  {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
     lines += ['Still wrong:'] if calibration.findings else []
     lines += [f'  {finding}' for finding in calibration.findings]
@@ -249,11 +249,11 @@ def _as_declared(value: Value, before: Value | None) -> Value:
 def _in_words(change: Change) -> str:
     before = 'not stated' if change.before is None else format_value(change.before)
     std = '' if change.std is None else f' +- {change.std:.2g}'
-    return f'before {before}, now {format_value(change.after)}{std}: {change.source}'
+    return f'was {before}, now {format_value(change.after)}{std}: {change.source}'
 
 
 def summary(calibration: Calibration) -> list[str]:
     """Return lines for the terminal."""
     lines = [f'  {change.key}: {_in_words(change)}' for change in calibration.changes]
-    lines += [f'  not seen: {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
+    lines += [f'  not determined: {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
     return lines + [f'  still wrong: {finding}' for finding in calibration.findings]

@@ -439,14 +439,16 @@ def check_transport(
     if steps:  # of one clock, whatever it stamps
         topic, *rest = steps
         how = f'they step by {steps[topic]:+.3g} s against their arrival'
-        how += f', as those of {", ".join(rest)} do: a clock was set' if rest else ''
+        how += f', as do those of {", ".join(rest)}: a clock was set' if rest else ''
         outcomes.append(found('order', topic, 0.99, how=how))
     if 'joints' not in late:
         return outcomes, replace(recording, **mended)
     assert recording.joints is not None
     if max(shifts.values()) - min(shifts.values()) > CLOCK_DIFFERENCE:  # no offset mends that
         name = max(shifts, key=lambda one: abs(shifts[one]))
-        how = f'its stamps shift by {shifts[name]:.2g} s against log time: a clock set, or drifting'
+        how = (
+            f'its stamps shift by {shifts[name]:.2g} s against log time: a clock was set or drifts'
+        )
         topic = getattr(recording, name).topic
         return [*outcomes, found('order', topic, 0.97, how=how)], replace(recording, **mended)
     off, recording = _clocks(replace(recording, **mended), late, facts)
@@ -470,7 +472,7 @@ def _clocks(
     for key, value in off.items():
         channel = getattr(recording, key)
         if abs(value) > MOST_OFFSET:
-            how = f'its stamps lie {abs(value):.3g} s off: another clock, such as time since start'
+            how = f'its stamps lie {abs(value):.3g} s off: another clock, such as time since boot'
             outcomes.append(found('order', channel.topic, 0.99, how=how))
             continue
         mended[key] = shifted(channel, round(-value * 1e9))

@@ -279,13 +279,13 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sure = confidence(sigmas) * (0.5 if slips else 1.0)
     evidence.figures['rover.radius_ratio'] = round(ratio.value, 4)
     words: dict[str, Any] = {'ratio': ratio.value, 'off': ratio.std}
-    words['trial'] = trial.words('off by', 'of the speed')
+    words['trial'] = trial.words('error', 'of the speed')
     alone = max(share, 1.0 - share) > SURE
     if not alone:
-        words['rival'] = ': the radius of the wheels, or the scale of the reference'
-        hides = 'soft ground makes' if soft else 'torques off zero hide'
+        words['rival'] = ': wrong wheel radius, or wrong scale of the reference'
+        hides = 'soft ground causes' if soft else 'torque zeros hide'
         words['rival'] += f', or {hides} slip' if slips else ''
-        words['separate'] = '; drive ten metres by a tape: the rims or the reference must say ten'
+        words['separate'] = '; drive ten metres along a tape: which of the two shows ten?'
     off = radius * ratio.std
     of_rims = {'value': round(float(np.mean(rims)), 5), 'std': round(off, 5), 'radii': listed(rims)}
     times, std = round(1.0 / ratio.value, 4), round(ratio.std / ratio.value**2, 4)
@@ -415,11 +415,11 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     if ratio.sigmas_from(1.0) < 4.0 or abs(ratio.value - 1.0) < LEAST_TRACK_ERROR:
         return []
     sure = confidence(ratio.sigmas_from(1.0))
-    words: dict[str, Any] = {'stated': stated, 'trial': trial.words('off by', 'of the track')}
-    rival, separate = ', or the gyro has another scale', '; measure it with a tape'
+    words: dict[str, Any] = {'stated': stated, 'trial': trial.words('error', 'of the track')}
+    rival, separate = ', or the gyro has a scale error', '; measure it with a tape'
     if not alone:
-        rival = ', or the radius is another, or the wheels slip'
-        separate += ', or drive straight by a reference'
+        rival = ', or the radius is wrong, or the wheels slip'
+        separate += ', or drive straight with a reference'
     words |= {'rival': rival, 'separate': separate, 'ratio': ratio.value, 'off': ratio.std}
     value, std = round(stated * ratio.value, 4), round(stated * ratio.std, 4)
     lateral = listed(evidence.facts.configuration.wheels.y * ratio.value, '.3f')

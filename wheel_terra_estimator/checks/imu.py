@@ -215,7 +215,7 @@ def _frozen(state: ImuState) -> Judged:
     if np.mean(same) > FROZEN_SHARE:
         how = f'{100 * np.mean(same):.0f} % of the messages repeat the one before'
     elif longest > FROZEN_TIME:
-        how = f'all six numbers stay the same for up to {longest:.1f} s'
+        how = f'all six numbers stay identical for up to {longest:.1f} s'
     else:
         return [], state
     alive = ~np.concatenate([[False], same])

@@ -27,8 +27,8 @@ FAR_NIS = 10.0
 """Mean normalised innovation squared of torque or balance that says that they do not fit. Usual
 0.03 to 1; up to 7 for seconds in turns without a reference and on snow; with the wrong sign 13."""
 _MISFITS = {
-    'nis_torque': ('fit of torque', 'torque does not fit the soil model'),
-    'nis_balance': ('fit of balance', 'torques, weight and slope do not fit each other'),
+    'nis_torque': ('fit of torque', 'torque contradicts the soil model'),
+    'nis_balance': ('fit of balance', 'torques, weight and slope contradict each other'),
 }
 """Figure of the filter -> subject and words of the fault."""
 _NOISE = 'noise_beyond_stated'
@@ -146,7 +146,7 @@ def _misfits(health: Mapping[str, Any], *, dug_in: bool) -> dict[str, str]:
         if health.get(key, 0.0) > FAR_NIS and not dug_in
     }
     if _NOISE in health:
-        told['noise'] = f'{health[_NOISE]} -> state it so'
+        told['noise'] = f'{health[_NOISE]} -> state that'
     return told
 
 

@@ -41,7 +41,7 @@ def check_required(recording: Recording, facts: RoverFacts) -> list[Outcome]:
                 cure = 'wheel-terra init --bag BAG --wheels NAMES makes a rover file for that'
         outcomes.append(_required(own, 'wheel rates', 'there is nothing to estimate', cure))
     if recording.imu is None:
-        effect = 'a reference velocity alone then tells slip, and nothing the slope'
+        effect = 'slip then rests on a reference velocity alone, and the slope is unknown'
         cure = 'record the IMU, or name its topic: --remap imu/data:=/TOPIC'
         outcomes.append(_required('imu/data', 'IMU', effect, cure))
     return outcomes
@@ -119,13 +119,13 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     if silence > LONGEST_SILENCE:
         others: Any = np.isfinite(joints.rate[last + 1 :]).any(axis=0)
         later = itertools.compress(joints.names, others)
-        how = f'in no message of the last {silence:.0f} s, but {", ".join(later)}'
+        how = f'in no message of the last {silence:.0f} s, only {", ".join(later)}'
         outcomes.append(_missing(joints.topic, facts.names, how))
     mute = [name for name in facts.names if name in silent]
     if mute:
         at = joints.position
         angles = at is not None and np.isfinite(at[:, joints.names.index(mute[0])]).any()
-        how = 'position alone: form its change' if angles else 'velocity empty, or too short'
+        how = 'position only, take its change' if angles else 'velocity empty, or too short'
         outcomes.append(_missing(joints.topic, mute, f'without a rate: {how}'))
     for name in spare:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
@@ -146,7 +146,7 @@ def proposal(recording: Recording) -> dict[str, Any]:
     remaps = [o.cure for o in check_topics(recording, ()) if isinstance(o, Finding)]
     reference = recording.reference
     if reference is not None and 'truth' in reference.topic:
-        remaps.append(f'--remap reference_odom:={reference.topic}  (or kept to compare with)')
+        remaps.append(f'--remap reference_odom:={reference.topic}  (or keep it to compare with)')
     names = wheel_names(recording.joints.names) if recording.joints is not None else ()
     return {'remaps': remaps, 'wheels.names': list(names)}
 

@@ -142,7 +142,7 @@ class Stays(NamedTuple):
         if self.rows.all():
             same = 'is the same' if math.isnan(self.value) else f'is {self.value:g}'
             return f'{same} in every message while the wheels turn'
-        return f'stays the same to the last digit for up to {self.longest:.1f} s of driving'
+        return f'stays identical to the last digit for up to {self.longest:.1f} s of driving'
 
 
 def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | None:

@@ -127,7 +127,7 @@ def _sign_and_zero(
         typical = float(np.nanmedian(others))
         far = own - typical
         spread = max(float(np.nanmax(others) - np.nanmin(others)), 0.1 * abs(far))
-        how = f'reads {1000 * far:+.0f} mm off the other wheels all the time'
+        how = f'reads {1000 * far:+.0f} mm against the other wheels all the time'
         least = max(ODD_ZERO * small, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
         # What is far beyond that is none of a sinkage.
         if least < abs(far) < NO_DEPTH * _radius(evidence) and _lasting(table, index, far):

@@ -242,7 +242,7 @@ class Trial(NamedTuple):
     def words(self, what: str, unit: str) -> str:
         """Return what the trial showed, to be put behind a finding."""
         unit = f' {unit}' if unit else ''
-        return f' ({what} {self.before:.3g} -> {self.after:.3g}{unit} on the other half)'
+        return f' ({what} {self.before:.3g}{unit}, corrected {self.after:.3g}, on the other half)'
 
 
 def halves(energy: FloatArray) -> tuple[slice, slice]:

@@ -357,7 +357,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         outcomes += told_of
     if blame == 'reference' and evidence.recording.reference is not None:
         alone = bool(turn) or told[1] is not None
-        sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels count backwards')
+        sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels read negative')
         if told[1] is None and _climbs(evidence, rows):
             sure, rival = 0.5 * sure, f'{rival}, or the rover slides back'
         outcomes.append(evidence.found('reference_reversed', sure, value=-1.0, rival=rival))
@@ -474,7 +474,7 @@ def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sides = evidence.found(
         'swapped_sides',
         0.97 if sense else 0.5,
-        rival='' if sense else ', or the gyro counts yaw to the right',
+        rival='' if sense else ', or the gyro is positive to the right',
         names=', '.join(facts.names[i] for i in order),
     )
     if sense:

@@ -21,10 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument('table', nargs='?', type=Path, metavar='LOG.csv', help='one row per time')
     parser.add_argument(
-        '--columns', type=Path, metavar='MAP.yaml', help='which column is what (see --example)'
+        '--columns', type=Path, metavar='MAP.yaml', help='meaning of the columns (see --example)'
     )
     add_output(parser, 'rosbag2 folder (MCAP)')
-    parser.add_argument('--example', action='store_true', help='print a map of columns and stop')
+    parser.add_argument('--example', action='store_true', help='print an example column map')
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         rows = f'{count} rows end' if count > 1 else 'a row ends'
         print(
             f'note: {rows} before the last column of the map (first: line {written.short[0]}); '
-            'what is missing there is left out'
+            'what is missing there is skipped'
         )
     for topic, count in written.held.items():
         print(f'note: {topic} repeats each reading over about {count} rows; it is written once')

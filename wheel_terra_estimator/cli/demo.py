@@ -73,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=Path('demo_output'),
     )
     parser.add_argument(
-        '--no-node', action='store_true', help='replay the drives even where rclpy is at hand'
+        '--no-node', action='store_true', help='replay the drives even if rclpy is installed'
     )
 
 
@@ -96,7 +96,7 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
     absent = [name for name in ('rclpy', 'wheel_terra_lab') if not importlib.util.find_spec(name)]
     live = not arguments.no_node and not absent
     if live:
-        print('The drives go over DDS to estimator_node, as fast as it takes them.')
+        print('The drives are sent over DDS to estimator_node, as fast as it processes them.')
     else:
         why = '' if arguments.no_node else f'Without {" and ".join(absent)} (docs/install.md) '
         print(f'{why}the drives go through `wheel-terra replay`; the numbers are the same.')
@@ -107,7 +107,7 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
             for drive, part in zip(DRIVES, drives, strict=True):
                 if status := _told(f'{drive.name}: {drive.title}', part):
                     return status
-            if status := _told('trial: what is missing in the model of a wheel?', trial):
+            if status := _told('trial: which effect is missing in the model of a wheel?', trial):
                 return status
         finally:  # after Ctrl-C or an error nothing new begins
             pool.shutdown(wait=False, cancel_futures=True)
@@ -116,7 +116,7 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
     print('\nReports with pictures, to be opened in a browser:')
     for report in (*(f'{drive.name}.html' for drive in DRIVES), 'trial/diagnosis/report.html'):
         print(f'  {(output / report).resolve()}')
-    print('\nWhat was shown:')
+    print('\nResults:')
     for line in shown:
         print(f'  {line}')
     return 0
@@ -148,7 +148,7 @@ def _trial(folder: Path) -> Ended:
     command = ['wheel_terra_estimator.cli.main', 'diagnose', '--overwrite']
     command += [str(shipped / 'blind.csv'), '--config', str(shipped / 'rig.yaml')]
     done = _run([*command, '-o', str(folder / 'diagnosis')], ONE_THREAD)
-    done.stdout = f'blind table, truth withheld (SHA-256 {SEAL_SHA256[:16]}...)\n{done.stdout}'
+    done.stdout = f'a table with a hidden effect (SHA-256 {SEAL_SHA256[:16]}...)\n{done.stdout}'
     return done
 
 
@@ -157,19 +157,19 @@ def _named(folder: Path) -> str:
     path = demo_recording('trial') / 'sealed.json'
     sealed = path.read_bytes()
     if hashlib.sha256(sealed).hexdigest() != SEAL_SHA256:
-        raise UserError(f'{path}: its checksum is wrong; install the package anew')
+        raise UserError(f'{path}: its checksum is wrong; reinstall the package')
     report = json.loads((folder / 'diagnosis' / 'report.json').read_text(encoding='utf-8'))
     hidden = ' + '.join(json.loads(sealed)['hidden'])
     said = ' + '.join(effect['name'] for effect in report['effects']) or report['verdict']
     judged = 'right' if said == hidden else 'wrong'
-    return f'truth revealed: {hidden} was hidden; named: {said}: {judged}'
+    return f'hidden effect {hidden}, identified {said}: {judged}'
 
 
 def _drive(number: int, output: Path, live: bool) -> Ended:
     """Run a drive; where DDS does not connect it with the node, replay it."""
     done = _run(_command(DRIVES[number], output, live), _environment(number))
     if live and done.returncode == NODE_NOT_FOUND:
-        said = 'DDS has no way to the node on this machine: `wheel-terra replay` instead.\n'
+        said = 'DDS does not reach the node on this machine: using `wheel-terra replay` instead.\n'
         done = _run(_command(DRIVES[number], output, False), _environment(number))
         done.stdout = said + done.stdout
     return done
@@ -217,7 +217,7 @@ def _outcome(drive: DemoDrive, output: Path) -> str:
     errors = truth_errors(history, truth, configuration.filter.class_thresholds)
     if errors is not None and errors.entrapped is not None:
         lead = errors.lead
-        words = 'no warning before' if lead is None else f'warned {lead:.1f} s before'
+        words = 'not warned before' if lead is None else f'warned {lead:.1f} s before'
         return f'entrapped at {errors.entrapped:.1f} s (median slip above 0.9 for 1 s), {words}'
     warnings = len(history.warnings)
     return f'never entrapped, {f"{warnings} false warnings" if warnings else "never warned"}'

@@ -158,7 +158,7 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
         named = diagnosis.configuration.replace({'effect_file': str(files.pop())})
         diagnosis = replace(diagnosis, configuration=named)
     if not configuration.soil_stated:
-        note = 'no soil was stated (--config): the default sand was taken for the model believed in'
+        note = 'no soil was stated (--config): the default sand was taken as the starting model'
         diagnosis = replace(diagnosis, notes=(*diagnosis.notes, note))
     return diagnosis
 
@@ -184,7 +184,7 @@ def _tell(diagnosis: Diagnosis, output: Path) -> None:
     if diagnosis.next_measurement:
         print(f'  next measurement: {worth(diagnosis.next_measurement[0])}')
     elif diagnosis.verdict in OPEN:
-        print('  next measurement: none of the usual ones would settle it')
+        print('  next measurement: none of the usual ones would decide')
     for note in diagnosis.notes:
         print(f'  note: {note}')
     print(f'  written: {output}')

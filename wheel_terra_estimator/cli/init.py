@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     reader.load([arguments.output])
     print(f'rover file: {arguments.output} ({len(sketch.wheels)} wheels, {sketch.mass:g} kg)')
     if others := ', '.join(sketch.left_out):
-        print(f'  not taken for wheels by their names: {others}; if they are: --wheels')
+        print(f'  not named like wheels: {others}; if they are: --wheels')
     for key in sorted(sketch.guessed):
         print(f'  {key} is a guess: measure it')
     print(f'next: wheel-terra check RECORDING --config {shlex.quote(str(arguments.output))}')
@@ -167,7 +167,7 @@ def _wheels_of(path: Path, remaps: list[str]) -> list[str]:
     rates = zip(joints.names, joints.rate.T, strict=True)
     others = [n for n, rate in rates if n not in names and (abs(rate) > 0.0).any()]
     if others:
-        print(f'not taken for wheels by their names: {", ".join(others)}; if they are: --wheels')
+        print(f'not named like wheels: {", ".join(others)}; if they are: --wheels')
     return names
 
 

@@ -36,7 +36,7 @@ from wheel_terra_estimator.errors import ConfigurationWarning, UserError, outsid
 COMMANDS = {
     'simulate': 'drive a simulated rover and write a rosbag2 with ground truth',
     'check': 'say what is wrong with a recording or a rover file, and how to correct it',
-    'calibrate': 'write a rover file with what a recording tells: radius, mounting, zeros, noise',
+    'calibrate': 'write a rover file with what a recording shows: radius, mounting, zeros, noise',
     'init': 'write a new rover file from a URDF, from a recording, or from measures',
     'config': 'list, show or find the shipped rover, soil and scenario files',
     'compare': 'put two bags of estimates side by side, against the truth where there is one',
@@ -44,12 +44,12 @@ COMMANDS = {
     'replay': 'run the estimator over a rosbag2, without ROS',
     'predict': 'print or draw the curves of the wheel-soil model',
     'diagnose': 'find where model and measurement disagree and name the missing effect',
-    'trial': 'hide an effect in a drawn table, diagnose it blind, reveal the truth',
+    'trial': 'hide an effect in a synthetic table, diagnose it blind, reveal the truth',
     'effects': 'list the physical and instrument effects that can be named',
     'soilbin': 'run the virtual soil bin (discrete elements)',
-    'reproduce': 'every figure, table and number of three papers beside ours, with a verdict',
+    'reproduce': 'compare figures, tables and numbers of three papers with ours, with a verdict',
     'evaluate': 'score the estimator against ground truth and baselines',
-    'bench': 'speed beside floors and peers, in processor time',
+    'bench': 'processor time of the estimator, beside other programs',
     'demo': 'run the estimator over two shipped drives, and a blind trial of the diagnosis',
 }
 """Sub-commands in the order of the help, and what each is for.

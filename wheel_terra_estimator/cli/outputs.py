@@ -57,7 +57,7 @@ def check(arguments: argparse.Namespace) -> None:
         refuse_inputs(path, inputs)
     for one, other in combinations(outputs.values(), 2):
         if one.absolute() == other.absolute():
-            raise UserError(f'{one}: is named for two outputs; give each a path of its own')
+            raise UserError(f'{one}: given for two outputs; give each its own path')
 
 
 def file_or_entry(text: str) -> Path | str:

@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs='+',
         metavar='BAG',
         help='rosbag2 folder, or a single .mcap or .db3 file; of several, each gets a folder below '
-        '-o (--report, --table, --track are names in it), and an interrupted run goes on',
+        '-o (--report, --table, --track are names in it), and an interrupted run is resumed',
     )
     add_output(
         parser,
@@ -80,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--arrival',
         type=Path,
         metavar='F',
-        help='take the messages in the order that a live node logged (its parameter '
+        help='replay messages in the order logged by a live node (its parameter '
         'record_arrival), not in that of the bag',
     )
 
@@ -122,7 +122,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
     if drive.result.interrupted:
         return INTERRUPTED
     if not drive.summary.sets:
-        raise UserError(f'{bag}: no estimate; what was heard, and why it was refused, stands above')
+        raise UserError(f'{bag}: no estimate; what was received and rejected is listed above')
     return 0
 
 
@@ -215,7 +215,7 @@ def _run_several(arguments: argparse.Namespace) -> int:
             scheduler=arguments.scheduler or '',
         )
     except KeyboardInterrupt:
-        raise KeyboardInterrupt('; without --overwrite the same command goes on') from None
+        raise KeyboardInterrupt('; the same command without --overwrite resumes') from None
     failed = [row for row in rows if row.error]
     if arguments.json:
         print(
@@ -237,7 +237,7 @@ def _plain_name(option: str, path: Path) -> str:
     """Return the name of a file that stands in the folder of each recording."""
     if path != Path(path.name):
         raise UserError(
-            f'--{option} {path}: with several recordings it stands in the folder of each; '
+            f'--{option} {path}: with several recordings it goes to the folder of each; '
             f'give a plain name such as {path.name}'
         )
     return path.name

@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='F',
         help="rover file, or the bare name of a shipped one, in place of the scenario's rover",
     )
-    parser.add_argument('--seed', type=int, default=0, help='decides all random quantities')
+    parser.add_argument('--seed', type=int, default=0, help='seed of all random quantities')
     parser.add_argument(
         '--duration', type=float, metavar='S', help="length of the drive in place of the scenario's"
     )

@@ -179,7 +179,7 @@ def _effects_to_try(
         elif options.effects is not None and name not in options.effects:
             not_tried[name] = 'was not asked for'
         elif effect.sparse:
-            not_tried[name] = 'is a law found from the rows: it is proposed, never named'
+            not_tried[name] = 'is a law found from the rows: it is only proposed, never named'
         else:
             asked = options.effects is not None
             tried.update({f.name: f for f in effect.forms if asked or f.candidate})

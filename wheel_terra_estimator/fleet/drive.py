@@ -21,7 +21,7 @@ from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
 
-NO_SOIL = 'no soil was stated (--config): begun from sand with the spread of all shipped soils'
+NO_SOIL = 'no soil was stated (--config): starting from sand with the spread of all shipped soils'
 
 QUICK_MESSAGES = 60_000  # messages of a topic that the checks before a replay look at
 

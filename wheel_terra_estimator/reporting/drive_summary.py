@@ -91,14 +91,14 @@ class DriveSummary:
     def verdict(self) -> str:
         """The drive in a sentence."""
         if not self.sets:
-            return 'No estimate: no usable wheel odometry was heard.'
+            return 'No estimate: no usable wheel odometry was received.'
         if self.warnings:
             times = ', '.join(f'{w.start:.1f} s' for w in self.warnings[:5])
             more = f' and {len(self.warnings) - 5} more' if len(self.warnings) > 5 else ''
             kind = 'A stuck warning' if len(self.warnings) == 1 else 'Stuck warnings'
             return f'{kind} at {times}{more}: {self.warnings[0].reason or "no reason given"}.'
         if all(wheel.slip is None for wheel in self.wheels):
-            return 'No stuck warning, but no slip was known at any time: nothing can be concluded.'
+            return 'No stuck warning, but slip was never known: nothing can be concluded.'
         high = [wheel.seconds['high'] + wheel.seconds['stuck'] for wheel in self.wheels]
         far = [wheel.slip_travel for wheel in self.wheels]
         worst = far.index(max(far))
@@ -106,7 +106,7 @@ class DriveSummary:
             some = ' for more than a centimetre' if any(high) else ''
             heard = {row.name for row in self.messages if row.count}
             unseen = heard and 'reference_odom' not in heard
-            cost = ' Without a reference velocity it may have slipped unseen.' if unseen else ''
+            cost = ' Without a reference velocity, slip may have gone unnoticed.' if unseen else ''
             return f'No stuck warning, no wheel in the classes high or stuck{some}.{cost}'
         name, far_in_cm = self.wheels[worst].name, 100.0 * far[worst]
         return (

@@ -175,7 +175,7 @@ def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
     for start, verdict in _warnings(history, slip):
         after = (history.seconds >= start) & (history.seconds <= start + FORESIGHT)
         if not after.any() or np.mean(there[after]) < LEAST_KNOWN:
-            found.append('Whether it was right is not known: the slip after it is not.')
+            found.append('Whether it was right is unknown, as is the slip after it.')
         else:
             found.append(f'By the estimates: {_in_words(verdict)}.')
     return tuple(found)
@@ -193,8 +193,8 @@ def _in_words(verdict: Verdict) -> str:
         return f'{word}, {abs(verdict.lead):.1f} s {when} the rover was entrapped'
     within = f'within {FORESIGHT:g} s'
     if verdict.outcome is Outcome.NEAR_MISS:
-        return f'a near miss, the median slip passed {NEAR_MISS_SLIP:g}, no entrapment {within}'
-    return f'false, the median slip did not pass {NEAR_MISS_SLIP:g} {within}'
+        return f'a near miss, median slip above {NEAR_MISS_SLIP:g}, no entrapment {within}'
+    return f'false, the median slip stayed below {NEAR_MISS_SLIP:g} for {FORESIGHT:g} s'
 
 
 def as_lines(errors: TruthErrors) -> list[str]:

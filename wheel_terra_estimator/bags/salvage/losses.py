@@ -59,12 +59,12 @@ class Losses:
             more = len(lost) - SHOWN_TOPICS
             words.append(f'lost: {topics}' + (f' and on {more} more topics' if more > 0 else ''))
         elif self.declared is None and (self.spans or self.state):
-            words.append('how many are lost cannot be told')
+            words.append('how many are lost is unknown')
         if spans := self._spans():
             words.append(f'lost {spans} of the recording' if not lost else spans)
         if self.doubtful:
             count = sum(self.doubtful.values())
-            words.append(f'{count} of them stand in a chunk with a wrong checksum')
+            words.append(f'{count} of them come from a chunk with a wrong checksum')
         return ['; '.join([*words, *self.left_out])]
 
     def _spans(self) -> str:

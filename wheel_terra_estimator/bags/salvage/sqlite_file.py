@@ -57,7 +57,7 @@ class SqliteFile:
         if fault and not (self._topics and counts):
             raise UserError(
                 f'{path}: SQLite finds no recording in it ({fault}); '
-                'copy it anew from where it was recorded, or: sqlite3 FILE .recover'
+                'copy it again from where it was recorded, or: sqlite3 FILE .recover'
             )
         self.topics = [Topic(*it, counts[number]) for number, it in self._topics.items()]
         for topic in self.topics:
@@ -160,7 +160,7 @@ class SqliteFile:
         if fault:
             self._note_missing_numbers()
         elif others := self._run('SELECT count(*) FROM messages').fetchone()[0] - counts.total():
-            self.losses.left_out.append(f'{others} rows that are no messages left out')
+            self.losses.left_out.append(f'{others} rows that are not messages were skipped')
         if ordered:
             self._number = self._time = array('q')
         return counts

@@ -32,7 +32,7 @@ ZERO_CHECKS = {
     'drivetrain_friction:proportional': 'read the torque while the wheel lifts, then lowers, '
     'a known weight on a cord round it',
     'wheel_radius_bias': 'roll the wheel out on a hard floor: distance over 10 turns',
-    'pitch_bias': 'read attitude and pull of the standing rig, then turned by 180 degrees',
+    'pitch_bias': 'read attitude and pull with the rig at rest, then turned by 180 degrees',
 }
 
 

@@ -64,7 +64,7 @@ SETTLING_TRAVEL = 0.5  # rim travel after standing, in wheel radii, that is not 
 _DRIFT = {'wheel rate': (0.10, 0.01), 'slip': (0.10, 0.02), 'slope': (0.0, 0.0035)}
 _CREEP = (0.10, 0.5e-3, 0.02)  # share of the sinkage, least [m], most in wheel radii
 
-SMOOTHED = 'slip: from the fixed-interval smoother, which heard neither torque nor sinkage'
+SMOOTHED = 'slip: from the fixed-interval smoother, without torque and sinkage'
 GOOD = 'steady'
 
 

@@ -74,7 +74,7 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
     """Return what stays open and what to do next, without any statistics."""
     if diagnosis.misread:
         return {
-            'open': ['What the column holds: model.yaml is fitted to it as it stands.'],
+            'open': ['What the column means: model.yaml is fitted to it as given.'],
             'next': ['Correct the column, and diagnose again.'],
         }
     still_off, known = channels_off(diagnosis.gap), catalogue()
@@ -83,7 +83,7 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
         for name in still_off
     ]
     if any(effect.remainder for effect in diagnosis.effects):
-        left.append('Something is left that the named effect does not explain.')
+        left.append('A misfit remains that the named effect does not explain.')
     for effect in diagnosis.effects:
         for name in effect.confounded_with:
             by = known[effect.name].confounded_with.get(name)
@@ -91,7 +91,7 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
             what = f'; what separates them: {by}' if by else ''
             left.append(f'These rows cannot tell {plain(effect.name)} from {plain(name)}{what}.')
     if diagnosis.verdict in OPEN and not still_off:
-        left.append('Why these rows need another soil, or more scatter, than was stated.')
+        left.append('Why these rows need a different soil, or more scatter, than stated.')
     settled = not left
     if settled:
         left.append('Nothing beyond noise and the allowed model error.')
@@ -102,19 +102,17 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
         following += _to_settle(diagnosis)
     if diagnosis.proposal and diagnosis.proposal.soil_held:
         following.append(
-            'The proposed law leaves a soil that can be believed; the refit without it does not. '
+            'The proposed law leaves a plausible soil; the refit without it does not. '
             'A measured soil number decides between the two.'
         )
     if diagnosis.proposal:
-        following.append(
-            'Until then proposal.yaml may stand in, inside the range of these rows only.'
-        )
+        following.append('Until then use proposal.yaml, within the range of these rows only.')
     if not following and settled:
-        following.append('Nothing; model.yaml is the model to go on with.')
+        following.append('Nothing; continue with model.yaml.')
     elif not following:
         following.append(
-            'model.yaml is the best model so far; which measurement would settle what stays open '
-            'these rows do not say.'
+            'model.yaml is the best model so far; these rows do not show which measurement would '
+            'settle what is open.'
         )
     return {'open': left, 'next': following}
 
@@ -155,7 +153,7 @@ def moved(shift: SoilShift) -> str:
     key = shift.name if shift.name.startswith('effects.') else f'soil.{shift.name}'
     return (
         f'{FACTORS.get(shift.name, key)} from {number(shift.before)} to {number(shift.after)}, '
-        f'{shift.z_score:+.1f} of its standard deviations ({shift.source})'
+        f'{shift.z_score:+.1f} standard deviations ({shift.source})'
     )
 
 
@@ -166,7 +164,7 @@ def soil_line(diagnosis: Diagnosis) -> str:
     """Return which number the fit shifts farthest, and how well those of the soil were known."""
     sources = ', '.join(dict.fromkeys(s.source.removeprefix(_CLASS) for s in diagnosis.soil))
     farthest = max(diagnosis.moved, key=lambda shift: abs(shift.z_score))
-    return f'Number that moved most: {moved(farthest)}; deviations of the soil from: {sources}.'
+    return f'Largest shift: {moved(farthest)}; standard deviations of the soil from: {sources}.'
 
 
 def why_not(
@@ -187,7 +185,7 @@ def why_not(
         return _leaves(remainder(selection, index, findings.setting.problem))
     if chosen < set(names):
         extra = joined(sorted(set(names) - chosen))
-        return f'{extra} adds nothing that the data ask for ({behind:.1f} nats behind)'
+        return f'{extra} is not supported by the data ({behind:.1f} nats behind)'
     if set(names) < chosen:
         return f'leaves what {joined(sorted(chosen - set(names)))} explains ({behind:.1f} nats)'
     return f'fits worse: {behind:.1f} nats behind {joined(sorted(chosen))}'
@@ -200,8 +198,8 @@ def _leaves(left: Remainder) -> str:
     if left.p_value <= IMPROBABLE:
         return 'leaves more scatter than the noise allows'
     if left.z_score >= LARGEST_Z_SCORE:
-        return 'needs a configured number too far off to be believed'
-    return 'too doubtful to be named'
+        return 'needs a configured number implausibly far off'
+    return 'too uncertain to be named'
 
 
 def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
@@ -214,7 +212,7 @@ def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
             f'(noise and allowed model error permit {amount(name, item.limit)})'
         )
     off = ' and '.join(parts)
-    text = f'Not decided: {off}, but these rows favour neither the refitted soil nor an effect'
+    text = f'Undecided: {off}, but these rows favour neither the refitted soil nor an effect'
     return f'{text}; nearest: {", ".join(nearest)}.' if nearest else f'{text}.'
 
 
@@ -242,7 +240,7 @@ def notes(
         several = f'{count} cells were rejected as outliers'
         found.append('1 cell was rejected as an outlier' if count == 1 else several)
     found += [
-        f'{moved(shift)}: look at it before any effect'
+        f'{moved(shift)}: check it before any effect'
         for shift in shifts
         if abs(shift.z_score) > LARGEST_Z_SCORE
     ]
@@ -343,8 +341,8 @@ def wrong_columns(misread: Mapping[str, float | str]) -> str:
         parts.append(f'the unit of {plain(name)} looks wrong{aside}, times {times:.4g}')
     text = ' and '.join(parts)
     return (
-        f'{text[0].upper()}{text[1:]}: so the rows are explained far better than by any effect. '
-        'Correct the column, or the soil of --config if it is right; no effect is named before.'
+        f'{text[0].upper()}{text[1:]}: that explains the rows far better than any effect. '
+        'Correct the column, or the soil of --config if it is right; no effect is named until then.'
     )
 
 
@@ -441,5 +439,5 @@ def sentence(
         parts.append(text)
     result = 'Missing in the model: ' + ', and '.join(parts)
     if any(effect.remainder for effect in effects):
-        result += '; something is left that this does not explain'
+        result += '; a misfit remains that this does not explain'
     return result + '.'

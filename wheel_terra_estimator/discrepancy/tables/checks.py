@@ -115,7 +115,7 @@ _LEAST = 5e-324  # above nought
 _RANGES: tuple[tuple[str, float, float, str], ...] = (
     ('slip', -1.0, 1.0, _NO_SLIP),
     ('normal_load', _LEAST, _MOST, 'is not positive; state the load in N'),
-    ('normal_load', _LEAST, 1e7, 'is more than any wheel bears; state the load in N'),
+    ('normal_load', _LEAST, 1e7, 'is more than any wheel carries; state the load in N'),
     ('slope', -0.9, 0.9, _DEGREES),
     ('slip_angle', -3.15, 3.15, _DEGREES),
     ('leaving_angle', -1.7, 1.7, _DEGREES),
@@ -129,7 +129,7 @@ _RANGES: tuple[tuple[str, float, float, str], ...] = (
     ('gravity', 1e-3, 100.0, 'is outside 0.001..100'),
     ('pass_number', 1.0, 1000.0, 'is outside 1..1000'),
     ('angular_velocity', -60.0, 60.0, 'looks like degrees per second; give rad/s'),
-    ('sinkage', -900.0, _MOST, 'looks like a mark of no reading; leave the cell empty'),
+    ('sinkage', -900.0, _MOST, 'looks like a missing-value code; leave the cell empty'),
     ('sinkage', -1.0, 1.0, 'looks like millimetres (or centimetres); give it in m'),
     *((f'{name}_std', _LEAST_DEVIATION, _MOST, _NO_DEVIATION) for name in QUANTITIES),
     ('slip_std', 0.0, _MOST, _NO_DEVIATION),
@@ -269,8 +269,8 @@ def _check_dead_columns(table: SteadyTable, remarks: list[str]) -> None:
             remarks.append(f'{quantity} is {said}: taken as measured, with its stated deviation')
             continue
         raise UserError(
-            f'{table.name}, line {table.lines[here][0]}, column {quantity}: {said}; nothing that '
-            f'was measured stands so still: leave the column out, or state its {quantity}_std'
+            f'{table.name}, line {table.lines[here][0]}, column {quantity}: {said}; no '
+            f'measurement is that constant: leave the column out, or state its {quantity}_std'
         )
 
 
@@ -286,7 +286,7 @@ def check_wheel_of_model(table: SteadyTable, configuration: Configuration) -> No
         if not (ratio < np.log(LIKE_WHEEL)).any():
             other = (
                 f'm, but the model file states {stated[0]:g} m (wheels.{key}); give the --config '
-                'of this wheel, or mend the column'
+                'of this wheel, or correct the column'
             )
             _refuse(table.name, table.lines, column, values, np.isfinite(values), other)
 

@@ -144,7 +144,7 @@ def new_rows(table: SteadyTable, earlier: Sequence[SteadyTable]) -> SteadyTable:
     if kept.all():
         return table
     names = ', '.join(part.name for part in earlier)
-    note = f'{np.sum(~kept)} rows are exact copies of rows of {names} and tell nothing new'
+    note = f'{np.sum(~kept)} rows are exact copies of rows of {names} and add nothing'
     return replace(table.select(kept), notes=(*table.notes, note))
 
 
