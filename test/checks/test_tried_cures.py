@@ -39,6 +39,16 @@ def test_wheels_backwards_in_turns_on_the_spot_are_found_all_the_same(wheels):
     assert 'on the other half' in finding.words
 
 
+def test_a_rover_that_slides_back_in_curves_has_no_reversed_wheels_for_sure():
+    """Wheels drive up a slope of 0.2 rad, the body goes down: mirrored, all wheels read negative."""
+    time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
+    down = rolling.Motion(time, 0.0 * time + 0.25, 0.1 * np.sin(time / 5.0), 0.0 * time - 0.2)
+    whole = rolling.recording(down)
+    joints = replace(whole.joints, rate=-whole.joints.rate)
+    (finding,) = rolling.checked(whole=whole, joints=joints).findings
+    assert finding.confidence < 0.5 and 'or the rover slides back' in finding.words
+
+
 @pytest.mark.parametrize('what', ['wheels', 'reference', 'both torque and reference'])
 def test_slopes_tell_whether_wheels_or_reference_run_backwards(what):
     """A drive without turns, starts or stops: only the torque uphill says which way it goes."""

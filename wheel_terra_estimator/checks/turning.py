@@ -69,6 +69,7 @@ UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
 CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
 SLIDES_BACK = 0.15  # slope against the wheels from which a rover may slide back on them [-]
+SLIDE = ', or the rover slides back'
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
@@ -347,8 +348,12 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         outcomes += [untold(kind, why) for kind in ('swapped_sides', 'exchanged_wheels')]
     told = _told_direction(mended, signs)
     blame = _blame(told, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
+    slides = told[0] is not None and told[0] < 0.0 and _climbs(evidence, rows)
     if blame == 'wheels':
         signs, turn = -signs, -turn
+        if slides:
+            trial = f'{chosen.trial}{SLIDE}'
+            chosen = chosen._replace(sure=0.5 * chosen.sure, trial=trial)
     if (signs < 0.0).any():
         finding, mended = _backwards(evidence, mended, signs, chosen)
         outcomes.append(finding)
@@ -358,8 +363,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if blame == 'reference' and evidence.recording.reference is not None:
         alone = bool(turn) or told[1] is not None
         sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels read negative')
-        if told[1] is None and _climbs(evidence, rows):
-            sure, rival = 0.5 * sure, f'{rival}, or the rover slides back'
+        if slides:
+            sure, rival = 0.5 * sure, f'{rival}{SLIDE}'
         outcomes.append(evidence.found('reference_reversed', sure, value=-1.0, rival=rival))
         velocity = -evidence.recording.reference.velocity
         mended = mended.with_channel('reference', velocity=velocity)
