@@ -110,10 +110,6 @@ class Rover(Node):
             self.create_subscription(JointState, f'{NODE}/{topic}', self._on_other, 100)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
 
-    def publish_at(self, topic: str, rate: float) -> None:
-        """Publish a topic at another rate [Hz] from now on."""
-        self._periods[topic] = 1.0 / rate
-
     def publish_due(self) -> float:
         """Send what is due; return when the next message is."""
         now = time.monotonic()
