@@ -14,7 +14,7 @@ import numpy as np
 
 from wheel_terra_estimator.checks import geometry, imu, torque, turning
 from wheel_terra_estimator.checks.evidence import EVEN_GROUND_STD, Evidence
-from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked, untold
+from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked, not_checked
 from wheel_terra_estimator.checks.run import examine
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -57,17 +57,17 @@ def calibrate(
         raise UserError(f'{recording.name}: it has no wheel rates to calibrate with')
     changes = _Changes(configuration.flat())
     _directions(changes, report, configuration)
-    for told in _sure(report):
-        read_off = told.fault.endswith('_offset') or told.fault == 'planet'
-        if read_off and told.parameter and told.value is not None:
-            changes.add(told.parameter, told.value, told.std, told.words)
+    for finding in _sure(report):
+        read_off = finding.fault.endswith('_offset') or finding.fault == 'planet'
+        if read_off and finding.parameter and finding.value is not None:
+            changes.add(finding.parameter, finding.value, finding.std, finding.words)
     _biases(changes, _mounting(changes, evidence, report), report)
     _noises_and_rates(changes, report)
     evidence = _radius(changes, evidence, report)
     if np.isfinite(evidence.torque).any(axis=0).all():
         _torques(changes, evidence)
     _track(changes, evidence)
-    report.not_checked.append(untold('mass', 'centre'))
+    report.not_checked.append(not_checked('mass', 'centre'))
     mended = {change.key for change in changes.made}
     rivals = ('mass', 'reference_scale' if 'wheels.radius' in mended else '')
     left = [f for f in report.findings if f.parameter not in mended and f.fault not in rivals]
@@ -96,25 +96,25 @@ def _sure(report: CheckReport) -> list[Finding]:
 
 
 def _directions(changes: _Changes, report: CheckReport, configuration: Configuration) -> None:
-    told = next((f for f in _sure(report) if f.fault == 'backwards' and f.wheel), None)
-    if told is None:
+    finding = next((f for f in _sure(report) if f.fault == 'backwards' and f.wheel), None)
+    if finding is None:
         return
-    wheels, wrong = configuration.wheels, str(told.wheel).split(', ')
+    wheels, wrong = configuration.wheels, str(finding.wheel).split(', ')
     after = [
         int(-d) if name in wrong else int(d)
         for name, d in zip(wheels.names, wheels.direction, strict=True)
     ]
-    changes.add('wheels.direction', after, None, f'{told.wheel}: {told.words}')
+    changes.add('wheels.direction', after, None, f'{finding.wheel}: {finding.words}')
 
 
 def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
     """Note the mounting; return the evidence in the frame of the file that is written."""
-    all_told = [f for f in report.findings if f.parameter in imu.MOUNTING]
-    if any(f.confidence <= imu.UNTURNED for f in all_told):  # a rival may be it
-        evidence, all_told = evidence.turned(evidence.facts.mounting), []
-    told = all_told[0] if all_told else None
-    rotation, std = evidence.rotation, told.std if told is not None else None
-    source = told.words if told is not None else 'mean specific force'
+    mountings = [f for f in report.findings if f.parameter in imu.MOUNTING]
+    if any(f.confidence <= imu.UNTURNED for f in mountings):  # a rival may be it
+        evidence, mountings = evidence.turned(evidence.facts.mounting), []
+    details = mountings[0] if mountings else None
+    rotation, std = evidence.rotation, details.std if details is not None else None
+    source = details.words if details is not None else 'mean specific force'
     tilt = imu.small_tilt(evidence)
     if tilt is not None and tilt.std < EVEN_GROUND_STD:
         if tilt.sigmas > CLEAR and tilt.sure > LEAST_SURE:
@@ -128,13 +128,13 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evi
 
 
 def _biases(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
-    told = next((f for f in _sure(report) if f.fault == 'force_bias'), None)
-    if told is not None:
+    finding = next((f for f in _sure(report) if f.fault == 'force_bias'), None)
+    if finding is not None:
         off = report.figures['imu.specific_force_bias']
-        changes.add(str(told.parameter), off, told.std, told.words)
+        changes.add(str(finding.parameter), off, finding.std, finding.words)
     seen = imu.gyro_bias(evidence)
     if seen is not None and not turning.gyro_unit_known(evidence):
-        report.not_checked.append(untold('zero', 'gyro_unit'))
+        report.not_checked.append(not_checked('zero', 'gyro_unit'))
     elif seen is not None:
         whole = (seen[0] + evidence.facts.sensors.angular_rate_bias).round(6).tolist()
         source = 'mean of the gyro at rest'
@@ -176,10 +176,10 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
 
 def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
     configuration, figures = evidence.facts.configuration, report.figures
-    told = next((finding for finding in _sure(report) if finding.fault == 'radius'), None)
+    radius = next((finding for finding in _sure(report) if finding.fault == 'radius'), None)
     open_yet = any(finding.fault == 'reference_scale' for finding in report.findings)
     rolling, source = evidence.facts.radius, 'straight stretches against the other wheels'
-    if told is not None and evidence.recording.reference is not None:
+    if radius is not None and evidence.recording.reference is not None:
         source = f'straight, steady, firm stretches against {evidence.recording.reference.topic}'
         if open_yet:  # nothing is mended by it yet
             rolling = rolling * figures['rover.radius_ratio']
@@ -187,7 +187,7 @@ def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evide
     if np.allclose(rolling, configuration.wheels.slip_radius):
         return evidence
     lugs = configuration.wheels.slip_radius - configuration.wheels.radius
-    std = told.std if told is not None else None
+    std = radius.std if radius is not None else None
     changes.add('wheels.radius', (rolling - lugs).round(5).tolist(), std, source)
     return replace(evidence, facts=replace(evidence.facts, radius=rolling))
 
@@ -208,13 +208,13 @@ def _torques(changes: _Changes, evidence: Evidence) -> None:
 
 
 def _track(changes: _Changes, evidence: Evidence) -> None:
-    told = None if turning.skids(evidence) else geometry.rolling_track(evidence)
-    sure = isinstance(told, geometry.Told) and told.alone
-    if isinstance(told, geometry.Told) and sure and told.ratio.sigmas_from(1.0) > CLEAR:
+    track = None if turning.skids(evidence) else geometry.rolling_track(evidence)
+    sure = isinstance(track, geometry.TriedRatio) and track.alone
+    if isinstance(track, geometry.TriedRatio) and sure and track.ratio.sigmas_from(1.0) > CLEAR:
         lateral = evidence.facts.configuration.wheels.y  # in which no side is swapped
-        std = float(np.abs(lateral).max()) * told.ratio.std
+        std = float(np.abs(lateral).max()) * track.ratio.std
         source = 'gyro against the difference of the sides in turns'
-        changes.add('wheels.y', (lateral * told.ratio.value).round(4).tolist(), std, source)
+        changes.add('wheels.y', (lateral * track.ratio.value).round(4).tolist(), std, source)
 
 
 def as_file(

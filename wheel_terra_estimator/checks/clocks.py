@@ -18,7 +18,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.finding import NotChecked, Outcome, found, of_offset, untold
+from wheel_terra_estimator.checks.finding import NotChecked, Outcome, found, not_checked, of_offset
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Channel, Recording, of_one_wheel, shifted
 from wheel_terra_estimator.checks.statistics import (
@@ -104,12 +104,12 @@ def corrected(recording: Recording, facts: RoverFacts) -> Recording:
 
 def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return which sensor's stamps are off, and the evidence with the reference on the wheels'."""
-    told = {'imu': _of_imu(evidence), 'reference': _of_reference(evidence)}
+    answers = {'imu': _of_imu(evidence), 'reference': _of_reference(evidence)}
     by_log = _moved(evidence, 'imu') - _moved(evidence, 'joints')
-    if by_log and isinstance(told['imu'], NotChecked):
-        told['imu'] = _lag_by_log(by_log)
-    outcomes: list[Outcome] = [one for one in told.values() if isinstance(one, NotChecked)]
-    lags = {name: one for name, one in told.items() if not isinstance(one, NotChecked)}
+    if by_log and isinstance(answers['imu'], NotChecked):
+        answers['imu'] = _lag_by_log(by_log)
+    outcomes: list[Outcome] = [one for one in answers.values() if isinstance(one, NotChecked)]
+    lags = {name: one for name, one in answers.items() if not isinstance(one, NotChecked)}
     blamed = _blamed(evidence, lags)
     for name, off in blamed.items():
         if abs(off.value) <= MOST_OFFSET:  # else another clock
@@ -161,39 +161,39 @@ def _lag_by_log(late: float) -> Lag:
 
 def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
     """Return the sensor whose stamps are off: the one that is off against both others."""
-    late = {name: told for name, told in lags.items() if told.counts(evidence, name)}
+    late = {name: lag for name, lag in lags.items() if lag.counts(evidence, name)}
     if len(late) == 2:
         imu, reference = late['imu'], late['reference']
-        std = math.hypot(*(_whole_std(evidence, *told) for told in late.items()))
+        std = math.hypot(*(_whole_std(evidence, *lag) for lag in late.items()))
         if abs(imu.value - reference.value) < max(APART, 3.0 * std):
             return {'wheel_odometry': imu.of_the_first()}
         return late
-    for name, told in late.items():
+    for name, lag in late.items():
         other = next((lag for key, lag in lags.items() if key != name), None)
         if other is not None and other.steady:
-            wheels = abs(other.value - told.value) < abs(other.value)
+            wheels = abs(other.value - lag.value) < abs(other.value)
         else:
-            wheels = _by_arrival(evidence, name, told)
+            wheels = _by_arrival(evidence, name, lag)
         if wheels:
-            return {'wheel_odometry': told.of_the_first()}
+            return {'wheel_odometry': lag.of_the_first()}
     return late
 
 
-def _by_arrival(evidence: Evidence, name: str, told: Lag) -> bool:
+def _by_arrival(evidence: Evidence, name: str, lag: Lag) -> bool:
     """Return whether the wheels' stamps lie off their arrival, not those of another channel."""
-    own, others, late = _late(evidence, 'joints'), _late(evidence, name), told.value
-    # It would come before it was measured.
-    if others > 0.0 and others + late < FUTURE - math.hypot(told.std, LEAST_STD[told.by]):
+    own, others, late = _late(evidence, 'joints'), _late(evidence, name), lag.value
+    # It would come before it was lag.
+    if others > 0.0 and others + late < FUTURE - math.hypot(lag.std, LEAST_STD[lag.by]):
         return True
     if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
         return abs(own - late) < abs(own) - 0.5 * abs(late) or own < FUTURE < others
     return abs(others) + abs(own - late) < abs(own) + abs(others + late)
 
 
-def _whole_std(evidence: Evidence, name: str, told: Lag) -> float:
+def _whole_std(evidence: Evidence, name: str, lag: Lag) -> float:
     """Return the deviation of a lag [s]; between two messages nothing is known of a change."""
     between = BETWEEN * max(evidence.period, _channel(evidence, name).period)
-    return math.hypot(told.std, between, LEAST_STD[told.by])
+    return math.hypot(lag.std, between, LEAST_STD[lag.by])
 
 
 def _channel(evidence: Evidence, name: str) -> Channel:
@@ -201,19 +201,19 @@ def _channel(evidence: Evidence, name: str) -> Channel:
     return channel
 
 
-def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
+def _outcome(evidence: Evidence, name: str, lag: Lag) -> Outcome:
     channel = _channel(evidence, name)
-    if not told.steady:
-        off = ' and '.join(f'{late:+.2f} s' for late in told.halves)
-        return untold('delay', 'drifts', topic=channel.topic, off=off)
-    std = _whole_std(evidence, name, told)
-    against, sure = told.by + told.trial.words('unlike part', ''), 0.97
-    if told.by == BY_LOG:
-        on_the_way = -LONGEST_WAY < told.value < 0.0
+    if not lag.steady:
+        off = ' and '.join(f'{late:+.2f} s' for late in lag.halves)
+        return not_checked('delay', 'drifts', topic=channel.topic, off=off)
+    std = _whole_std(evidence, name, lag)
+    against, sure = lag.by + lag.trial.words('unlike part', ''), 0.97
+    if lag.by == BY_LOG:
+        on_the_way = -LONGEST_WAY < lag.value < 0.0
         rival, sure = (', or its messages come late', 0.5) if on_the_way else ('', 0.97)
         against = f'log time: two clocks{rival}'
-    told_of = of_offset(name, told.value, std, against, evidence.facts)
-    return evidence.found(f'{name}_offset', sure, **told_of)
+    details = of_offset(name, lag.value, std, against, evidence.facts)
+    return evidence.found(f'{name}_offset', sure, **details)
 
 
 # Lags of pairs -----------------------------------------------------------------------------------
@@ -223,9 +223,9 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
     """Return how late the IMU is after the wheels; turns and accelerations must not contradict."""
     imu, difference = evidence.recording.imu, evidence.side_difference
     if imu is None or evidence.gyro is None:
-        return untold('delay', 'no_imu')
+        return not_checked('delay', 'no_imu')
     if evidence.period > SLOWEST:
-        return untold('delay', 'seldom')
+        return not_checked('delay', 'seldom')
     time, at = even_times(evidence.time, STEP), evidence.seconds(imu)
     by_log = _moved(evidence, 'imu') - _moved(evidence, 'joints')
 
@@ -248,10 +248,10 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
         started = after(change, felt, 'starts')
     best = turned or started
     if best is None:
-        return untold('delay', 'no_turns', limit=round(_longest('turns', time), 1))
+        return not_checked('delay', 'no_turns', limit=round(_longest('turns', time), 1))
     apart = 0.0 if turned is None or started is None else abs(turned.value - started.value)
     if started is not None and started.steady and apart > APART + 3.0 * best.std:
-        return untold('delay', 'unlike', apart=apart)
+        return not_checked('delay', 'unlike', apart=apart)
     evidence.figures['imu.delay_s'] = round(best.value, 3)
     return best
 
@@ -260,13 +260,13 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     """Return how late the reference is after the wheels, by starts and stops."""
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < 10:
-        return untold('delay', 'no_reference')
+        return not_checked('delay', 'no_reference')
     time, at = even_times(evidence.time, STEP), evidence.seconds(reference)
     order = np.argsort(at, kind='stable')
     forward, rim = reference.velocity[order, 0], _even(evidence, evidence.rim, time)
     slow = time.size < 2 or float(np.median(np.diff(at[order]))) > SLOWEST
     if slow or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
-        return untold('delay', 'no_change')
+        return not_checked('delay', 'no_change')
 
     def around(near: float) -> Lag | None:  # means are those up to a time
         sent = at[order] - _moved(evidence, 'joints')
@@ -274,13 +274,13 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
 
     own, wheels = _late(evidence, 'reference'), _late(evidence, 'joints')
     by_log = wheels - own
-    told = around(0.0) or (around(by_log) if abs(by_log) > CLOCK_DIFFERENCE else None)
-    if told is None and own < -CLOCK_DIFFERENCE < wheels:  # the future, whatever the speeds are
-        told = _lag_by_log(by_log)
-    if told is None:
-        return untold('delay', 'does_not_follow', limit=LONGEST['speeds'])
-    evidence.figures['reference.delay_s'] = round(told.value, 3)
-    return told
+    lag = around(0.0) or (around(by_log) if abs(by_log) > CLOCK_DIFFERENCE else None)
+    if lag is None and own < -CLOCK_DIFFERENCE < wheels:  # the future, whatever the speeds are
+        lag = _lag_by_log(by_log)
+    if lag is None:
+        return not_checked('delay', 'does_not_follow', limit=LONGEST['speeds'])
+    evidence.figures['reference.delay_s'] = round(lag.value, 3)
+    return lag
 
 
 def _even(evidence: Evidence, values: FloatArray, time: FloatArray) -> FloatArray:
@@ -597,5 +597,5 @@ def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Out
     # Cameras lose single readings as a matter of course; the estimator needs neither all the time.
     if not gaps.size and not (name in ('joints', 'imu') and missing > GAP_SHARE):
         return []
-    told: dict[str, Any] = {'gaps': gaps.size, 'longest': float(step.max()), 'period': period}
-    return [found('drop_outs', channel.topic, 0.99, missing=100.0 * missing, **told)]
+    details: dict[str, Any] = {'gaps': gaps.size, 'longest': float(step.max()), 'period': period}
+    return [found('drop_outs', channel.topic, 0.99, missing=100.0 * missing, **details)]

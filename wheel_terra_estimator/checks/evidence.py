@@ -72,10 +72,10 @@ class Evidence:
     steering: FloatArray  # (k, n) angles, positive left [rad]; nan of a wheel that has none
     likelier_radius: float = 1.0  # over those of ``facts``, of a finding that has a rival [-]
 
-    def found(self, key: str, confidence: float, **told: Any) -> Finding:
+    def found(self, key: str, confidence: float, **details: Any) -> Finding:
         """Return a finding on the topic of its fault's channel; see `finding.found`."""
         channel = getattr(self.recording, FAULTS[key].channel)
-        return found(key, channel.topic, confidence, **told)
+        return found(key, channel.topic, confidence, **details)
 
     @property
     def joints(self) -> JointSeries:
@@ -356,13 +356,13 @@ def once(tells: Callable[[Evidence], Result]) -> Callable[[Evidence], Result]:
     """Let what a function tells of an evidence stay with it, as a cached property does."""
 
     @wraps(tells)
-    def told(evidence: Evidence) -> Result:
+    def kept_result(evidence: Evidence) -> Result:
         kept: dict[str, Any] = evidence.__dict__
         if tells.__name__ not in kept:
             kept[tells.__name__] = tells(evidence)
         return kept[tells.__name__]
 
-    return told
+    return kept_result
 
 
 def _shared(values: NDArray[Any]) -> NDArray[Any]:

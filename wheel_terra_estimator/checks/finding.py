@@ -150,7 +150,7 @@ def found(
     )
 
 
-def untold(kind: str, why: str, **figures: Any) -> NotChecked:
+def not_checked(kind: str, why: str, **figures: Any) -> NotChecked:
     """Return why a kind of fault was not checked, in the words of `not_checked.yaml`."""
     return NotChecked(kind, NOT_CHECKED[kind][why].format(**figures))
 

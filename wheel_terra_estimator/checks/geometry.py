@@ -20,7 +20,7 @@ from wheel_terra_estimator.checks.finding import (
     NotChecked,
     Outcome,
     listed,
-    untold,
+    not_checked,
 )
 from wheel_terra_estimator.checks.reference import ASIDE
 from wheel_terra_estimator.checks.sinkage import without_stated_errors
@@ -66,7 +66,7 @@ MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steere
 CLEAR_TURN = 0.95  # correlation of gyro and difference of the sides that a turn has [-]
 
 
-class Told(NamedTuple):
+class TriedRatio(NamedTuple):
     """A ratio, and what it left when it was found on one half and tried on the other."""
 
     ratio: Estimate
@@ -106,7 +106,7 @@ def _straight_speeds(evidence: Evidence) -> _Speeds | None:
     return _Speeds(rim[rows], forward[rows], rows) if rows.sum() >= LEAST_REFERENCES else None
 
 
-def radius_ratio(evidence: Evidence) -> Told | NotChecked:
+def radius_ratio(evidence: Evidence) -> TriedRatio | NotChecked:
     """Return true over configured radius from straight, steady, firm stretches.
 
     The reference's velocity is ``v = q (1 - k m) rim`` with the traction m = sum of T/r over the
@@ -115,20 +115,20 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
     """
     reference, facts, figures = evidence.recording.reference, evidence.facts, evidence.figures
     if reference is None:
-        return untold('radius', 'no_reference')
+        return not_checked('radius', 'no_reference')
     if not facts.known:
-        return untold('radius', 'no_file')
+        return not_checked('radius', 'no_file')
     if 'wheels.rad_per_count' in figures:
-        return untold('radius', 'counts')
+        return not_checked('radius', 'counts')
     if rounding(evidence) > MOST_ROUNDING:
-        return untold('radius', 'rounded')
+        return not_checked('radius', 'rounded')
     speeds = _straight_speeds(evidence)
     if speeds is None:
-        return untold('radius', 'no_straight')
+        return not_checked('radius', 'no_straight')
     plain = speeds.ratio
     figures['rover.speed_over_rim_speed'] = round(plain.value, 4)
     if not OF_RADII[0] < plain.value < OF_RADII[1]:
-        return untold('radius', 'far_off', ratio=plain.value)
+        return not_checked('radius', 'far_off', ratio=plain.value)
     ratio = _without_slip(evidence, speeds, plain)
     if isinstance(ratio, NotChecked):
         return ratio
@@ -137,7 +137,7 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
         1.0,
         speeds.rim**2,
     )
-    return Told(_referred_to_slip_radius(evidence, ratio), trial)
+    return TriedRatio(_referred_to_slip_radius(evidence, ratio), trial)
 
 
 def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estimate | NotChecked:
@@ -155,24 +155,24 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     traction = demand + resistance.value
     if np.isfinite(evidence.torque).any(axis=0).all():
         traction = speeds.at(evidence, thrust(evidence)) / (facts.mass * facts.gravity)
-        told = _resistance(evidence, float(np.median(traction - demand)))
-        if isinstance(told, NotChecked):
-            return told
-        resistance = told
+        estimate = _resistance(evidence, float(np.median(traction - demand)))
+        if isinstance(estimate, NotChecked):
+            return estimate
+        resistance = estimate
     elif plain.value > 1.0:
         # Nothing but a larger radius makes a rover outrun its rolling wheels.
         return Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD))
     else:
-        return untold('radius', 'no_torque')
+        return not_checked('radius', 'no_torque')
     depth = _depth(evidence).value
     middle = float(np.median(demand)) + resistance.value
     as_slip = (plain.value < 1.0) == (middle >= 0.0)  # downhill wheels skid: faster than the rims
     if as_slip and depth > SOFT_DEPTH:
-        return untold('radius', 'soft', depth=depth)
+        return not_checked('radius', 'soft', depth=depth)
     costs = float(np.median(traction - demand))
     unseen = _depth(evidence) is FIRM_DEPTH and 1.0 - (costs / MOST_COST) ** 4 < plain.value
     if unseen and plain.value < MOST_SOFT and middle >= 0.0:
-        return untold('radius', 'costly', seen=costs)
+        return not_checked('radius', 'costly', seen=costs)
     seen = NOT_SEEN
     if demand.any():
         both = block_fit(
@@ -185,7 +185,7 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + seen.std**2)
     slope = max(weight * seen.value + (1.0 - weight) * SLOPE_OF_SLIP.value, 0.0)
     if as_slip and weight < LEAST_SEEN:
-        return untold('radius', 'no_slopes')
+        return not_checked('radius', 'no_slopes')
     slip, skid = slope * middle, slope * resistance.value
     value = plain.value / (1.0 - slip) * (1.0 - 0.5 * skid)
     slope_std = math.sqrt(weight) * seen.std
@@ -203,7 +203,7 @@ def _resistance(evidence: Evidence, seen: float) -> Estimate | NotChecked:
     std = math.hypot(float(sensors.torque_zero_std) * arm, float(sensors.torque_gain_std) * seen)
     unlike = abs(seen - RESISTANCE.value) > 3.0 * math.hypot(std, RESISTANCE.std)
     if unlike or seen > SOFT_TRACTION:
-        return untold('radius', 'costly', seen=seen)
+        return not_checked('radius', 'costly', seen=seen)
     share = RESISTANCE.std**2 / (RESISTANCE.std**2 + std**2)
     value = share * seen + (1.0 - share) * RESISTANCE.value
     return Estimate(max(value, 0.0), math.sqrt(share) * std)
@@ -250,11 +250,11 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if ASIDE in evidence.figures:
         return [], evidence
     if late := evidence.figures.get(SMOOTHED_BY):
-        return [untold('gain', 'smooth', late=late)], evidence
-    told = radius_ratio(evidence)
-    if isinstance(told, NotChecked):
-        return [told], evidence
-    (ratio, trial, _), facts = told, evidence.facts
+        return [not_checked('gain', 'smooth', late=late)], evidence
+    found_ratio = radius_ratio(evidence)
+    if isinstance(found_ratio, NotChecked):
+        return [found_ratio], evidence
+    (ratio, trial, _), facts = found_ratio, evidence.facts
     radius = float(np.mean(facts.radius))
     evidence.figures['rover.rolling_radius_m'] = round(radius * ratio.value, 5)
     evidence.figures['rover.rolling_radius_std_m'] = round(radius * ratio.std, 5)
@@ -263,13 +263,13 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     off_by = abs(ratio.value - 1.0)
     of_one = 0.5 * facts.side.size * off_by
     if sides > max(LEAST_UNLIKE, off_by) or wheels > max(LEAST_UNLIKE, of_one):
-        return [untold('radius', 'one_wheel', unlike=100.0 * max(sides, wheels))], evidence
+        return [not_checked('radius', 'one_wheel', unlike=100.0 * max(sides, wheels))], evidence
     if off_by < LEAST_RADIUS_ERROR or sigmas < UNCLEAR_SIGMAS:
         return [], evidence
     if sigmas < RADIUS_SIGMAS:
-        return [untold('radius', 'unclear', ratio=ratio.value, std=ratio.std)], evidence
+        return [not_checked('radius', 'unclear', ratio=ratio.value, std=ratio.std)], evidence
     if not trial.falls:
-        return [untold('radius', 'halves')], evidence
+        return [not_checked('radius', 'halves')], evidence
     scale, stated = ratio.value, facts.configuration.wheels
     rims = facts.radius * scale - (stated.slip_radius - stated.radius)  # lugs stay
     share = _share_of_radius(evidence, ratio)
@@ -326,13 +326,13 @@ def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
     odds = math.log(PRIOR_OF_RADIUS / (1.0 - PRIOR_OF_RADIUS))
     gain, off = (evidence.figures.get(f'torque.gain{end}', math.nan) for end in ('', '_std'))
     # The torque over the radius is what slopes ask for; a track of the rims is what they turn by.
-    told = [(Estimate(gain, off), ratio.value)]
-    turns = None if turning.skids(evidence) else told_track(evidence)
-    if isinstance(turns, Told):
+    pairs = [(Estimate(gain, off), ratio.value)]
+    turns = None if turning.skids(evidence) else measured_track(evidence)
+    if isinstance(turns, TriedRatio):
         std = math.hypot(turns.ratio.std, TRACK_STD, ratio.std)
         rolling = 1.0 / evidence.figures['rover.speed_over_rim_speed']
-        told.append((Estimate(turns.ratio.value, std), rolling))
-    for seen, by_radius in told:
+        pairs.append((Estimate(turns.ratio.value, std), rolling))
+    for seen, by_radius in pairs:
         of_scale, of_radius = seen.sigmas_from(1.0), seen.sigmas_from(by_radius)
         if min(of_scale, of_radius) < 1.0:  # else it is off as well
             odds += 0.5 * (of_scale**2 - of_radius**2)
@@ -346,16 +346,16 @@ def stated_track(evidence: Evidence) -> float:
 
 
 @once
-def told_track(evidence: Evidence) -> Told | NotChecked:
+def measured_track(evidence: Evidence) -> TriedRatio | NotChecked:
     """Return effective over configured track from the gyro and the difference of the sides."""
     facts, difference = evidence.facts, evidence.side_difference
     if evidence.gyro is None or not facts.known or not facts.has_sides():
-        return untold('track', 'no_sides')
+        return not_checked('track', 'no_sides')
     rows = evidence.turning & np.isfinite(difference)
     yaw, difference = evidence.yaw[rows], difference[rows]
     clear = rows.sum() > 60 and correlation(yaw, difference) > CLEAR_TURN
     if not clear or float(np.quantile(np.abs(evidence.gyro[:, 2]), 0.95)) < LEAST_TURN_RATE:
-        return untold('track', 'no_turn')
+        return not_checked('track', 'no_turn')
     track = stated_track(evidence)
 
     turns = np.column_stack([yaw, np.ones(yaw.size)])[:, : 1 if evidence.rested else 2]
@@ -369,45 +369,45 @@ def told_track(evidence: Evidence) -> Told | NotChecked:
         ratio = Estimate(ratio.value, math.hypot(ratio.std, STEERED_STD * ratio.value))
     trial = tried(lambda part: fitted(part).value, 1.0, yaw**2)
     if abs(ratio.value - 1.0) > LEAST_TRACK_ERROR and not trial.falls:
-        return untold('track', 'halves')
-    return Told(ratio, trial)
+        return not_checked('track', 'halves')
+    return TriedRatio(ratio, trial)
 
 
-def rolling_track(evidence: Evidence) -> Told | NotChecked:
+def rolling_track(evidence: Evidence) -> TriedRatio | NotChecked:
     """Return the track ratio of a rover that does not skid, where no slip may be it.
 
     Slip and a wrong radius widen the track of the turns as they slow the straights.
     """
-    told = told_track(evidence)
-    if isinstance(told, NotChecked):
-        return told
+    track = measured_track(evidence)
+    if isinstance(track, NotChecked):
+        return track
     soft = evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
     if soft or _depth(evidence).value > SOFT_DEPTH or turning.left_in_turns(evidence) > MOST_UNLIKE:
-        return untold('track', 'slip_in_turns')
-    speeds, ratio = _straight_speeds(evidence), told.ratio
+        return not_checked('track', 'slip_in_turns')
+    speeds, ratio = _straight_speeds(evidence), track.ratio
     slip = UNSEEN_SLIP if speeds is None else speeds.ratio.value - 1.0
     seen = Estimate(ratio.value, math.hypot(ratio.std, slip))
-    return Told(seen, told.trial, alone=speeds is not None)
+    return TriedRatio(seen, track.trial, alone=speeds is not None)
 
 
 def check_track(evidence: Evidence) -> list[Outcome]:
     """Return a track that the turns contradict."""
     figures = evidence.figures
     if 'wheels.rad_per_count' in figures:
-        return [untold('track', 'counts')]
+        return [not_checked('track', 'counts')]
     if rounding(evidence) > MOST_ROUNDING:
-        return [untold('track', 'rounded')]
-    told = told_track(evidence)
-    if isinstance(told, NotChecked):
-        return [told]
-    (ratio, trial, alone), stated = told, stated_track(evidence)
+        return [not_checked('track', 'rounded')]
+    track = measured_track(evidence)
+    if isinstance(track, NotChecked):
+        return [track]
+    (ratio, trial, alone), stated = track, stated_track(evidence)
     times = ratio.value * evidence.likelier_radius
     figures['rover.effective_over_stated_track'] = round(times, 3)
     figures['rover.effective_track_m'] = round(times * stated, 4)
     if times > SKID_TRACKS[1] and ratio.sigmas_from(SKID_TRACKS[1]) > RADIUS_SIGMAS:
         return [evidence.found('places', 0.8, ratio=times, stated=stated)]
     if turning.skids(evidence):
-        return [untold('track', 'skids', track=times * stated)]
+        return [not_checked('track', 'skids', track=times * stated)]
     rolling = rolling_track(evidence)
     if isinstance(rolling, NotChecked):
         return [NotChecked(kind, rolling.reason) for kind in ('track', 'radius')]

@@ -31,7 +31,7 @@ from wheel_terra_estimator.checks.finding import (
     Outcome,
     found,
     listed,
-    untold,
+    not_checked,
 )
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
@@ -132,9 +132,9 @@ class ImuState:
         """Whether there is a force or a rate that means something."""
         return bool(np.isfinite(getattr(self.imu, name)).any())
 
-    def found(self, key: str, sure: float, **told: Any) -> Finding:
+    def found(self, key: str, sure: float, **details: Any) -> Finding:
         """Return a finding on its topic."""
-        return found(key, self.imu.topic, sure, **told)
+        return found(key, self.imu.topic, sure, **details)
 
 
 Judged = tuple[list[Outcome], ImuState]
@@ -143,7 +143,7 @@ Judged = tuple[list[Outcome], ImuState]
 def check_imu(state: ImuState) -> Judged:
     """Return what the IMU says against itself, and the recording with that mended."""
     if state.recording.imu is None or state.imu.stamp.size < LEAST_MESSAGES:
-        none: list[Outcome] = [untold(kind, 'no_imu') for kind in ('mounting', 'gravity')]
+        none: list[Outcome] = [not_checked(kind, 'no_imu') for kind in ('mounting', 'gravity')]
         return none, replace(state, recording=replace(state.recording, imu=None))
     outcomes, state = _placeholders(state)
     for check, *needed in (
@@ -153,8 +153,8 @@ def check_imu(state: ImuState) -> Judged:
         (_up_by_orientation, 'force'),
     ):
         if all(map(state.has, needed)):
-            told, state = check(state)
-            outcomes += told
+            found_now, state = check(state)
+            outcomes += found_now
     return outcomes, state
 
 
@@ -179,8 +179,8 @@ def _up_by_orientation(state: ImuState) -> Judged:
     if not apart >= UP_APART or turned_round:
         return [], state
     how = f'its up and that of linear_acceleration lie {math.degrees(apart):.0f} degrees apart'
-    told = state.found('orientation', 0.97, how=how)
-    return [told], state.with_values(orientation=np.full_like(imu.orientation, np.nan))
+    finding = state.found('orientation', 0.97, how=how)
+    return [finding], state.with_values(orientation=np.full_like(imu.orientation, np.nan))
 
 
 def _placeholders(state: ImuState) -> Judged:
@@ -193,7 +193,7 @@ def _placeholders(state: ImuState) -> Judged:
         if not state.has(name) and name not in imu.absent:
             outcomes.append(state.found('imu_nan', 0.99, share=100.0, field=field))
         elif not state.has(name):
-            outcomes.append(untold(of, f'{name}_missing', field=field, tells=tells))
+            outcomes.append(not_checked(of, f'{name}_missing', field=field, tells=tells))
         elif not np.nan_to_num(getattr(imu, name)).any():
             outcomes.append(state.found('force_zero', 0.999, field=field))
             state = state.without(name)
@@ -236,8 +236,8 @@ def _wild(state: ImuState) -> Judged:
         noise = np.array([robust_std(column) for column in np.diff(values, axis=0).T])
         wild = (off > np.maximum(limit, WILD_SIGMAS * noise)).any(axis=1)  # or in another unit
         if LEAST_WILD <= wild.sum() <= MOST_WILD * wild.size:
-            told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'unit': unit}
-            outcomes.append(state.found('imu_wild', 0.97, most=float(off.max()), **told))
+            details = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'unit': unit}
+            outcomes.append(state.found('imu_wild', 0.97, most=float(off.max()), **details))
             kept &= ~wild
     return outcomes, state.with_imu(rows_of(imu, kept)) if outcomes else state
 
@@ -255,7 +255,7 @@ def _gravity(state: ImuState) -> Judged:
         clear = off > max(SLOPES * gravity, GRAVITY_BIAS)
         return [_scale_of_force(state, size)] if clear else [], state
 
-    def told(key: str, value: float, **figures: Any) -> list[Outcome]:
+    def reported(key: str, value: float, **figures: Any) -> list[Outcome]:
         return [state.found(key, 0.98, value=value, size=size, gravity=gravity, **figures)]
 
     upright = abs(float((state.rotation @ middle)[2])) > UPRIGHT_SHARE * size
@@ -265,15 +265,15 @@ def _gravity(state: ImuState) -> Judged:
     place = next((p for p, there in places if abs(size / there - 1.0) <= GRAVITY_TOLERANCE), '')
     elsewhere = bool(place) and upright  # a slope leaves as much, but along the ground
     if size < 0.3 * min(gravity, STANDARD_GRAVITY) and not in_g and not elsewhere:
-        return told('gravity_off', gravity), state.without('force')
+        return reported('gravity_off', gravity), state.without('force')
     for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
         if abs(size * factor / gravity - 1.0) <= UNIT_TOLERANCE:
-            return told('force_unit', factor, unit=unit), state.with_values(
+            return reported('force_unit', factor, unit=unit), state.with_values(
                 force=imu.force * factor
             )
     if place:
         there = GRAVITIES[place]
-        return told('planet', there, place=place), replace(state, gravity=there)
+        return reported('planet', there, place=place), replace(state, gravity=there)
     return [_scale_of_force(state, size)], state
 
 
@@ -423,14 +423,14 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [evidence.found('force_axes', 0.95)], replace(evidence, force=None)
     seen, quick = felt_yaw(evidence), felt_yaw(evidence, 0.5 * DRIFT)
     if seen is None or quick is None:
-        return [untold('mounting', 'no_starts')], evidence
+        return [not_checked('mounting', 'no_starts')], evidence
     # Slopes at the places of starts and stops fall off faster than these: a rover that goes to and
     # fro feels the same ones each time.
     apart = math.remainder(seen.value - quick.value, 2.0 * math.pi)
     seen = Estimate(seen.value, math.hypot(seen.std, 0.5 * apart, YAW_MODEL_STD))
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
-        unclear = untold('mounting', 'yaw_open', least=math.degrees(YAW_SIGMAS * seen.std))
+        unclear = not_checked('mounting', 'yaw_open', least=math.degrees(YAW_SIGMAS * seen.std))
         return [unclear] if YAW_SIGMAS * seen.std > LEAST_YAW else [], evidence
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)
     words: dict[str, Any] = {'angle': -math.degrees(seen.value), 'off': math.degrees(seen.std)}
@@ -492,17 +492,17 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     tilt = small_tilt(evidence)
     if tilt is None:
-        return [untold('mounting', 'no_circle')], evidence
+        return [not_checked('mounting', 'no_circle')], evidence
     std = math.degrees(tilt.std)
     evidence.figures['imu.tilt_roll_deg'] = round(math.degrees(tilt.roll), 3)
     evidence.figures['imu.tilt_pitch_deg'] = round(math.degrees(tilt.pitch), 3)
     evidence.figures['imu.tilt_std_deg'] = round(std, 3)
     if not tilt.ground <= EVEN_GROUND_STD:  # nan: an axis without a number
-        return [untold('mounting', 'uneven')], evidence
+        return [not_checked('mounting', 'uneven')], evidence
     size = math.hypot(tilt.roll, tilt.pitch)
     if size < LEAST_MOUNTING or tilt.sigmas < 4.0:
         if tilt.std > EVEN_GROUND_STD:
-            return [untold('mounting', 'zero_open', least=4.0 * std)], evidence
+            return [not_checked('mounting', 'zero_open', least=4.0 * std)], evidence
         return [], evidence
     gravity, biases = evidence.facts.gravity, evidence.facts.sensors.specific_force_bias
     off = gravity * np.array([-tilt.pitch, tilt.roll, 0.0])
@@ -514,8 +514,8 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         worst = int(np.argmax(np.abs(off)))
         evidence.figures['imu.specific_force_bias'] = (biases + off).round(3).tolist()
         words |= {'value': round(float((biases + off)[worst]), 3), 'std': gravity * tilt.std}
-        told_of = evidence.found('force_bias', sure, **words)
-        return [told_of], replace(evidence, force=evidence.force - off)
+        bias = evidence.found('force_bias', sure, **words)
+        return [bias], replace(evidence, force=evidence.force - off)
     words['rival'] = f' (or its accelerometer is off by {words["zero"]:.2g} m/s^2)'
     mended = evidence.turned(tilt.taken_off(evidence.rotation))
     return [mounting_finding('imu_tilt', evidence, mended, std, sure, **words)], mended
@@ -541,8 +541,8 @@ def mounting_finding(
         for name, angle, apart in zip(MOUNTING, new, change, strict=True)
         if apart >= LEAST_SHOWN
     )
-    told = {'value': round(new[most], 3), 'std': std, 'parameter': MOUNTING[most]}
-    return evidence.found(key, sure, angles=angles, **told, **figures)
+    details = {'value': round(new[most], 3), 'std': std, 'parameter': MOUNTING[most]}
+    return evidence.found(key, sure, angles=angles, **details, **figures)
 
 
 def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
@@ -563,12 +563,12 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         stated = getattr(sensors, key)
         evidence.figures[f'imu.{key}'] = float(f'{noise:.3g}')
         if noise > NOISE_FACTOR * stated:
-            told: dict[str, Any] = {'noise': noise, 'stated': stated, 'unit': unit}
-            told |= {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}'}
-            outcomes.append(evidence.found('imu_noise', confidence(noise / stated), **told))
+            details: dict[str, Any] = {'noise': noise, 'stated': stated, 'unit': unit}
+            details |= {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}'}
+            outcomes.append(evidence.found('imu_noise', confidence(noise / stated), **details))
     seen = gyro_bias(evidence)
     if seen is None:
-        return [*outcomes, untold('zero', 'no_rest', least=LEAST_STANDSTILL)]
+        return [*outcomes, not_checked('zero', 'no_rest', least=LEAST_STANDSTILL)]
     bias, std, noise_std = seen
     evidence.figures['imu.gyro_bias_rad_s'] = [float(f'{b:.3g}') for b in bias]
     worst = int(np.argmax(np.abs(bias)))
@@ -576,11 +576,11 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
     # One that changes evenly keeps its sign where it is more than two such deviations.
     if abs(bias[worst]) > max(least, BIAS_SIGMAS * noise_std[worst], 2.0 * std[worst]):
         whole = bias + sensors.angular_rate_bias
-        told = {'axis': 'xyz'[worst], 'bias': float(bias[worst]), 'biases': listed(whole, '.5f')}
-        told |= {'value': float(f'{whole[worst]:.4g}'), 'std': float(std[worst])}
+        details = {'axis': 'xyz'[worst], 'bias': float(bias[worst]), 'biases': listed(whole, '.5f')}
+        details |= {'value': float(f'{whole[worst]:.4g}'), 'std': float(std[worst])}
         known = gyro_unit_known(evidence)
-        told['rival'] = '' if known else ', or it is in degrees per second: drive a circle'
-        outcomes.append(evidence.found('gyro_bias', 0.99 if known else 0.5, **told))
+        details['rival'] = '' if known else ', or it is in degrees per second: drive a circle'
+        outcomes.append(evidence.found('gyro_bias', 0.99 if known else 0.5, **details))
     return outcomes
 
 

@@ -62,7 +62,7 @@ class InputJudge:
         ``health``: what the estimator says of itself.
         """
         misfits = _misfits(health, dug_in=estimates.stuck and estimates.stuck_confirmed)
-        faults = _told({**estimates.faults, **misfits}, self._checks.remarks)
+        faults = _reported({**estimates.faults, **misfits}, self._checks.remarks)
         if self._failed:
             faults |= _NOT_CHECKED
         silenced = self._silenced(self._checks.findings)
@@ -73,7 +73,7 @@ class InputJudge:
             estimates,
             slip_class=classes,
             reasons=tuple(reasons),
-            faults=_told(faults, self._checks.findings),
+            faults=_reported(faults, self._checks.findings),
         )
         self._follow(estimates, reasons[0] if len(silenced) == len(self._names) else '')
         if not self._waits_for:
@@ -139,23 +139,23 @@ def _misfits(health: Mapping[str, Any], *, dug_in: bool) -> dict[str, str]:
 
     No model fits a rover that is `dug_in`.
     """
-    told = {
+    details = {
         subject: f'{words} (NIS {health[key]:.0f}, usual below 1): sign or scale of the '
         'torques, rover.mass or soil -> wheel-terra check'
         for key, (subject, words) in _MISFITS.items()
         if health.get(key, 0.0) > FAR_NIS and not dug_in
     }
     if _NOISE in health:
-        told['noise'] = f'{health[_NOISE]} -> state that'
-    return told
+        details['noise'] = f'{health[_NOISE]} -> state that'
+    return details
 
 
-def _told(faults: Mapping[str, str], findings: tuple[Finding, ...]) -> dict[str, str]:
+def _reported(faults: Mapping[str, str], findings: tuple[Finding, ...]) -> dict[str, str]:
     """Return the faults of a set with what was found, by topic."""
     result = dict(faults)
     for finding in findings:
         subject = SUBJECT + finding.topic
         wheel = f'{finding.wheel} ' if finding.wheel else ''
-        told = f'{wheel}{finding.words} ({100 * finding.confidence:.0f} %) -> {finding.cure}'
-        result[subject] = f'{result[subject]}; {told}' if subject in result else told
+        text = f'{wheel}{finding.words} ({100 * finding.confidence:.0f} %) -> {finding.cure}'
+        result[subject] = f'{result[subject]}; {text}' if subject in result else text
     return result

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.checks.finding import Finding, Outcome, found, untold
+from wheel_terra_estimator.checks.finding import Finding, Outcome, found, not_checked
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 
@@ -71,9 +71,9 @@ def check_topics(
                 there += [
                     t for t, kind, n in recording.topics if kind == IMU and n and t not in there
                 ]
-            told: dict[str, Any] = {'own': default, 'there': ' and '.join(there)}
+            details: dict[str, Any] = {'own': default, 'there': ' and '.join(there)}
             remap = f'--remap {own}:={series.topic}'
-            outcomes.append(found('topic_name', series.topic, 0.9, remap=remap, **told))
+            outcomes.append(found('topic_name', series.topic, 0.9, remap=remap, **details))
     return outcomes
 
 
@@ -93,7 +93,7 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     """Return wheels that are absent from the recording, and the facts with the names it has."""
     joints = recording.joints
     if joints is None:
-        return [untold('missing_wheel', 'no_joints')], facts
+        return [not_checked('missing_wheel', 'no_joints')], facts
     if not facts.known:
         return [], facts
     silent = {
@@ -108,8 +108,11 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     names = tuple(renamed.get(name, name) for name in facts.names)
     outcomes: list[Outcome] = []
     if renamed:
-        told: dict[str, Any] = {'wheel': ', '.join(renamed), 'other': ', '.join(renamed.values())}
-        outcomes.append(found('joint_name', joints.topic, 0.95, names=', '.join(names), **told))
+        details: dict[str, Any] = {
+            'wheel': ', '.join(renamed),
+            'other': ', '.join(renamed.values()),
+        }
+        outcomes.append(found('joint_name', joints.topic, 0.95, names=', '.join(names), **details))
     gone = [name for name in absent if name not in renamed]
     if gone:
         outcomes.append(_missing(joints.topic, gone, 'in no message'))

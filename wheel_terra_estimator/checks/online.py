@@ -124,8 +124,8 @@ class OnlineChecks:
 
     def _standing(self, driving: str) -> tuple[Finding, ...]:
         tallies = self._verdicts.tallies
-        told = [n for n, t in tallies.items() if t.stands and FAULTS[n].driving == driving]
-        return tuple(tallies[name].finding for name in sorted(told, key=RANK.__getitem__))
+        standing = [n for n, t in tallies.items() if t.stands and FAULTS[n].driving == driving]
+        return tuple(tallies[name].finding for name in sorted(standing, key=RANK.__getitem__))
 
     @property
     def undecided(self) -> str:

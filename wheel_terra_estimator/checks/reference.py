@@ -12,7 +12,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import NO_NOISE, Evidence, Mask, noise_of
-from wheel_terra_estimator.checks.finding import Outcome, untold
+from wheel_terra_estimator.checks.finding import Outcome, not_checked
 from wheel_terra_estimator.checks.series import VelocitySeries, nearest
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,
@@ -74,8 +74,8 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         sense = np.sign(np.interp(evidence.time, evidence.seconds(reference), calm))
         turns = (evidence.moving & ~evidence.unturned)[:, None]  # in which the sides may be unlike
         mended = evidence.with_rate(np.where(turns, np.nan, evidence.rate * sense[:, None]))
-        told = evidence.found('rates_unsigned', 0.95, other='reference goes')
-        return [told], mended
+        finding = evidence.found('rates_unsigned', 0.95, other='reference goes')
+        return [finding], mended
     return [], evidence
 
 
@@ -145,14 +145,16 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         mended = evidence.with_channel('reference', velocity=along)
         return [evidence.found('reference_world', 0.95)], mended
     if in_body < STEADY:
-        return [untold('mounting', 'reference_frame')] if _sideways(reference) else [], evidence
+        return [not_checked('mounting', 'reference_frame')] if _sideways(
+            reference
+        ) else [], evidence
     aside = float(np.angle(direction.mean()))  # whatever jumps there are
     if abs(aside) < FAR_ASIDE:
         return [], evidence
     angle = math.degrees(aside)
     if not reference.points_aside:  # a rover that keeps to a cross slope may slide aside on it
         evidence.figures[ASIDE] = round(angle, 1)  # and tells no unit, no radius
-        return [untold('mounting', 'reference_aside', angle=angle)], evidence
+        return [not_checked('mounting', 'reference_aside', angle=angle)], evidence
     turned = velocity * np.exp(-1j * aside)
     mended = evidence.with_channel(
         'reference', velocity=np.column_stack([turned.real, turned.imag, 0.0 * rim])
@@ -223,7 +225,7 @@ def check_jumps(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return velocities that leave their neighbours, and the evidence with these made calm."""
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < LEAST_REFERENCES:
-        return [untold('jumps', 'few')], evidence
+        return [not_checked('jumps', 'few')], evidence
     forward, at = reference.velocity[:, 0], evidence.seconds(reference)
     off, speed = lonely(forward[:, None])[:, 0], float(np.quantile(np.abs(forward), 0.8))
     usual = max(robust_std(np.diff(forward)), 1e-6)
@@ -235,15 +237,15 @@ def check_jumps(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     mended, share = evidence.with_channel('reference', velocity=velocity), float(np.mean(wild))
     if share < JUMP_SHARE or wild.sum() < LEAST_JUMPS:
         return [], mended
-    told = {'count': int(wild.sum()), 'share': 100.0 * share, 'most': float(np.abs(off).max())}
-    return [evidence.found('jumps', 0.97, **told)], mended
+    details = {'count': int(wild.sum()), 'share': 100.0 * share, 'most': float(np.abs(off).max())}
+    return [evidence.found('jumps', 0.97, **details)], mended
 
 
 def check_covariance(evidence: Evidence) -> list[Outcome]:
     """Compare the stated variance with the scatter of the velocity."""
     reference = evidence.recording.reference
     if reference is None:
-        return [untold('covariance', 'no_reference')]
+        return [not_checked('covariance', 'no_reference')]
     forward = reference.velocity[:, 0]
     if reference.stamp.size < LEAST_REFERENCES or not np.ptp(forward):
         return []  # no reading of a speed
@@ -264,5 +266,5 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     if expected and noise / COVARIANCE_FACTOR <= expected <= usual_speed:
         return []
     noise = max(noise, LEAST_STD)
-    told = {'noise': noise, 'variance': noise**2, 'stated': usual}
-    return [evidence.found('covariance', 0.9, value=float(f'{noise:.2g}'), **told)]
+    details = {'noise': noise, 'variance': noise**2, 'stated': usual}
+    return [evidence.found('covariance', 0.9, value=float(f'{noise:.2g}'), **details)]

@@ -59,8 +59,8 @@ def _held(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes, reference = list[Outcome](), evidence.recording.reference
     times = _times_sent(np.hstack([evidence.rate, evidence.torque]), evidence.moving)
     if times > 1.0:
-        told = {'times': times, 'period': times * evidence.period}
-        outcomes.append(evidence.found('rates_held', 0.95, **told))
+        details = {'times': times, 'period': times * evidence.period}
+        outcomes.append(evidence.found('rates_held', 0.95, **details))
         values = np.nan_to_num(np.hstack([evidence.rate, evidence.torque]))
         new = np.append(True, np.any(np.diff(values, axis=0) != 0.0, axis=1))
         evidence = evidence.rows(new | ~evidence.moving)
@@ -69,8 +69,8 @@ def _held(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     driven = np.interp(evidence.seconds(reference), evidence.time, evidence.moving) > 0.5
     times = _times_sent(reference.velocity, driven)
     if times > 1.0:
-        told = {'times': times, 'period': times * reference.period}
-        outcomes.append(evidence.found('reference_held', 0.95, **told))
+        details = {'times': times, 'period': times * reference.period}
+        outcomes.append(evidence.found('reference_held', 0.95, **details))
         new = np.append(True, np.diff(reference.velocity[:, 0]) != 0.0)
         recording = replace(evidence.recording, reference=rows_of(reference, new))
         evidence = replace(evidence, recording=recording)
@@ -89,15 +89,15 @@ def _reference(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     reference = evidence.recording.reference
     if reference is None:
         return [], evidence
-    left, told, driven = None, [], float(evidence.moving.sum()) * evidence.period
+    left, findings, driven = None, [], float(evidence.moving.sum()) * evidence.period
     if not reference.velocity.any():
-        told = [evidence.found('reference_zero', 0.9)] if driven > LEAST_TIME else []
+        findings = [evidence.found('reference_zero', 0.9)] if driven > LEAST_TIME else []
     elif dead := stays(evidence, evidence.seconds(reference), reference.velocity):
-        told = [evidence.found('reference_frozen', 0.97, how=dead.how)]
+        findings = [evidence.found('reference_frozen', 0.97, how=dead.how)]
         left = None if dead.rows.all() else rows_of(reference, ~dead.rows)
-    if not told:
+    if not findings:
         return [], evidence
-    return [*told], replace(evidence, recording=replace(evidence.recording, reference=left))
+    return [*findings], replace(evidence, recording=replace(evidence.recording, reference=left))
 
 
 def _joints(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -106,10 +106,10 @@ def _joints(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     for table, fault in zip(left, ('rate_frozen', 'torque_frozen'), strict=True):
         greatest, dead = float(np.nanmax(np.abs(table), initial=0.0)), dict[str, str]()
         for i, name in enumerate(evidence.facts.names):
-            told = stays(evidence, evidence.time, table[:, i : i + 1])
+            still = stays(evidence, evidence.time, table[:, i : i + 1])
             # Else a wheel that stands, or a drive at its limit.
-            if told is not None and told.value and abs(told.value) < greatest:
-                dead[name], table[:, i] = told.how, np.nan
+            if still is not None and still.value and abs(still.value) < greatest:
+                dead[name], table[:, i] = still.how, np.nan
         if dead:
             how = next(iter(dead.values()))
             outcomes.append(evidence.found(fault, 0.97, wheel=', '.join(dead), how=how))

@@ -41,7 +41,7 @@ from wheel_terra_estimator.checks.finding import (
     NotChecked,
     Outcome,
     found,
-    untold,
+    not_checked,
 )
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Recording, Series, rows_of
@@ -127,7 +127,7 @@ def _examined(
     if own == 'odom':  # in which radius and track are its publisher's
         recording = names.of_rims(recording, facts)
         checks = tuple(check for check in checks if check[1] is not geometry)
-        report.not_checked += [untold('radius', 'odom'), untold('track', 'odom')]
+        report.not_checked += [not_checked('radius', 'odom'), not_checked('track', 'odom')]
     stated = facts
     facts = mended('missing_wheel', facts, lambda: names.check_wheel_names(recording, stated))
     arrived = recording
@@ -137,7 +137,7 @@ def _examined(
     recording = mended('placeholder', stamped, lambda: _whole_rows(stamped))
     evidence = against_each_other(recording, facts, checks, mended)
     if evidence is None:
-        report.not_checked.append(untold('sign', 'no_rates'))
+        report.not_checked.append(not_checked('sign', 'no_rates'))
     if not report.findings:
         report.take(_standing(evidence) if evidence else [found('no_drive', topic, 0.99)])
     return evidence
@@ -159,7 +159,7 @@ def _standing(evidence: Evidence) -> list[Outcome]:
         turns = float(np.quantile(np.abs(moving_mean(yaw_rate - np.median(yaw_rate), width)), 0.99))
     if goes > LEAST_GOING or turns > LEAST_TURNING:
         return [evidence.found('no_drive', 0.99)]
-    return [untold('sign', 'hardly_moves')]
+    return [not_checked('sign', 'hardly_moves')]
 
 
 class Mended:
@@ -178,8 +178,8 @@ class Mended:
     ) -> Given:
         """Run a check of a kind of fault on what is given, and note what it said by its name."""
         nothing: list[Outcome] | tuple[list[Outcome], Given] = []
-        told = run_apart(self.report, kind, nothing, check)
-        outcomes, given = told if isinstance(told, tuple) else (told, given)
+        result = run_apart(self.report, kind, nothing, check)
+        outcomes, given = result if isinstance(result, tuple) else (result, given)
         self.report.take(outcomes)
         self.by_check[name] = outcomes
         return given

@@ -10,7 +10,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.finding import Finding, Outcome, listed, untold
+from wheel_terra_estimator.checks.finding import Finding, Outcome, listed, not_checked
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import SinkageSeries
 from wheel_terra_estimator.checks.statistics import bend_noise, halves
@@ -32,17 +32,17 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return what is wrong with the sinkage readings, and the evidence with their signs mended."""
     sinkage = evidence.recording.sinkage
     if sinkage is None:
-        return [untold('zero', 'no_sinkage')], evidence
-    outcomes: list[Outcome] = [untold('exchanged_wheels', 'sinkage_order')]
-    outcomes.append(untold('delay', 'sinkage'))
+        return [not_checked('zero', 'no_sinkage')], evidence
+    outcomes: list[Outcome] = [not_checked('exchanged_wheels', 'sinkage_order')]
+    outcomes.append(not_checked('delay', 'sinkage'))
     names, table = without_stated_errors(evidence.facts, sinkage)
     nothing = [names[i] for i in np.flatnonzero(~np.isfinite(table).any(axis=0))]
     few = not names or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS
     if few or not np.nan_to_num(table).any():
         why = ('zero', 'sinkage_few') if few else ('placeholder', 'sinkage_zero')
-        return [*outcomes, untold(*why)], evidence
+        return [*outcomes, not_checked(*why)], evidence
     if nothing:
-        outcomes.append(untold('zero', 'sinkage_no_number', wheels=', '.join(nothing)))
+        outcomes.append(not_checked('zero', 'sinkage_no_number', wheels=', '.join(nothing)))
     unit, table = _unit(evidence, table)
     middle = np.nanmedian(table, axis=0)
     evidence.figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
@@ -51,11 +51,11 @@ def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if facts.known and noise > ANOTHER_UNIT * float(facts.sensors.sinkage_std):
         unknown = np.full_like(sinkage.sinkage, np.nan)  # zeros and signs would be those of noise
         mended = evidence.with_channel('sinkage', sinkage=unknown)
-        return [*outcomes, *unit, untold('unit', 'sinkage_scatters', noise=noise)], mended
-    told = _sign_and_zero(evidence, names, table, middle)
-    outcomes += [*unit, *told]
+        return [*outcomes, *unit, not_checked('unit', 'sinkage_scatters', noise=noise)], mended
+    findings = _sign_and_zero(evidence, names, table, middle)
+    outcomes += [*unit, *findings]
     known = sinkage.sinkage
-    for finding in told:
+    for finding in findings:
         if isinstance(finding, Finding):  # a zero is left unknown, as what may be a sign is
             wrong = [finding.wheel in (None, name) for name in sinkage.names]
             known = np.where(wrong, np.nan, known)
@@ -93,9 +93,9 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
             off[unit, factor] = abs(math.log(ratio))
     if off:
         (unit, factor), *others = sorted(off, key=lambda entry: off[entry])
-        told = {'level': level, 'noise': noise, 'radius': radius, 'unit': unit}
-        told['rival'] = ''.join(f', or in {other}' for other, _ in others)
-        finding = evidence.found('sinkage_unit', 0.97 / len(off), value=factor, **told)
+        details = {'level': level, 'noise': noise, 'radius': radius, 'unit': unit}
+        details['rival'] = ''.join(f', or in {other}' for other, _ in others)
+        finding = evidence.found('sinkage_unit', 0.97 / len(off), value=factor, **details)
         return [finding], table * factor
     return [], table
 
@@ -119,7 +119,7 @@ def _sign_and_zero(
         return [evidence.found('sinkage_sign', 0.5, value=-1.0, reading=1000 * usual)]
     outcomes: list[Outcome] = []
     if np.nanmedian(np.abs(middle)) < limit:
-        outcomes.append(untold('sign', 'sinkage_shallow'))
+        outcomes.append(not_checked('sign', 'sinkage_shallow'))
     for index, name in enumerate(names):
         others, own = np.delete(middle, index), float(middle[index])
         if others.size < 2 or not np.isfinite(own):
@@ -155,5 +155,5 @@ def _zero(evidence: Evidence, names: list[str], left: float, std: float, how: st
     zeros[rows] += gain[rows] * left
     value = round(float(np.mean(zeros[rows])), 4) if rows else round(left, 4)
     wheel = names[0] if len(names) == 1 else None
-    told = {'wheel': wheel, 'value': value, 'std': round(std, 4), 'zeros': listed(zeros)}
-    return evidence.found('sinkage_zero', 0.9 if wheel else 0.8, how=how, **told)
+    details = {'wheel': wheel, 'value': value, 'std': round(std, 4), 'zeros': listed(zeros)}
+    return evidence.found('sinkage_zero', 0.9 if wheel else 0.8, how=how, **details)

@@ -19,7 +19,7 @@ from wheel_terra_estimator.checks.evidence import (
     felt_yaw,
     once,
 )
-from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome, listed, untold
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome, listed, not_checked
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
     Trial,
@@ -60,19 +60,19 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return what is wrong with the torques."""
     known = np.isfinite(evidence.torque).any(axis=0)
     if not known.any():
-        return _not_told('no_torque'), evidence
+        return _not_checked('no_torque'), evidence
     if not np.nan_to_num(evidence.torque).any():
         blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
         return [evidence.found('torque_placeholder', 0.99)], blank
     unsigned = [] if evidence.force is None else _unsigned(evidence)
     if unsigned:
         blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
-        return [*unsigned, *_not_told('no_sign')], blank
+        return [*unsigned, *_not_checked('no_sign')], blank
     outcomes, evidence = _signs(evidence)
     if not evidence.facts.known or evidence.force is None:
         return outcomes, evidence
     if not known.all():
-        return [*outcomes, *_not_told('not_all')], evidence
+        return [*outcomes, *_not_checked('not_all')], evidence
     zeros = torque_zeros(evidence)
     without = evidence
     if zeros is not None:  # a zero looks like a resistance that no soil has, not the other way
@@ -88,8 +88,8 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [*outcomes, *_gain(evidence), *wrong], evidence
 
 
-def _not_told(why: str, **figures: float) -> list[Outcome]:
-    return [untold(kind, why, **figures) for kind in ('gain', 'mass')]
+def _not_checked(why: str, **figures: float) -> list[Outcome]:
+    return [not_checked(kind, why, **figures) for kind in ('gain', 'mass')]
 
 
 def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -97,15 +97,15 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
     The mean alone does not tell: a wheel whose radius is a little smaller is dragged by the others.
     """
-    facts, told = evidence.facts, answers(evidence)
-    if told is not None and _fight(evidence, told):
-        told = None
-    if told is None:
-        return [untold('sign', 'torque_no_change')], evidence
-    usual = float(np.median([abs(answer.value) for answer, _ in told]))
-    agree = all(answer.value * level.value > 0.0 for answer, level in told)
+    facts, details = evidence.facts, answers(evidence)
+    if details is not None and _fight(evidence, details):
+        details = None
+    if details is None:
+        return [not_checked('sign', 'torque_no_change')], evidence
+    usual = float(np.median([abs(answer.value) for answer, _ in details]))
+    agree = all(answer.value * level.value > 0.0 for answer, level in details)
     wrong, unsure = [], []
-    for i, (answer, level) in enumerate(told):
+    for i, (answer, level) in enumerate(details):
         brakes = -level.value > SIGN_SIGMAS * level.std
         clear = answer.sigmas_from(0.0) > SIGN_SIGMAS or (brakes and agree)
         drives = level.value > SIGN_SIGMAS * level.std
@@ -113,25 +113,25 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             wrong.append(i)
         elif brakes:
             unsure.append(facts.names[i])
-    why = untold('sign', 'torque_unsure', wheels=', '.join(unsure))
+    why = not_checked('sign', 'torque_unsure', wheels=', '.join(unsure))
     outcomes: list[Outcome] = [why] if unsure else []
     if not wrong:
         return outcomes, evidence
     torque = evidence.torque.copy()
     torque[:, wrong] *= -1.0
-    sure = confidence(min(max(one.sigmas_from(0.0) for one in told[i]) for i in wrong))
+    sure = confidence(min(max(one.sigmas_from(0.0) for one in details[i]) for i in wrong))
     names = ', '.join(facts.names[i] for i in wrong)
     outcomes.append(evidence.found('torque_sign', sure, wheel=names, value=-1.0))
     return outcomes, evidence.with_rate(evidence.rate, torque)
 
 
-def _fight(evidence: Evidence, told: list[tuple[Estimate, Estimate]]) -> bool:
+def _fight(evidence: Evidence, measured: list[tuple[Estimate, Estimate]]) -> bool:
     """Return whether wheels may fight one another: torques of both signs leave next to nothing.
 
     On firm ground they do so from the start on: without slopes nothing then tells the signs. Those
     of wheels that are reversed are as large as the others.
     """
-    facts, levels = evidence.facts, np.array([level.value for _, level in told])
+    facts, levels = evidence.facts, np.array([level.value for _, level in measured])
     rows, sizes = evidence.steady & evidence.unturned, np.abs(levels)
     alike = sizes.min() > ALIKE_LEVELS * sizes.max()
     if alike or not (facts.known and rows.any() and levels.min() < 0.0 < levels.max()):
@@ -158,20 +158,20 @@ def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
         along = along * math.cos(yaw.value) + across * math.sin(yaw.value)
     design = np.column_stack([along, sense, np.ones(sense.size)])[rows]
     table = np.column_stack([moving_mean(np.nan_to_num(t), width) for t in evidence.torque.T])
-    told = [block_fit(design, column)[0] for column in table[rows].T]
+    measured = [block_fit(design, column)[0] for column in table[rows].T]
     rows = rows & (along * sense > UPHILL_ENOUGH * evidence.facts.gravity)
     if not evidence.enough(rows):
         return None
     way = np.column_stack([sense, np.ones(sense.size)])[rows]
     levels = [block_fit(way, column)[0] for column in table[rows].T]
     if yaw is not None:
-        return list(zip(told, levels, strict=True))
-    shares = [answer.value * level.value for answer, level in zip(told, levels, strict=True)]
+        return list(zip(measured, levels, strict=True))
+    shares = [answer.value * level.value for answer, level in zip(measured, levels, strict=True)]
     if sum(shares) * np.median(shares) <= 0.0:
         return None
     forward = math.copysign(1.0, sum(shares))
-    told = [Estimate(forward * answer.value, answer.std) for answer in told]
-    return list(zip(told, levels, strict=True))
+    measured = [Estimate(forward * answer.value, answer.std) for answer in measured]
+    return list(zip(measured, levels, strict=True))
 
 
 def thrust(evidence: Evidence) -> FloatArray:
@@ -184,7 +184,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts, rows = evidence.facts, evidence.straight
     assert evidence.force is not None
     if rows.sum() < LEAST_MOVING_ROWS:
-        return [untold('gain', 'no_straight')], evidence
+        return [not_checked('gain', 'no_straight')], evidence
     level = (thrust(evidence) - facts.mass * evidence.force[:, 0]) * np.sign(evidence.rim)
     traction = _middle_mean(level[rows]) / (facts.mass * facts.gravity)
     evidence.figures['torque.level_traction'] = round(traction, 4)
@@ -192,16 +192,16 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         finding = evidence.found('torque_unit', 0.97, value=1e-3, traction=traction)
         return [finding], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
     if not evidence.enough(rows):
-        return [untold('gain', 'no_straight')], evidence
+        return [not_checked('gain', 'no_straight')], evidence
     size = _middle_mean(np.abs(thrust(evidence)[rows])) / (facts.mass * facts.gravity)
     if traction < LEAST_TRACTION < size:
-        return _not_told('unlike_slopes'), evidence
+        return _not_checked('unlike_slopes'), evidence
     open_to = 1.0 + 3.0 * float(facts.sensors.torque_gain_std)
     if size >= LEAST_TRACTION and traction <= MOST_TRACTION * open_to:
         return [], evidence
     seen = traction if size >= LEAST_TRACTION else size
     finding = evidence.found('torque_scale', 0.8, traction=seen)
-    return [finding, untold('mass', 'no_scale')], evidence
+    return [finding, not_checked('mass', 'no_scale')], evidence
 
 
 def _middle_mean(values: FloatArray) -> float:
@@ -225,7 +225,7 @@ def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
     """Return the scale of the torques by slopes, and its trial on halves, or why not."""
     rows = evidence.straight
     if evidence.force is None or not evidence.enough(rows, 3.0):
-        return untold('gain', 'few_straights')
+        return not_checked('gain', 'few_straights')
     # Noise of a regressor makes a slope look flat: both sides are means over the same time.
     along = moving_mean(evidence.force[:, 0], SMOOTH_ROWS)[rows]
     pushed = moving_mean(thrust(evidence), SMOOTH_ROWS)[rows]
@@ -235,8 +235,8 @@ def slope_fit(evidence: Evidence) -> Slopes | NotChecked:
     if scatter < LEAST_SLOPE_STD or max(down, -up) > -UP_AND_DOWN:
         steepest = max(up, -down)
         if steepest <= UP_AND_DOWN:
-            return untold('gain', 'no_slopes')
-        return untold('gain', 'one_way', by=math.degrees(steepest / evidence.facts.gravity))
+            return not_checked('gain', 'no_slopes')
+        return not_checked('gain', 'one_way', by=math.degrees(steepest / evidence.facts.gravity))
     columns = [evidence.facts.mass * along, sense]
     if (sense > 0).any() and (sense < 0).any():
         columns.append(np.ones(along.size))
@@ -264,13 +264,13 @@ def torque_gain(evidence: Evidence) -> Slopes | NotChecked:
     if isinstance(fit, NotChecked):
         return fit
     if fit.gain.value <= 0.0:
-        return untold('gain', 'unlike_slopes')
+        return not_checked('gain', 'unlike_slopes')
     traction = evidence.figures.get('torque.level_traction', 1.0)
     traction = max(traction, traction / fit.gain.value)  # with this scale as well
     if traction > SOFT_TRACTION:
-        return untold('gain', 'soft', traction=traction)
+        return not_checked('gain', 'soft', traction=traction)
     if abs(fit.gain.value - 1.0) > LEAST_GAIN_ERROR and not fit.trial.falls:
-        return untold('gain', 'halves')
+        return not_checked('gain', 'halves')
     apart = min(0.5 * fit.trial.after, 1.0)
     # A body that digs in reads uphill where thrust rises: slopes seem to cost less, never more.
     tilt = RUT_TILT * traction**2 * evidence.facts.gravity / fit.scatter
@@ -290,7 +290,7 @@ def _gain(evidence: Evidence) -> list[Outcome]:
     open_yet = facts.sensors.torque_gain_std  # by the rover file
     sigmas = Estimate(gain, math.hypot(std, open_yet)).sigmas_from(1.0)
     if sigmas < GAIN_SIGMAS:
-        return _not_told('left_open', gain=gain, std=std)
+        return _not_checked('left_open', gain=gain, std=std)
     whole = gain * facts.errors.torque.gain
     middle, mass = float(np.mean(whole)), facts.mass * gain
     words = {'gain': gain, 'off': std, 'mass': mass, 'gains': listed(whole, '.3f')}
@@ -317,9 +317,9 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
 
 def like_a_pitch(evidence: Evidence, zeros: list[Estimate]) -> bool:
     """Return whether zeros are one in all torques, as a pitch of the IMU that no circle told is."""
-    told = evidence.figures.get('imu.tilt_std_deg', math.inf) < math.degrees(EVEN_GROUND_STD)
+    known = evidence.figures.get('imu.tilt_std_deg', math.inf) < math.degrees(EVEN_GROUND_STD)
     seen = np.array([zero.value for zero in zeros]) / evidence.facts.radius
-    return not told and float(np.ptp(seen)) < ALIKE_ZEROS * abs(float(np.mean(seen)))
+    return not known and float(np.ptp(seen)) < ALIKE_ZEROS * abs(float(np.mean(seen)))
 
 
 @once
@@ -361,7 +361,7 @@ def _unsigned(evidence: Evidence) -> list[Outcome]:
 def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     """Return zeros that are off."""
     if zeros is None:
-        return [untold('zero', 'torque_one_way')]
+        return [not_checked('zero', 'torque_one_way')]
     facts = evidence.facts
     stated = max(float(facts.sensors.torque_zero_std), 1e-3)
     driving = float(np.nanmedian(np.abs(evidence.torque[evidence.moving])))
@@ -372,9 +372,9 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     whole = whole_zeros(evidence, zeros)
     pitch = like_a_pitch(evidence, zeros)  # a slope that is none is in all of them
     sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong)) * (0.5 if pitch else 1.0)
-    told: dict[str, Any] = {'rival': ', or the IMU is pitched: drive a level circle' * pitch}
-    told['left'] = listed((zeros[i].value for i in wrong), '.2f')
-    told['zeros'] = listed((zero.value for zero in whole), '.2f')
-    told['wheel'] = ', '.join(facts.names[i] for i in wrong)
+    details: dict[str, Any] = {'rival': ', or the IMU is pitched: drive a level circle' * pitch}
+    details['left'] = listed((zeros[i].value for i in wrong), '.2f')
+    details['zeros'] = listed((zero.value for zero in whole), '.2f')
+    details['wheel'] = ', '.join(facts.names[i] for i in wrong)
     value, std = (round(number, 3) for number in whole[wrong[0]])
-    return [evidence.found('torque_zero', sure, value=value, std=std, **told)]
+    return [evidence.found('torque_zero', sure, value=value, std=std, **details)]

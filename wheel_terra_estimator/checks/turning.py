@@ -35,7 +35,7 @@ from wheel_terra_estimator.checks.finding import (
     Finding,
     Outcome,
     listed,
-    untold,
+    not_checked,
 )
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of
 from wheel_terra_estimator.checks.series import ImuSeries
@@ -215,11 +215,11 @@ def exchanges(stretch: Turning) -> list[Fix]:
     """
     count = stretch.lateral.size
     left, right = (np.flatnonzero(s * stretch.lateral > 0.0).tolist() for s in (1.0, -1.0))
-    told = [(pair,) for pair in itertools.product(left, right) if count > 2]
+    pairings = [(pair,) for pair in itertools.product(left, right) if count > 2]
     if stretch.along is not None and np.ptp(stretch.along, axis=1).max(initial=0.0) > 0.0:
         rows = [list(itertools.combinations(side, 2)) for side in (left, right)]
-        told += [(pair,) for side in rows for pair in side] + list(zip(*rows, strict=False))
-    return [Fix((1,) * count), *(Fix((1,) * count, tuple(pairs)) for pairs in told)]
+        pairings += [(pair,) for side in rows for pair in side] + list(zip(*rows, strict=False))
+    return [Fix((1,) * count), *(Fix((1,) * count, tuple(pairs)) for pairs in pairings)]
 
 
 # In a recording ----------------------------------------------------------------------------------
@@ -260,8 +260,8 @@ def check_steering_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     most = float(np.nanmax(np.abs(evidence.steering), initial=0.0))
     if most <= MOST_STEERING:
         return [], evidence
-    told = evidence.found('steering_degrees', 0.97, value=math.radians(1.0), most=most)
-    return [told], replace(evidence, steering=np.radians(evidence.steering))
+    finding = evidence.found('steering_degrees', 0.97, value=math.radians(1.0), most=most)
+    return [finding], replace(evidence, steering=np.radians(evidence.steering))
 
 
 def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -270,7 +270,7 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     gain, zero = _steered_as_turned(evidence)
     still, order = np.abs(gain) < STILL, _sides_exchanged(facts)
     if still.any() and not (gain > AS_TURNED).any():
-        return [untold('frozen', 'steering')], evidence
+        return [not_checked('frozen', 'steering')], evidence
     ahead = np.nan_to_num(evidence.steering[evidence.unturned])
     # One angle that is published for two wheels is off in turns alone.
     stays = (np.median(ahead, axis=0) if ahead.size else 0.0) * zero > 0.5 * zero**2
@@ -284,10 +284,10 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         wrong |= gain < -AS_TURNED
     if not wrong.any():
         return [], evidence
-    told = {'wheel': facts.named(wrong), 'share': listed(100.0 * gain[wrong], '.0f')}
-    told['degrees'] = listed(np.degrees(zero[wrong]), '.0f')
+    details = {'wheel': facts.named(wrong), 'share': listed(100.0 * gain[wrong], '.0f')}
+    details['degrees'] = listed(np.degrees(zero[wrong]), '.0f')
     left = replace(evidence, steering=np.where(wrong, np.nan, evidence.steering))
-    return [evidence.found('steering_angle', 0.9, **told)], left
+    return [evidence.found('steering_angle', 0.9, **details)], left
 
 
 def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
@@ -303,9 +303,9 @@ def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     if evidence.turning.sum() < LEAST_TURNING_ROWS or np.ptp(heading) < LEAST_HEADINGS:
         return gain, zero
     yaw, speed = evidence.yaw[rows, None], np.nan_to_num(evidence.speed[rows])
-    told = speed * np.tan(np.nan_to_num(evidence.steering[rows]))
+    by_angle = speed * np.tan(np.nan_to_num(evidence.steering[rows]))
     others = ~steered if not steered.all() else steered
-    aside = np.median((told * steered - yaw * x)[:, others], axis=1, keepdims=True) + yaw * x
+    aside = np.median((by_angle * steered - yaw * x)[:, others], axis=1, keepdims=True) + yaw * x
     for i in np.flatnonzero(steered & np.isfinite(evidence.rate).any(axis=0)):
         seen = speed[:, i] * np.tan(np.nan_to_num(steering[rows, i]))
         share, off = block_fit(np.column_stack([aside[:, i], speed[:, i]]), seen)
@@ -326,8 +326,8 @@ def check_axes(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     turned = replace(facts, lateral=wheels.x, side=np.sign(wheels.x))
     places = {'wheels.x': wheels.y.tolist(), 'wheels.y': wheels.x.tolist()}
     turned = replace(turned, configuration=facts.configuration.replace(places))
-    told = {'x': listed(wheels.y, '.3f'), 'y': listed(wheels.x, '.3f')}
-    return [evidence.found('axes', 0.9, **told)], replace(evidence, facts=turned)
+    details = {'x': listed(wheels.y, '.3f'), 'y': listed(wheels.x, '.3f')}
+    return [evidence.found('axes', 0.9, **details)], replace(evidence, facts=turned)
 
 
 def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -336,7 +336,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     there, rows = _known(evidence)
     if rows.sum() < LEAST_MOVING_ROWS or not there.size:
         kinds = ('sign', 'swapped_sides', 'exchanged_wheels')
-        return [untold(kind, 'hardly_moves') for kind in kinds], evidence
+        return [not_checked(kind, 'hardly_moves') for kind in kinds], evidence
     outcomes: list[Outcome] = []
     chosen = _chosen(evidence, there, rows)
     signs, turn, mended = chosen.signs, chosen.track, evidence
@@ -345,10 +345,10 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         outcomes.append(finding)
     if not turn:
         why = 'no_turn' if facts.known else 'no_places'
-        outcomes += [untold(kind, why) for kind in ('swapped_sides', 'exchanged_wheels')]
-    told = _told_direction(mended, signs)
-    blame = _blame(told, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
-    slides = told[0] is not None and told[0] < 0.0 and _climbs(evidence, rows)
+        outcomes += [not_checked(kind, why) for kind in ('swapped_sides', 'exchanged_wheels')]
+    agreement = _direction(mended, signs)
+    blame = _blame(agreement, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
+    slides = agreement[0] is not None and agreement[0] < 0.0 and _climbs(evidence, rows)
     if blame == 'wheels':
         signs, turn = -signs, -turn
         if slides:
@@ -358,10 +358,10 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         finding, mended = _backwards(evidence, mended, signs, chosen)
         outcomes.append(finding)
     if turn < 0.0:
-        told_of, mended = _swapped(mended)
-        outcomes += told_of
+        swaps, mended = _swapped(mended)
+        outcomes += swaps
     if blame == 'reference' and evidence.recording.reference is not None:
-        alone = bool(turn) or told[1] is not None
+        alone = bool(turn) or agreement[1] is not None
         sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels read negative')
         if slides:
             sure, rival = 0.5 * sure, f'{rival}{SLIDE}'
@@ -403,13 +403,13 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
 _Agreement: TypeAlias = 'tuple[float | None, float | None]'
 
 
-def _blame(told: _Agreement, half_reversed: bool, turn: float) -> str:
+def _blame(agreement: _Agreement, half_reversed: bool, turn: float) -> str:
     """Return what runs backwards: the wheels beyond the signs that were found, the reference, ''.
 
     ``half_reversed``: half of the wheels or more have a negative sign; ``turn``: track by the
     turns, negative where they run against the gyro, 0 without turns.
     """
-    reference, force = told
+    reference, force = agreement
     against_force = force is not None and force < 0.0
     if reference is None:
         return 'wheels' if turn < 0.0 and against_force else ''
@@ -420,7 +420,7 @@ def _blame(told: _Agreement, half_reversed: bool, turn: float) -> str:
     return 'wheels' if others or turn < 0.0 or (not turn and against_force) else 'reference'
 
 
-def _told_direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
+def _direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
     """Return how the common speed agrees with reference and specific force; None: not told."""
     speed = row_medians(np.nan_to_num(evidence.rate) * signs)
     reference, by_reference, by_force = evidence.recording.reference, None, None
@@ -454,10 +454,10 @@ def _backwards(
     evidence: Evidence, mended: Evidence, signs: FloatArray, chosen: _Chosen
 ) -> tuple[Finding, Evidence]:
     facts = evidence.facts
-    told: dict[str, Any] = {'trial': chosen.trial, 'wheel': facts.named(signs < 0.0)}
-    told['directions'] = listed(facts.direction * signs, '.0f')
+    details: dict[str, Any] = {'trial': chosen.trial, 'wheel': facts.named(signs < 0.0)}
+    details['directions'] = listed(facts.direction * signs, '.0f')
     value = float(-facts.direction[signs < 0.0][0])
-    finding = evidence.found('backwards', chosen.sure, value=value, **told)
+    finding = evidence.found('backwards', chosen.sure, value=value, **details)
     return finding, mended.with_rate(mended.rate * signs, mended.torque * signs)
 
 
@@ -468,9 +468,9 @@ def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """
     facts, (against, sense) = evidence.facts, _sense_of_gyro(evidence)
     if sense < 0 and evidence.gyro is not None:
-        told = {'value': -1.0, 'axis': 'z', 'against': f'wheels and {against}'}
+        details = {'value': -1.0, 'axis': 'z', 'against': f'wheels and {against}'}
         mended = replace(evidence, gyro=evidence.gyro * [1.0, 1.0, -1.0])
-        return [evidence.found('gyro_reversed', 0.9, **told)], mended
+        return [evidence.found('gyro_reversed', 0.9, **details)], mended
     mended = replace(evidence, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
     order = _sides_exchanged(facts)
     if np.isfinite(evidence.steering).any():  # steering joints are named as before, or with it
@@ -575,8 +575,8 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         parts = [block_fit(both, turns)[0].value for turns in (aside, across, gyro)]
         off = min((cure.value - 1.0, 1.0 / math.hypot(*parts) - 1.0), key=abs)
         if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
-            told = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
-            finding = evidence.found('gyro_scale', 0.9, std=cure.std, **told)
+            details = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
+            finding = evidence.found('gyro_scale', 0.9, std=cure.std, **details)
             times = np.array([1.0, 1.0, cure.value])
             if not 0.5 < cure.value < 2.0:  # another unit, of all axes
                 times[:] = cure.value
@@ -601,9 +601,9 @@ def _exchanged(evidence: Evidence, chosen: _Chosen) -> tuple[Finding, Evidence]:
     names = evidence.facts.names
     order = Fix((), chosen.exchanged).order(len(names))
     wheels = ', '.join(names[i] for pair in chosen.exchanged for i in pair)
-    told = {'wheel': wheels, 'trial': chosen.trial}
-    told['names'] = ', '.join(names[i] for i in order)
-    finding = evidence.found('exchanged', min(chosen.sure, 0.95), **told)
+    details = {'wheel': wheels, 'trial': chosen.trial}
+    details['names'] = ', '.join(names[i] for i in order)
+    finding = evidence.found('exchanged', min(chosen.sure, 0.95), **details)
     return finding, evidence.with_rate(evidence.rate[:, order], evidence.torque[:, order])
 
 
@@ -617,7 +617,7 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     ratio = track_ratio(evidence)
     if ratio is None:
-        return [untold('unit', 'gyro_no_turn')], evidence
+        return [not_checked('unit', 'gyro_no_turn')], evidence
     times = 1.0 / abs(ratio)
     scaled = IN_DEGREES_BY_WHEELS[0] < times < IN_DEGREES_BY_WHEELS[1]
     moving = evidence.moving
@@ -626,9 +626,9 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not scaled or slips:
         return [], evidence
     words = {'times': times, 'how': 'turning of the wheels'}
-    told = evidence.found('gyro_degrees', 0.95, value=math.radians(1.0), **words)
+    finding = evidence.found('gyro_degrees', 0.95, value=math.radians(1.0), **words)
     mended = evidence.with_channel('imu', rate=np.radians(imu.rate))
-    return [told], replace(mended, gyro=np.radians(evidence.gyro))
+    return [finding], replace(mended, gyro=np.radians(evidence.gyro))
 
 
 def _as_stated(evidence: Evidence, within: Mask) -> Fit | None:

@@ -19,7 +19,7 @@ from wheel_terra_estimator.checks.evidence import (
     noise_of,
     row_medians,
 )
-from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, untold
+from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, not_checked
 from wheel_terra_estimator.checks.reference import (
     LEAST_ROWS,
     ahead,
@@ -92,9 +92,9 @@ def check_limits(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         at[:, index] &= often and fine and noise_of(free) > noisy
     if not at.any():
         return [], evidence
-    told = {'wheel': evidence.facts.named(at.any(axis=0)), 'most': float(np.nanmax(rate[at]))}
-    told['long'] = float(at.any(axis=1).sum()) * evidence.period
-    return [evidence.found('rate_limit', 0.95, **told)], evidence.rows(~at.any(axis=1))
+    details = {'wheel': evidence.facts.named(at.any(axis=0)), 'most': float(np.nanmax(rate[at]))}
+    details['long'] = float(at.any(axis=1).sum()) * evidence.period
+    return [evidence.found('rate_limit', 0.95, **details)], evidence.rows(~at.any(axis=1))
 
 
 def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -110,8 +110,8 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not dead:
         return [], evidence
     how = f'does not follow the others for up to {max(dead.values()):.1f} s of driving'
-    told = evidence.found('rate_frozen', 0.97, wheel=', '.join(dead), how=how)
-    return [told], evidence.with_rate(rate)
+    finding = evidence.found('rate_frozen', 0.97, wheel=', '.join(dead), how=how)
+    return [finding], evidence.with_rate(rate)
 
 
 def _stands(evidence: Evidence, index: int) -> float:
@@ -172,8 +172,8 @@ def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not zero.any():
         return [], evidence
     wheels = zero.any(axis=0)
-    told = {'wheel': evidence.facts.named(wheels), 'count': int(zero.any(axis=1).sum())}
-    finding = evidence.found('rate_zeros', 0.95, **told)
+    details = {'wheel': evidence.facts.named(wheels), 'count': int(zero.any(axis=1).sum())}
+    finding = evidence.found('rate_zeros', 0.95, **details)
     if wheels.all():
         return [finding], evidence.rows(~zero.all(axis=1))
     return [finding], evidence.with_rate(np.where(zero, np.nan, evidence.rate))
@@ -198,8 +198,8 @@ def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         alone = int((there & ~copies).sum())
         every = copies.all() and (turns & evidence.moving).sum() > LEAST_CHANGES
         if copies.any() and (alone > (not there.all()) or (every and same.min() == same.size)):
-            told = {'field': field, 'wheel': evidence.facts.named(copies)}
-            outcomes.append(evidence.found('copied', 0.95, **told))
+            details = {'field': field, 'wheel': evidence.facts.named(copies)}
+            outcomes.append(evidence.found('copied', 0.95, **details))
             table = np.where(copies, np.nan, table)
         mended.append(table)
     return outcomes, evidence.with_rate(*mended) if outcomes else evidence
@@ -220,11 +220,11 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         noise = np.array([robust_std(column) for column in np.diff(table, axis=0).T])
         wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
         # To break away or turn back takes a large torque for an instant.
-        told_by = wild if name == 'velocity' else wild & evidence.steady[:, None]
-        if told_by.sum() >= LEAST_WILD and wild.sum() < MOST_WILD * wild.size:
+        counted = wild if name == 'velocity' else wild & evidence.steady[:, None]
+        if counted.sum() >= LEAST_WILD and wild.sum() < MOST_WILD * wild.size:
             wheels = evidence.facts.named(wild.any(axis=0))
-            told = {'field': name, 'count': int(wild.sum()), 'most': float(off[wild].max())}
-            outcomes.append(evidence.found('wild', 0.97, wheel=wheels, **told))
+            details = {'field': name, 'count': int(wild.sum()), 'most': float(off[wild].max())}
+            outcomes.append(evidence.found('wild', 0.97, wheel=wheels, **details))
             table = np.where(wild, np.nan, table)
         mended.append(table)
     return outcomes, evidence.with_rate(*mended) if outcomes else evidence
@@ -245,8 +245,8 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     unlike = [np.nanmean(sense[rows & (common == way)], axis=0) for way in (1.0, -1.0)]
     unsigned = np.minimum(*np.abs(unlike)) * np.sign(unlike[0] * unlike[1]) > ONE_SIGN
     if unsigned.any():
-        told_of = {'wheel': facts.named(unsigned), 'other': 'other wheels go'}
-        outcomes.append(evidence.found('rates_unsigned', 0.95, **told_of))
+        how = {'wheel': facts.named(unsigned), 'other': 'other wheels go'}
+        outcomes.append(evidence.found('rates_unsigned', 0.95, **how))
         signed = np.abs(evidence.rate) * common[:, None]
         evidence = evidence.with_rate(np.where(unsigned, signed, evidence.rate))
     ratio = speed[rows] / middle[rows, None]
@@ -258,16 +258,16 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if not abs(whole[i]) > max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LEAST_COUNTS):
             continue
         times = math.exp(whole[i])
-        told = {'times': times, 'by': 1.0 / times}
+        details = {'times': times, 'by': 1.0 / times}
         if abs(whole[i]) > MOST_ODD:  # no wheel is so much larger
-            outcomes.append(evidence.found('wheel_counts', 0.95, wheel=name, **told))
+            outcomes.append(evidence.found('wheel_counts', 0.95, wheel=name, **details))
             rate[:, i] /= times
             continue
         rolling[i] /= times
         radii = facts.configuration.wheels.radius + rolling - facts.radius  # lugs stay
-        told |= {'value': round(float(radii[i]), 5), 'std': round(float(radii[i]) * beside, 5)}
+        details |= {'value': round(float(radii[i]), 5), 'std': round(float(radii[i]) * beside, 5)}
         sure = 0.9 if beside < LEAST_ODD / ODD else 0.5  # what is written is right to 3 %
-        finding = evidence.found('wheel_scale', sure, wheel=name, radii=listed(radii), **told)
+        finding = evidence.found('wheel_scale', sure, wheel=name, radii=listed(radii), **details)
         outcomes.append(finding)
     if not outcomes:
         return [], evidence
@@ -281,11 +281,11 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return the unit of the rates where speeds or turns tell it is not rad/s."""
     facts = evidence.facts
     if not facts.known:
-        return [untold('unit', 'no_radius')], evidence
+        return [not_checked('unit', 'no_radius')], evidence
     ratio, how = _speed_ratio(evidence), 'speed of the reference'
     track = turning.track_ratio(evidence)
     if ratio is None and track is None:
-        return [untold('unit', 'no_speed')], evidence
+        return [not_checked('unit', 'no_speed')], evidence
     turns = track is not None and abs(track) > LEAST_ROLLING_TRACK  # as rad/s do
     radius, known = float(np.nanmean(facts.radius)), dict(RATE_UNITS)
     if not turns and radius < LARGE_WHEEL:  # else too near to rad/s
@@ -294,9 +294,9 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     of_reference = {} if track is not None else units_of_reference(ratio or 0.0, UNIT_BAND)
     if units and of_reference:  # no turn tells which of both it is
         sure = 0.97 / (len(units) + len(of_reference))
-        told, evidence = _unit_findings(evidence, units, how, sure * len(units))
-        told += [evidence.found('reference_unit', sure, **one) for one in of_reference.values()]
-        return told, evidence.with_rate(evidence.rate * math.nan)
+        findings, evidence = _unit_findings(evidence, units, how, sure * len(units))
+        findings += [evidence.found('reference_unit', sure, **one) for one in of_reference.values()]
+        return findings, evidence.with_rate(evidence.rate * math.nan)
     rolls = ratio and track and abs(ratio * track - 1.0) < SAME_SCALE
     scaled = ratio is not None and ratio > MOST_COUNT and not OF_RADII[0] < ratio < OF_RADII[1]
     if track and rolls and scaled and not units:
@@ -309,8 +309,8 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if ratio is None or not 0.0 < ratio < MOST_COUNT:
         return [], evidence
     evidence.figures['wheels.rad_per_count'] = value = float(f'{ratio:.4g}')
-    told_of = {'times': 1.0 / ratio, 'counts': 2.0 * math.pi / ratio, 'how': how}
-    finding = evidence.found('rate_counts', 0.45 if units else 0.9, value=value, **told_of)
+    details = {'times': 1.0 / ratio, 'counts': 2.0 * math.pi / ratio, 'how': how}
+    finding = evidence.found('rate_counts', 0.45 if units else 0.9, value=value, **details)
     perhaps, _ = _unit_findings(evidence, units, how, 0.45)
     return [*perhaps, finding], evidence.with_rate(evidence.rate * ratio)
 
@@ -323,12 +323,12 @@ def _fitting_units(
     units = {}
     for unit, factor in known.items():
         by_turn = track is not None and turning.ordinary_track(track * factor)
-        told = by_turn and not usual
+        fits = by_turn and not usual
         if ratio is not None:
             least = LEAST_BAND if factor < MOST_COUNT else UNIT_BAND[0]
-            told = least < ratio / factor < UNIT_BAND[1]
-            told &= track is None or by_turn or not usual
-        if told:
+            fits = least < ratio / factor < UNIT_BAND[1]
+            fits &= track is None or by_turn or not usual
+        if fits:
             units[unit] = factor
     if ratio is None or not units:
         return units
@@ -393,11 +393,11 @@ def check_noise(evidence: Evidence) -> list[Outcome]:
     key, wrong = ('rate_steps', coarse) if coarse.any() else ('rate_noise', noisy)
     seen = float(np.median(np.array(noise)[wrong]))
     step, period = float(np.median(np.array(by_steps)[wrong])) / COUNTING_STD, evidence.period
-    told: dict[str, Any] = {'noise': seen, 'stated': stated, 'step': step, 'period': period}
-    told |= {'share': 100.0 * step / max(working, 1e-9)}
-    told |= {'counts': 2.0 * math.pi / max(step * period, 1e-9)}
+    details: dict[str, Any] = {'noise': seen, 'stated': stated, 'step': step, 'period': period}
+    details |= {'share': 100.0 * step / max(working, 1e-9)}
+    details |= {'counts': 2.0 * math.pi / max(step * period, 1e-9)}
     wheel = None if 2 * wrong.sum() > wrong.size else evidence.facts.named(wrong)
-    return [evidence.found(key, 0.95, wheel=wheel, value=float(f'{seen:.2g}'), **told)]
+    return [evidence.found(key, 0.95, wheel=wheel, value=float(f'{seen:.2g}'), **details)]
 
 
 def _intervals(time: FloatArray) -> FloatArray:
