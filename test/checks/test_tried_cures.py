@@ -40,7 +40,7 @@ def test_wheels_backwards_in_turns_on_the_spot_are_found_all_the_same(wheels):
 
 
 def test_a_rover_that_slides_back_in_curves_has_no_reversed_wheels_for_sure():
-    """Wheels drive up a slope of 0.2 rad, the body goes down: mirrored, all wheels read negative."""
+    """Wheels drive up a slope of 0.2 rad, the body goes down."""
     time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
     down = rolling.Motion(time, 0.0 * time + 0.25, 0.1 * np.sin(time / 5.0), 0.0 * time - 0.2)
     whole = rolling.recording(down)

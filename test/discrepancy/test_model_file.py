@@ -10,6 +10,7 @@ from test_workflow import FEW, make, noisy
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy import workflow
 from wheel_terra_estimator.discrepancy.report.model_file import corrected, write_model
 from wheel_terra_estimator.discrepancy.result import Proposal
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
@@ -234,3 +235,28 @@ def test_a_friction_of_rows_that_turn_both_ways_stays_a_friction():
     model, _ = corrected(diagnose(check_table('t.csv', table), configuration))
     assert model.effects['drivetrain_friction']['torque'] > 0.0
     assert not model.sensors.torque_zero.any()
+
+
+def test_curves_of_uncertain_slips_stand_where_the_slip_was_read(tmp_path, monkeypatch):
+    """The fit stands at more probable slips, which are nearer to the truth than those read."""
+    table, values, *_ = make('sweep40')
+    configuration = reader.from_parameters(values, complete=False)
+    true, rng = table['slip'], np.random.default_rng(3)
+    read = np.clip(true + 0.03 * rng.standard_normal(true.size), -0.9, 0.9)
+    search, kept = workflow.search, []
+    monkeypatch.setattr(workflow, 'search', lambda *given: kept.append(search(*given)) or kept[0])
+    uncertain = {**table, 'slip': read, 'slip_std': np.full(true.size, 0.03)}
+    few = Options(effects=('bulldozing', 'cohesion'))
+    found = diagnose(check_table('t.csv', uncertain), configuration, options=few)
+    assert found.verdict == 'agrees'
+    np.testing.assert_allclose(found.curves.refit, found.curves.after)
+    probable = kept[0].setting.forward.points.slip
+    assert np.std(probable - true) < 0.8 * np.std(read - true)
+    write_model(found, tmp_path / 'model.yaml')
+    there, here = (
+        predicted({**table, 'slip': slip}, configuration, tmp_path, 'model.yaml')
+        for slip in (read, probable)
+    )
+    for q in range(1, len(QUANTITIES)):  # pull and torque, which bend little over an error
+        moved = np.std(here[:, q] - there[:, q])
+        assert np.std(found.curves.after[:, q] - there[:, q]) < 0.5 * moved

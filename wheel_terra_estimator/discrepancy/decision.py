@@ -339,5 +339,7 @@ def _curves(
     refit, fitted = setting.predicted(fits, problem.variance(floor))
     left = floor if setting.forward.active is None else 0.0  # what a reference shows is in them
     band = np.sqrt(findings.noise.std**2 + (left * problem.scale) ** 2)
-    whole = (configured.outputs[0], refit, fitted, held_out[0], held_out[-1], after.outputs, band)
-    return Curves(*(values[:rows] for values in whole))
+    # Where slips are latent the model stands at the most probable slip; a curve is compared with
+    # what was read, so that it goes back along the tangent (cells that were not measured stay).
+    curves = (configured.outputs[0], refit, fitted, held_out[0], held_out[-1], after.outputs)
+    return Curves(*[(values - problem.moved)[:rows] for values in curves] + [band[:rows]])

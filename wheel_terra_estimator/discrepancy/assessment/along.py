@@ -56,7 +56,7 @@ def changed_stretch(
     columns = fitted.sensitivity[:, [place[name] for name in _FIELDS]]
     jacobian = fitted.jacobian / np.sqrt(fitted.prior)
     inverse = problem.rotation.T @ over_covariance(problem.rotation, variance, jacobian)
-    target = problem.observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
+    target = problem.wanted - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
     # Sums over the cells of each time; those of a stretch are differences of running sums.
     times = np.unique(time)
     at = np.searchsorted(times, time)[problem.row]

@@ -43,7 +43,7 @@ def locate(
         return np.asarray((residual - shared) / problem.std[:, None])
 
     looked_at = np.ones(len(table), dtype=bool) if ours is None else ours
-    cells = own((problem.observed - problem.flat(nothing.outputs))[:, None])[:, 0]
+    cells = own((problem.wanted - problem.flat(nothing.outputs))[:, None])[:, 0]
     cells = np.where(problem.outlier | ~looked_at[problem.row], 0.0, cells)
     residual = np.full((len(table), len(QUANTITIES)), np.nan)
     residual[problem.row, problem.quantity] = cells

@@ -152,7 +152,7 @@ def fit(
             residual = problem.residual(state.outputs[index])
             weighted = residual / variance
             if kept is not None:
-                residual = problem.observed - problem.flat(state.outputs[index])
+                residual = problem.wanted - problem.flat(state.outputs[index])
                 weighted = kept[b] @ residual
             better = way.is_better(float(residual @ weighted))
             if better:

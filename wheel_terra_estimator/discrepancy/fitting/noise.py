@@ -199,7 +199,7 @@ def find_outliers(
     (4,) per quantity [share of the range]; ``narrow`` (N, N) comes from `slip_features`.
     """
     jacobian = problem.rotation @ fitted.sensitivity / np.sqrt(fitted.prior)
-    target = problem.observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
+    target = problem.wanted - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
     sizes: list[FloatArray | float] = [_ROBUST_FLOOR]
     if np.max(amplitude) > _ROBUST_FLOOR:
         sizes.append(np.maximum(amplitude, _ROBUST_FLOOR))

@@ -31,6 +31,8 @@ class Problem:
     """Cells of a table in whitened, rotated coordinates."""
 
     observed: FloatArray  # (m,) measured values
+    # (m,) values that the model has to match: moved along the slip where this is latent
+    wanted: FloatArray
     # (m,) indices of each cell
     row: IndexArray
     quantity: IndexArray
@@ -43,6 +45,7 @@ class Problem:
     # (m,) quantity to which each rotated axis belongs; -1 where slip errors mix them
     block: IndexArray
     log_std: float  # sum of the logarithms of the noise (half the log determinant at amplitude 0)
+    rows: int  # N
 
     @property
     def size(self) -> int:
@@ -55,7 +58,14 @@ class Problem:
 
     def residual(self, outputs: FloatArray) -> FloatArray:
         """Return what (N, 4) outputs leave of the cells, whitened and rotated."""
-        return self.rotation @ (self.observed - self.flat(outputs))
+        return self.rotation @ (self.wanted - self.flat(outputs))
+
+    @property
+    def moved(self) -> FloatArray:
+        """(N, 4) what ``wanted`` differs by from the readings; 0 where nothing was measured."""
+        shift = np.zeros((self.rows, len(self.scale)))
+        shift[self.row, self.quantity] = self.wanted - self.observed
+        return shift
 
     def shared_error(
         self, residual: FloatArray, ours: BoolArray | None, variance: FloatArray
@@ -147,6 +157,7 @@ def build_problem(
     outliers: Sequence[tuple[int, int]] = (),  # cells rejected
     # Errors of inputs (slip, leaving angle), common to the quantities of a row
     common: Sequence[CommonError] = (),
+    moved: FloatArray | None = None,  # (N, 4) by which readings and what is wanted differ
     group: FloatArray | None = None,  # (N,) rows of other numbers share no structural error
 ) -> Problem:
     """Return the problem of an (N, 4) table."""
@@ -179,8 +190,10 @@ def build_problem(
         values, vectors = np.linalg.eigh(whitening @ smooth[square] @ whitening.T)
         rotation[square], roughness[mine] = vectors.T @ whitening, np.maximum(values, 0.0)
         log_std += float(np.log(np.diag(lower)).sum())
+    observed = measured[row, quantity]
     return Problem(
-        measured[row, quantity],
+        observed,
+        observed if moved is None else observed + moved[row, quantity],
         row,
         quantity,
         deviation,
@@ -190,4 +203,5 @@ def build_problem(
         roughness,
         block,
         log_std,
+        len(measured),
     )

@@ -123,7 +123,9 @@ class Gap:
     @cached_property
     def measured(self) -> FloatArray:
         """(N, 4) cells that the model has to match; nan where they were rejected."""
-        return kept_cells(self.table, self.findings)
+        # Where slips are latent the model stands at the most probable one.
+        moved = self.findings.setting.problem.moved[: len(self.table)]
+        return kept_cells(self.table, self.findings) + moved
 
     def left_out(
         self, setting: Setting, fits: Sequence[Fit], groups: IndexArray

@@ -144,7 +144,7 @@ class Columns:
             cells = reading.scale[setting.problem.quantity]
             problem = replace(
                 setting.problem,
-                observed=setting.problem.observed * cells,
+                wanted=setting.problem.wanted * cells,
                 rotation=setting.problem.rotation / cells,
             )
             other = replace(setting, forward=self.forward.at(reading.points), problem=problem)

@@ -22,6 +22,7 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
     CommonError,
     Problem,
     build_problem,
+    over_covariance,
     slip_features,
 )
 from wheel_terra_estimator.discrepancy.result import Noise
@@ -59,6 +60,7 @@ _BEHIND = 3.0  # nats behind the best of all, up to which that is done
 _KEPT = 30  # best sets that are weighed again, where beds differ
 _ROUNDS = 2  # of adding and swapping
 _NEAR = 2.0  # nats behind the best one, up to which that is done
+_FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def search(
     noise = noises.stated_noise(table, builder.scale, builder.trials, builder.reference)
     problem, nothing = builder.fit_nothing(noise.std, (), None)
     if (table.slip_std > 0.0).any():
-        builder.let_err('slip', table.slip_std, _shared_readings(table.columns['slip']), nothing)
+        builder.linearise(nothing, noise.std)
         problem, nothing = builder.fit_nothing(noise.std, (), nothing)
     if table.leaving_angle_std.any():
         builder.let_err('leaving_angle', table.leaving_angle_std, np.arange(len(table)), nothing)
@@ -269,6 +271,7 @@ class _Builder:
         names = table.varying()
         self.narrow = slip_features(self.inputs, names.index('slip') if 'slip' in names else None)
         self.by_input: list[CommonError] = []
+        self._moved: FloatArray | None = None
         self.by_bed: list[CommonError] = []
         # What differs between trials, each on its bed, or from a reference is no noise.
         self.trials = np.zeros(len(table)) if table.sweeps() is None else table.trials()
@@ -279,6 +282,32 @@ class _Builder:
         """Take an input of the model for uncertain, linearly around a fit."""
         slope = self.forward.by_input(name, nothing.coordinates, nothing.u, nothing.angle)
         self.by_input.append(CommonError(slope, std, group))
+
+    def linearise(self, nothing: Fit, noise_std: FloatArray) -> None:
+        """Linearise the slip errors around the most probable slips, given all quantities.
+
+        Where the curves bend within an error of the slip, a tangent at the reading is not enough.
+        """
+        slip, std = self.table.columns['slip'], self.table.slip_std
+        group = _shared_readings(slip)
+        self.let_err('slip', std, group, nothing)
+        problem = self.build(noise_std, ())
+        here = nothing.within(problem)
+        target = here.residual + here.jacobian @ here.u
+        variance = problem.variance(_LATENT_FLOOR)
+        cells = problem.rotation.T @ over_covariance(target, variance, here.jacobian)
+        by_slip = problem.flat(self.by_input[0].slope)
+        pull = np.bincount(
+            group[problem.row], by_slip * std[problem.row] * cells, minlength=group.max() + 1
+        )
+        moved = np.clip(pull[group], -_FARTHEST, _FARTHEST) * std
+        moved = np.clip(slip + moved, -0.97, 0.97) - slip
+        self.forward = self.forward.at(replace(self.forward.points, slip=slip + moved))
+        angle = self.forward.solve([nothing.coordinates], [nothing.u], jacobian=False).angle[0]
+        slope = self.forward.by_input('slip', nothing.coordinates, nothing.u, angle)
+        self.by_input = [CommonError(slope, std, group)]
+        # The reading lies off the point of linearisation: the tangent takes the cells along.
+        self._moved = slope * moved[:, None]
 
     def part_beds(self, beds: IndexArray, problem: Problem, nothing: Fit) -> None:
         """Let stiffness and strength of the beds differ, linearly around a fit."""
@@ -296,7 +325,7 @@ class _Builder:
         rejected = [(row, quantity) for row, quantity, _ in outliers]
         group = self.apart if free else None
         return build_problem(
-            self.table.measured, std, self.inputs, self.scale, rejected, common, group
+            self.table.measured, std, self.inputs, self.scale, rejected, common, self._moved, group
         )
 
     def fit_nothing(

@@ -102,7 +102,7 @@ class Setting:
         """(K, N, 4) outputs with the structural error that a reference shows beside each."""
         problem, values = self.problem, np.array(outputs)
         cells = values[:, problem.row, problem.quantity]
-        residual = (problem.observed - cells).T
+        residual = (problem.wanted - cells).T
         values[:, problem.row, problem.quantity] += problem.shared_error(
             residual, self.forward.active, variance
         ).T
