@@ -96,6 +96,23 @@ def test_release_of_a_warning_or_a_stop_opens_a_crawl_then_what_is_known_decides
     assert stopped.drive(0.2, 0.1).scale == 1.0
 
 
+def test_a_wheel_that_lost_its_rate_in_motion_does_not_move_a_rover_at_rest():
+    """Its slip velocity is held at 0.02 m/s; the others stand, and the next start passes whole."""
+    rover = Rover()
+
+    def take(turning, slip_class):
+        velocity = [0.02 * turning] * 3 + [0.02]
+        given = Estimates(0.02, [0.1] * 4, velocity, [*[slip_class] * 3, UNKNOWN], [10.0] * 4)
+        rover.state = after_estimates(rover.state, rover.now, given, rover.tuning)
+
+    rover.drive(1.0, 0.2)
+    for forward, turning, slip_class in ((0.2, 1.0, 0), (0.0, 0.0, UNKNOWN)):
+        for _ in range(100):
+            take(turning, slip_class)
+            rover.command(forward)
+    assert rover.scale(0.2) == 1.0
+
+
 def test_the_table_is_that_of_the_page():
     rows = [line.strip('|\n ').split(' | ') for line in PAGE.open() if line.startswith('| ')]
     states = [cell.strip('`') for cell in next(row for row in rows if row[0] == 'event')[1:]]

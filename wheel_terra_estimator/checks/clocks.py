@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome, found, not_checked, of_offset
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
@@ -387,7 +387,12 @@ ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
 MOST_LATE = 40.0  # beyond which a history is no cure [s]
 QUARTERS, UNEVEN = 4, 0.5  # parts of a drive; unlike gains of a drift over their mean, at most [-]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
-IN_BURSTS, LEAST_BURSTS = 0.05, 10  # usual step over the mean one of messages read in bursts [-]
+PAUSE = 5.0  # between bursts, over the median step, at least [-]
+IN_PAUSES = 0.8  # share of the time that passes between bursts, at least [-]
+LEAST_BURSTS, LEAST_IN_A_BURST = 10, 3
+READ_AT_ONCE, READ_SHARE = 2e6, 0.1  # step within a burst [ns], over the period: less than this
+LONGEST_WAIT = 2.0  # for a burst, over the median; beyond it is a pause, or a step of the clock
+OFF_PERIOD = 0.2  # scatter of the periods of bursts, over their median, at most [-]
 LONGEST_WAY = 10.0  # of a message into the log [s]
 
 
@@ -487,16 +492,34 @@ def _clocks(
 
 def _evenly(channel: Channel) -> Channel | None:
     """Return messages that were read in bursts spread evenly up to their ends; None: no bursts."""
-    step = np.diff(channel.stamp)
-    if step.min() <= 0 or np.median(step) > IN_BURSTS * step.mean():
+    stamp = channel.stamp
+    ends = _bursts(stamp)
+    if ends is None:
         return None
-    ends = np.flatnonzero(step > step.mean())
-    if ends.size < LEAST_BURSTS:
+    count, wait = np.median(np.diff(ends)), np.median(np.diff(stamp[ends]))
+    # Up to the end of each burst, and over no pause or step that is longer than others.
+    waits = np.minimum(np.diff(stamp[ends], prepend=stamp[ends[0]] - wait), LONGEST_WAIT * wait)
+    period = waits / np.diff(ends, prepend=ends[0] - count)
+    row = np.arange(stamp.size)
+    end = np.minimum(np.searchsorted(ends, row), ends.size - 1)
+    late = np.round(period[end] * (ends[end] - row) + stamp - stamp[ends[end]]).astype(np.int64)
+    return replace(channel, stamp=stamp - late, log_time=channel.log_time - late)
+
+
+def _bursts(stamp: IntArray) -> IntArray | None:
+    """Return the last message of each burst of stamps (k,) [ns]; None: no bursts.
+
+    A buffer is read in no time, and as many messages come as time has passed.
+    """
+    step = np.diff(stamp)
+    ends = np.flatnonzero(step > PAUSE * np.median(step))
+    if step.min() < 0 or ends.size < LEAST_BURSTS or step[ends].sum() < IN_PAUSES * step.sum():
         return None
-    since = channel.stamp - channel.stamp[0]
-    even = np.interp(np.arange(since.size), ends, since[ends]).round().astype(np.int64)
-    late = since - even
-    return replace(channel, stamp=channel.stamp - late, log_time=channel.log_time - late)
+    count = np.diff(ends)
+    period = np.diff(stamp[ends]) / count
+    regular = robust_std(period) < OFF_PERIOD * np.median(period)
+    regular &= np.median(step) < min(READ_AT_ONCE, READ_SHARE * float(np.median(period)))
+    return ends if regular and np.median(count) >= LEAST_IN_A_BURST else None
 
 
 def _drift(late: list[float], others: list[list[float]]) -> float:

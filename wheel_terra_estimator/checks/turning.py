@@ -269,13 +269,12 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts, track = evidence.facts, track_ratio(evidence)
     gain, zero = _steered_as_turned(evidence)
     still, order = np.abs(gain) < STILL, _sides_exchanged(facts)
-    if still.any() and not (gain > AS_TURNED).any():
-        return [not_checked('frozen', 'steering')], evidence
     ahead = np.nan_to_num(evidence.steering[evidence.unturned])
     # One angle that is published for two wheels is off in turns alone.
     stays = (np.median(ahead, axis=0) if ahead.size else 0.0) * zero > 0.5 * zero**2
-    wrong = stays & (np.abs(zero) > LEAST_STEERING_ZERO)
-    wrong |= still & ~still[order]  # both of an axle may be held straight
+    turned = bool((gain > AS_TURNED).any())
+    wrong = stays & (np.abs(zero) > LEAST_STEERING_ZERO) & turned
+    wrong |= still & ~still[order] & turned  # both of an axle may be held straight
     # Of joints that are exchanged the inner one turns too little, to either side.
     crossed = _steered_as_turned(replace(evidence, steering=evidence.steering[:, order]))[1]
     across = (zero * zero[order] < 0.0) & (np.abs(crossed) < LEAST_FALL * np.abs(zero))
@@ -283,7 +282,7 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if track is not None and track > 0.0:
         wrong |= gain < -AS_TURNED
     if not wrong.any():
-        return [], evidence
+        return [not_checked('frozen', 'steering')] * bool(still.any() and not turned), evidence
     details = {'wheel': facts.named(wrong), 'share': listed(100.0 * gain[wrong], '.0f')}
     details['degrees'] = listed(np.degrees(zero[wrong]), '.0f')
     left = replace(evidence, steering=np.where(wrong, np.nan, evidence.steering))

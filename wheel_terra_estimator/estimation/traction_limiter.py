@@ -327,7 +327,13 @@ def _after_unknown(
 ) -> LimiterState:
     """Return the state after a set without any known class: rest, a start, or doubt."""
     state = replace(state, out=None)
-    slowly = all(abs(speed) <= REST_SPEED for speed in estimates.slip_velocity)
+    # The slip velocity of a wheel without rates is held: it does not move the others.
+    latest = max((wheel.at for wheel in state.wheels), default=-math.inf)
+    slowly = all(
+        abs(speed) <= REST_SPEED
+        for wheel, speed in zip(state.wheels, estimates.slip_velocity, strict=True)
+        if latest - wheel.at <= tuning.stale_after
+    )
     if slowly and _still_time(state, now) >= REST_TIME and state.known_since_start:
         start = Decision(1.0, 'starting', 'slip unknown at rest: command passes')
         wheels = (Wheel(),) * len(state.wheels)

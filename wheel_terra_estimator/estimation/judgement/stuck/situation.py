@@ -31,6 +31,7 @@ _SLOWED = 0.2  # of the rim speed: more is missing where wheels are held, or sto
 _CREEP = 0.1  # of the speed before: below it no direction is taken, wheels settle as they stop
 NEAR_LIMIT = 0.7
 """Of the torque limit: below it nothing holds the wheels, above it nobody stops them."""
+_AT_REST = 0.9  # of the torque limit: below it a rover may be parked on a slope
 _PULLING_AWAY = 1.0  # [s] that a wheel of a rover at rest may pull near its limit before it turns
 
 
@@ -200,7 +201,7 @@ class Situation:
     def standing(self) -> bool:
         """Whether the rover stands for want of power, or is about to."""
         if self.pulls_at_rest:
-            return self.strain > NEAR_LIMIT
+            return self.strain > _AT_REST
         return self._held(self.strain) and (
             self.slowed or self.rim < (1.0 - _SLOWED) * self.fastest
         )
@@ -214,7 +215,7 @@ class Situation:
     def stalled(self) -> tuple[bool, ...]:
         """Wheels that pull near their limit and hardly turn while another turns, or all stand."""
         if self.pulls_at_rest:
-            return tuple([w.torque_share > NEAR_LIMIT for w in self.motion.wheels])
+            return tuple([w.torque_share > _AT_REST for w in self.motion.wheels])
         return tuple(
             [
                 self._held(w.torque_share) and abs(w.rim_speed) < _STALL_RATIO * self.fastest
@@ -246,7 +247,7 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
         forward = sum([1 if w.rim_speed > 0.0 else -1 for w in now.moving])
         way = (forward > 0) - (forward < 0)
     stands = not moves and not any(isnan(w.rim_speed) for w in motion.wheels)
-    pulls = stands and any(w.torque_share > NEAR_LIMIT for w in motion.wheels)
+    pulls = stands and any(w.torque_share > _AT_REST for w in motion.wheels)
     return Situation(
         motion,
         Memory(
