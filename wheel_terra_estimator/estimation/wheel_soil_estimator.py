@@ -554,6 +554,8 @@ class WheelSoilEstimator:
         sinkage = ekf.mean[self._layout.sinkage].tolist()
         seen, onward = [], max(known(rims), key=abs, default=0.0)
         if abs(onward) <= rover.rest_speed:
+            onward = self._contact_age.state.direction  # of the last drive
+        if abs(onward) <= rover.rest_speed:
             onward = 0.0  # all stand
         for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
             limit, torque = rover.torque_limit[i], wheels.state.torque[i]
@@ -581,6 +583,7 @@ class WheelSoilEstimator:
                 depth_read=self._depth_read(time),
                 slip_known=self._reference.known_twice(time),
                 demand=self._demand.state,
+                holding_share=self._holding_share(),
             ),
         )
         self._clock = self._clock._replace(assessment=assessment, speed=present)
@@ -593,6 +596,14 @@ class WheelSoilEstimator:
             self._follow_sideways(time, body, rims)
         if self._buffer is not None:
             self._buffer.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
+
+    def _holding_share(self) -> float:
+        """Return the share of all torque limits that holds the rover on its slope [-]."""
+        limit, loads = sum(self._rover.torque_limit), self._loads.state
+        if limit <= 0.0:
+            return 0.0
+        levers = zip(loads.load, self._rover.slip_radius, strict=True)
+        return abs(loads.slope_share) * sum([load * radius for load, radius in levers]) / limit
 
     def _learn_slopes(
         self, time: float, slips: tuple[WheelSlip, ...], rims: Floats, lateral_motion: float

@@ -138,6 +138,17 @@ def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
     assert '2 wheels stalled' in found[-1].reason
 
 
+def test_a_rover_parked_on_a_slope_by_wheels_at_their_limit_is_not_stuck():
+    """Their torques are what holds it; on the level the same ones press against something."""
+    shares = (0.95, 0.95, 0.5, 0.4)
+    for holding_share, raises in ((0.7, False), (0.0, True)):
+        monitor = StuckMonitor(SETTINGS)
+        held(monitor, [wheel(0.2, rim=0.05, torque=0.4)] * 4, 3.0)
+        parked = [wheel(0.2, rim=0.0, known=False, torque=share) for share in shares]
+        found = held(monitor, parked, 10.0, start=3.0, holding_share=holding_share)
+        assert any(a.stuck for a in found) is raises
+
+
 @pytest.mark.parametrize(
     ('torques', 'raises'), [((0.99, 0.95, 0.1, -0.9), True), ((0.95,), False), ((0.85,) * 4, False)]
 )

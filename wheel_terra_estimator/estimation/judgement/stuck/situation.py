@@ -32,6 +32,7 @@ _CREEP = 0.1  # of the speed before: below it no direction is taken, wheels sett
 NEAR_LIMIT = 0.7
 """Of the torque limit: below it nothing holds the wheels, above it nobody stops them."""
 _AT_REST = 0.9  # of the torque limit: below it a rover may be parked on a slope
+_BEYOND_SLOPE = 0.15  # mean share of the torque limits beyond what holds a rover on its slope
 _PULLING_AWAY = 1.0  # [s] that a wheel of a rover at rest may pull near its limit before it turns
 
 
@@ -72,6 +73,8 @@ class RoverMotion(NamedTuple):
     depth_read: bool = True  # sensors tell the sinkage of most wheels
     slip_known: bool = False  # by two references of the last seconds, while wheels turned
     demand: float = NAN  # required traction coefficient in the direction of the drive [-]
+    holding_share: float = 0.0
+    """Share of all torque limits that holds the rover on its slope [-]."""
 
 
 class Memory(NamedTuple):
@@ -247,7 +250,9 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
         forward = sum([1 if w.rim_speed > 0.0 else -1 for w in now.moving])
         way = (forward > 0) - (forward < 0)
     stands = not moves and not any(isnan(w.rim_speed) for w in motion.wheels)
-    pulls = stands and any(w.torque_share > _AT_REST for w in motion.wheels)
+    shares = [w.torque_share for w in motion.wheels if not isnan(w.torque_share)]
+    pulls = stands and max(shares, default=0.0) > _AT_REST
+    pulls = pulls and sum(shares) / len(shares) - motion.holding_share > _BEYOND_SLOPE
     return Situation(
         motion,
         Memory(
