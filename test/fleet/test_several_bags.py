@@ -136,7 +136,7 @@ def test_ctrl_c_leaves_whole_outputs_and_the_next_run_goes_on(
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert said.endswith('interrupted; without --overwrite the same command goes on\n')
+    assert said.endswith('interrupted; the same command without --overwrite resumes\n')
     assert sorted(p.name for p in out.iterdir()) == [MARKER, 'short']
     before = estimates(out / 'short')
     assert main(command[3:]) == 0
