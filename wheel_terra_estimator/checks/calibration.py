@@ -109,12 +109,12 @@ def _directions(changes: _Changes, report: CheckReport, configuration: Configura
 
 def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
     """Note the mounting; return the evidence in the frame of the file that is written."""
-    mountings = [f for f in report.findings if f.parameter in imu.MOUNTING]
-    if any(f.confidence <= imu.UNTURNED for f in mountings):  # a rival may be it
-        evidence, mountings = evidence.turned(evidence.facts.mounting), []
-    details = mountings[0] if mountings else None
-    rotation, std = evidence.rotation, details.std if details is not None else None
-    source = details.words if details is not None else 'mean specific force'
+    findings = [f for f in report.findings if f.parameter in imu.MOUNTING]
+    if any(f.confidence <= imu.UNTURNED for f in findings):  # a rival may be it
+        evidence, findings = evidence.turned(evidence.facts.mounting), []
+    finding = findings[0] if findings else None
+    rotation, std = evidence.rotation, finding.std if finding is not None else None
+    source = finding.words if finding is not None else 'mean specific force'
     tilt = imu.small_tilt(evidence)
     if tilt is not None and tilt.std < EVEN_GROUND_STD:
         if tilt.sigmas > CLEAR and tilt.sure > LEAST_SURE:

@@ -182,7 +182,7 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
 def _by_arrival(evidence: Evidence, name: str, lag: Lag) -> bool:
     """Return whether the wheels' stamps lie off their arrival, not those of another channel."""
     own, others, late = _late(evidence, 'joints'), _late(evidence, name), lag.value
-    # It would come before it was lag.
+    # It would come before it was measured.
     if others > 0.0 and others + late < FUTURE - math.hypot(lag.std, LEAST_STD[lag.by]):
         return True
     if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
@@ -372,6 +372,11 @@ LONGEST_SILENCE = 5.0  # of an input at an end of a recording in which others co
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
 GAP_SHARE = 0.05  # share of missing messages of a stuttering channel
+PAUSE = 5.0  # between bursts, over the median step, at least [-]
+IN_PAUSES = 0.8  # share of the time that passes between bursts, at least [-]
+LEAST_BURSTS, LEAST_IN_A_BURST = 10, 3
+READ_AT_ONCE, READ_SHARE = 2e6, 0.1  # step within a burst [ns], over the period: less than this
+LONGEST_WAIT = 2.0  # for a burst, over the median; beyond it is a pause, or a step of the clock
 SHORT = 0.1  # share of the steps between messages that are shorter than a usual short one [-]
 IN_A_ROW = 0.2  # share of the steps over which two messages or more are lost, at least [-]
 SEVERAL = 10  # messages over which a period is taken where stamps jitter
@@ -387,12 +392,6 @@ ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
 MOST_LATE = 40.0  # beyond which a history is no cure [s]
 QUARTERS, UNEVEN = 4, 0.5  # parts of a drive; unlike gains of a drift over their mean, at most [-]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
-PAUSE = 5.0  # between bursts, over the median step, at least [-]
-IN_PAUSES = 0.8  # share of the time that passes between bursts, at least [-]
-LEAST_BURSTS, LEAST_IN_A_BURST = 10, 3
-READ_AT_ONCE, READ_SHARE = 2e6, 0.1  # step within a burst [ns], over the period: less than this
-LONGEST_WAIT = 2.0  # for a burst, over the median; beyond it is a pause, or a step of the clock
-OFF_PERIOD = 0.2  # scatter of the periods of bursts, over their median, at most [-]
 LONGEST_WAY = 10.0  # of a message into the log [s]
 
 

@@ -153,8 +153,8 @@ def check_imu(state: ImuState) -> Judged:
         (_up_by_orientation, 'force'),
     ):
         if all(map(state.has, needed)):
-            found_now, state = check(state)
-            outcomes += found_now
+            findings, state = check(state)
+            outcomes += findings
     return outcomes, state
 
 

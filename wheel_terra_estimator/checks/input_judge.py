@@ -139,15 +139,15 @@ def _misfits(health: Mapping[str, Any], *, dug_in: bool) -> dict[str, str]:
 
     No model fits a rover that is `dug_in`.
     """
-    details = {
+    misfits = {
         subject: f'{words} (NIS {health[key]:.0f}, usual below 1): sign or scale of the '
         'torques, rover.mass or soil -> wheel-terra check'
         for key, (subject, words) in _MISFITS.items()
         if health.get(key, 0.0) > FAR_NIS and not dug_in
     }
     if _NOISE in health:
-        details['noise'] = f'{health[_NOISE]} -> state that'
-    return details
+        misfits['noise'] = f'{health[_NOISE]} -> state that'
+    return misfits
 
 
 def _reported(faults: Mapping[str, str], findings: tuple[Finding, ...]) -> dict[str, str]:

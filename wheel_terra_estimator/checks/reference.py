@@ -145,9 +145,8 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         mended = evidence.with_channel('reference', velocity=along)
         return [evidence.found('reference_world', 0.95)], mended
     if in_body < STEADY:
-        return [not_checked('mounting', 'reference_frame')] if _sideways(
-            reference
-        ) else [], evidence
+        unclear: list[Outcome] = [not_checked('mounting', 'reference_frame')]
+        return unclear if _sideways(reference) else [], evidence
     aside = float(np.angle(direction.mean()))  # whatever jumps there are
     if abs(aside) < FAR_ASIDE:
         return [], evidence

@@ -97,15 +97,15 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
     The mean alone does not tell: a wheel whose radius is a little smaller is dragged by the others.
     """
-    facts, details = evidence.facts, answers(evidence)
-    if details is not None and _fight(evidence, details):
-        details = None
-    if details is None:
+    facts, answered = evidence.facts, answers(evidence)
+    if answered is not None and _fight(evidence, answered):
+        answered = None
+    if answered is None:
         return [not_checked('sign', 'torque_no_change')], evidence
-    usual = float(np.median([abs(answer.value) for answer, _ in details]))
-    agree = all(answer.value * level.value > 0.0 for answer, level in details)
+    usual = float(np.median([abs(answer.value) for answer, _ in answered]))
+    agree = all(answer.value * level.value > 0.0 for answer, level in answered)
     wrong, unsure = [], []
-    for i, (answer, level) in enumerate(details):
+    for i, (answer, level) in enumerate(answered):
         brakes = -level.value > SIGN_SIGMAS * level.std
         clear = answer.sigmas_from(0.0) > SIGN_SIGMAS or (brakes and agree)
         drives = level.value > SIGN_SIGMAS * level.std
@@ -119,7 +119,7 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return outcomes, evidence
     torque = evidence.torque.copy()
     torque[:, wrong] *= -1.0
-    sure = confidence(min(max(one.sigmas_from(0.0) for one in details[i]) for i in wrong))
+    sure = confidence(min(max(one.sigmas_from(0.0) for one in answered[i]) for i in wrong))
     names = ', '.join(facts.names[i] for i in wrong)
     outcomes.append(evidence.found('torque_sign', sure, wheel=names, value=-1.0))
     return outcomes, evidence.with_rate(evidence.rate, torque)

@@ -245,8 +245,10 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     unlike = [np.nanmean(sense[rows & (common == way)], axis=0) for way in (1.0, -1.0)]
     unsigned = np.minimum(*np.abs(unlike)) * np.sign(unlike[0] * unlike[1]) > ONE_SIGN
     if unsigned.any():
-        how = {'wheel': facts.named(unsigned), 'other': 'other wheels go'}
-        outcomes.append(evidence.found('rates_unsigned', 0.95, **how))
+        wheels = facts.named(unsigned)
+        outcomes.append(
+            evidence.found('rates_unsigned', 0.95, wheel=wheels, other='other wheels go')
+        )
         signed = np.abs(evidence.rate) * common[:, None]
         evidence = evidence.with_rate(np.where(unsigned, signed, evidence.rate))
     ratio = speed[rows] / middle[rows, None]

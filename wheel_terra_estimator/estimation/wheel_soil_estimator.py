@@ -553,10 +553,9 @@ class WheelSoilEstimator:
         ekf = self._ekf
         sinkage = ekf.mean[self._layout.sinkage].tolist()
         seen, onward = [], max(known(rims), key=abs, default=0.0)
-        if abs(onward) <= rover.rest_speed:
-            onward = self._contact_age.state.direction  # of the last drive
-        if abs(onward) <= rover.rest_speed:
-            onward = 0.0  # all stand
+        stands = abs(onward) <= rover.rest_speed
+        if stands:
+            onward = self._contact_age.state.direction  # of the last drive, 0 before one
         for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
             limit, torque = rover.torque_limit[i], wheels.state.torque[i]
             seen.append(
@@ -583,7 +582,7 @@ class WheelSoilEstimator:
                 depth_read=self._depth_read(time),
                 slip_known=self._reference.known_twice(time),
                 demand=self._demand.state,
-                holding_share=self._holding_share(),
+                holding_share=self._holding_share() if stands else 0.0,
             ),
         )
         self._clock = self._clock._replace(assessment=assessment, speed=present)

@@ -74,7 +74,7 @@ class RoverMotion(NamedTuple):
     slip_known: bool = False  # by two references of the last seconds, while wheels turned
     demand: float = NAN  # required traction coefficient in the direction of the drive [-]
     holding_share: float = 0.0
-    """Share of all torque limits that holds the rover on its slope [-]."""
+    """Share of all torque limits that holds a rover at rest on its slope [-]."""
 
 
 class Memory(NamedTuple):
@@ -97,7 +97,6 @@ class Situation:
 
     motion: RoverMotion
     memory: Memory
-    time: float = NAN  # [s]
 
     @cached_property
     def moving(self) -> tuple[WheelMotion, ...]:
@@ -212,7 +211,7 @@ class Situation:
     @cached_property
     def pulls_at_rest(self) -> bool:
         """Whether the rover stands, and has for too long not turned a wheel that pulls."""
-        return self.time - self.memory.pulls_since > _PULLING_AWAY
+        return self.memory.time - self.memory.pulls_since > _PULLING_AWAY
 
     @cached_property
     def stalled(self) -> tuple[bool, ...]:
@@ -253,6 +252,7 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
     shares = [w.torque_share for w in motion.wheels if not isnan(w.torque_share)]
     pulls = stands and max(shares, default=0.0) > _AT_REST
     pulls = pulls and sum(shares) / len(shares) - motion.holding_share > _BEYOND_SLOPE
+    since = time if isnan(memory.pulls_since) else memory.pulls_since
     return Situation(
         motion,
         Memory(
@@ -273,9 +273,6 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
             + gain_of(now.rim * dt, _DEEPENING_RADII * now.radius) * (now.depth - usual),
             way=way,
             way_since=memory.way_since if way == memory.way else time,
-            pulls_since=(time if isnan(memory.pulls_since) else memory.pulls_since)
-            if pulls
-            else NAN,
+            pulls_since=since if pulls else NAN,
         ),
-        time,
     )
