@@ -12,7 +12,7 @@ from parts import SAND, Parts
 from scipy.optimize import minimize_scalar
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.contacts.contact_age import DECAY, START_VARIANCE, ContactAge
+from wheel_terra_estimator.estimation.contacts.contact_age import VARIANCE_DECAY, VARIANCE_AT_ONE_LENGTH, ContactAge
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation, turning_wheels
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
@@ -519,16 +519,16 @@ def test_in_a_steady_turn_the_moments_of_pulls_and_lateral_forces_cancel(parts, 
 
 
 def test_contacts_form_within_their_length_and_their_doubt_falls_from_there_on(parts):
-    age, forming, variances = ContactAge(parts.rover), [], []
+    age, half_formed, variances = ContactAge(parts.rover), [], []
     for _ in range(4):
-        forming.append(age.forming)
+        half_formed.append(age.half_formed)
         age.advance(0.4 * parts.rover.contact_length)
-    assert forming == [False, False, True, False]  # from half of their length to all of it
+    assert half_formed == [False, False, True, False]  # from half of their length to all of it
     age = ContactAge(parts.rover)
     for _ in range(3):
         age.advance(parts.rover.contact_length)
         variances.append(age.shear_variance)
-    assert variances == pytest.approx(START_VARIANCE * np.exp(-DECAY * np.arange(3)))
+    assert variances == pytest.approx(VARIANCE_AT_ONE_LENGTH * np.exp(-VARIANCE_DECAY * np.arange(3)))
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ def test_a_gyro_without_accelerometer_and_the_reverse_are_kept_apart():
     for i in range(5):
         inertial.update(0.02 * i, InertialReading(0, unknown, rate, None), GyroZero())
     window = inertial.take()
-    assert (window.readings, window.rates, window.tells_force) == (0, 5, False)
+    assert (window.readings, window.rates, window.has_force) == (0, 5, False)
     assert window.yaw_rate / window.rates == pytest.approx(0.3)
     force = np.array([1.0, 0.0, 9.7])
     inertial.update(0.1, InertialReading(0, force, unknown, None), GyroZero())
@@ -106,7 +106,7 @@ def test_a_gyro_without_accelerometer_and_the_reverse_are_kept_apart():
     # An orientation alone gives the specific force of a rover that stands so.
     inertial.update(0.12, InertialReading(0, unknown, unknown, up), GyroZero())
     window = inertial.take()
-    assert window.tells_force
+    assert window.has_force
     assert window.mean_force() == pytest.approx((9.8 * np.sin(0.1), 0.0, 9.8 * np.cos(0.1)))
 
 

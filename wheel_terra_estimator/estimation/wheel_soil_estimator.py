@@ -286,7 +286,7 @@ class WheelSoilEstimator:
             self._torque_over_load(cycle), cycle.dt, settled=self._contact_age.settled
         )
         self._predict(cycle)
-        if not cycle.reference_known and self._contact_age.forming:
+        if not cycle.reference_known and self._contact_age.half_formed:
             self._speed.remove_start_transient(ekf, cycle)
 
         if reference is not None:
@@ -374,7 +374,7 @@ class WheelSoilEstimator:
         reference_known = self._reference.known(time)
         reverses = self._contact_age.update(yaw_compensated.typical)
         demand = (
-            self._contact_age.state.direction * loads.slope_share if window.tells_force else NAN
+            self._contact_age.state.direction * loads.slope_share if window.has_force else NAN
         )
         if reverses:
             speed.reverse_direction(ekf, self._demand.state, demand)

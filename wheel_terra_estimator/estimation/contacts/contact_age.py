@@ -1,6 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Travel since the contacts began to form, at a start or a reversal."""
+"""How far the contacts have formed since a start or a reversal.
+
+Shear builds up as a wheel rolls: only after one contact length is all of its contact new, and its
+shear that of the steady model.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,9 @@ from typing import NamedTuple
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.rover import Rover
 
-# Model error of the shear model after a start; tuned on simulated drives, seeds 1000 to 1019.
-START_VARIANCE = 2.5  # at one contact length, over the square of the shear
-DECAY = 2.0  # per contact length
+# Error of the shear model after a start; tuned on simulated drives, seeds 1000 to 1019.
+VARIANCE_AT_ONE_LENGTH = 2.5  # relative variance of the shear after one contact length [-]
+VARIANCE_DECAY = 2.0  # exponent of its decay per contact length [-]
 
 
 class ContactAgeState(NamedTuple):
@@ -23,7 +27,7 @@ class ContactAgeState(NamedTuple):
 
 
 class ContactAge(Component[ContactAgeState]):
-    """Travel since the contacts formed."""
+    """Tracks the travel over which the present contacts have formed."""
 
     def __init__(self, rover: Rover) -> None:
         super().__init__(ContactAgeState())
@@ -56,12 +60,13 @@ class ContactAge(Component[ContactAgeState]):
         return self.state.travel > self._rover.contact_length
 
     @property
-    def forming(self) -> bool:
-        """Whether they are in the second half of forming; before, even gripping wheels spin."""
+    def half_formed(self) -> bool:
+        """Whether half of each contact is new, not all; before, wheels spin on any soil."""
         return 0.5 < self.state.travel / self._rover.contact_length <= 1.0
 
     @property
     def shear_variance(self) -> float:
-        """Relative variance of the shear model [-]: shear builds up over a contact length."""
+        """Relative variance of the shear model [-]; it decays with the travel."""
+
         lengths = self.state.travel / self._rover.contact_length
-        return START_VARIANCE * math.exp(-DECAY * (lengths - 1.0))
+        return VARIANCE_AT_ONE_LENGTH * math.exp(-VARIANCE_DECAY * (lengths - 1.0))

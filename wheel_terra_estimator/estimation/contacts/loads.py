@@ -53,7 +53,7 @@ class WheelLoads(Component[LoadState]):
         `pulls` and `torques` are those of each wheel after the last cycle [N], [N m]; they act
         along the headings. The load of wheels that carry nothing goes to the others.
         """
-        if window.tells_force:
+        if window.has_force:
             force, rover = self._smoothed(window), self._rover
             moment = [t - f * r for t, f, r in zip(torques, pulls, rover.rim_radius, strict=True)]
             if headings.steered:

@@ -62,13 +62,14 @@ class SpeedAndVariance(NamedTuple):
 
 
 def pooled(one: SpeedAndVariance, other: SpeedAndVariance) -> SpeedAndVariance:
-    """Return the mixture (linear opinion pool) of two estimates from the same readings.
+    """Return the linear opinion pool (Stone 1961) of two estimates from the same readings.
 
-    The mean and variance of both, weighted by their inverse variances, as of two experts (linear
-    opinion pool, Stone 1961): never below the variance of covariance intersection, consistent
-    however strongly the errors are correlated, and larger by what the two differ by.
+    Mean and variance of the mixture of both, weighted by their inverse variances. Consistent
+    however strongly their errors are correlated: its variance is never below that of covariance
+    intersection, and grows with the square of their difference.
     """
+
     both = one.variance + other.variance
-    weight, apart = other.variance / both, one.speed - other.speed
-    variance = 2.0 * weight * one.variance + weight * (1.0 - weight) * apart**2
-    return SpeedAndVariance(other.speed + weight * apart, variance)
+    weight, difference = other.variance / both, one.speed - other.speed
+    variance = 2.0 * weight * one.variance + weight * (1.0 - weight) * difference**2
+    return SpeedAndVariance(other.speed + weight * difference, variance)

@@ -51,7 +51,7 @@ class InertialWindow(NamedTuple):
     """What the messages state of their noise, where no file does."""
 
     def mean_force(self) -> tuple[float, float, float]:
-        """Return the mean specific force [m/s^2]; `tells_force` holds."""
+        """Return the mean specific force [m/s^2]; `has_force` holds."""
         n = self.readings
         if not n and self.gravity is not None:
             return self.gravity
@@ -62,7 +62,7 @@ class InertialWindow(NamedTuple):
     None unless there is an orientation and no accelerometer."""
 
     @property
-    def tells_force(self) -> bool:
+    def has_force(self) -> bool:
         """Whether the specific force is known."""
         return self.readings > 0 or self.gravity is not None
 
