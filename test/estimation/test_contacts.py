@@ -12,7 +12,11 @@ from parts import SAND, Parts
 from scipy.optimize import minimize_scalar
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.contacts.contact_age import VARIANCE_DECAY, VARIANCE_AT_ONE_LENGTH, ContactAge
+from wheel_terra_estimator.estimation.contacts.contact_age import (
+    VARIANCE_AT_ONE_LENGTH,
+    VARIANCE_DECAY,
+    ContactAge,
+)
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation, turning_wheels
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
@@ -54,7 +58,7 @@ def window(yaw=0.0, pitch=0.0, force=(0.0, 0.0, 9.8), readings=5):
         *(readings * f for f in force),
         yaw_rate=readings * yaw,
         pitch_rate=readings * pitch,
-        rates=readings,
+        rate_readings=readings,
     )
 
 
@@ -528,7 +532,9 @@ def test_contacts_form_within_their_length_and_their_doubt_falls_from_there_on(p
     for _ in range(3):
         age.advance(parts.rover.contact_length)
         variances.append(age.shear_variance)
-    assert variances == pytest.approx(VARIANCE_AT_ONE_LENGTH * np.exp(-VARIANCE_DECAY * np.arange(3)))
+    assert variances == pytest.approx(
+        VARIANCE_AT_ONE_LENGTH * np.exp(-VARIANCE_DECAY * np.arange(3))
+    )
 
 
 @pytest.mark.parametrize(

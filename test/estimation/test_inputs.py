@@ -96,12 +96,12 @@ def test_a_gyro_without_accelerometer_and_the_reverse_are_kept_apart():
     for i in range(5):
         inertial.update(0.02 * i, InertialReading(0, unknown, rate, None), GyroZero())
     window = inertial.take()
-    assert (window.readings, window.rates, window.has_force) == (0, 5, False)
-    assert window.yaw_rate / window.rates == pytest.approx(0.3)
+    assert (window.readings, window.rate_readings, window.has_force) == (0, 5, False)
+    assert window.yaw_rate / window.rate_readings == pytest.approx(0.3)
     force = np.array([1.0, 0.0, 9.7])
     inertial.update(0.1, InertialReading(0, force, unknown, None), GyroZero())
     window = inertial.take()
-    assert (window.readings, window.rates) == (1, 0)
+    assert (window.readings, window.rate_readings) == (1, 0)
     assert window.mean_force() == pytest.approx((1.0, 0.0, 9.7))
     # An orientation alone gives the specific force of a rover that stands so.
     inertial.update(0.12, InertialReading(0, unknown, unknown, up), GyroZero())

@@ -12,7 +12,7 @@ from parts import SAND
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import read_values, write_values
 from wheel_terra_estimator.estimation.contacts.demand import Climbed, SteepestClimb
-from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
+from wheel_terra_estimator.estimation.contacts.equilibrium_slip import EquilibriumSlip
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH, StateLayout
 from wheel_terra_estimator.estimation.measurements import (
@@ -169,9 +169,9 @@ def test_the_soil_that_is_kept_carries_what_its_drive_was_seen_to_climb():
     zero = estimator._zero_velocity.state.zero
 
     def usual(found, demand):
-        return UsualSlip(configuration.replace(found), rover).at(demand, 0.8)
+        return EquilibriumSlip(configuration.replace(found), rover).at(demand, 0.8)
 
-    pulls, slips = UsualSlip(configuration, rover).curve
+    pulls, slips = EquilibriumSlip(configuration, rover).curve
     demand, slip = 0.8 * pulls[slips.index(0.3)], 0.3
     without = estimator._learned.values(mean, covariance, zero)
     kept = estimator._learned.values(mean, covariance, zero, Climbed(demand, slip))

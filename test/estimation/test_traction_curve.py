@@ -9,13 +9,13 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.contacts.equilibrium_slip import EquilibriumSlip
 from wheel_terra_estimator.estimation.contacts.measured_wheels import (
     SpeedAndVariance,
     pooled,
     slip_of_torque,
     torque_of_slip,
 )
-from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -29,7 +29,7 @@ def parts():
 
 @pytest.fixture(scope='module')
 def usual(parts):
-    return UsualSlip(parts.configuration, parts.rover)
+    return EquilibriumSlip(parts.configuration, parts.rover)
 
 
 def pull_share(parts, slip):
@@ -80,7 +80,7 @@ def test_sand_that_nobody_stated_holds_no_rover_on_the_level():
     for stated in ({}, {'soil.cohesion': 170.0}):
         configuration = reader.from_parameters(tiny | stated)
         parts = Parts(configuration)
-        slips[bool(stated)] = UsualSlip(configuration, parts.rover).at(0.0, beyond=0.8)
+        slips[bool(stated)] = EquilibriumSlip(configuration, parts.rover).at(0.0, beyond=0.8)
     assert slips[False] < 0.1
     assert slips[True] == 0.8  # that of the file
 
@@ -93,7 +93,7 @@ def test_lugs_of_which_no_file_says_it_shear_half_way_up(slip, stated):
     keys += ['effects.lug_shear_radius.enabled:=true'] * stated
     lugged = Parts(reader.load(SAND, keys))
     demand = pull_share(lugged, slip)
-    found = UsualSlip(lugged.configuration, lugged.rover).at(demand, beyond=0.8)
+    found = EquilibriumSlip(lugged.configuration, lugged.rover).at(demand, beyond=0.8)
     assert found == pytest.approx(slip, abs=0.02)
 
 

@@ -14,7 +14,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.demand import Climbed
-from wheel_terra_estimator.estimation.contacts.usual_slip import steady_pull
+from wheel_terra_estimator.estimation.contacts.equilibrium_slip import steady_pull
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
 from wheel_terra_estimator.estimation.filter.initial_state import PRIORS
 from wheel_terra_estimator.estimation.filter.state import (

@@ -340,7 +340,7 @@ class WheelSoilEstimator:
                 ]
             ),
             stationary=stationary,
-            aside=self._lateral_forces(cycle),
+            sideways=self._lateral_forces(cycle),
             tilt_std=math.hypot(*(self._sinkage_process.state.dug * self._rover.rut_tilt)),
         )
         tilt = rut_tilt(self._rover, layout, ekf.mean)
@@ -373,9 +373,7 @@ class WheelSoilEstimator:
         yaw_compensated = RimSpeeds.of(rims, turning.yaw_rate, headings)
         reference_known = self._reference.known(time)
         reverses = self._contact_age.update(yaw_compensated.typical)
-        demand = (
-            self._contact_age.state.direction * loads.slope_share if window.has_force else NAN
-        )
+        demand = self._contact_age.state.direction * loads.slope_share if window.has_force else NAN
         if reverses:
             speed.reverse_direction(ekf, self._demand.state, demand)
             if self._buffer is not None:

@@ -67,6 +67,5 @@ class ContactAge(Component[ContactAgeState]):
     @property
     def shear_variance(self) -> float:
         """Relative variance of the shear model [-]; it decays with the travel."""
-
         lengths = self.state.travel / self._rover.contact_length
         return VARIANCE_AT_ONE_LENGTH * math.exp(-VARIANCE_DECAY * (lengths - 1.0))

@@ -3,9 +3,9 @@
 """Demand: required traction coefficient (pull over load), its change, and its maximum in a drive.
 
 The sum of the pulls is mass times the specific force along the body, whatever slope and
-acceleration make it (Newton). A rover that must pull more slips more, in the next contact length
-and not at the next reference velocity, so the change is fed forward into the prediction of the
-speed, with a gain that the reference velocities teach.
+acceleration make it (Newton). A rover that must pull more slips more within a contact length, long
+before the next reference velocity shows it. So the change is fed forward into the prediction of the
+speed, by the slip per demand that the filter learns (``SLIP_PER_DEMAND`` of the state).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Demand(Component[float]):
 
 
 class Climbed(NamedTuple):
-    """What a soil that is kept has to carry."""
+    """Steepest steady climb of a drive: what a soil kept for the next one must carry."""
 
     demand: float = 0.0  # greatest running mean of the demand [-]
     slip: float = NAN  # its mean there [-]
@@ -66,7 +66,7 @@ class SteepestClimb(Component[Climbed]):
             self.state = Climbed(most, its_slip)
             return
         if isnan(mean_demand):
-            # The first moment of a stretch is no mean.
+            # Of the first moment of a stretch no demand above 0 counts: it is no mean yet.
             self.state = Climbed(most, its_slip, min(demand, 0.0), slip)
             return
         gain = gain_of(dt, MEAN_TIME)

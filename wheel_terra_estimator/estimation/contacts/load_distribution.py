@@ -189,8 +189,8 @@ def _close_rocker_bogie(
 ) -> None:
     """Add: no moment about each bogie pivot, equal moments of left and right rocker.
 
-    Pivots are x and height above the contact points. Pulls act below them; they are taken as the
-    even share of ``m f_x`` plus what `pull` says beyond it.
+    Pivots are x and height above the contact points [m]. The pulls act that far below them, each
+    with the even share of ``m f_x`` plus what `pull` says beyond it.
     """
     n = len(position)
     x = position[:, 0]

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What each wheel carries, from the specific force of the last cycle."""
+"""Normal load of each wheel, from the specific force of the last cycle."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ class WheelLoads(Component[LoadState]):
         unloaded: tuple[bool, ...],
         headings: Headings,
     ) -> LoadState:
-        """Work out the loads of a cycle; they are held where no IMU reading came.
+        """Return the loads of a cycle; without an IMU reading those of the last one.
 
-        `pulls` and `torques` are those of each wheel after the last cycle [N], [N m]; they act
-        along the headings. The load of wheels that carry nothing goes to the others.
+        `pulls` [N] and `torques` [N m] are those of each wheel after the last cycle, along its
+        heading. The load of `unloaded` wheels is shared out among the others.
         """
         if window.has_force:
             force, rover = self._smoothed(window), self._rover
@@ -68,7 +68,7 @@ class WheelLoads(Component[LoadState]):
         return self.state
 
     def _smoothed(self, window: InertialWindow) -> tuple[float, float, float]:
-        """Return the mean specific force, smoothed as far as vibration asks."""
+        """Return the mean specific force, low-passed so that vibration moves no load."""
         force, before = window.mean_force(), self.state
         if not (before.force_known and window.duration > 0.0):
             return force

@@ -68,7 +68,6 @@ def pooled(one: SpeedAndVariance, other: SpeedAndVariance) -> SpeedAndVariance:
     however strongly their errors are correlated: its variance is never below that of covariance
     intersection, and grows with the square of their difference.
     """
-
     both = one.variance + other.variance
     weight, difference = other.variance / both, one.speed - other.speed
     variance = 2.0 * weight * one.variance + weight * (1.0 - weight) * difference**2

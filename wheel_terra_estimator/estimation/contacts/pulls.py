@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drawbar pull of each wheel after the update of a cycle.
 
-The filter is slow to learn soil, on purpose; a pull need not be, since torque gives it whatever the
-strength, and the specific force gives the sum; in a turn the pulls turn the rover against what
-pushes its wheels aside. These corrections stay outside the state.
+The filter learns soil slowly, on purpose. A pull can be corrected at once: it follows from the
+torque whatever the strength of the soil, the specific force gives the sum of all pulls, and in a
+steady turn their yaw moment balances that of the lateral forces. These corrections stay outside the
+state.
 """
 
 from __future__ import annotations
@@ -50,14 +51,14 @@ class PullEvidence(NamedTuple):
     cycle: Cycle
     readings: Floats  # last torque of each wheel [N m], nan = never known
     stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
-    aside: Sideways | None  # lateral forces in a turn, where they are known; None elsewhere
-    tilt_std: float  # of the body against the ground, by digging alone [rad]: doubt, no weight
+    sideways: Sideways | None  # lateral forces in a turn, where they are known; None elsewhere
+    tilt_std: float  # of the body against the ground, by unmodelled slip-sinkage [rad]
 
 
 class KnownSum(NamedTuple):
-    """A weighted sum of the pulls that is known."""
+    """A weighted sum of the pulls that is known: a force or a moment."""
 
-    shares: FloatArray  # (n,) with which each counts in it
+    shares: FloatArray  # (n,) weight of each pull in it
     value: float
     variance: float
 
@@ -73,9 +74,9 @@ class PullState(NamedTuple):
 
 
 class Pulls(Component[PullState]):
-    """Works out pulls, torques and deviations of all wheels.
+    """Computes pulls, torques and deviations of all wheels.
 
-    The `loads` on level ground [N] are what a pull may be before anything is known.
+    The `loads` on level ground [N] are the deviations of the pulls before anything is known.
     """
 
     def __init__(self, rover: Rover, sensors: SensorFigures, loads: Floats) -> None:
@@ -91,7 +92,7 @@ class Pulls(Component[PullState]):
 
         `tilt` is that of the body against the ground by its ruts [rad].
         """
-        forces, total, cycle, readings, stationary, aside, tilt_std = evidence
+        forces, total, cycle, readings, stationary, sideways, tilt_std = evidence
         loads, lateral_motion = cycle.loads, cycle.lateral_motion
         state, share = self.state, loads.slope_share
         n = self._rover.wheel_count
@@ -109,7 +110,7 @@ class Pulls(Component[PullState]):
             noises = forces.pull_noise.tolist()
         for i, load in enumerate(loads.load):
             if not cycle.turns[i]:
-                # Static friction carries the slope, or it is dragged along.
+                # Its torque gives the pull; else static friction carries its share of the slope.
                 standing = stationary[i]
                 pull[i] = load * share if isnan(standing) else standing
                 torque[i] = pull[i] * self._rover.rim_radius[i]
@@ -123,7 +124,7 @@ class Pulls(Component[PullState]):
                 if beyond and torque_by_strength[i]:
                     torques[i] += beyond
                     pulls[i] += beyond * pull_by_strength[i] / torque_by_strength[i]
-                # First order from far away overshoots: no soil gives more than the load.
+                # An extrapolation to first order may overshoot: no soil gives more than the load.
                 pull[i] = clipped(pulls[i], -load, load)
                 most = _MOST_TORQUE * load * self._rover.shear_radius[i]
                 torque[i] = clipped(torques[i], -most, most)
@@ -135,14 +136,14 @@ class Pulls(Component[PullState]):
                 std[i] = math.sqrt(all_variances)
         model_pull = tuple(pull)
         if forces is not None:
-            sums = self._known(cycle, total, aside, tilt)
+            sums = self._known(cycle, total, sideways, tilt)
             if sums:
                 errors = joint + np.diag(np.array(own) + scrub)
                 pull = distributed(np.array(pull), errors, sums, loads.load)
         self.state = PullState(tuple(pull), tuple(std), model_pull, tuple(torque), tuple(excess))
 
     def _known(
-        self, cycle: Cycle, total: SumOfPulls | None, aside: Sideways | None, tilt: float
+        self, cycle: Cycle, total: SumOfPulls | None, sideways: Sideways | None, tilt: float
     ) -> list[KnownSum]:
         """Return what is known of the pulls together.
 
@@ -153,14 +154,14 @@ class Pulls(Component[PullState]):
         known = []
         if total is not None:
             known.append(KnownSum(along, total.along - total.weight * tilt, total.variance))
-        if aside is not None:
+        if sideways is not None:
             rover = self._rover
             x = np.array(rover.longitudinal) - rover.centre_of_gravity[0]
             y = np.array(rover.lateral) - rover.centre_of_gravity[1]
             arms = x * along + y * across
-            doubt = arms * aside.force_std
-            moment = -float(arms @ aside.force)
-            known.append(KnownSum(x * across - y * along, moment, float(doubt @ doubt)))
+            stds = arms * sideways.force_std
+            moment = -float(arms @ sideways.force)
+            known.append(KnownSum(x * across - y * along, moment, float(stds @ stds)))
         return known
 
     def _own_variance(
@@ -177,12 +178,7 @@ class Pulls(Component[PullState]):
         )
 
     def _believed(self, excess: float, reading: float) -> float:
-        """Return what of the excess is beyond the sensor's errors [N m].
-
-        The filter takes torque for one piece of information per ground, so that slip and soil are
-        not torn along T(s) = const. The pull may follow at once: it hangs on the torque alone,
-        whatever the strength.
-        """
+        """Return the part of the excess that the sensor's errors do not explain [N m]."""
         if isnan(reading):
             return 0.0
         sensors = self._sensors
@@ -201,8 +197,8 @@ def distributed(
 ) -> list[float]:
     """Return the pulls (n,) [N] with the residuals of known sums distributed.
 
-    `errors` (n, n) is their covariance [N^2]. The deviations stay: what parts the wheels from one
-    another is not known better for it.
+    `errors` (n, n) is their covariance [N^2]. The deviations of single pulls stay: a sum says
+    nothing of the differences between wheels.
     """
     shares = np.array([each.shares for each in known])
     residual = np.array([each.value for each in known]) - shares @ pull

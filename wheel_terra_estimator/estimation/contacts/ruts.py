@@ -8,21 +8,21 @@ bottom of its rut. How much of that rut stays is learned (``RUT_SHARE`` of the s
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.estimation.scalars import gain_of
 
 _LEAST_SPEED = 1e-3  # [m/s], for the curvature of the path
-_LEAST_WAY = 1e-3  # [m], of a rover with one axle
+_LEAST_DISTANCE = 1e-3  # from wheel to wheel [m], for a rover with one axle
 
 
 class RutState(NamedTuple):
-    """Ruts that the wheels meet."""
+    """Ruts that the wheels meet, one entry per wheel."""
 
-    depth: Floats  # of the preceding wheel's rut where this wheel rolls; 0 if undisturbed [m]
+    depth: Floats  # of the preceding wheel's rut where this wheel rolls [m]; 0 on virgin ground
     direction: float = 0.0  # of the drive: 1, -1, 0 = none yet
 
 
@@ -47,13 +47,13 @@ class Ruts(Component[RutState]):
             return
         depths = []
         for i, leader in enumerate(rover.leader if direction > 0.0 else rover.leader_in_reverse):
-            rut, way = 0.0, 2.0 * rover.curvature_length  # virgin ground, once the rover is past
+            rut, distance = 0.0, 2.0 * rover.curvature_length  # virgin ground, a rover length on
             if leader is not None:
                 ahead, here = rover.longitudinal[leader], rover.longitudinal[i]
-                # Wheels that turn about one centre run beside the ruts of those before them.
+                # In a turn a wheel runs beside the rut of the wheel ahead, by this share of it.
                 beside = 0.5 * abs(curvature * (ahead**2 - here**2)) / rover.width[i]
-                rut, way = sinkage[leader] * max(1.0 - beside, 0.0), abs(ahead - here)
-            gain = -math.expm1(-travel / max(way, _LEAST_WAY)) if before.direction else 1.0
+                rut, distance = sinkage[leader] * max(1.0 - beside, 0.0), abs(ahead - here)
+            gain = gain_of(travel, max(distance, _LEAST_DISTANCE)) if before.direction else 1.0
             depths.append(before.depth[i] + gain * (rut - before.depth[i]))
         self.state = RutState(tuple(depths), direction)
 

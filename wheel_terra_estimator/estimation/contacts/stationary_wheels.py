@@ -34,19 +34,18 @@ _SLIDING_DEVIATIONS = 2.0  # of the speed, from which a rover slides on wheels t
 _MOST_DRAG = 2.0  # of the load: friction and the soil pushed ahead
 _STRAIGHT = 0.1
 """Lateral motion above which a torque against the drag is no sign of a jammed drive [-]."""
-_DRAGGED_DOUBT = 0.1
-"""Standard deviation of a dragged wheel's pull over its load, beside gain and turning."""
-_IDLE_DOUBT = 0.3
-"""The same of a wheel that stands, is lifted or unknown: it may carry its share of the slope,
-or nothing."""
+_DRAGGED_STD = 0.1
+"""Deviation of a dragged wheel's pull over its load, besides torque gain and turning [-]."""
+_IDLE_STD = 0.3
+"""The same without a torque: the wheel may carry its share of the slope, or nothing."""
 
 
 class StationaryPull(NamedTuple):
     """Pull of a wheel that does not turn under a load."""
 
-    pull: float  # [N], nan where no torque is known
-    expected: float  # the pull, or what the wheel's share of the slope asks [N]
-    std: float  # [N]
+    pull: float  # by its torque [N], nan where none is known
+    expected: float  # that pull, else the wheel's share of the slope [N]
+    std: float  # of `expected` [N]
 
 
 class StationaryWheels:
@@ -92,11 +91,11 @@ class StationaryWheels:
         rover, torques, loads = self._rover, np.array(cycle.torque), np.array(cycle.loads.load)
         speed = cycle.headings.speeds(float(x[SPEED]), cycle.yaw_rate)
         held = np.clip(torques / np.array(rover.shear_radius), -loads, loads)
-        rims, doubt = np.array(cycle.rims), _SLIDING_DEVIATIONS * speed_std
+        rims, least_speed = np.array(cycle.rims), _SLIDING_DEVIATIONS * speed_std
         # It turns on beside faster ones, and its hub is no faster than its rim.
         creeps = np.abs(rims) > rover.rest_speed
         creeps &= rims * cycle.yaw_compensated.typical > 0.0
-        creeps &= np.abs(speed) < np.maximum(np.abs(rims), doubt)
+        creeps &= np.abs(speed) < np.maximum(np.abs(rims), least_speed)
         direction = np.where(np.where(creeps, rims, speed) > 0.0, 1.0, -1.0)
         forces = self._models.forces(
             WheelStates(
@@ -114,9 +113,10 @@ class StationaryWheels:
         gain = np.where(usable, by_pull / np.where(usable, by_torque, 1.0), 0.0)
         pull = forces.pull + gain * (direction * torques - forces.torque)
         most = _MOST_DRAG * loads
-        # Where nothing turns faster than the speed is in doubt, the rover comes to rest.
-        standing = all(abs(rim) < doubt for rim in known(cycle.rims))
-        stands = np.abs(speed) < (max(rover.rest_speed, doubt) if standing else rover.rest_speed)
+        # Where no wheel turns faster than the uncertainty of the speed, the rover comes to rest.
+        standing = all(abs(rim) < least_speed for rim in known(cycle.rims))
+        limit = max(rover.rest_speed, least_speed) if standing else rover.rest_speed
+        stands = np.abs(speed) < limit
         return np.where(stands & ~creeps, held, direction * np.clip(pull, -most, most))
 
     def expectation(
@@ -124,7 +124,7 @@ class StationaryWheels:
     ) -> StationaryPull:
         """Return what to expect of a wheel that gives `pull` [N], nan = unknown."""
         if isnan(pull):
-            return StationaryPull(pull, load * slope_share, _IDLE_DOUBT * load)
+            return StationaryPull(pull, load * slope_share, _IDLE_STD * load)
         # In turns it is pushed sideways, too.
-        doubt = _DRAGGED_DOUBT + self._gain_std + min(lateral_motion, 1.0)
-        return StationaryPull(pull, pull, doubt * load)
+        share = _DRAGGED_STD + self._gain_std + min(lateral_motion, 1.0)
+        return StationaryPull(pull, pull, share * load)

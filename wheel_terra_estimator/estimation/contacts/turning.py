@@ -16,7 +16,8 @@ from wheel_terra_estimator.estimation.scalars import clipped, known, median
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _LEAST_GAIN = 0.25
-"""Of the gyro per cycle while it agrees with the wheels; more than noise is followed."""
+"""Weight of the gyro per cycle while it agrees with the wheels [-]; it rises with what exceeds the
+noise."""
 _LEAST_NOISE = 1e-6  # of the yaw rate [rad/s]
 _LEAST_CURVATURE_LENGTH = 0.1  # [m], for rovers with one axle
 _LEAST_TRAVEL_SHARE = 0.1
@@ -28,10 +29,10 @@ _LEAST_SPEED = 1e-4  # [m/s]
 _LEAST_YAW_NOISE_SHARE = 0.4
 """Of the gyro's noise that the smoothing leaves: sqrt(g / (2 - g)) for the least gain."""
 _SKID_YAW_SHARE = 0.6
-"""Yaw rate over that of rolling wheels, of a rover that has to skid to turn, and its doubt: it
-turns as one with 1.3 to 3 times its track (docs/own_rover.md)."""
-_SKID_YAW_DOUBT = 0.4  # of that yaw rate
-_ROLL_YAW_DOUBT = 0.15  # of a rover that does not skid
+"""Yaw rate of a skid-steered rover over that of rolling wheels [-]: it turns as one with 1.3 to 3
+times its track (docs/own_rover.md)."""
+_SKID_YAW_STD = 0.4  # deviation of that yaw rate, relative
+_ROLL_YAW_STD = 0.15  # the same of a rover that does not skid
 _LEAST_WHEEL_YAW_STD = 0.005  # [rad/s]
 
 _OPPOSED = 0.5
@@ -39,7 +40,7 @@ _OPPOSED = 0.5
 
 
 def sides_oppose(rims: Floats, by_yaw_rate: Floats) -> bool:
-    """Tell whether the wheels ask for a spin on the spot, however little the body follows.
+    """Return whether the wheels are driven for a turn on the spot, however little the body turns.
 
     `rims` [m/s], nan = unknown; the sign of `by_yaw_rate` [m] (see `Headings`) gives the side.
     """
@@ -76,7 +77,7 @@ class Turning(Component[TurningState]):
         self._rover, self._sensors = rover, sensors
         skids = rover.skids
         self._skid_share = _SKID_YAW_SHARE if skids else 1.0
-        self._wheel_doubt = _SKID_YAW_DOUBT if skids else _ROLL_YAW_DOUBT
+        self._wheel_yaw_std = _SKID_YAW_STD if skids else _ROLL_YAW_STD
         self._curvature_length = max(rover.curvature_length, _LEAST_CURVATURE_LENGTH)
 
     def update(
@@ -98,7 +99,7 @@ class Turning(Component[TurningState]):
         by_wheels = state.by_wheels
         if known(rims):
             by_wheels = self._skid_share * headings.yaw_rate(rims)
-        if window.rates:
+        if window.rate_readings:
             # Of a message of the gyro [rad/s].
             noise = window.stated.angular_rate_std or self._sensors.angular_rate_std
             yaw_rate = self._yaw_rate(window, by_wheels - state.by_wheels, noise)
@@ -106,7 +107,7 @@ class Turning(Component[TurningState]):
             std = math.hypot(left, self._sensors.angular_rate_bias_std)
         elif gyro_silent and known(rims):
             yaw_rate = by_wheels
-            std = math.hypot(self._wheel_doubt * yaw_rate, _LEAST_WHEEL_YAW_STD)
+            std = math.hypot(self._wheel_yaw_std * yaw_rate, _LEAST_WHEEL_YAW_STD)
         else:
             return state
         # Nose-up rotation over travel, both forgotten over the length of the rover.
@@ -116,12 +117,11 @@ class Turning(Component[TurningState]):
             yaw_rate=yaw_rate,
             yaw_rate_std=std,
             by_wheels=by_wheels,
-            rotation=keep * state.rotation - window.pitch_rate / max(window.rates, 1) * dt,
+            rotation=keep * state.rotation - window.pitch_rate / max(window.rate_readings, 1) * dt,
             travel=keep * state.travel + travel,
         )
         turning = fastest_rim > self._rover.low_rim
-        # How fast the wheel is pushed sideways that is pushed most; wheels that do not steer are
-        # all taken as the outermost.
+        # Greatest lateral speed of a wheel; without steering that of the outermost axle.
         side = abs(yaw_rate) * self._rover.curvature_length
         if headings.steered:
             side = max(abs(side) for side in headings.side_speeds(speed, yaw_rate))
@@ -135,18 +135,18 @@ class Turning(Component[TurningState]):
         if abs(state.travel) < _LEAST_TRAVEL_SHARE * self._curvature_length:
             return 0.0
         curvature = clipped(state.rotation / state.travel, -_STEEPEST, _STEEPEST)
-        # What the gyro's zero makes of it, against the curvature of common ground.
-        doubt = self._sensors.angular_rate_bias_std / max(abs(speed), _LEAST_SPEED)
-        return curvature / (1.0 + (doubt / _COMMON_CURVATURE) ** 2)
+        # Shrunk by the variance that the gyro's zero adds, against that of common ground.
+        error = self._sensors.angular_rate_bias_std / max(abs(speed), _LEAST_SPEED)
+        return curvature / (1.0 + (error / _COMMON_CURVATURE) ** 2)
 
     def _yaw_rate(self, window: InertialWindow, change: float, noise: float) -> float:
-        """Return the yaw rate: carried on by its `change` by the wheels, set right by the gyro.
+        """Return the yaw rate [rad/s]: predicted by its `change` by the wheels, then corrected.
 
-        What may be noise of the gyro is smoothed, what is more is followed: the smoothing makes
-        the yaw rate late only by what the wheels do not tell of its change.
+        The weight of the gyro grows with its residual over its noise, so that noise is smoothed and
+        a real change is followed at once.
         """
         expected = self.state.yaw_rate + change
-        now = window.yaw_rate / window.rates
-        noise = max(noise / math.sqrt(window.rates), _LEAST_NOISE)
+        now = window.yaw_rate / window.rate_readings
+        noise = max(noise / math.sqrt(window.rate_readings), _LEAST_NOISE)
         gain = clipped(_LEAST_GAIN * abs(now - expected) / noise, _LEAST_GAIN, 1.0)
         return expected + gain * (now - expected)

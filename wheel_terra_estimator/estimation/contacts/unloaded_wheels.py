@@ -18,13 +18,13 @@ _HOLD = 0.3  # [s] before a wheel is called unloaded, or loaded again
 _FREE_SHARE = 0.2  # of the typical torque: a wheel with less carries nothing
 _LOADED_SHARE = 0.4  # with more it carries its load again
 _LEAST_RIM_SHARE = 0.95  # of the typical rim speed: a slower one is held
-_TELLING_TORQUE = 5.0
-"""Typical torque over noise and zero of the sensors above which torques can be compared."""
-_MOST_LATERAL_MOTION = 0.1  # in turns torques differ for other reasons [-]
+_COMPARABLE_TORQUE = 5.0
+"""Typical torque over noise and zero of the sensors above which torques can be compared [-]."""
+_MOST_LATERAL_MOTION = 0.1  # above it torques differ for other reasons [-]
 
 
 class UnloadedState(NamedTuple):
-    """Unloaded wheels, and since when the torque of each indicates a change [s], nan = not."""
+    """Unloaded wheels, and since when each seems to have changed [s], nan = it does not."""
 
     unloaded: tuple[bool, ...]
     since: Floats
@@ -52,14 +52,14 @@ class UnloadedWheels(Component[UnloadedState]):
                 self.state = state._replace(unloaded=(False,) * len(torque))
             return self.state
         typical = median([torque[i] for i in rolling])
-        middle_rim = median([rims[i] for i in rolling])
-        telling = abs(typical) > _TELLING_TORQUE * self._noise
-        telling = telling and cycle.lateral_motion < _MOST_LATERAL_MOTION
+        typical_rim = median([rims[i] for i in rolling])
+        comparable = abs(typical) > _COMPARABLE_TORQUE * self._noise
+        comparable = comparable and cycle.lateral_motion < _MOST_LATERAL_MOTION
         unloaded, since = list(state.unloaded), list(state.since)
         for i in rolling:
-            share = torque[i] / typical if telling else 1.0
-            pace = rims[i] / middle_rim if middle_rim else 0.0
-            free = self._seems_free(share, pace, telling=telling, unloaded=unloaded[i])
+            share = torque[i] / typical if comparable else 1.0
+            rim_share = rims[i] / typical_rim if typical_rim else 0.0
+            free = _seems_free(share, rim_share, comparable=comparable, unloaded=unloaded[i])
             if free == unloaded[i]:
                 since[i] = NAN
             elif isnan(since[i]):
@@ -69,8 +69,9 @@ class UnloadedWheels(Component[UnloadedState]):
         self.state = UnloadedState(tuple(unloaded), tuple(since))
         return self.state
 
-    def _seems_free(self, share: float, pace: float, *, telling: bool, unloaded: bool) -> bool:
-        """Return whether shares of the typical torque and rim speed indicate no load."""
-        if unloaded:
-            return not telling or share < _LOADED_SHARE
-        return telling and abs(share) < _FREE_SHARE and pace > _LEAST_RIM_SHARE
+
+def _seems_free(share: float, rim_share: float, *, comparable: bool, unloaded: bool) -> bool:
+    """Return whether shares of the typical torque and rim speed indicate no load."""
+    if unloaded:
+        return not comparable or share < _LOADED_SHARE
+    return comparable and abs(share) < _FREE_SHARE and rim_share > _LEAST_RIM_SHARE

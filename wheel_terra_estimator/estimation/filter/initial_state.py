@@ -11,7 +11,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.estimation.contacts.usual_slip import steady_sinkage
+from wheel_terra_estimator.estimation.contacts.equilibrium_slip import steady_sinkage
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, GatedFilter
 from wheel_terra_estimator.estimation.filter.state import (

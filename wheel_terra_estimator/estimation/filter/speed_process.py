@@ -25,7 +25,7 @@ from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
-from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
+from wheel_terra_estimator.estimation.contacts.equilibrium_slip import EquilibriumSlip
 from wheel_terra_estimator.estimation.filter.consistency import excess, smoothed_nis
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import (
@@ -160,7 +160,7 @@ class SpeedProcess(Component[SpeedState]):
             )
         )
         self._rover, self._sensors = rover, sensors
-        self._equilibrium_slip = UsualSlip(configuration, rover)
+        self._equilibrium_slip = EquilibriumSlip(configuration, rover)
         self._rim_noise = _RATE_NOISE * sensors.wheel_rate_std * max(rover.slip_radius)
 
     def acceleration_noise(self, stated: StatedNoise) -> tuple[float, float]:

@@ -78,8 +78,8 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         row[SPEED] = 1.0
         ekf.fuse([Row(-speed, row, variance)])
         turning = abs(yaw_rate) >= _MOST_YAW_RATE
-        if settled > _GYRO_SETTLING_TIME and window.rates and not turning:
-            self._learn_zero(yaw_rate, window.pitch_rate / window.rates)
+        if settled > _GYRO_SETTLING_TIME and window.rate_readings and not turning:
+            self._learn_zero(yaw_rate, window.pitch_rate / window.rate_readings)
 
     def _learn_zero(self, yaw_rate: float, pitch_rate: float) -> None:
         state = self.state

@@ -41,7 +41,7 @@ class InertialWindow(NamedTuple):
     force_z: float = 0.0
     yaw_rate: float = 0.0  # sum, zero taken off [rad/s]
     pitch_rate: float = 0.0
-    rates: int = 0  # readings of the gyro in these two sums
+    rate_readings: int = 0  # readings of the gyro in these two sums
     speed_change: float = 0.0  # integral of f_x - g_x [m/s]
     duration: float = 0.0  # [s] covered by that integral
     noise_density: float = 0.0
@@ -122,7 +122,7 @@ class InertialInput(Component[InertialState]):
             window = window._replace(
                 yaw_rate=window.yaw_rate + (yaw_rate - zero.yaw),
                 pitch_rate=window.pitch_rate + (pitch_rate - zero.pitch),
-                rates=window.rates + 1,
+                rate_readings=window.rate_readings + 1,
             )
         if not isnan(force_x):
             since = time - force_time if force_time > -math.inf else 0.0

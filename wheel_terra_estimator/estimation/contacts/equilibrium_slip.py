@@ -22,16 +22,16 @@ _SLIPS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.
 _MOST_ON_LEVEL = 0.3  # slip of a rover that drives on level ground, whatever it is [-]
 _ROLLING_RESISTANCE = 0.1  # of measured wheels on loose soil, over the load [-]
 _BISECTIONS = 20  # of the logarithm of the sinkage: to a hundred thousandth
-_SHALLOWEST = 1e-4  # sinkage [m]
-_DEEPEST = 0.9  # of the radius
+_SHALLOWEST = 1e-4  # least sinkage looked at [m]
+_DEEPEST = 0.9  # greatest sinkage looked at, over the radius [-]
 
 
-class UsualSlip:
+class EquilibriumSlip:
     """Inverse of the steady traction curve of the whole rover on the configured soil.
 
-    Each wheel stands at the sinkage at which the bearing law carries its load on level ground, at
-    each slip; its pull there holds its resistance already (closed form, Ding et al. 2015). The
-    curve is worked out when it is first asked for: with a reference velocity it never is.
+    At each slip each wheel stands at the sinkage at which the bearing law carries its load on level
+    ground; its pull there already includes its rolling resistance (closed form, Ding et al. 2015).
+    The curve is computed when it is first needed: with a reference velocity it never is.
     """
 
     def __init__(self, configuration: Configuration, rover: Rover) -> None:
