@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The wheel models of the contact law that ``rover.contact_law`` names.
 
-Resistive force theory at a known sinkage comes from a table. The forces of a smooth wheel in units
-of scale, width and radius depend on two numbers alone, the entrance angle and v/(r w). Five
-integrals over the rim are tabulated once and interpolated by cubic splines.
+Resistive force theory is interpolated. The forces of a smooth wheel in units of scale, width and
+radius depend on two numbers alone, the entrance angle and v/(r w): five integrals over the rim are
+tabulated once over both, and read by cubic splines.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _MOTION_CELLS, _ANGLE_CELLS = 96, 24
 _DEEPEST = 0.5 * math.pi  # entrance angle [rad]
 _FURTHEST = 0.5 * math.pi  # of the angle whose tangent is (v/(r w) - 1) over the entrance angle
 _SHALLOW = 1e-4  # entrance angle at which the limit of a shallow contact is taken [rad]
-_LEAST_LIFT = 0.05  # of the lift of the normal stress: what friction may leave of it
+_LEAST_LIFT = 0.05  # vertical force over that of the normal stress alone, at least [-]
 
 
 class RimForces(NamedTuple):
@@ -112,10 +112,10 @@ def contact_models(configuration: Configuration) -> WheelModels:
 class ResistiveForceModels(WheelModels):
     """Models by resistive force theory, without effects; see `WheelModels` for the methods.
 
-    The sinkage is measured and the load given, so that the scale of the stress cancels in torque
-    and pull. The learned strength is a factor on the stress tangential to the rim, 1 in the theory;
-    K has no part. Stiffness and slip-sinkage act on the load that the law carries at a sinkage.
-    The pressure of the configured soil on a plate gives the scale.
+    With sinkage and load given, the scale of the stress cancels in torque and pull. The learned
+    strength is a factor on the stress tangential to the rim, 1 in the theory; K has no effect.
+    Stiffness and slip-sinkage act on the load that the law carries at a sinkage; its scale is that
+    of the configured soil's pressure on a plate.
     """
 
     def __init__(self, configuration: Configuration) -> None:

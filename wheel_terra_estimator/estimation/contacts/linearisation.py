@@ -33,9 +33,10 @@ from wheel_terra_estimator.estimation.rover import Rover
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _SLOPE_KEEP = 0.9
-"""Share of the old derivatives kept in a cycle: they are means over about a second."""
+"""Share of the old derivatives kept in a cycle [-]: they are means over about a second."""
 _NEW_CONTACT = 0.15
-"""Change of a torque by strength, of load times radius, that is no noise of the state."""
+"""Change of d torque / d ln strength, over load times radius [-], beyond the noise of the state:
+the wheel has come free or has locked."""
 _LEAST_RIM_OVER_REST = 2.0
 """Rim speed over ``rest_speed`` above which a wheel turns."""
 
@@ -43,12 +44,12 @@ _LEAST_RIM_OVER_REST = 2.0
 class ContactForces(NamedTuple):
     """Torque and pull of the turning wheels in the body's signs; zero for the others."""
 
-    state: FloatArray  # (size,) at which they were worked out
+    state: FloatArray  # (size,) at which they were evaluated
     pull: FloatArray  # (n,) [N]
     torque: FloatArray  # (n,) [N m]
-    pull_rows: FloatArray  # (n, size)
+    pull_rows: FloatArray  # (n, size) Jacobian
     torque_rows: FloatArray  # (n, size)
-    pull_noise: FloatArray  # (n,) [N]: what the error of a measured leaving angle makes of it
+    pull_noise: FloatArray  # (n,) deviation by the error of a measured leaving angle [N]
     torque_noise: FloatArray  # (n,) [N m]
 
     def moved_to(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -61,13 +62,14 @@ class Linearisation(Component[FloatArray]):
     """Evaluates the wheel models once per cycle, with smoothed derivatives.
 
     Its memory: smoothed derivatives of torque and pull as in `WheelForces`, (2, 6, n); nan = none.
-    `leaving_angle_std` is that of a measured leaving angle as it is used, smoothed [rad].
+    `leaving_angle_std` is the deviation of a measured leaving angle after smoothing [rad].
 
     Notes
     -----
-    The curves bend within the uncertainty of the state. A slope taken at the noisy estimate is
-    correlated with its error, which pulls the slip to the flat side and lets strength and K run
-    along T(s) = const to their bounds; a smoothed one is not (docs/estimation/design.md).
+    Torque and pull are curved within the uncertainty of the state. A derivative taken at the noisy
+    estimate is correlated with the error of that estimate: slip is biased to the flat side of the
+    curve, and strength and K drift along T(s) = const to their bounds. A smoothed derivative is not
+    (docs/estimation/design.md).
     """
 
     def __init__(
@@ -78,9 +80,9 @@ class Linearisation(Component[FloatArray]):
         self._leaving_angle_std = leaving_angle_std
 
     def update(self, x: FloatArray, cycle: Cycle, ruts: Floats) -> ContactForces:
-        """Work out the forces of the wheels that turn at a state `x` (size,).
+        """Return the forces of the wheels that turn at a state `x` (size,).
 
-        `ruts` are those that each wheel meets [m].
+        `ruts` are the depths of the ruts that the wheels meet [m].
         """
         turns, headings, loads = cycle.turns, cycle.headings, cycle.loads.load
         layout, n = self._layout, self._rover.wheel_count
@@ -127,7 +129,7 @@ class Linearisation(Component[FloatArray]):
     def _noise_of_angle(
         self, states: WheelStates, forces: WheelForces, turning: BoolArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return what one deviation of the leaving angles makes of torques and pulls, (n,) each."""
+        """Return the change of torques and pulls by one deviation of the leaving angles, (n,)."""
         nothing = np.zeros(len(turning))
         if states.leaving_angle is None:
             return nothing, nothing
@@ -143,7 +145,7 @@ class Linearisation(Component[FloatArray]):
         """Return the smoothed derivatives; `moment`: load times radius of each wheel [N m]."""
         old, new = self.state, np.stack([forces.d_torque, forces.d_pull])
         slopes = smoothed_slopes(old, new, _SLOPE_KEEP)
-        # A wheel that comes free or locks is another contact at once.
+        # A wheel that comes free or locks has new derivatives at once.
         change = np.abs(new[0, STRENGTH] - old[0, STRENGTH])
         other = change > _NEW_CONTACT * moment
         slopes[:, 1:] = np.where(other, new[:, 1:], slopes[:, 1:])
@@ -166,12 +168,12 @@ def contact_states(
 
 
 def _met(x: FloatArray, layout: StateLayout, ruts: FloatArray | Floats) -> FloatArray:
-    """Return the ruts that wheels meet (n,) [m]: none stands higher than its rut."""
+    """Return the ruts that wheels stand in (n,) [m]: none is deeper than the wheel's sinkage."""
     return np.minimum(ruts, np.maximum(x[layout.sinkage], 0.0))
 
 
 def turning_wheels(rover: Rover, rims: Floats, loads: Floats) -> tuple[bool, ...]:
-    """Say for which wheels the contact models hold: they turn under a load."""
+    """Return for which wheels the contact models hold: they turn under a load."""
     least = _LEAST_RIM_OVER_REST * rover.rest_speed
     return tuple(
         abs(rim) >= least and load >= LEAST_LOAD for rim, load in zip(rims, loads, strict=True)

@@ -34,9 +34,9 @@ from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 # Effects of a table or of an instrument that the filter must not apply: loads are terrain-normal
 # already, and the pull comes from specific force, not from an attitude.
 _NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias', 'pull_zero', 'pull_gain'})
-_LEAST_BEARING = 0.05  # of the normal stress's part: cohesion alone carries no wheel
+_LEAST_BEARING = 0.05  # vertical force over that of the normal stress alone, at least [-]
 MOST_RATIO = 3.0
-"""v/(r w) beyond which the shear is saturated: more changes nothing [-]."""
+"""v/(r w) beyond which the shear is saturated, so that torque and pull stay the same [-]."""
 LEAST_SINKAGE = 1e-4  # [m]
 _MOST_SINKAGE = 0.95  # of the radius: the bearing law ends at the hub
 _LEAST_DEPTH = 1e-6  # at the angle of greatest stress [m]
@@ -66,8 +66,9 @@ class WheelStates(NamedTuple):
 
 
 STEPPED = ('speed_ratio', 'sinkage', 'strength', 'shear_modulus', 'centroid', 'mound')
+"""Entries of `WheelStates` by which torque and pull are differentiated."""
 _STEP = 1e-7
-"""Finite step of each, in its own unit: its curvature and rounding are both far below 1e-4."""
+"""Finite step of each, in its own unit: errors by curvature and rounding are far below 1e-4."""
 _STEPS = _STEP * np.eye(len(STEPPED), len(STEPPED) + 1, 1)[:, :, None]
 
 
@@ -135,8 +136,8 @@ class WheelModels:
 
         Notes
         -----
-        Where the speed opposes the rim the forces are those of slip 1, and they tell nothing of the
-        speed: the shear is saturated.
+        Where the speed opposes the rim the shear is saturated: the forces are those of slip 1 at
+        any such speed.
         """
         values = np.empty((len(STEPPED), len(STEPPED) + 1, len(self._radius)))
         for stepped, name in zip(values, STEPPED, strict=True):
