@@ -55,7 +55,7 @@ from wheel_terra_estimator.checks.turning import (
     ordinary_track,
     track_ratio,
 )
-from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE, WILD_RATE
+from wheel_terra_estimator.estimation.timing.input_checks import OUTLIER_FORCE, OUTLIER_RATE
 
 GRAVITY_TOLERANCE = 0.1  # of the mean specific force (slopes, bias, vibration) [-]
 SLOPES = 0.035  # the same by slopes and bias alone [-]
@@ -229,7 +229,10 @@ def _frozen(state: ImuState) -> Judged:
 def _wild(state: ImuState) -> Judged:
     """Leave out single samples that no body can make; the node does so by the same limits."""
     imu, outcomes, kept = state.imu, list[Outcome](), np.ones(state.imu.stamp.size, dtype=bool)
-    for values, limit, unit in ((imu.force, WILD_FORCE, 'm/s^2'), (imu.rate, WILD_RATE, 'rad/s')):
+    for values, limit, unit in (
+        (imu.force, OUTLIER_FORCE, 'm/s^2'),
+        (imu.rate, OUTLIER_RATE, 'rad/s'),
+    ):
         off = lonely(values)
         if (off > limit).sum() < LEAST_WILD:
             continue

@@ -332,7 +332,7 @@ ReferenceVelocity
                 f'stamps went back, {self._clock_steps} times so far: a new run begins, soil is '
                 'kept (a looped recording, a clock that was set, or sources of different clocks)'
             )
-        for channel, by in self._lags.apart.items():
+        for channel, by in self._lags.clock_offsets.items():
             where = 'ahead of wheels and IMU' if by > 0 else f'behind {names[INERTIAL - channel]}'
             faults[names[channel]] = (
                 f'stamps {abs(by) / SECOND:.1f} s {where}: late, or a clock is off -> set the '

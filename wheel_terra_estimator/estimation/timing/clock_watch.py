@@ -1,12 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tells a stray stamp from a step of the clock, by stamps and their order of arrival alone.
+"""Distinguishes a stray stamp from a step of the clock, by stamps and their order of arrival alone.
 
-A slow topic is late, a message is resent, a driver stamps one message wrongly: none of these may
-end a run, or every loop over a late camera would. A step of the clock (a looped bag, a simulation
-that was reset, a corrected system clock) takes all topics with it. So a message far off its time
-line is held until a second one bears it out, or the old line goes on. Wheel odometry keeps the
-time: other topics carry it away only where that is silent, and it takes it back when it returns.
+A message that is late, resent or wrongly stamped must not end a run. A step of the clock (a looped
+bag, a simulation that was reset, a corrected system clock) shifts all topics. So a message far off
+the present time line is held until a second one confirms it, or until the old time line goes on.
+Wheel odometry keeps the time: other topics move it only while wheel odometry is silent.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ PROVING_MESSAGES = 5
 """Messages of wheel odometry that prove a step though other topics stay on the old time line."""
 
 MOST_HELD = 1000
-"""Messages that are held at most; a stamp that stands still must not fill the memory."""
+"""Messages that are held at most, so that a stuck clock cannot fill the memory."""
 
 
 class Suspicion(Enum):
-    """How a stamp does not fit."""
+    """On which side of the time line a stamp does not fit."""
 
     BEHIND = 'behind'
     AHEAD = 'ahead'
@@ -77,9 +76,9 @@ class ClockWatch:
         self._newest_of: list[int | None] = [None] * channels
         self._held: list[Arrival] = []
         self._suspicion = Suspicion.BEHIND
-        self._odometry_astray = 0
+        self._odometry_held = 0
         self._odometry_suspicion: Suspicion | None = None
-        self._astray_from = 0, 0  # stamp of the first of them, and the time of the run then
+        self._odometry_held_from = 0, 0  # stamp of the first of them, and the time of the run then
 
     def retune(self, clock_step: int, max_lag: int, history: int) -> None:
         """Go on with other limits."""
@@ -111,9 +110,9 @@ class ClockWatch:
         if channel == WHEEL_ODOMETRY:
             if suspicion is not self._odometry_suspicion:
                 self._odometry_suspicion = suspicion
-                self._odometry_astray, self._astray_from = 0, (stamp, present or 0)
-            self._odometry_astray += 1
-        if not self._borne_out(present or 0):
+                self._odometry_held, self._odometry_held_from = 0, (stamp, present or 0)
+            self._odometry_held += 1
+        if not self._confirmed(present or 0):
             return Judgement([], strays=strays)
         accepted = self.release()
         return Judgement(accepted, suspicion is Suspicion.BEHIND, strays)
@@ -128,12 +127,13 @@ class ClockWatch:
         return accepted
 
     def finish(self) -> Judgement:
-        """Return what to do at the end of the data with what is still held."""
+        """Return what to do with what is still held at the end of the data."""
         if self._suspicion is Suspicion.AHEAD:
             return Judgement(self.release())
         return Judgement([], strays=self._drop_held())
 
     def _suspect(self, channel: int, stamp: int, present: int | None) -> Suspicion | None:
+        """Return how a stamp does not fit the time line; None: it fits."""
         if present is None:
             return None
         own = self._newest_of[channel]
@@ -148,28 +148,28 @@ class ClockWatch:
             return Suspicion.AHEAD
         return None
 
-    def _borne_out(self, present: int) -> bool:
+    def _confirmed(self, present: int) -> bool:
+        """Return whether the held messages prove a step of the clock."""
         channels = [arrival.channel for arrival in self._held]
         odometry, own = WHEEL_ODOMETRY in channels, self._newest_of[WHEEL_ODOMETRY]
         stamps = [a.measurement.stamp for a in self._held if a.channel == channels[-1]]
-        first, then = self._astray_from
-        # Not where it has only fallen behind: what came late in a burst catches up.
+        first, then = self._odometry_held_from
+        # Wheel odometry that has only fallen behind (a late burst) will catch up.
         late = self._suspicion is Suspicion.BEHIND and own is not None and first >= own
-        astray = self._odometry_astray >= PROVING_MESSAGES
+        astray = self._odometry_held >= PROVING_MESSAGES
         return (
             (not late and odometry and len(channels) > 1)
             # Another topic alone for so long that wheel odometry would have arrived.
             or (not late and stamps[-1] - stamps[0] > 3 * self._clock_step)
             or len(channels) >= MOST_HELD
-            # Wheel odometry keeps the time: where it and another topic have different clocks
-            # for good, the other one gives way.
+            # Where wheel odometry and another topic have different clocks for good, it prevails.
             or (astray and (not late or 2 * (present - then) > stamps[-1] - first))
         )
 
     def _accept(self, arrival: Arrival) -> None:
         channel, stamp = arrival.channel, arrival.measurement.stamp
         if channel == WHEEL_ODOMETRY:
-            self._odometry_astray, self._odometry_suspicion = 0, None
+            self._odometry_held, self._odometry_suspicion = 0, None
         own = self._newest_of[channel]
         if own is None or stamp > own:
             self._newest_of[channel] = stamp

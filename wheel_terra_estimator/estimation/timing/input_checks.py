@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of single measurements: what cannot be true is left out and counted, the rest is used.
+"""Checks of single measurements: implausible values are rejected and counted, the rest is used.
 
 After these checks a number is finite, or nan where the measurement types allow it.
 """
@@ -33,10 +33,10 @@ GREATEST_STEERING = math.pi  # [rad]
 GREATEST_TORQUE = 1.0e5  # [N m]
 GREATEST_FORCE = 500.0  # specific force [m/s^2], 50 g
 GREATEST_RATE = 50.0  # angular rate [rad/s]
-WILD_FORCE = 30.0  # change of the specific force from one message to the next [m/s^2], 3 g
-WILD_RATE = 5.0  # change of the angular rate from one message to the next [rad/s]
-WILD_TIME = 500_000_000  # messages further apart are not compared [ns]
-GREATEST_VARIANCE = GREATEST_SPEED**2  # says that nothing is known
+OUTLIER_FORCE = 30.0  # change of the specific force from one message to the next [m/s^2], 3 g
+OUTLIER_RATE = 5.0  # change of the angular rate from one message to the next [rad/s]
+OUTLIER_TIME = 500_000_000  # messages further apart are not compared [ns]
+GREATEST_VARIANCE = GREATEST_SPEED**2  # of a reference [(m/s)^2]; above, it means unknown
 LATEST_STAMP = 2**31 * SECOND  # builtin_interfaces/Time ends in 2038 [ns]
 
 CHANNELS: dict[type, int] = {
@@ -64,13 +64,13 @@ _UNKNOWN = np.full(3, math.nan)
 _UNKNOWN.setflags(write=False)
 
 
-def _far(one: InertialReading, other: InertialReading) -> bool:
-    """Whether no body gets from one reading to the other in the time between."""
-    if abs(one.stamp - other.stamp) > WILD_TIME:
+def _differs(one: InertialReading, other: InertialReading) -> bool:
+    """Return whether no rover could get from one reading to the other in the time between."""
+    if abs(one.stamp - other.stamp) > OUTLIER_TIME:
         return False
     force = np.abs(one.specific_force - other.specific_force).max()
     rate = np.abs(one.angular_rate - other.angular_rate).max()
-    return bool(force > WILD_FORCE or rate > WILD_RATE)  # nan is not far
+    return bool(force > OUTLIER_FORCE or rate > OUTLIER_RATE)  # nan is not far
 
 
 class InputChecks:
@@ -98,7 +98,7 @@ class InputChecks:
         self.rejected: list[Counter[str]] = [Counter() for _ in self.names]
         self.refused = [0] * len(self.names)
         self._inertial_before: InertialReading | None = None
-        self._wild: InertialReading | None = None
+        self._outlier: InertialReading | None = None
         self._count = wheels.count
         self._rates = _symmetric((GREATEST_SPEED / wheels.slip_radius).tolist())
         self._torques = _symmetric([GREATEST_TORQUE] * self._count)
@@ -115,7 +115,7 @@ class InputChecks:
         )
 
     def check(self, channel: int, measurement: Measurement) -> Measurement | None:
-        """Return the measurement without what cannot be true; None where nothing is left."""
+        """Return the measurement without implausible values; None where nothing is left."""
         stamp = measurement.stamp
         if stamp <= 0:
             self.refuse(channel, 'stamp is zero or negative')
@@ -127,11 +127,11 @@ class InputChecks:
         return checked
 
     def reject(self, channel: int, reason: str) -> None:
-        """Count a part of a message that was left out."""
+        """Count a part of a message that is not used."""
         self.rejected[channel][reason] += 1
 
     def refuse(self, channel: int, reason: str) -> None:
-        """Count a message that was left out."""
+        """Count a message that is not used."""
         self.refused[channel] += 1
         self.reject(channel, reason)
 
@@ -158,7 +158,7 @@ class InputChecks:
         return m if kept is steering else replace(m, steering=kept)
 
     def _inertial(self, m: InertialReading) -> InertialReading | None:
-        """Keep the good fields of a message; nan stands for one that is not there."""
+        """Return the message with implausible vectors replaced by nan; None where none is left."""
         if any(m.variance) and (variance := credible(m.variance)) != m.variance:
             m = replace(m, variance=variance)
         x, y, z = m.specific_force.tolist()
@@ -168,7 +168,7 @@ class InputChecks:
         bad_force = force == 0.0 or not force <= GREATEST_FORCE
         bad_rate = not rate <= GREATEST_RATE
         if bad_force or bad_rate:
-            self._tell_inertial(m, bad_force, bad_rate, silent=force == 0.0)
+            self._count_inertial(m, bad_force, bad_rate, silent=force == 0.0)
             if (bad_force and bad_rate and m.orientation is None) or (force == rate == 0.0):
                 self.refused[INERTIAL] += 1
                 return None
@@ -177,24 +177,24 @@ class InputChecks:
                 specific_force=_UNKNOWN if bad_force else m.specific_force,
                 angular_rate=_UNKNOWN if bad_rate else m.angular_rate,
             )
-        if self._is_wild(m):
+        if self._is_outlier(m):
             self.refuse(INERTIAL, 'a single outlier, impossible motion of a rover')
             return None
         return m if m.orientation is None else self._oriented(m, m.orientation)
 
-    def _is_wild(self, m: InertialReading) -> bool:
-        """Whether a message leaves the one before too far, and is not borne out by another."""
-        before, wild = self._inertial_before, self._wild
-        if before is not None and _far(m, before) and (wild is None or _far(m, wild)):
-            self._wild = m
+    def _is_outlier(self, m: InertialReading) -> bool:
+        """Return whether a message differs too much from the last good one and the last outlier."""
+        before, outlier = self._inertial_before, self._outlier
+        if before is not None and _differs(m, before) and (outlier is None or _differs(m, outlier)):
+            self._outlier = m
             return True
-        self._inertial_before, self._wild = m, None
+        self._inertial_before, self._outlier = m, None
         return False
 
-    def _tell_inertial(
+    def _count_inertial(
         self, m: InertialReading, bad_force: bool, bad_rate: bool, *, silent: bool
     ) -> None:
-        """Say what of an IMU message is left out; what it does not hold is no fault of it."""
+        """Count the implausible vectors of an IMU message; those it does not hold are no fault."""
         if silent:
             self.reject(INERTIAL, 'specific force exactly zero (sensor not running)')
         elif bad_force and not np.isnan(m.specific_force).all():

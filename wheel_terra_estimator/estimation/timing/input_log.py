@@ -1,10 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The log of a run's inputs, and the steps through it of the estimator and of the checks.
+"""The inputs of a run, sorted by stamp, and the steps of estimator and checks through them.
 
-The log is sorted by stamp, equal stamps merged. How it divides into steps follows from its stamps
-alone (see ``step_grid``), so the state at a stamp does not depend on the order of arrival. Kept
-states make a late input cost a short run and not a long one.
+Inputs of equal stamps are merged. How the log divides into steps follows from the stamps alone (see
+``step_grid``), so the state at a stamp does not depend on the order of arrival. For a late input
+the steps are repeated from the last kept state before it.
 """
 
 from __future__ import annotations
@@ -30,18 +30,17 @@ from wheel_terra_estimator.estimation.timing.merging import (
 from wheel_terra_estimator.estimation.timing.step_grid import LONGEST_STEP, StepGrid
 
 KEPT_STATE_SPACING = 50_000_000
-"""Least distance of kept states [ns]: a state is a few references and two small arrays, so keeping
-it costs a twentieth of the step that a late input would make again without it."""
+"""Least time between kept states [ns]: keeping one costs a twentieth of a step."""
 DENSE_SPAN = 100_000_000
-"""Inputs that come so little [ns] after a step that would have used them make them denser."""
+"""After an input that is late by less than this [ns] all states of the last steps are kept."""
 DENSE_DURATION = 2_000_000_000
-"""For so long [ns of stamps] after the last such input."""
+"""Time for which that goes on after the last such input [ns of stamps]."""
 TRIM_LENGTH = 64
-"""Forgotten entries are taken off the log in pieces of this length."""
+"""Entries that are no longer needed are removed once there are so many."""
 
 
 class Stepped(Protocol):
-    """What runs through the log: the same steps from the same state give the same numbers."""
+    """A part that steps through the log: from the same state the same steps give the same state."""
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Bring the state to `stamp` [ns], later than the one before, with all inputs of it."""
@@ -57,38 +56,38 @@ class Stepped(Protocol):
 
 
 class Estimator(Stepped, Protocol):
-    """What the core runs; may have `learned`, too (see `EstimatorCore.learned`)."""
+    """What the core runs; it may have `learned` and `taught` too (see `EstimatorCore`)."""
 
     def health(self) -> dict[str, Any]:
-        """Return what the filter says of itself; a dictionary of its own each time."""
+        """Return counters and texts for diagnostics, in a new dictionary."""
 
     def estimates(self) -> EstimateSet:
         """Return the estimates at the stamp of the last step."""
 
 
-class _Walk(NamedTuple):
-    """What the division into steps needs to know of the log before a step."""
+class _Progress(NamedTuple):
+    """What the division into steps needs to know of the steps before."""
 
-    next_reference: int  # a reference velocity is used again from this stamp on
+    next_reference: int  # stamp from which on a reference velocity is used again [ns]
     step_index: int  # of the last wheel odometry; -1: none yet
-    end: int  # stamp of the last step
+    end: int  # stamp of the last step [ns]
     measured: LastMeasured
     steps: int  # since the start of the run
 
 
 class _Kept(NamedTuple):
-    """A state to come back to."""
+    """A state to return to."""
 
     state: Any
-    walk: _Walk
+    walk: _Progress
 
 
-class _Charged(NamedTuple):
-    """Where the last run ended: late inputs are charged from there, settled since or not."""
+class _LastRun(NamedTuple):
+    """Where the last run ended: the cost of late inputs is counted from there."""
 
     position: int  # entries[:position] made its state
     end: int  # stamp of its last step [ns]
-    clean: int  # entries[:clean] have not changed since
+    unchanged: int  # entries[:unchanged] have not changed since
 
 
 class Entry:
@@ -104,7 +103,7 @@ class Entry:
 
 
 class InputLog:
-    """Inputs of one run and what runs through them: runners that make the same steps side by side.
+    """Inputs of one run, and the `runners` that make the same steps through them.
 
     Reference velocities are thinned to `reference_period`, by stamps [ns]; 0: all are used.
 
@@ -134,12 +133,12 @@ class InputLog:
         self.contradicted = [0] * len(CHANNELS)
         self._reference_period = reference_period
         self._pristine = self._snapshot()
-        self._charged: _Charged
-        self._settled: bool  # since the last run
+        self._last_run: _LastRun
+        self._caught_up: bool  # since the last run
         self.clear(keep_soil=False)
 
     def clear(self, *, keep_soil: bool) -> None:
-        """Begin a new run; soil and biases kept but widened, or forgotten."""
+        """Begin a new run; soil and biases kept with inflated covariance, or reset."""
         self._origin: tuple[Any, bool] | None = (
             self._snapshot() if keep_soil else self._pristine,
             keep_soil,
@@ -150,8 +149,8 @@ class InputLog:
         self.dirty = 0
         self._ran = 0  # entries[:_ran] have been run, and not changed since
         self._position = -1  # entries[:_position] made the state of the last step; -1: none did
-        self._astray = False  # the runners were taken beyond the last step
-        self._walk = _Walk(0, -1, 0, None, 0)
+        self._provisional = False  # the runners have made a part of the next step
+        self._progress = _Progress(0, -1, 0, None, 0)
         self._account()
         self._last_kept = 0  # stamp of the newest kept state
         self._dense_until = 0
@@ -161,16 +160,16 @@ class InputLog:
         state = self._snapshot()
         self._runners = runners
         self._pristine = self._snapshot()
-        if self._astray or self._position != self._ran:
+        if self._provisional or self._position != self._ran:
             for entry in self.entries[self._ran :]:
                 entry.kept = None  # run again by the new one
         self._restore(state)
         self._reference_period = reference_period
         self.grid = grid
-        self._walk = self._walk._replace(step_index=-1)
+        self._progress = self._progress._replace(step_index=-1)
 
     def insert(self, channel: int, measurement: Measurement) -> tuple[int, bool]:
-        """Put an input where its stamp belongs; return where, and whether as a new entry."""
+        """Insert an input by its stamp; return its index, and whether it is a new entry."""
         stamp = measurement.stamp
         entries, stamps = self.entries, self.stamps
         self.first = stamp if self.first is None else min(self.first, stamp)
@@ -187,10 +186,10 @@ class InputLog:
             changed = True
         else:
             changed = self._merge(entries[index], channel, measurement)
-        charged = self._charged
-        if changed and index < charged.clean:
+        last_run = self._last_run
+        if changed and index < last_run.unchanged:
             self.dirty = max(self.dirty, self.steps_after(stamp))
-            self._charged = charged._replace(clean=index)
+            self._last_run = last_run._replace(unchanged=index)
         if changed and index < self._ran:
             if stamp > stamps[self._ran - 1] - DENSE_SPAN:
                 self._dense_until = stamps[self._ran - 1] + DENSE_DURATION
@@ -199,7 +198,7 @@ class InputLog:
 
     def steps_after(self, stamp: int) -> int:
         """Return how many steps would be made again for an input of this stamp [ns]."""
-        position, end, _ = self._charged
+        position, end, _ = self._last_run
         if position <= 0 or self.first is None or stamp > end:
             return 0
         if self.grid.every_stamp:
@@ -208,7 +207,7 @@ class InputLog:
         return self.grid.step_index(end - self.first) - before + 1
 
     def reaches(self, stamp: int) -> bool:
-        """Whether a state before `stamp` [ns] is kept: not where a shorter history forgot it."""
+        """Return whether a state before `stamp` [ns] is still kept."""
         return self._origin is not None or stamp > self.stamps[0]
 
     def run_to(self, last: int) -> None:
@@ -216,28 +215,28 @@ class InputLog:
         pending = self._run_steps(last)
         self._account()
         if pending:
-            # The rest is taken in for this one set; the next step begins where this one did.
+            # These make a provisional step for this set; the next one begins where it began.
             self._keep(always=True)
-            self._astray = True
-            self._step(self.entries[last].stamp, pending, self._walk)
+            self._provisional = True
+            self._step(self.entries[last].stamp, pending, self._progress)
 
     def process_pending(self, last: int) -> None:
         """Make the steps up to the entry `last` that the next run would make anyway.
 
-        Once between two runs, so that however many inputs come late it costs no more than those.
+        At most once between two runs, so that late inputs are not paid for twice.
         """
-        if self._position < 0 or self._settled:
+        if self._position < 0 or self._caught_up:
             return  # the first run begins by itself
-        self._settled = True
+        self._caught_up = True
         try:
             self._run_steps(last)
         except BaseException:
-            self._astray = True  # a step failed half way; the next run begins before it
+            self._provisional = True  # a step failed; the next run begins before it
             raise
 
     def _run_steps(self, last: int) -> list[list[Any]]:
         """Make all whole steps up to the entry `last`; return what is left over of the next."""
-        if self._position != self._ran or self._position < 0 or self._astray:
+        if self._position != self._ran or self._position < 0 or self._provisional:
             self._go_back()
         entries = self.entries
         dense = entries[last].stamp < self._dense_until
@@ -246,7 +245,7 @@ class InputLog:
         for index in range(self._position, last + 1):
             entry = entries[index]
             entry.kept = None
-            after = self._walk_on(entry, pending)
+            after = self._extend_step(entry, pending)
             if after is not None:
                 if dense and entry.stamp >= dense_from:
                     self._keep(always=True)  # what is late by little comes between these
@@ -257,20 +256,20 @@ class InputLog:
         return pending
 
     def _account(self) -> None:
-        """Begin to count what late inputs make dirty."""
+        """Count the cost of late inputs from here on."""
         self.dirty = 0
-        self._settled = False
-        self._charged = _Charged(self._position, self._walk.end, self._ran)
+        self._caught_up = False
+        self._last_run = _LastRun(self._position, self._progress.end, self._ran)
 
     def begin_after(self, index: int) -> None:
-        """Forget the state and all up to an entry: the estimator failed there."""
+        """Drop the state and all entries up to an index: the estimator failed there."""
         del self.entries[: index + 1], self.stamps[: index + 1]
-        self._ran, self._position, self._astray = 0, -1, False
+        self._ran, self._position, self._provisional = 0, -1, False
         self._origin = self._pristine, False
         self._account()
 
     def forget(self, horizon: int) -> int:
-        """Take off what no input younger than `horizon` [ns] needs; return how many entries."""
+        """Drop entries that no input younger than `horizon` [ns] needs; return how many."""
         stamps = self.stamps
         if len(stamps) <= TRIM_LENGTH or stamps[TRIM_LENGTH] >= horizon:
             return 0
@@ -284,19 +283,19 @@ class InputLog:
         self._origin = None
         self._ran -= index
         self._position -= index
-        position, end, clean = self._charged
-        self._charged = _Charged(position - index, end, clean - index)
+        position, end, unchanged = self._last_run
+        self._last_run = _LastRun(position - index, end, unchanged - index)
         return index
 
     # -- Steps ----------------------------------------------------------------------------------
 
-    def _walk_on(self, entry: Entry, pending: list[list[Any]]) -> _Walk | None:
-        """Add an entry to the next step; if it ends that step, return what follows."""
+    def _extend_step(self, entry: Entry, pending: list[list[Any]]) -> _Progress | None:
+        """Add an entry to the `pending` step; return the progress after it if it ends the step."""
         parts, stamp = entry.parts, entry.stamp
-        after = self._walk
+        after = self._progress
         ends = self.grid.every_stamp or stamp - after.end >= LONGEST_STEP
         if parts[REFERENCE] is not None:
-            # Thinned out here, in the order of stamps, so that the order of arrival is nothing.
+            # Thinned here, by stamps, so that the order of arrival has no effect.
             due = self._next_reference(stamp)
             if due is None:
                 parts = [*parts[:REFERENCE], None, *parts[REFERENCE + 1 :]]
@@ -313,21 +312,21 @@ class InputLog:
                 ends = True
         return after if ends else None
 
-    def _step(self, stamp: int, pending: list[list[Any]], after: _Walk) -> None:
-        inputs, measured = merge_step(stamp, pending, self._walk.measured)
+    def _step(self, stamp: int, pending: list[list[Any]], after: _Progress) -> None:
+        inputs, measured = merge_step(stamp, pending, self._progress.measured)
         self.counts['steps'] += 1
-        self._walk = after._replace(end=stamp, measured=measured, steps=after.steps + 1)
+        self._progress = after._replace(end=stamp, measured=measured, steps=after.steps + 1)
         for runner in self._runners:
             runner.step(stamp, inputs)
 
     def _next_reference(self, stamp: int) -> int | None:
-        """Return from which stamp on the next one is used; None where this one is left out."""
-        period, due = self._reference_period, self._walk.next_reference
+        """Return the stamp from which on the next one is used; None where this one is not."""
+        period, due = self._reference_period, self._progress.next_reference
         if not period:
             return 0
         if stamp < due - period // 20:  # leaves room for jitter of stamps
             return None
-        # In step with the first one, so that jitter does not add up to a lower rate.
+        # Counted from the due stamp, so that jitter does not lower the rate.
         return due + period if due + period > stamp else stamp + period
 
     # -- Kept states ----------------------------------------------------------------------------
@@ -340,12 +339,12 @@ class InputLog:
             runner.restore(state)
 
     def _keep(self, always: bool = False) -> None:
-        """Keep the state after the last step, if it is worth it."""
+        """Keep the state after the last step; not `always`: if the last one kept is old enough."""
         if self._position <= 0:
             return  # the start of the run is known anyway
         entry = self.entries[self._position - 1]
         if entry.kept is None and (always or entry.stamp - self._last_kept >= KEPT_STATE_SPACING):
-            entry.kept = _Kept(self._snapshot(), self._walk)
+            entry.kept = _Kept(self._snapshot(), self._progress)
             self._last_kept = entry.stamp
 
     def _go_back(self) -> None:
@@ -353,11 +352,11 @@ class InputLog:
         index = self._ran - 1
         while index >= 0 and self.entries[index].kept is None:
             index -= 1
-        steps = self._walk.steps
+        steps = self._progress.steps
         if index >= 0:
             kept = self.entries[index].kept
             assert kept is not None
-            self._walk = kept.walk
+            self._progress = kept.walk
             self._restore(kept.state)
         else:
             assert self._origin is not None
@@ -365,13 +364,13 @@ class InputLog:
             self._restore(state)
             for runner in self._runners:
                 runner.begin_run(self.stamps[0], keep_soil)
-            self._walk = _Walk(0, -1, self.stamps[0], None, 0)
+            self._progress = _Progress(0, -1, self.stamps[0], None, 0)
         if self._position >= 0:
             self.counts['reruns'] += self._position != self._ran
-            self.counts['steps_repeated'] += max(steps - self._walk.steps, 0)
-        self._last_kept = self._walk.end
+            self.counts['steps_repeated'] += max(steps - self._progress.steps, 0)
+        self._last_kept = self._progress.end
         self._position = self._ran = index + 1
-        self._astray = False
+        self._provisional = False
 
     def _merge(self, entry: Entry, channel: int, measurement: Any) -> bool:
         """Merge into the entry of the same stamp; return whether that changes anything."""

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Learns how far wheel odometry and IMU lag behind one another, by stamps and order of arrival.
 
-Where one of them comes late for good, waiting for it is cheaper than running again for each of its
-messages, and no set is lost. A lag of a few milliseconds is not waited for: one step is soon run
-again, and a message at 10 Hz that is held for the next one is a tenth of a second old. Where wheel
-odometry of one stamp comes in several messages, a later stamp is waited for.
+Where one of them is always late, waiting for it is cheaper than repeating steps for each of its
+messages. A lag of a few milliseconds is not waited for: to repeat one step costs less than to delay
+all outputs. Where wheel odometry of one stamp comes in several messages, the next stamp is awaited.
 
-The time of the run is theirs, too: other topics carry it on while both are silent, less the lead
-that their clock has before these two.
+Both also give the time of the run; while both are silent other topics advance it, less the lead of
+their clock.
 """
 
 from __future__ import annotations
@@ -23,20 +22,20 @@ SHORTEST_HOLD = 20_000_000
 """A lag below this [ns] is not waited for."""
 
 _MEMORY = 64  # messages of a channel
-_SHARE = 0.95  # of them that are waited for
+_SHARE = 0.95  # of the messages that the learned lag covers
 _LEARN_EVERY = 8  # messages, once the memory is half full
-_ROOM = 1.05  # over the lag that was seen
-_LEADS = 4  # messages of another topic, the least lead of which is that of its clock
-_CLOCKS_AGREE = 200_000_000  # within this lead [ns]; wheels are silent after 0.5 s
+_MARGIN = 1.05  # learned lag over the observed one
+_LEADS = 4  # messages of another topic; the least of their leads is that of its clock
+_CLOCKS_AGREE = 200_000_000  # a lead below this [ns] is no difference of clocks
 _IN_PARTS = 0.25
-"""Share of repeated stamps above which a stamp comes in parts (half of them in two, and so on)."""
+"""Share of repeated stamps above which one stamp comes in several messages."""
 
 
 class LagLearner:
     """Lag of each of the two channels, and how long to hold inputs back.
 
-    `fixed` is how long [ns], below 0: as learned; it may be changed. `learned` has the lag of each
-    channel [ns], `present` is the time of the run [ns].
+    `fixed` is a stated time to hold them [ns], below 0: as learned; it may be changed. `learned` is
+    the lag of each channel [ns], `present` the time of the run [ns].
     """
 
     def __init__(self, fixed: int) -> None:
@@ -51,7 +50,7 @@ class LagLearner:
         self._led: set[int] = set()  # other channels that were received since then
         self.present: int | None = None
         self._first: int | None = None
-        self._odometry_heard = False
+        self._odometry_received = False
         self.learned = dict.fromkeys(self._lags, 0)
 
     @property
@@ -60,10 +59,10 @@ class LagLearner:
         return LONGEST_HOLD if self.fixed < 0 else self.fixed
 
     @property
-    def apart(self) -> dict[int, int]:
-        """Channels -> how far their stamps are ahead when they come, beyond what is waited for.
+    def clock_offsets(self) -> dict[int, int]:
+        """Channels whose stamps are too far off to be waited for -> by how much [ns].
 
-        Below 0: how far wheel odometry or IMU are behind the other [ns].
+        Positive: ahead of wheel odometry and IMU; negative: one of these two behind the other.
         """
         ahead = {c: min(each) for c, each in self._leads.items() if len(each) == _LEADS}
         behind = {c: min(each) for c, each in self._lags.items() if len(each) == _MEMORY}
@@ -75,10 +74,10 @@ class LagLearner:
         """Forget the time, not the lags: they belong to the transport."""
         self._newest = self._first = self.present = None
         self._led.clear()
-        self._odometry_heard = False
+        self._odometry_received = False
 
     def note(self, channel: int, stamp: int, *, whole: bool = True) -> None:
-        """Take the stamp [ns] of an accepted message, that may hold some of the wheels only."""
+        """Take the stamp [ns] of an accepted message; not `whole`: it holds some wheels only."""
         if self._first is None:
             self._first = stamp
         lags = self._lags.get(channel)
@@ -87,14 +86,14 @@ class LagLearner:
             if self._newest is not None and channel not in self._led:
                 self._led.add(channel)
                 leads.append(stamp - self._newest)
-            # Who states the lag has stamps at their word until a second message.
+            # With a stated lag a second message is needed before a clock counts as ahead.
             known = len(leads) > (self.fixed >= 0) and min(leads) > _CLOCKS_AGREE
             self._advance(stamp - min(leads) if known else stamp)
             return
         self._advance(stamp)
         self._led.clear()
         if channel == WHEEL_ODOMETRY:
-            self._odometry_heard = True
+            self._odometry_received = True
             self._repeats.append(stamp == self._odometry and not whole)
             self._odometry = stamp
         newest = self._newest
@@ -105,7 +104,7 @@ class LagLearner:
         self._counts[channel] += 1
         if len(lags) < _MEMORY // 2 or self._counts[channel] % _LEARN_EVERY == 0:
             usual = sorted(lags)[int(_SHARE * (len(lags) - 1) + 0.5)]
-            self.learned[channel] = 0 if usual < SHORTEST_HOLD else round(_ROOM * usual)
+            self.learned[channel] = 0 if usual < SHORTEST_HOLD else round(_MARGIN * usual)
 
     def _advance(self, stamp: int) -> None:
         self.present = stamp if self.present is None else max(self.present, stamp)
@@ -115,11 +114,11 @@ class LagLearner:
         if self.fixed >= 0:
             return self.fixed
         if (
-            not self._odometry_heard
+            not self._odometry_received
             and self._first is not None
             and self.present is not None
             and self.present - self._first < 2 * LONGEST_HOLD
         ):
-            return LONGEST_HOLD  # it may be on its way
+            return LONGEST_HOLD  # wheel odometry may still be on its way
         in_parts = sum(self._repeats) > _IN_PARTS * len(self._repeats)
         return min(max(*self.learned.values(), int(in_parts)), LONGEST_HOLD)

@@ -1,11 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs in the order of their stamps, whatever the order of their arrival; which sets are due.
+"""Releases inputs in the order of their stamps, and decides which sets of estimates are due.
 
-An estimate for a stamp is by definition what the estimator gives when it runs through the log of
-inputs from the start of the run to that stamp. The timeline says when an input is released, when a
-set is due, and what becomes of inputs that come late. It runs nothing: who asks it runs through the
-log when a set is due, so that any number of late inputs between two sets costs one run.
+The estimates of a stamp are by definition those of a run through all inputs from the start of the
+run to that stamp. The timeline decides when an input is released, when a set is due, and what
+becomes of late inputs. It runs nothing itself: its caller runs the log up to each due set, so that
+any number of late inputs between two sets costs one run.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from wheel_terra_estimator.estimation.timing.input_log import InputLog
 
 GREATEST_LENGTH = 100_000
 """Inputs that the log holds at most, so that no publisher can fill the memory."""
-ALLOWANCE = 2.0  # [s] over which steps that are run again may be saved up
+ALLOWANCE = 2.0  # [s] over which an unused rate of repeated steps accumulates
 
 
 class Fate(Enum):
@@ -30,7 +30,7 @@ class Fate(Enum):
 
     IN_ORDER = 'in order'
     LATE = 'late'  # older than the state, fused at its own stamp
-    DEFERRED = 'deferred'  # late, waits until running again is affordable
+    DEFERRED = 'deferred'  # late, waits until the rate of repeated steps allows it
     TOO_OLD = 'too old'
     FULL = 'no room'
 
@@ -44,19 +44,19 @@ class TimeSettings:
     silence: int
     heartbeat: int  # period
     reference_period: int  # 0 = every reference velocity is used
-    rerun_rate: float = 0.0  # steps run again per second of stamps [Hz], 0 = any number
+    rerun_rate: float = 0.0  # repeated steps per second of stamps [Hz], 0 = any number
 
 
 class Due(NamedTuple):
-    """A set that is due; whoever gets it runs the log up to it before asking for the next."""
+    """A set that is due; the caller must run the log up to it before it asks for the next one."""
 
-    entry: int  # of the log
+    entry: int  # index in the log
     stamp: int  # [ns]
-    silent: bool  # there was no wheel odometry for `TimeSettings.silence`
+    silent: bool  # no wheel odometry for `TimeSettings.silence`
 
 
 class Timeline:
-    """Log of one run after the other, and the sets that are due.
+    """Release of the inputs of successive runs, and the sets that are due.
 
     ``log.entries[:released]`` may be used.
     """
@@ -80,13 +80,13 @@ class Timeline:
         self._odometry: int | None = None  # newest released stamp of wheel odometry
         self._intervals = 0, 0  # the last two between such stamps [ns]
         self._heartbeats = 0  # sets of the present silence
-        self._overdue = 0  # wheel odometry lags by so much more than is waited for [ns]
+        self._overdue = 0  # lag of wheel odometry beyond what is waited for [ns]
         self._deferred: list[tuple[int, Measurement]] = []
         self._newest: int | None = None
-        self._allowance = self.settings.rerun_rate * ALLOWANCE  # steps that may be run again now
+        self._allowance = self.settings.rerun_rate * ALLOWANCE  # steps that may be repeated now
 
     def end_run(self, *, keep_soil: bool) -> None:
-        """Let the next input begin a new run; soil and biases kept but widened, or forgotten."""
+        """Let the next input begin a new run; soil and biases kept or reset."""
         self._log.clear(keep_soil=keep_soil)
         self._clear()
 
@@ -96,10 +96,10 @@ class Timeline:
         self._allowance = min(self._allowance, settings.rerun_rate * ALLOWANCE)
 
     def insert(self, channel: int, measurement: Measurement) -> tuple[Fate, Due | None]:
-        """Put an input into the log; return its fate, and the set that it made due at once.
+        """Put an input into the log; return its fate, and a set that is due by it at once.
 
-        Such is wheel odometry that comes after younger inputs of other channels but is younger than
-        the last set.
+        The latter for wheel odometry older than inputs released before it but younger than the last
+        set.
         """
         stamp = measurement.stamp
         if self.is_too_old(stamp):
@@ -118,7 +118,7 @@ class Timeline:
     def advance(self, newest: int, hold: int = 0, overdue: int = 0) -> Iterator[Due]:
         """Release inputs up to `hold` before the newest stamp; yield the sets that became due.
 
-        `overdue` is by how much wheel odometry lags behind what is held back: no silence. All [ns].
+        `overdue`: lag of wheel odometry beyond `hold`, which does not count as silence. All [ns].
         """
         self._overdue = overdue
         if self._newest is None or newest > self._newest:
@@ -142,7 +142,7 @@ class Timeline:
         self.released -= due.entry + 1
 
     def is_too_old(self, stamp: int) -> bool:
-        """Whether an input of this stamp [ns] comes too late to be used."""
+        """Return whether an input of this stamp [ns] comes too late to be used."""
         state = self._state
         if state is None:
             return False
@@ -150,7 +150,7 @@ class Timeline:
 
     @property
     def slow_odometry(self) -> float:
-        """How often wheel odometry comes [s] where that is no silence; 0: it is one."""
+        """Period of wheel odometry that is slow rather than silent [s]; 0: it is silent."""
         every, settings = min(self._intervals), self.settings
         silent = (self._last_set or 0) - (self._odometry or 0)
         slow = every > 0.9 * settings.silence and silent < 2 * every
@@ -168,13 +168,13 @@ class Timeline:
             self.released += 1
         fate = Fate.LATE if state is not None and stamp < state else Fate.IN_ORDER
         if channel == WHEEL_ODOMETRY and index < self.released:
-            self._hear_odometry(stamp)
+            self._note_odometry(stamp)
             if self._set_is_due(stamp):
                 return fate, self._due(index)
         return fate, None
 
     def _insert_deferred(self, at_any_cost: bool = False) -> Iterator[Due]:
-        """Fuse what waited, all at once, as soon as running again for the oldest is affordable."""
+        """Insert all deferred inputs, as soon as the allowance covers the oldest of them."""
         if not self._deferred:
             return
         oldest = min(measurement.stamp for _, measurement in self._deferred)
@@ -201,9 +201,9 @@ class Timeline:
             self.released = index + 1
             self._state = entry.stamp
             if self._odometry is None:
-                self._hear_odometry(entry.stamp)  # silence counts from the start of the run
+                self._note_odometry(entry.stamp)  # silence counts from the start of the run
             if entry.parts[WHEEL_ODOMETRY] is not None:
-                self._hear_odometry(entry.stamp)
+                self._note_odometry(entry.stamp)
                 if self._set_is_due(entry.stamp):
                     yield self._due(index)
             elif self._heartbeat_is_due(entry.stamp):
@@ -212,7 +212,7 @@ class Timeline:
             self.released -= log.forget(self._state - self.settings.history)
 
     def _set_is_due(self, stamp: int) -> bool:
-        """Whether wheel odometry of this stamp is the first since a multiple of the period."""
+        """Return whether wheel odometry of this stamp is the first in a period of the sets."""
         last = self._last_set
         if last is None:
             return True
@@ -224,7 +224,7 @@ class Timeline:
         assert first is not None
         return self._log.grid.set_index(stamp - first) > self._log.grid.set_index(last - first)
 
-    def _hear_odometry(self, stamp: int) -> None:
+    def _note_odometry(self, stamp: int) -> None:
         if self._odometry is None or stamp > self._odometry:
             if self._odometry is not None:
                 self._intervals = self._intervals[1], stamp - self._odometry
@@ -232,7 +232,7 @@ class Timeline:
             self._heartbeats = 0
 
     def _heartbeat_is_due(self, stamp: int) -> bool:
-        """Whether the silence of wheel odometry makes this stamp one of a set."""
+        """Return whether, in a silence of wheel odometry, a set is due at this stamp."""
         assert self._odometry is not None
         silent = stamp - self._odometry - self.settings.silence - self._overdue
         if silent < 0:
@@ -242,7 +242,7 @@ class Timeline:
             return False
         period = self.settings.heartbeat
         if self._last_set is not None and stamp < self._last_set + 3 * period // 4:
-            return False  # wheel odometry came late, its sets were given already
+            return False  # wheel odometry was late, its sets have been given
         self._heartbeats = beat
         return True
 
