@@ -12,7 +12,7 @@ from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
-from wheel_terra_estimator.estimation.inputs.noise import SeenNoise, StatedNoise
+from wheel_terra_estimator.estimation.inputs.noise import ObservedNoise, StatedNoise
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     InertialVariance,
@@ -31,7 +31,7 @@ def sensors():
 
 @pytest.fixture
 def noise():
-    return SeenNoise(sensors())
+    return ObservedNoise(sensors())
 
 
 def read(noise, sensor, std, times, slope=0.0, messages=1):
@@ -40,7 +40,7 @@ def read(noise, sensor, std, times, slope=0.0, messages=1):
     for time in times:
         values = slope * time + std / np.sqrt(messages) * rng.normal(size=6)
         noise.read(sensor, float(time), tuple(values.tolist()))
-    return noise.seen(sensor)
+    return noise.observed(sensor)
 
 
 @pytest.mark.parametrize(
@@ -58,43 +58,43 @@ def test_noise_clearly_beyond_what_is_stated_is_taken_in_its_place(noise):
     stated, times = noise.stated['torque'], 0.1 * np.arange(400)
     for share, taken in ((0.5, False), (1.5, False), (4.0, True)):
         noise.reset()
-        seen = read(noise, 'torque', share * stated, times)
-        assert noise.variance('torque') == pytest.approx((seen if taken else stated) ** 2)
+        observed = read(noise, 'torque', share * stated, times)
+        assert noise.variance('torque') == pytest.approx((observed if taken else stated) ** 2)
     # A message that states more than is seen is believed.
     assert noise.variance('torque', 100.0 * stated**2) == 100.0 * stated**2
 
 
 def test_noise_that_nobody_stated_is_taken_as_it_is_seen():
     times, default = 0.1 * np.arange(400), sensors().torque_std
-    silent = SeenNoise(sensors(), given={'sensors.sinkage_std'})
+    silent = ObservedNoise(sensors(), given={'sensors.sinkage_std'})
     assert silent.variance('torque') == default**2
-    seen = read(silent, 'torque', 0.1 * default, times)
-    assert silent.variance('torque') == pytest.approx(seen**2)
-    assert seen == pytest.approx(0.1 * default, rel=0.1)
+    observed = read(silent, 'torque', 0.1 * default, times)
+    assert silent.variance('torque') == pytest.approx(observed**2)
+    assert observed == pytest.approx(0.1 * default, rel=0.1)
     read(silent, 'sinkage', 0.1 * silent.stated['sinkage'], times)
     assert silent.variance('sinkage') == silent.stated['sinkage'] ** 2
 
 
 def test_noise_that_messages_of_the_imu_state_is_told_as_stated():
-    noise, times = SeenNoise(sensors(), given=()), 0.1 * np.arange(400)
+    noise, times = ObservedNoise(sensors(), given=()), 0.1 * np.arange(400)
     by_imu = StatedNoise(angular_rate_std=0.0005)
-    seen = read(noise, 'gyro', 0.02, times)
+    observed = read(noise, 'gyro', 0.02, times)
     assert noise.report(by_imu)['gyro_noise_stated_rad_s'] == 0.0005
     words = noise.in_words(by_imu)
     assert list(words) == ['default']  # vibration is no fault
-    assert f'gyro noise {seen / 0.0005:.0f} times what is stated' in words['default']
+    assert f'gyro noise {observed / 0.0005:.0f} times what is stated' in words['default']
     assert '(covariance of imu/data, or sensors.angular_rate_std: ' in words['default']
 
 
 def test_what_nobody_stated_is_known_after_the_first_seconds():
     rng = np.random.default_rng(8)
-    told, silent = SeenNoise(sensors()), SeenNoise(sensors(), given=())
+    told, silent = ObservedNoise(sensors()), ObservedNoise(sensors(), given=())
     for i in range(120):
         odometry = WheelOdometry(0, np.full(6, 0.5), 3.0 + 0.02 * rng.normal(size=6))
         for noise in (told, silent):
-            noise.take(0.1 * i, StepInputs(wheel_odometry=odometry))
-    assert told.seen('torque') is None
-    assert silent.seen('torque') == pytest.approx(0.02, rel=0.1)
+            noise.update(0.1 * i, StepInputs(wheel_odometry=odometry))
+    assert told.observed('torque') is None
+    assert silent.observed('torque') == pytest.approx(0.02, rel=0.1)
 
 
 def test_steps_and_gaps_are_no_noise(noise):
@@ -104,7 +104,7 @@ def test_steps_and_gaps_are_no_noise(noise):
     for i, time in enumerate(times):
         value = 0.02 * (i // 100) + std * rng.normal()  # a wheel enters another rut
         noise.read('sinkage', float(time), (value, NAN))
-    assert noise.seen('sinkage') == pytest.approx(std, rel=0.3)
+    assert noise.observed('sinkage') == pytest.approx(std, rel=0.3)
     before = noise.state.channels['sinkage'].readings
     noise.read('sinkage', 100.0, (0.5, 0.5))
     assert noise.state.channels['sinkage'].readings == before
@@ -113,7 +113,7 @@ def test_steps_and_gaps_are_no_noise(noise):
 def compared(noise, innovations, variance, filter_variance, *stated):
     for i, innovation in enumerate(innovations):
         noise.compare_reference(float(i), innovation, variance, filter_variance, *stated)
-    return noise.seen('reference')
+    return noise.observed('reference')
 
 
 @pytest.mark.parametrize('factor', [0.5, 1.0, 4.0])
@@ -128,7 +128,7 @@ def test_the_noise_of_references_is_seen_beside_a_filter_that_follows_them(noise
         noise.compare_reference(float(i), innovation, R, P)
         mean += P / (P + R) * innovation
         P *= R / (P + R)
-    assert noise.seen('reference') == pytest.approx(factor * np.sqrt(R), rel=0.3)
+    assert noise.observed('reference') == pytest.approx(factor * np.sqrt(R), rel=0.3)
 
 
 def test_a_vibrating_rover_is_told_in_words(noise):
@@ -155,15 +155,15 @@ def test_wild_references_are_no_noise(noise, first):
         innovation = std * rng.normal() + (50.0 * std if i % 20 == first else 0.0)
         noise.compare_reference(float(i), innovation, std**2, 1e-6 * std**2, std**2)
         assert noise.variance('reference', std**2) == std**2
-    assert noise.seen('reference') == pytest.approx(std, rel=0.5)
+    assert noise.observed('reference') == pytest.approx(std, rel=0.5)
 
 
 @pytest.mark.parametrize(('share', 'told'), [(1.0, False), (0.1, True)])
 def test_a_reference_is_held_against_its_own_covariance(noise, share, told):
     std = 20.0 * noise.stated['reference']
     innovations = std * np.random.default_rng(7).normal(size=300)
-    seen = compared(noise, innovations, std**2, 1e-6 * std**2, (share * std) ** 2)
-    assert seen == pytest.approx(std, rel=0.3)
+    observed = compared(noise, innovations, std**2, 1e-6 * std**2, (share * std) ** 2)
+    assert observed == pytest.approx(std, rel=0.3)
     assert noise.report()['reference_noise_stated_m_s'] == pytest.approx(share * std)
     assert ('covariance of reference_odom' in noise.in_words().get('stated', '')) is told
     assert 'default' not in noise.in_words()

@@ -74,7 +74,7 @@ from wheel_terra_estimator.estimation.inputs.contact_sensors import (
     SinkageInput,
 )
 from wheel_terra_estimator.estimation.inputs.inertial import InertialInput, InertialWindow
-from wheel_terra_estimator.estimation.inputs.noise import NOTHING_STATED, SeenNoise, StatedNoise
+from wheel_terra_estimator.estimation.inputs.noise import NOTHING_STATED, ObservedNoise, StatedNoise
 from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge, WheelSlip
@@ -145,7 +145,7 @@ class WheelSoilEstimator:
         self._wheels = WheelOdometryInput(rover, sensors)
         self._sinkages = SinkageInput(rover.wheel_count)
         self._leaving_angles = LeavingAngleInput(rover.wheel_count)
-        self._noise = SeenNoise(sensors, given=configuration.stated)
+        self._noise = ObservedNoise(sensors, given=configuration.stated)
         # Wheels on the ground.
         self._steering = Steering(rover)
         self._turning = Turning(rover, sensors)
@@ -249,7 +249,7 @@ class WheelSoilEstimator:
 
     def _take(self, time: float, inputs: StepInputs) -> None:
         """Take in the measurements of a stamp, `time` [s] after the start of the run."""
-        self._noise.take(time, inputs)
+        self._noise.update(time, inputs)
         if inputs.inertial is not None:
             before = self._inertial.stated
             self._inertial.update(time, inputs.inertial, self._zero_velocity.state.zero)
@@ -550,13 +550,13 @@ class WheelSoilEstimator:
         slips = self._slips.update(time, rims, body)
         ekf = self._ekf
         sinkage = ekf.mean[self._layout.sinkage].tolist()
-        seen, onward = [], max(known(rims), key=abs, default=0.0)
+        motions, onward = [], max(known(rims), key=abs, default=0.0)
         stands = abs(onward) <= rover.rest_speed
         if stands:
             onward = self._contact_age.state.direction  # of the last drive, 0 before one
         for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
             limit, torque = rover.torque_limit[i], wheels.state.torque[i]
-            seen.append(
+            motions.append(
                 WheelMotion(
                     wheel.slip,
                     wheel.std,
@@ -574,7 +574,7 @@ class WheelSoilEstimator:
             RoverMotion(
                 present.speed,
                 self._reference.fresh(time),
-                tuple(seen),
+                tuple(motions),
                 turning=motion.lateral_motion > _SHARP_TURN
                 or sides_oppose(rims, body.headings.by_yaw_rate),
                 depth_read=self._depth_read(time),

@@ -1,11 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Noise of sensors: as an IMU's messages state it where no file does, and as it is seen.
+"""Noise of the sensors: as the messages of an IMU state it, and as it is observed.
 
-Three readings in step differ from a straight line by their noise and by how the quantity bends:
-x1 - 2 x2 + x3 has six times the variance of white noise, and hardly any of slow motion. A reference
-velocity is compared with the filter in place of a line: innovations of a slow state differ from one
-another by the noise of two references.
+The second difference x1 - 2 x2 + x3 of equally spaced readings has six times the variance of white
+noise, and hardly any part of a slow motion. Reference velocities are compared with the filter
+instead: successive innovations of a slow state differ by the noise of both references.
 """
 
 from __future__ import annotations
@@ -24,10 +23,9 @@ from wheel_terra_estimator.estimation.scalars import clipped
 _Range = tuple[float, float]
 
 KEYS = ('sensors.specific_force_std', 'sensors.angular_rate_std', 'sensors.orientation_std_deg')
-"""Where a file states each entry of `StatedNoise`."""
+"""Configuration key of each entry of `StatedNoise`."""
 _CREDIBLE: tuple[_Range, ...] = ((5e-5, 5.0), (1e-5, 0.3), (1e-4, 0.1))
-"""Least and greatest deviation of each that is no placeholder.
-
+"""Least and greatest credible deviation of each; anything else is a placeholder.
 Specific force [m/s^2]: a tactical-grade accelerometer resolves 7 micro-g in 1 Hz (Safran MS1002
 datasheet, 2016); rovers vibrate with up to 3 m/s^2. Angular rate [rad/s]: a fibre-optic gyro of
 0.012 deg/sqrt(h) at 10 Hz; sixty times the 0.005 of a common one. Orientation [rad]: 0.006 deg, as
@@ -36,7 +34,7 @@ of survey-grade systems; 6 deg, beyond which an inclination says nothing of the 
 
 
 def credible(variance: InertialVariance) -> InertialVariance:
-    """Return the variances without placeholders: 0 stands for what no sensor has."""
+    """Return the variances, with 0 (not stated) in place of placeholders."""
     kept = [
         value if least**2 <= value <= most**2 else 0.0
         for value, (least, most) in zip(variance, _CREDIBLE, strict=True)
@@ -45,14 +43,14 @@ def credible(variance: InertialVariance) -> InertialVariance:
 
 
 class StatedNoise(NamedTuple):
-    """Standard deviations that count in place of the defaults; 0 = that of ``sensors.*`` counts."""
+    """Standard deviations stated by messages; 0 = not stated, that of ``sensors.*`` is used."""
 
     specific_force_std: float = 0.0  # [m/s^2], per message
     angular_rate_std: float = 0.0  # [rad/s], per message
     orientation_std: float = 0.0  # roll and pitch [rad]
 
     def completed(self, variance: InertialVariance, given: Container[str]) -> StatedNoise:
-        """Return it with what a message states and neither a file nor a message before it did.
+        """Return it completed by a message, where neither a file nor an earlier message states it.
 
         `variance` holds no placeholders; `given` are the keys that a file states.
         """
@@ -65,39 +63,39 @@ class StatedNoise(NamedTuple):
 
 NOTHING_STATED = StatedNoise()
 
-_LINE = 6.0  # variance of x1 - 2 x2 + x3 over that of each
+_DIFFERENCE_FACTOR = 6.0  # variance of x1 - 2 x2 + x3 over that of each
 
-# How slowly it is learned, and within which bounds.
-_ONE_SECOND_IN = 4  # is learned from; the noise of sensors changes slowly
-_FIRST_SECONDS = 12.0  # of a run; of what nobody stated they are all learned from
-_READINGS = 200.0  # over which the mean goes
-_REFERENCES = 30.0
-_MOST_JUMP = 2.0
-"""Deviations of what is seen for which one reading counts at most: steps are no noise, and with
-four, one wild reading in 16 would raise it without end."""
-_WILD = 10.0
-"""Deviations of what is seen beyond which a reference is wild: no noise, and the gate's."""
-_IN_STEP = 0.2  # share by which two spacings of readings may differ
+# How fast the observed noise is learned, and within which bounds.
+_SECONDS_PER_SAMPLE = 4  # one second in four is used: the noise of sensors changes slowly
+_FIRST_SECONDS = 12.0  # of a run [s], all of which are used where nobody states the noise
+_READINGS = 200.0  # length of the running mean of the variance, in readings
+_REFERENCES = 30.0  # the same, in references
+_MOST_DEVIATIONS = 2.0
+"""Limit of one reading in that mean, over the observed deviation: steps are no noise. With a limit
+of four, one outlier in 16 readings would raise the mean without end."""
+_OUTLIER_DEVIATIONS = 10.0
+"""Observed deviations beyond which a reference is an outlier, left to the gate of the filter."""
+_IN_STEP = 0.2  # greatest relative difference of two equal spacings of readings
 _LONGEST_GAP = 0.5  # between readings that are compared [s]
-_LEAST_SHARE = 0.01  # of the stated deviation
+_LEAST_SHARE = 0.01  # bounds of the observed deviation, over the stated one
 _MOST_SHARE = 100.0
 _REPORTED_AFTER = 100  # readings before it is reported
-_TOLD_REFERENCES = 10
-_MUCH = 5.0  # times what is stated, to be said
-_FAR = 1000.0  # times what is stated, from which the figure means nothing more
-_CLEARLY = 2.0
-"""Times what is stated, to be taken in its place: less may be the motion's own."""
+_REPORTED_AFTER_REFERENCES = 10
+_FAULT_FACTOR = 5.0  # observed over stated deviation that is reported as a fault
+_MOST_FACTOR = 1000.0  # the same above which no figure is given
+_REPLACING_FACTOR = 2.0
+"""The same above which the observed one replaces the stated one; less may be motion."""
 
 
 class ChannelState(NamedTuple):
-    """One sensor: its last two readings, and the mean of what they scatter."""
+    """One sensor: its last two readings, and the running mean of its observed variance."""
 
     time: float = -math.inf  # of the last reading [s]
     gap: float = 0.0  # between the last two [s]
-    last: Floats = ()
-    before: Floats = ()
+    last: Floats = ()  # last reading, or last innovation and gain of a reference
+    before: Floats = ()  # the reading before it
     variance: float = 0.0
-    readings: int = 0
+    readings: int = 0  # in the mean
 
 
 class Sensor(NamedTuple):
@@ -121,38 +119,35 @@ SENSORS = {
     'sinkage': Sensor('sinkage_std', 'm', 'sinkage_rate'),
     'reference': Sensor('reference_std', 'm_s'),
 }
-"""The covariance of a reference's message comes before the key."""
+"""The covariance in a message of the reference precedes ``sensors.reference_std``."""
 _ALL = frozenset(sensor.key for sensor in SENSORS.values())
 
 
-class SeenNoiseState(NamedTuple):
-    """What was read of each sensor, and what the last reference states."""
+class ObservedNoiseState(NamedTuple):
+    """Memory of each sensor, and the deviation that the last reference states."""
 
     channels: Mapping[str, ChannelState] = dict.fromkeys(SENSORS, ChannelState())
     reference_stated: float = 0.0  # [m/s], 0 = nothing
 
 
-class SeenNoise(Component[SeenNoiseState]):
-    """Learns the noise of a message of each sensor; readings are means of those of a step.
+class ObservedNoise(Component[ObservedNoiseState]):
+    """Learns the noise of one message of each sensor from the merged readings of the steps.
 
-    `given` are the keys that somebody stated, as against defaults; all of them by default.
+    `given` are the configuration keys that a file states (not defaults); by default all of them.
     """
 
     def __init__(self, sensors: SensorFigures, given: Container[str] = _ALL) -> None:
-        super().__init__(SeenNoiseState())
+        super().__init__(ObservedNoiseState())
         self._figures = sensors
         self._defaults = {name for name, sensor in SENSORS.items() if sensor.key not in given}
         self.stated: dict[str, float] = {
             name: getattr(sensors, sensor.std) for name, sensor in SENSORS.items()
         }
 
-    def take(self, time: float, inputs: StepInputs) -> None:
-        """Take the readings of a step at a time [s]; one second in four is enough to learn from.
-
-        Of what nobody stated the first seconds are all learned from.
-        """
+    def update(self, time: float, inputs: StepInputs) -> None:
+        """Take the readings of a step at a time [s]."""
         skipped: Collection[str] = ()
-        if int(time) % _ONE_SECOND_IN:
+        if int(time) % _SECONDS_PER_SAMPLE:
             if time > _FIRST_SECONDS:
                 return
             skipped = SENSORS.keys() - self._defaults
@@ -176,17 +171,17 @@ class SeenNoise(Component[SeenNoiseState]):
         variance, count = state.variance, state.readings
         in_step = abs(gap - state.gap) <= _IN_STEP * gap <= _IN_STEP * _LONGEST_GAP
         if in_step and len(state.before) == len(values):
-            bends = [
+            differences = [
                 (a - 2.0 * b + c) ** 2
                 for a, b, c in zip(state.before, state.last, values, strict=True)
                 if not isnan(a + b + c)
             ]
-            if bends:
+            if differences:
                 # The mean of n messages has an n-th of their variance.
                 rate: float = getattr(self._figures, SENSORS[sensor].rate)
                 messages = max(gap * rate, 1.0)
-                seen = messages * sum(bends) / (_LINE * len(bends))
-                variance, count = self._mean(sensor, variance, count, seen, _READINGS)
+                observed = messages * sum(differences) / (_DIFFERENCE_FACTOR * len(differences))
+                variance, count = self._mean(sensor, variance, count, observed, _READINGS)
         self._keep(sensor, ChannelState(time, gap, values, state.last, variance, count))
 
     def compare_reference(
@@ -194,63 +189,62 @@ class SeenNoise(Component[SeenNoiseState]):
     ) -> None:
         """Take the innovation of a reference [m/s], its variance and that of the speed [(m/s)^2].
 
-        `stated` is the variance in the message [(m/s)^2]; none where it is not above 0. The speed
-        took over the share K = P / (P + R) of the innovation before, so that the difference of two
-        has the variance (1 + (1 + K)^2) R.
+        `stated` is the variance in the message [(m/s)^2], 0 or less = not stated. The speed was
+        corrected by the share K = P / (P + R) of the innovation before, so that the difference of
+        two has the variance (1 + (1 + K)^2) R.
         """
         state = self.state.channels['reference']
-        seen_variance, count = state.variance, state.readings
+        observed_variance, count = state.variance, state.readings
         if state.last:
             last, gain = state.last
-            seen = (innovation - last) ** 2 / (1.0 + (1.0 + gain) ** 2)
-            if seen <= _WILD**2 * max(seen_variance, variance):
-                seen_variance, count = self._mean(
-                    'reference', seen_variance, count, seen, _REFERENCES
+            observed = (innovation - last) ** 2 / (1.0 + (1.0 + gain) ** 2)
+            if observed <= _OUTLIER_DEVIATIONS**2 * max(observed_variance, variance):
+                observed_variance, count = self._mean(
+                    'reference', observed_variance, count, observed, _REFERENCES
                 )
         kept = (innovation, P / (P + variance))
-        self._keep('reference', ChannelState(time, 0.0, kept, (), seen_variance, count))
+        self._keep('reference', ChannelState(time, 0.0, kept, (), observed_variance, count))
         own = math.sqrt(stated) if stated > 0.0 else 0.0
         self.state = self.state._replace(reference_stated=own)
 
     def _mean(
-        self, sensor: str, variance: float, count: int, seen: float, length: float
+        self, sensor: str, variance: float, count: int, observed: float, length: float
     ) -> tuple[float, int]:
         stated = self.stated[sensor] ** 2
-        if count and seen > _MOST_JUMP**2 * max(variance, stated):
-            # Louder for good is learned, a little at a time; a step is not.
-            seen = _MOST_JUMP**2 * max(variance, stated)
+        if count and observed > _MOST_DEVIATIONS**2 * max(variance, stated):
+            # A lasting increase is learned step by step; a single step of the reading is not.
+            observed = _MOST_DEVIATIONS**2 * max(variance, stated)
         count += 1
-        variance += (seen - variance) / min(count, length)
+        variance += (observed - variance) / min(count, length)
         low, high = _LEAST_SHARE**2 * stated, _MOST_SHARE**2 * stated
         return clipped(variance, low, high), count
 
     def _keep(self, sensor: str, channel: ChannelState) -> None:
         self.state = self.state._replace(channels={**self.state.channels, sensor: channel})
 
-    def seen(self, sensor: str) -> float | None:
-        """Return the deviation of one message as seen; None while too few came."""
+    def observed(self, sensor: str) -> float | None:
+        """Return the observed deviation of one message; None after too few readings."""
         state = self.state.channels[sensor]
-        least = _TOLD_REFERENCES if sensor == 'reference' else _REPORTED_AFTER
+        least = _REPORTED_AFTER_REFERENCES if sensor == 'reference' else _REPORTED_AFTER
         return math.sqrt(state.variance) if state.readings >= least else None
 
     def variance(self, sensor: str, stated: float | None = None) -> float:
-        """Return the variance of one message: as stated, or as seen where that is clearly more.
+        """Return the variance of one message: as stated, or as observed where that is clearly more.
 
-        Where nobody stated one, as seen once it is; the default before. `stated` is that of the
-        message itself, where it states one.
+        Where no file states it, as observed, and the default until then. `stated` is the variance
+        in the message itself, where it holds one.
         """
-        seen = self.seen(sensor) or 0.0
+        observed = self.observed(sensor) or 0.0
         if stated is None:
             stated = self.stated[sensor] ** 2
-            if seen and sensor in self._defaults:
-                return seen**2
-        return seen**2 if seen**2 > _CLEARLY**2 * stated else stated
+            if observed and sensor in self._defaults:
+                return observed**2
+        return observed**2 if observed**2 > _REPLACING_FACTOR**2 * stated else stated
 
     def _stated(self, sensor: str, by_imu: StatedNoise) -> tuple[float, bool, bool]:
-        """Return the deviation of a message as stated; by the message, and whether more is a fault.
+        """Return the stated deviation, whether a message states it, and whether more is a fault.
 
-        The message of an IMU states what its sensors have at rest: a rover that vibrates is no
-        fault of anybody.
+        The messages of an IMU state its noise at rest: the vibration of a rover is no fault.
         """
         own = {
             'reference': self.state.reference_stated,
@@ -262,38 +256,42 @@ class SeenNoise(Component[SeenNoiseState]):
         return self.stated[sensor], False, sensor not in self._defaults
 
     def report(self, by_imu: StatedNoise = NOTHING_STATED) -> dict[str, float]:
-        """Return stated and seen noise by key, with the unit at its end.
+        """Return stated and observed noise by key, with the unit at its end.
 
         `by_imu` is what the messages of the IMU state, where no file does.
         """
         found = {}
         for name, sensor in SENSORS.items():
-            seen = self.seen(name)
-            if seen is not None:
+            observed = self.observed(name)
+            if observed is not None:
                 stated, _, _ = self._stated(name, by_imu)
                 found[f'{name}_noise_stated_{sensor.unit}'] = float(f'{stated:.3g}')
-                found[f'{name}_noise_seen_{sensor.unit}'] = float(f'{seen:.3g}')
+                found[f'{name}_noise_seen_{sensor.unit}'] = float(f'{observed:.3g}')
         return found
 
     def in_words(self, by_imu: StatedNoise = NOTHING_STATED) -> dict[str, str]:
-        """Return what is much noisier than stated, and than a default; empty where nothing is.
+        """Return messages on sensors much noisier than stated, and than a default, by these words.
 
-        An IMU that is noisier than its messages state is among the latter.
+        An IMU that is noisier than its messages state counts among the latter.
         """
         words: dict[str, list[str]] = {'stated': [], 'default': []}
         for name, sensor in SENSORS.items():
-            seen = self.seen(name)
-            if seen is None:
+            observed = self.observed(name)
+            if observed is None:
                 continue
             stated, by_message, binding = self._stated(name, by_imu)
-            if 0.0 < _MUCH * stated < seen:
+            if 0.0 < _FAULT_FACTOR * stated < observed:
                 where = sensor.key
                 if by_message:
                     where = _BY_MESSAGE.get(name, f'covariance of imu/data, or {sensor.key}')
-                times = f'{seen / stated:.0f}' if seen < _FAR * stated else f'over {_FAR:.0f}'
+                times = (
+                    f'{observed / stated:.0f}'
+                    if observed < _MOST_FACTOR * stated
+                    else f'over {_MOST_FACTOR:.0f}'
+                )
                 than = 'what is stated' if binding or by_message else 'the default'
                 words['stated' if binding else 'default'].append(
-                    f'{name.replace("_", " ")} noise {times} times {than} ({where}: {seen:.2g})'
+                    f'{name.replace("_", " ")} noise {times} times {than} ({where}: {observed:.2g})'
                 )
         return {than: '; '.join(found) for than, found in words.items() if found}
 
