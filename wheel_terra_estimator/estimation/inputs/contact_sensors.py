@@ -43,12 +43,11 @@ class SinkageInput(Component[SinkageSums]):
         return sums
 
 
-# Smoothing of the rear cameras' angles.
-_GAIN = 0.3  # per reading
+_GAIN = 0.3  # of the smoothed leaving angle, per reading [-]
 SMOOTHED_NOISE = math.sqrt(_GAIN / (2.0 - _GAIN))
 """Deviation of a smoothed leaving angle over that of one reading [-]."""
 _LONGEST_AGE = 1.0
-"""An older angle [s] is forgotten: half a wheel's turn of a slow rover."""
+"""Age up to which an angle is used [s]: half a turn of a slow rover's wheel."""
 
 
 class LeavingAngleState(NamedTuple):
@@ -76,7 +75,7 @@ class LeavingAngleInput(Component[LeavingAngleState]):
         self.state = LeavingAngleState(tuple(angle), tuple(when))
 
     def angles(self, time: float) -> Floats:
-        """Return the leaving angle of each wheel [rad]; nan where there is none of late."""
+        """Return the leaving angle of each wheel [rad]; nan where none is recent."""
         state, longest = self.state, _LONGEST_AGE
         if time - max(state.time) >= longest:
             return self._unknown

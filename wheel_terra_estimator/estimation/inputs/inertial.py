@@ -15,14 +15,13 @@ from wheel_terra_estimator.estimation.inputs.noise import KEYS, NOTHING_STATED, 
 from wheel_terra_estimator.estimation.measurements import InertialReading
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of
 
-# Times of the IMU.
 _LONGEST_GAP = 0.25
-"""Time over which one reading is held [s]; a longer gap is not integrated over."""
+"""Longest time between two readings that is integrated over [s]."""
 _NOISE_TIME = 2.0
-"""Time constant with which the seen noise of the accelerometer is smoothed [s]."""
+"""Time constant of the observed noise of the accelerometer [s]."""
 _LEVELLING_TIME = 5.0
-"""Time constant with which an attitude without orientation follows the specific force [s]: a
-rover's mean acceleration over longer than a start or a stop is nothing."""
+"""Time constant with which an attitude without orientation follows the specific force [s]: over
+longer than a start or a stop the mean acceleration of a rover vanishes."""
 
 
 class GyroZero(NamedTuple):
@@ -45,21 +44,21 @@ class InertialWindow(NamedTuple):
     speed_change: float = 0.0  # integral of f_x - g_x [m/s]
     duration: float = 0.0  # [s] covered by that integral
     noise_density: float = 0.0
-    """Square of the white noise density that f_x - g_x is seen to have, with vibration and what
-    the attitude adds [(m/s^2)^2 s]."""
+    """Observed power spectral density of f_x - g_x, with vibration and noise of the attitude
+    [(m/s^2)^2 s]."""
     stated: StatedNoise = NOTHING_STATED
-    """What the messages state of their noise, where no file does."""
+    """Noise that the messages state, where no file does."""
 
     def mean_force(self) -> tuple[float, float, float]:
-        """Return the mean specific force [m/s^2]; `has_force` holds."""
+        """Return the mean specific force [m/s^2]; only where `has_force` holds."""
         n = self.readings
         if not n and self.gravity is not None:
             return self.gravity
         return self.force_x / n, self.force_y / n, self.force_z / n
 
     gravity: tuple[float, float, float] | None = None
-    """What the accelerometer of a rover at rest would read by the reported orientation [m/s^2];
-    None unless there is an orientation and no accelerometer."""
+    """Specific force at rest by the reported orientation [m/s^2]; None unless there is an
+    orientation and no accelerometer."""
 
     @property
     def has_force(self) -> bool:
@@ -72,11 +71,11 @@ class Attitude(NamedTuple):
 
     sine_up: float = 0.0  # g_x / g: sine of the body's slope, nose up positive
     known: bool = False
-    reported: bool = False  # by the IMU, else from gyro and specific force
+    reported: bool = False  # by the IMU; else from gyro and specific force
 
 
 class InertialState(NamedTuple):
-    """What is kept of the IMU."""
+    """Memory of the IMU readings."""
 
     time: float = -math.inf  # of the last message [s]
     force_time: float = -math.inf  # of the last specific force
@@ -87,9 +86,9 @@ class InertialState(NamedTuple):
 
 
 class InertialInput(Component[InertialState]):
-    """Sums IMU readings; knows the body's slope, with or without a reported orientation.
+    """Sums IMU readings; tracks the body's slope, with or without a reported orientation.
 
-    `given` are the keys that a file states, as against defaults; all of them by default.
+    `given` are the configuration keys that a file states (not defaults); by default all of them.
     """
 
     def __init__(self, gravity: float, given: Container[str] = frozenset(KEYS)) -> None:
@@ -99,11 +98,11 @@ class InertialInput(Component[InertialState]):
 
     @property
     def stated(self) -> StatedNoise:
-        """What the messages state of their noise, where no file does."""
+        """Noise that the messages state, where no file does."""
         return self.state.window.stated
 
     def keep_stated(self, stated: StatedNoise) -> None:
-        """Go on with what messages stated in an old run."""
+        """Begin with the noise that messages stated in an earlier run."""
         self.state = InertialState(window=InertialWindow(stated=stated))
 
     def update(self, time: float, reading: InertialReading, zero: GyroZero) -> None:
@@ -132,10 +131,10 @@ class InertialInput(Component[InertialState]):
             speed_change, duration = window.speed_change, window.duration
             noise = window.noise_density
             if 0.0 < since <= _LONGEST_GAP:
-                # Readings of a white noise differ by twice its variance; times dt it is a density,
-                # the same for raw readings and for means of several.
-                seen = 0.5 * change**2 * since
-                noise += gain_of(since, _NOISE_TIME) * (seen - noise)
+                # The difference of two readings has twice the variance of white noise; times dt it
+                # is a density, the same for raw readings and for means of several.
+                density = 0.5 * change**2 * since
+                noise += gain_of(since, _NOISE_TIME) * (density - noise)
                 speed_change += acceleration * since
                 duration += since
             window = window._replace(
@@ -148,11 +147,11 @@ class InertialInput(Component[InertialState]):
                 noise_density=noise,
             )
         elif reading.orientation is not None:
-            window = window._replace(gravity=self._at_rest(reading.orientation))
+            window = window._replace(gravity=self._gravity_in_body(reading.orientation))
         self.state = InertialState(time, force_time, rate_time, window, attitude, last)
 
-    def _at_rest(self, orientation: FloatArray) -> tuple[float, float, float]:
-        """Return the specific force of a rover that stands with this orientation [m/s^2]."""
+    def _gravity_in_body(self, orientation: FloatArray) -> tuple[float, float, float]:
+        """Return the specific force of a rover at rest with this orientation [m/s^2]."""
         x, y, z, w = orientation.tolist()
         g = self._gravity
         return 2.0 * (x * z - w * y) * g, 2.0 * (y * z + w * x) * g, (1 - 2 * (x * x + y * y)) * g
@@ -169,8 +168,8 @@ class InertialInput(Component[InertialState]):
     ) -> Attitude:
         """Return the attitude after a reading that came `dt` [s] after the last one.
 
-        Without an orientation it follows the gyro, its `zero` [rad/s] taken off, and is pulled to
-        the specific force: right on average.
+        Without an orientation: complementary filter of the gyro, less its `zero` [rad/s], and the
+        specific force.
         """
         if reading.orientation is not None:
             x, y, z, w = reading.orientation.tolist()

@@ -14,32 +14,29 @@ from wheel_terra_estimator.estimation.measurements import WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN
 
-# Times of the wheel odometry.
 _SMOOTHING_TIME = 0.05
-"""Time constant of the rim speeds [s]: fast odometry is noisy or quantised; less than any use
-of the rim speed needs."""
+"""Time constant of the rim speeds [s], since fast odometry is noisy or quantised."""
 _LONGEST_SMOOTHED = 0.06
-"""A wheel whose messages come this slowly [s between messages] is not smoothed."""
-_SLOPE_GAIN = 0.5  # smoothing of the rim speeds' rate of change, per message
-_LONGEST_CARRIED = 0.15
-"""Time [s] over which a rim speed is carried on at its rate of change: over the lag of its
-smoothing, and to a stamp between two messages."""
+"""Time between messages from which on rim speeds are not smoothed [s]."""
+_SLOPE_GAIN = 0.5  # smoothing of the rim speeds' rate of change, per message [-]
+_LONGEST_EXTRAPOLATED = 0.15
+"""Longest extrapolation of a rim speed [s]: over the lag of its smoothing, and to a stamp between
+two messages."""
 _LONGEST_GAP = 0.3  # between messages from which a rate of change is taken [s]
-_SLOPE_NOISE = 3.0  # deviations of the rates within which a rim speed is constant
-_TORQUE_AGE = 2.0
-"""A torque that is no older [s] counts as known."""
+_SLOPE_NOISE = 3.0  # deviations of the rates within which a rim speed counts as constant
+_TORQUE_AGE = 2.0  # up to which a torque counts as known [s]
 
 
 class WheelOdometryState(NamedTuple):
-    """What is kept of the wheel odometry; one entry per wheel."""
+    """Memory of the wheel odometry; tuples have one entry per wheel."""
 
     time: float  # of the last message [s], -inf = none yet
     rim_speed: Floats  # [m/s], nan = never known
     rate_time: Floats  # [s]
     rim_slope: Floats  # rate of change of the rim speeds, smoothed [m/s^2]
-    lag: Floats  # by which the smoothed rim speeds are behind the readings [s]
-    torque_time: float
-    torque_sum: Floats  # since the last cycle
+    lag: Floats  # of the smoothed rim speeds behind the readings [s]
+    torque_time: float  # of the last torque [s]
+    torque_sum: Floats  # since the last cycle [N m]
     torque_count: tuple[int, ...]
     torque: Floats  # mean of the last cycle that had one [N m], nan = never known
 
@@ -64,7 +61,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         super().__init__(start)
         self._radius = rover.slip_radius
         self._silence = rover.silence
-        # A constant rim speed whose readings scatter seems to change by this much a second.
+        # Apparent rate of change of a constant rim speed by the scatter of its readings.
         noise = _SLOPE_NOISE * sensors.wheel_rate_std * max(rover.slip_radius)
         self._least_slope = noise / _SMOOTHING_TIME
 
@@ -108,7 +105,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         )
 
     def take_torque(self) -> Floats:
-        """Return the mean torque of each wheel since the last call, nan = none came."""
+        """Return the mean torque of each wheel since the last call [N m], nan = none came."""
         state = self.state
         n = len(state.torque)
         mean = tuple(
@@ -130,14 +127,14 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         each = zip(state.rim_speed, state.rim_slope, state.rate_time, state.lag, strict=True)
         return tuple(
             [
-                self._carried(rim, slope, time - when + lag) if time - when <= silence else NAN
+                self._extrapolated(rim, slope, time - when + lag) if time - when <= silence else NAN
                 for rim, slope, when, lag in each
             ]
         )
 
-    def _carried(self, rim: float, slope: float, age: float) -> float:
+    def _extrapolated(self, rim: float, slope: float, age: float) -> float:
         """Return a rim speed extrapolated over its age [s], to compensate the lag of smoothing."""
-        if abs(slope) <= self._least_slope or age > _LONGEST_CARRIED:
+        if abs(slope) <= self._least_slope or age > _LONGEST_EXTRAPOLATED:
             return rim
         return rim + slope * age
 
@@ -146,9 +143,9 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         return max((abs(rim) for rim in self.state.rim_speed if not isnan(rim)), default=0.0)
 
     def silent(self, time: float) -> bool:
-        """Say whether no message came for longer than ``filter.silence``."""
+        """Return whether no message came for longer than ``filter.silence``."""
         return time - self.state.time > self._silence
 
     def torque_known(self, time: float) -> bool:
-        """Say whether a torque was read of late."""
+        """Return whether a torque was read within `_TORQUE_AGE`."""
         return time - self.state.torque_time < _TORQUE_AGE
