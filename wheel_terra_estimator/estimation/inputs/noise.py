@@ -284,11 +284,8 @@ class ObservedNoise(Component[ObservedNoiseState]):
                 where = sensor.key
                 if by_message:
                     where = _BY_MESSAGE.get(name, f'covariance of imu/data, or {sensor.key}')
-                times = (
-                    f'{observed / stated:.0f}'
-                    if observed < _MOST_FACTOR * stated
-                    else f'over {_MOST_FACTOR:.0f}'
-                )
+                limited = f'over {_MOST_FACTOR:.0f}'
+                times = f'{observed / stated:.0f}' if observed < _MOST_FACTOR * stated else limited
                 than = 'what is stated' if binding or by_message else 'the default'
                 words['stated' if binding else 'default'].append(
                     f'{name.replace("_", " ")} noise {times} times {than} ({where}: {observed:.2g})'

@@ -23,8 +23,8 @@ from wheel_terra_estimator.estimation.smoothing.history_buffer import (
 )
 
 _LEAST_PIVOT = 1e-7
-"""Square root of the least share of a variance that the other entries leave open: below it the
-inverse of a covariance is rounding."""
+"""Least pivot of the Cholesky factor of a correlation matrix [-]: with a smaller one its inverse is
+lost in rounding."""
 
 
 def smoothed_before(
@@ -32,8 +32,8 @@ def smoothed_before(
 ) -> Gaussian:
     """Return the smoothed state before a transition of the forward pass, within bounds (size,).
 
-    `later` is the smoothed state after it, None where nothing is known of what came later. Where
-    the covariance cannot be inverted the filter's own state is returned.
+    `later` is the smoothed state after it, None at a cut. Where the covariance cannot be inverted
+    the filter's own state is returned.
     """
     before, F, after = transition
     if later is None:
@@ -61,7 +61,7 @@ def smoothed_states(
 ) -> Iterator[Gaussian | None]:
     """Yield the smoothed state at each position of a buffer, the last one (its length) first.
 
-    None where the filter was started anew and nothing is known of what came after.
+    None before a restart of the filter.
     """
     state = buffer.end
     yield state

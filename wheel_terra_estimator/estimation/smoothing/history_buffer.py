@@ -2,15 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the forward pass of the estimator keeps for the backward pass.
 
-The filter changes its state in four ways, and each is one thing to a smoother:
+* A prediction, a covariance inflation (process noise) and a reset of one entry (its row of the
+  transition matrix is zero) are transitions: mean and covariance before and after, and F are kept.
+* Of a measurement update nothing is kept: the backward pass needs its result alone, which is the
+  state before the next transition.
+* A restart of the filter is a cut: nothing is carried back over it.
 
-* a prediction, a widening (process noise by another name) and an entry that is set (its row of the
-  transition matrix is zero) are transitions: mean and covariance before and after, and F;
-* a measurement changes what is known of the state and not the state: nothing is kept;
-* a start anew is a cut, over which nothing of the future is carried back.
-
-So the prediction on the buffer is exactly what the next update started from. Of a covariance one
-triangle is kept, of F what differs from no change.
+Of a covariance one triangle is kept, of F the entries that differ from the identity.
 """
 
 from __future__ import annotations
@@ -29,21 +27,21 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.errors import UserError
 
 Item = TypeVar('Item')
-LASTING = Path('/var/tmp')
-"""Where temporary files may be large: on many systems /tmp lies in memory."""
+LARGE_FILES = Path('/var/tmp')
+"""Folder for large temporary files: on many systems /tmp lies in memory."""
 
 
 class DiskBuffer(Generic[Item]):
     """A list in a temporary file, so that a long drive does not fill the memory.
 
-    Items are in the order in which they were added; only their places are in memory.
-    The file has no name and goes away with the object. It lies in the folder that the environment
-    variable ``TMPDIR`` names, else in ``/var/tmp`` where there is one.
+    Items are in the order in which they were added; only their positions are in memory. The file is
+    deleted with the object. It lies in the folder that the environment variable ``TMPDIR`` names,
+    else in ``/var/tmp`` where there is one.
     """
 
     def __init__(self) -> None:
-        lasting = LASTING if not os.environ.get('TMPDIR') and LASTING.is_dir() else None
-        self._file = tempfile.TemporaryFile(dir=lasting)  # noqa: SIM115 - closed with the object
+        folder = LARGE_FILES if not os.environ.get('TMPDIR') and LARGE_FILES.is_dir() else None
+        self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - closed with the object
         weakref.finalize(self, self._file.close)
         self._places = array('q', [0])  # where each item begins, and where the next one will
         self._at_end = True
@@ -98,7 +96,7 @@ class Gaussian(NamedTuple):
 
 
 class Transition(NamedTuple):
-    """A step of the state: x' = F x + ... + noise, to first order."""
+    """A change of the state, linearised: x' = F x + constant + noise."""
 
     before: Gaussian
     F: FloatArray  # (size, size)
@@ -106,7 +104,7 @@ class Transition(NamedTuple):
 
 
 class Mark(NamedTuple):
-    """An item of the forward pass that is recomputed from the smoothed state."""
+    """Inputs of the forward pass whose outputs are recomputed from the smoothed state."""
 
     position: int  # transitions before it
     content: Any
@@ -115,8 +113,8 @@ class Mark(NamedTuple):
 class HistoryBuffer:
     """Transitions and marks of a drive in the order of their stamps.
 
-    It is a part of the estimator like any other: where the estimator goes back to an earlier state
-    for a late input, the buffer is wound back with it.
+    Like a component of the estimator it has snapshots: where the estimator returns to an earlier
+    state for a late input, the buffer is truncated to that state.
     """
 
     def __init__(self) -> None:
@@ -150,7 +148,7 @@ class HistoryBuffer:
         return Transition(unpacked((mean, triangle)), F, unpacked((mean_after, triangle_after)))
 
     def mark(self, content: Any, present: Gaussian) -> None:
-        """Keep something that belongs to the present state."""
+        """Keep inputs that belong to the present state."""
         position = len(self)
         self.marks.append(Mark(position, content))
         self._end = position, Gaussian(present.mean.copy(), present.covariance.copy())
@@ -165,14 +163,14 @@ class HistoryBuffer:
     # -- Part of the estimator -------------------------------------------------------------------
 
     def reset(self) -> None:
-        """Leave everything: a new run of the same recording goes on behind the cut."""
+        """Keep everything: a new run of the same recording follows after the cut."""
 
     def snapshot(self) -> tuple[int, int]:
-        """Return how far the buffer is: transitions and marks."""
+        """Return the numbers of transitions and marks."""
         return len(self), len(self.marks)
 
     def restore(self, snapshot: tuple[int, int]) -> None:
-        """Wind the buffer back."""
+        """Truncate the buffer to a snapshot."""
         self._transitions.truncate(snapshot[0])
         self.marks.truncate(snapshot[1])
 

@@ -1,17 +1,16 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The estimates of a whole drive once it is over.
+"""Smoothed estimates of a whole drive.
 
-The forward pass is the estimator itself. What follows from the state is worked out anew from the
-smoothed one by the very parts that the estimator has. What warns of things to come (stuck warning,
-its probability and times, rim travel left, pull margin, the words beside them) stays the filter's:
-a warning of the past is of no use, and what was warned of when is what the recording is asked
-about. So do the normal loads, which follow from attitude and specific force alone, and the rates of
-sinkage. Where the filter does not judge a wheel (class unknown), the smoother does not either.
+The forward pass is the estimator itself. Its own components then compute the outputs again from the
+smoothed states. Warnings (stuck warning, its probability and times, rim travel left, pull margin
+and their reasons) stay those of the filter, because a recording is asked what was warned of when.
+So do the normal loads, which follow from attitude and specific force alone, and the rates of
+sinkage. Where the filter gives a wheel no class, the smoother does not either.
 
-Pulls: the errors of the shear model have a short memory, and what the future says of them is worth
-less than what the filter has learned of them from the torques. They stay the filter's; and two
-estimates that err differently are best taken together, so the mean of both pulls is published.
+Pulls: the errors of the shear model have a short memory, so that later readings say less of them
+than the torques of the moment. They stay those of the filter, and the mean of filtered and smoothed
+pull is published, since the two err differently.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ from wheel_terra_estimator.estimation.smoothing.history_buffer import (
 from wheel_terra_estimator.estimation.smoothing.window import Moment, centred
 from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant, WheelSoilEstimator
 
-_OF_THE_FILTER = (
+_FILTERED_FIELDS = (
     'stuck',
     'stuck_direction',
     'stuck_confirmed',
@@ -65,16 +64,14 @@ _OF_THE_FILTER = (
     'reasons',
     'faults',
 )
-"""Fields of a set that stay the filter's."""
-
-
-# Tuned on simulated drives of both worlds, seeds 1021 to 1024 and 2180.
-_LEAST_SHARE = 0.9
-"""Of the filter's deviation of a speed: model errors do not average out as noise does."""
+"""Fields of a set that stay those of the filter."""
+_LEAST_STD_SHARE = 0.9
+"""Least deviation of a smoothed speed over the filter's [-]: model errors do not average out.
+Tuned on drives of simulators A and B, seeds 1021 to 1024 and 2180."""
 
 
 class Kept(NamedTuple):
-    """A set of the filter, and what else came with it."""
+    """A set of the filter, and what its caller wants back with the smoothed one."""
 
     estimates: EstimateSet
     companion: Any
@@ -105,29 +102,29 @@ class DriveSmoother:
         self._kept: DiskBuffer[Kept] = DiskBuffer()
 
     def keep(self, estimates: EstimateSet, companion: Any = None) -> None:
-        """Keep a set of the filter, with anything that is to come back beside the smoothed one."""
+        """Keep a set of the filter; `companion` is returned with the smoothed one."""
         self._kept.append(Kept(estimates, companion))
 
     def sets(self) -> Iterator[Kept]:
         """Yield the smoothed sets in the order of those that were kept, with their companions.
 
-        A set of the filter is given as it is where there is nothing to smooth.
+        Where there is nothing to smooth the set of the filter is returned.
         """
-        parts = _Judges(self._configuration)
+        parts = _SmoothedOutputs(self._configuration)
         guard = OutputGuard(self._configuration)
         classes, last = PublishedClasses(self._configuration), 0
         for kept, moment in centred(self._moments(parts)):
             estimates = kept.estimates
             if moment is not None:
-                judged = parts.judge(moment, estimates)
-                estimates = guard.repaired(judged.stamp, judged)[0]
+                smoothed = parts.estimates_at(moment, estimates)
+                estimates = guard.repaired(smoothed.stamp, smoothed)[0]
             if estimates.stamp < last:  # the clock stepped back
                 classes.reset()
             last = estimates.stamp
             yield Kept(classes.follow(estimates), kept.companion)
 
-    def _moments(self, parts: _Judges) -> Iterator[tuple[Kept, Moment | None]]:
-        """Yield each set that was kept with what is smoothed of its instant."""
+    def _moments(self, parts: _SmoothedOutputs) -> Iterator[tuple[Kept, Moment | None]]:
+        """Yield each set that was kept with the smoothed quantities of its instant."""
         moments = self._smoothed(parts)
         place, key = _Key(), _Key()
         moment: Moment | None = None
@@ -140,13 +137,13 @@ class DriveSmoother:
                     break
                 place = place.next(moment.instant.sources.stamp)
             if moment is not None and place == key:
-                half = tuple((0.5 * (moment.pull + kept.estimates.drawbar_pull)).tolist())
-                yield kept, moment._replace(pull=np.array(half))
+                pull = 0.5 * (moment.pull + kept.estimates.drawbar_pull)
+                yield kept, moment._replace(pull=pull)
             else:
                 yield kept, None
 
-    def _smoothed(self, parts: _Judges) -> Iterator[Moment]:
-        """Yield what follows from the smoothed state at each instant of the buffer."""
+    def _smoothed(self, parts: _SmoothedOutputs) -> Iterator[Moment]:
+        """Yield the smoothed quantities at each instant of the buffer, in order of time."""
         buffer = self._buffer
         backwards: DiskBuffer[tuple[FloatArray, FloatArray] | None] = DiskBuffer()
         for state in smoothed_states(buffer, *self.estimator.bounds):
@@ -167,8 +164,8 @@ class DriveSmoother:
                 parts.follow_pulls(evidence, filtered, now)
 
 
-class _Judges:
-    """What the estimator makes of its state, run once more over the smoothed one."""
+class _SmoothedOutputs:
+    """The components of the estimator that compute outputs from a state, for the smoothed one."""
 
     def __init__(self, configuration: Configuration) -> None:
         self._rover = rover = Rover.from_configuration(configuration)
@@ -180,15 +177,15 @@ class _Judges:
         self._outputs = Outputs(configuration, rover, sensors, layout)
 
     def follow_pulls(self, evidence: PullEvidence, filtered: FloatArray, now: Gaussian) -> None:
-        """Work out the pulls of a cycle; errors of the shear model stay those of the filter."""
+        """Compute the pulls of a cycle; the errors of the shear model stay those of the filter."""
         mean, own = now.mean.copy(), self._layout.shear_error
         mean[own] = filtered[own]
         tilt = rut_tilt(self._rover, self._layout, mean)
         self._pulls.update(mean, now.covariance, evidence, tilt=tilt)
 
     def moment(self, instant: Instant, now: Gaussian) -> Moment:
-        """Return what is smoothed of an instant."""
-        # Between two cycles the speed is extrapolated from the state, and so is its correction.
+        """Return the smoothed quantities of an instant."""
+        # The smoothed correction at the last cycle also holds for the speed extrapolated from it.
         given = instant.sources
         speed = given.speed + float(now.mean[SPEED]) - instant.cycle.speed
         carried = max(given.speed_variance - instant.cycle.variance, 0.0)
@@ -197,7 +194,7 @@ class _Judges:
             speed, variance = pooled(SpeedAndVariance(speed, variance), instant.usual)
         rims = known(given.rims)
         typical = sum(map(abs, rims)) / len(given.rims)
-        least = max(typical * LEAST_SLIP_STD, _LEAST_SHARE * instant.motion.speed_std)
+        least = max(typical * LEAST_SLIP_STD, _LEAST_STD_SHARE * instant.motion.speed_std)
         return Moment(
             instant,
             now,
@@ -208,8 +205,8 @@ class _Judges:
             np.array(self._pulls.state.pull),
         )
 
-    def judge(self, moment: Moment, live: EstimateSet) -> EstimateSet:
-        """Return the estimates of a moment; `live` is what the filter said of it."""
+    def estimates_at(self, moment: Moment, live: EstimateSet) -> EstimateSet:
+        """Return the estimates of a moment; `live` are those of the filter."""
         given = moment.instant.sources
         rims = tuple(moment.rims.tolist())
         body = moment.instant.motion._replace(
@@ -228,12 +225,12 @@ class _Judges:
             ),
             {},
         )
-        # Where the filter alone knew the slip too badly, the smoother may know it.
+        # Where only its deviation kept the filter from a class, the smoother may give one.
         unjudged = (live.slip_class == SlipClass.UNKNOWN) & (live.slip_std <= self._most_std)
         return replace(
             smoothed,
             drawbar_pull=moment.pull,
             drawbar_pull_std=live.drawbar_pull_std,
             slip_class=np.where(unjudged, live.slip_class, smoothed.slip_class),
-            **{name: getattr(live, name) for name in _OF_THE_FILTER},
+            **{name: getattr(live, name) for name in _FILTERED_FIELDS},
         )

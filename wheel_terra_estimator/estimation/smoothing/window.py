@@ -1,11 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Means over a window around each set: the noise of encoders, gyro and torques is not in the state.
+"""Centred moving averages: the noise of encoders, gyro and torques is not in the smoothed state.
 
-The smoothed state says how fast the rover was; slip and pull also take the rim speeds, the yaw rate
-and the torques of the moment, with their noise. A window that lies evenly around a moment takes the
-noise and delays nothing. It ends where a wheel starts, stops or turns round, where sets are
-missing, and it is never longer on one side than on the other.
+Slip and pull follow from the smoothed speed and from the rim speeds, the yaw rate and the torques
+of the moment, with their noise. A symmetric window reduces it without delay. It does not reach over
+a start, a stop or a reversal of a wheel, nor over missing sets.
 """
 
 from __future__ import annotations
@@ -25,21 +24,20 @@ from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant
 Companion = TypeVar('Companion')
 
 HALF_WIDTH = 0.5
-"""Of the window [s]; tuned on simulated drives of both worlds, seeds 1021 to 1024."""
+"""Of the window [s]; tuned on drives of simulators A and B, seeds 1021 to 1024."""
 LONGEST_GAP = 0.25  # between two sets of a window [s]
-TURNING = 5e-3
-"""Rim speed above which a wheel turns [m/s]."""
+TURNING = 5e-3  # rim speed above which a wheel turns [m/s]
 
 
 class Moment(NamedTuple):
-    """What is smoothed of an instant."""
+    """Smoothed quantities of an instant."""
 
     instant: Instant
     state: Gaussian
     rims: FloatArray  # (n,) [m/s], nan = unknown
     speed: float  # [m/s]
     yaw_rate: float  # [rad/s]
-    speed_std: float
+    speed_std: float  # [m/s]
     pull: FloatArray  # (n,) [N]
 
 
@@ -55,7 +53,7 @@ def centred(
 ) -> Iterator[tuple[Companion, Moment | None]]:
     """Yield the same pairs with rim speeds, speed, yaw rate and pull over load averaged."""
     places: deque[_Place[Companion]] = deque()
-    given = 0  # of the places: how many were yielded and wait for others' windows
+    given = 0  # how many of the places were yielded; they remain for the windows of later ones
     for companion, moment in pairs:
         before = places[-1] if places else None
         goes_on = before is not None and moment is not None and _alike(before.moment, moment)
@@ -83,7 +81,7 @@ def centred(
 def _averaged(
     places: deque[_Place[Companion]], given: int, end: float
 ) -> Iterator[tuple[Companion, Moment]]:
-    """Yield what waits at the end of a stretch [s]."""
+    """Yield the places from index `given` on, at the `end` of a stretch [s]."""
     for index in range(given, len(places)):
         yield places[index].companion, _mean_around(places[index], places, end)
 
@@ -105,13 +103,13 @@ def _mean_around(place: _Place[Companion], places: deque[_Place[Companion]], end
 
 
 def _load(moment: Moment) -> FloatArray:
-    """Return the loads (n,) to divide by [N]."""
+    """Return the loads (n,) as divisors [N]: infinite where there is none."""
     load = np.array(moment.instant.sources.loads.load)
     return np.where(load > 0.0, load, np.inf)
 
 
 def _alike(before: Moment, after: Moment) -> bool:
-    """Whether a window may reach over both moments."""
+    """Return whether a window may reach over both moments."""
     if not 0.0 < after.instant.time - before.instant.time <= LONGEST_GAP:
         return False
     return bool(np.array_equal(_turning(before), _turning(after), equal_nan=True))
