@@ -9,7 +9,7 @@ from parts import SAND, Parts
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
 from wheel_terra_estimator.estimation.filter.speed_process import (
-    USUAL_LENGTH,
+    EQUILIBRIUM_LENGTH,
     SpeedProcess,
     SpeedStep,
 )
@@ -279,7 +279,7 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
     """As a first-order process in travel: a share of exp(-1) is left after its length."""
     made, rim = process([0.05] * 6), 0.05
     free = SpeedStep(1.0, 0.0, 0.0, 0.0)
-    length = USUAL_LENGTH
+    length = EQUILIBRIUM_LENGTH
 
     def after(travel, buried=False):
         cycle = Parts(reader.load(SAND)).cycle([rim] * 6, dt=travel / rim)

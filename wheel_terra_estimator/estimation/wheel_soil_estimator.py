@@ -55,8 +55,8 @@ from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import (
+    EQUILIBRIUM_LENGTH,
     HELD_LENGTH,
-    USUAL_LENGTH,
     SpeedProcess,
 )
 from wheel_terra_estimator.estimation.filter.state import (
@@ -436,7 +436,7 @@ class WheelSoilEstimator:
         unseen = not cycle.still and not cycle.reference_known
         # No slip is usual where the ground holds the rover.
         held, buried = self._clock.assessment.holds, self._clock.assessment.buried
-        length = HELD_LENGTH if held and not buried else USUAL_LENGTH
+        length = HELD_LENGTH if held and not buried else EQUILIBRIUM_LENGTH
         if unseen:
             expected = speed.towards_equilibrium_slip(
                 by_wheels, cycle, direction, length, buried=buried

@@ -5,11 +5,11 @@
 Two predictions of the change of speed over a step, each with its own variance, are combined by
 their inverse variances:
 
-* with the wheels: v / rim speed changes only with the terrain: by the change of the required
-  traction coefficient times the slip per demand (state), and by a random walk over rim travel.
-  Exact through ramps, stops and restarts of a slow rover; poor where fast wheels spin up.
-* with the accelerometer: dv = (f_x - g_x - bias) dt. Good for fractions of a second; its error in a
-  second is negligible at 1 m/s but as large as a speed of 5 cm/s.
+* with the wheels: v / rim speed changes by the change of the required traction coefficient times
+  the slip per demand (state), and by a random walk over rim travel. Exact through ramps, stops and
+  restarts of a slow rover; poor where wheels spin up fast.
+* with the accelerometer: dv = (f_x - g_x - bias) dt. Good for fractions of a second; its error over
+  a second is negligible beside 1 m/s, and as large as a speed of 5 cm/s.
 """
 
 from __future__ import annotations
@@ -47,9 +47,8 @@ from wheel_terra_estimator.estimation.scalars import (
 )
 
 LEAST_SLIP_STD = 0.02
-"""Of a speed over the rim speed [-]: no set of soil models is better than that."""
-_LEAST_WHEELS = 3
-"""Wheels that can disagree."""
+"""Least deviation of the speed over the rim speed [-]: no soil model is better."""
+_LEAST_WHEELS = 3  # needed for a median absolute deviation
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
 _FIRST_RATIO = 0.95  # v / rim speed before anything is known: level, loose soil
@@ -57,11 +56,10 @@ _FIRST_RATIO_STD = 0.3
 _LEAST_REVERSED_RATIO = 0.2
 _MOST_REVERSED_RATIO = 1.1
 _REVERSED_SLIP_SHARE = 0.5
-"""Of the slip to be expected with the new direction: behind a reversal ruts and shear form
-anew, and the slip grows with them. Tuned on stops and reversals of both worlds, seeds 1000 to
-1005."""
-_FIRST_SIGHT_SHARE = 0.3
-"""Deviation of the speed over the rim speed when wheel rates first arrive."""
+"""Slip right after a reversal over the steady one [-]: it grows as ruts and shear form again.
+Tuned on stops and reversals in simulators A and B, seeds 1000 to 1005."""
+_FIRST_SPEED_SHARE = 0.3
+"""Deviation of the speed over the rim speed when wheel rates first arrive [-]."""
 _LEAST_RATIO = -0.5  # remembered v / rim speed
 _MOST_RATIO = 2.0
 _LEAST_RATIO_STD = 0.1
@@ -76,39 +74,38 @@ _START_WALK = 0.4
 """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
 _START_WALK_TRAVEL = 0.2  # [m] with which it decays
 _DIGGING_WALK = 12.0
-"""The same over the sinkage that most wheels gain per rim travel [1/sqrt(m)]: where contacts
-change, the slip does."""
-_MOST_WALK = 0.6  # of it where contacts change [1/sqrt(m)]
+"""The same over the sinkage that most wheels gain per rim travel [1/sqrt(m)]: the slip changes with
+the contacts."""
+_MOST_WALK = 0.6  # limit of that walk [1/sqrt(m)]
 _WATCHED_SHARE = 0.5
-"""Of ``filter.ratio_walk`` where sinkages would show such a change."""
+"""Factor on ``filter.ratio_walk`` where measured sinkages would show such a change [-]."""
 _DEMAND_ERROR = 0.3  # error of the slip due to a change of demand, over that slip [-]
 _SLIP_PER_DEMAND_WALK = 0.2  # [1/sqrt(m)]
 _INFLATION_RATE = 2.0
-"""Process noise of a change of speed, over its square, per second [1/s]: it may come within
-half a second."""
+"""Process noise of an expected change of speed, over its square [1/s]: it takes half a second."""
 _INFLATION_TIME = 0.3  # with which the inflation decays [s]
 _RATE_NOISE = 3.0
 """Deviations of the wheel rates within which the wheels do not disagree [-]."""
-_SIDE_TIME = 1.0  # over which a change of one side against the other is seen [s]
-_SIDE_CHANGE = 1.0  # speed that it may bring, over that change [-]
+_SIDE_TIME = 1.0  # time constant of the rim speeds that sides are compared with [s]
+_SIDE_CHANGE = 1.0  # change of speed over the change of one side against the other [-]
 _LEAST_COVERED = 0.5  # of a step by the IMU, to use it
 _BIAS_WALK = 1e-3  # of the accelerometer's bias [m/s^2/sqrt(s)]
 _ATTITUDE_TIME = 20.0
-"""Time constant of the errors of the attitude [s]: what changes faster is seen as noise."""
-_EQUILIBRIUM_SLIP_STD = 0.2  # about that of the configured soil on such a slope
-USUAL_LENGTH = 1.5  # rim travel over which slip returns to it [m]
+"""Time constant of the errors of the attitude [s]; faster ones are seen as noise."""
+_EQUILIBRIUM_SLIP_STD = 0.2  # of the slip about that of the configured soil on such a slope [-]
+EQUILIBRIUM_LENGTH = 1.5  # rim travel over which the slip reverts to it [m]
 HELD_LENGTH = 15.0
-"""The same where the ground holds the rover [m]: who drives on does not drive for longer."""
+"""The same for a rover that is held by the ground [m]: no attempt to drive on lasts longer."""
 _LEAST_EQUILIBRIUM_SLIP = -0.2
 _MOST_EQUILIBRIUM_SLIP = 0.8
-_DRIVING = 0.3
+_DRIVING_TORQUE = 0.3
 """Torque over load times radius of a wheel that drives [-]: on loose soil it slips by a tenth."""
-_SURELY = 2.0  # deviations by which a rover is faster than such a wheel
+_BOUND_DEVIATIONS = 2.0  # of the speed, by which it may exceed that of such a wheel
 _START_SHARE = 0.5
-"""Of the usual speed: what is farther from it at a start without reference is a transient of
-the accelerometer."""
-_START_TRANSIENT = 0.1
-"""Speed [m/s] that a transient may make (0.3 m/s^2 for 0.3 s): what is more is a slide."""
+"""Relative difference from the expected speed above which, at a start without a reference velocity,
+the speed may be a transient of the accelerometer [-]."""
+_MOST_TRANSIENT = 0.1
+"""Greatest speed that a transient causes [m/s] (0.3 m/s^2 for 0.3 s); more is a slide."""
 
 
 class SpeedStep(NamedTuple):
@@ -118,12 +115,11 @@ class SpeedStep(NamedTuple):
     bias_gain: float
     constant: float
     variance: float
-    wheel_weight: float = 1.0
-    """Share of the prediction with the wheels in it."""
+    wheel_weight: float = 1.0  # of the prediction with the wheels in it [-]
 
 
 class PastDrive(NamedTuple):
-    """What is remembered of the last drive in a direction."""
+    """Last drive in a direction."""
 
     ratio: float  # v / rim speed
     ratio_std: float
@@ -131,7 +127,7 @@ class PastDrive(NamedTuple):
 
 
 class SpeedState(NamedTuple):
-    """What the prediction of the speed remembers."""
+    """Memory of the prediction of the speed."""
 
     cycle_time: float  # of the last cycle [s], nan = none yet
     rims: RimSpeeds  # at the last cycle
@@ -139,11 +135,11 @@ class SpeedState(NamedTuple):
     ratio_std: float
     ratio_walk: float  # random walk of it [1/sqrt(m)]
     inflation: float = 0.0
-    """Process-noise inflation: change of speed that changing contacts may bring [m/s]."""
-    slow_rims: Floats = ()  # mean of `rims.each` over the last second [m/s]
-    settled: bool = True  # the contacts were, at the last cycle
+    """Change of speed that changing contacts may cause [m/s], for the process noise."""
+    slow_rims: Floats = ()  # `rims.each`, low-passed over a second [m/s]
+    settled: bool = True  # whether the contacts were, at the last cycle
     other_direction: PastDrive | None = None
-    felt_nis: float | None = None
+    acceleration_nis: float | None = None
     """Running mean of the NIS of wheels against accelerometer; None = never compared."""
 
 
@@ -164,10 +160,10 @@ class SpeedProcess(Component[SpeedState]):
         self._rim_noise = _RATE_NOISE * sensors.wheel_rate_std * max(rover.slip_radius)
 
     def acceleration_noise(self, stated: StatedNoise) -> tuple[float, float]:
-        """Return the noise of specific force less gravity, as the IMU reports it or by default.
+        """Return the noise of specific force less gravity, as the IMU states it or by default.
 
-        White noise [(m/s^2)^2 s], and how fast the bias walks, with gravity by errors of the
-        attitude [(m/s^2)^2/s], both squared.
+        Power spectral density of the white noise [(m/s^2)^2 s], and of the random walk of the bias,
+        with gravity by errors of the attitude [(m/s^2)^2/s].
         """
         sensors = self._sensors
         force = stated.specific_force_std or sensors.specific_force_std
@@ -175,18 +171,18 @@ class SpeedProcess(Component[SpeedState]):
         walk = _BIAS_WALK**2 + 2.0 * attitude**2 / _ATTITUDE_TIME
         return force**2 / max(sensors.imu_rate, 1.0), walk
 
-    # -- What other parts tell -------------------------------------------------------------------
+    # -- Inputs from other components ------------------------------------------------------------
 
     def inflate(self, speed_change: float) -> None:
-        """Widen the prediction for contacts under change that may bring `speed_change` [m/s]."""
+        """Inflate the process noise for changing contacts, by `speed_change` [m/s]."""
         if speed_change > self.state.inflation:
             self.state = self.state._replace(inflation=speed_change)
 
     def follow_sides(self, rims: RimSpeeds, dt: float) -> None:
-        """Widen the prediction where wheels change against one another for longer than a cycle.
+        """Inflate the process noise where rim speeds change relative to one another.
 
-        A rover that begins or ends a turn moves with the mean of its sides no more: by how much
-        one side slips more than the other is not known.
+        At the begin or end of a turn the two sides slip differently, so that the body speed is not
+        that of their mean.
         """
         slow = self.state.slow_rims
         gain = gain_of(dt, _SIDE_TIME)
@@ -198,16 +194,16 @@ class SpeedProcess(Component[SpeedState]):
                 ]
             )
         )
-        apart = spread([now - old for old, now in zip(slow, rims.each, strict=True)])
-        self.inflate(_SIDE_CHANGE * max(apart - self._rim_noise, 0.0))
+        changes = spread([now - old for old, now in zip(slow, rims.each, strict=True)])
+        self.inflate(_SIDE_CHANGE * max(changes - self._rim_noise, 0.0))
 
     def reverse_direction(self, ekf: GatedFilter, before: float, now: float) -> None:
-        """Carry v / rim speed over to the other direction: up becomes down.
+        """Set v / rim speed for a drive in the other direction: uphill becomes downhill.
 
-        It is that of the last drive in this direction, else of the drive that ended. The slip
-        changes by the learned slip per demand times what is asked less (or more) than there, and
-        begins with a share of that. `before` and `now` are what the ground asked of the drive that
-        ended, and asks of this one, as shares of the load [-]; nan = unknown.
+        It starts from the last drive in this direction, else from the drive that ended. The slip
+        changes by the learned slip per demand times the change of the demand, and begins with a
+        share of that. `before` and `now` are the demands of the drive that ended and of this one
+        [-]; nan = unknown.
         """
         state = self.state
         ended = PastDrive(state.ratio, state.ratio_std, before)
@@ -266,7 +262,7 @@ class SpeedProcess(Component[SpeedState]):
     def predict(self, prediction: Prediction, step: SpeedStep, cycle: Cycle) -> None:
         """Add speed, gravity bias and slip per demand to a prediction.
 
-        `step` predicts the speed for an unchanged required traction coefficient (demand).
+        `step` predicts the speed for an unchanged demand (required traction coefficient).
         """
         dt, rim, demand_change = cycle.dt, cycle.yaw_compensated.typical, cycle.demand_change
         mean, F, Q = prediction
@@ -303,25 +299,25 @@ class SpeedProcess(Component[SpeedState]):
         opposed = max(magnitude**2 - now**2, 0.0)
         variance += 0.5 * opposed * _MOST_WALK**2 * magnitude * dt
         variance += (_RIM_CHANGE * change) ** 2 + _FLOOR_WALK * dt
-        apart = self.disagreement(rims)
-        variance += _INFLATION_RATE * inflation * inflation * dt + apart * apart
+        disagreement = self.disagreement(rims)
+        variance += _INFLATION_RATE * inflation * inflation * dt + disagreement * disagreement
         if state.settled and state.rims.along(self._rover.low_rim):
             return SpeedStep(now / before, 0.0, 0.0, variance)
-        # From a start on: a ratio taken from slow wheels would carry their noise up the ramp.
+        # At a start: the ratio v / rim speed of slow wheels is noise, so the kept one is used.
         variance += state.ratio_std**2 * max(now * now - before * before, 0.0)
         return SpeedStep(1.0, 0.0, state.ratio * change, variance)
 
-    def felt(self, dt: float, window: InertialWindow) -> tuple[float, float] | None:
+    def velocity_increment(self, dt: float, window: InertialWindow) -> tuple[float, float] | None:
         """Return the change of speed by the accelerometer over `dt` [s], and its variance.
 
-        [m/s], [(m/s)^2], with the bias in it; None where the IMU left out too much.
+        [m/s], [(m/s)^2], the bias included; None where the IMU covers too little of the step.
         """
         covered = window.duration
         if covered < _LEAST_COVERED * dt or dt <= 0.0:
             return None
         # Vibration: observed noise counts where it exceeds the configured one.
         stated, _ = self.acceleration_noise(window.stated)
-        noise = max(stated, window.noise_density) * excess(self.state.felt_nis) ** 2
+        noise = max(stated, window.noise_density) * excess(self.state.acceleration_nis) ** 2
         # Gaps of the IMU are filled with the mean acceleration of the step.
         return window.speed_change * dt / covered, noise * dt
 
@@ -330,30 +326,34 @@ class SpeedProcess(Component[SpeedState]):
 
         Their difference observes speed and bias, best at rest, where the wheels are exact. `step`
         is the prediction without accelerometer. Return the variance [(m/s)^2] to be added to it
-        where the difference exceeds the gate: soil that yields suddenly is no random walk, and
-        wheel rates do not show it. If the difference lasts, the attitude is taken to be wrong and
-        the accelerometer noise grows with the running NIS.
+        where the difference exceeds the gate: soil that fails suddenly is no random walk, and wheel
+        rates do not show it. If the difference lasts, the accelerometer noise grows with the
+        running NIS: the attitude is probably wrong.
         """
-        felt = self.felt(cycle.dt, cycle.window)
-        if felt is None or isnan(self.state.rims.typical) or isnan(cycle.yaw_compensated.typical):
+        increment = self.velocity_increment(cycle.dt, cycle.window)
+        if (
+            increment is None
+            or isnan(self.state.rims.typical)
+            or isnan(cycle.yaw_compensated.typical)
+        ):
             return 0.0
         row = np.zeros(len(ekf.mean))
         row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - 1.0, cycle.dt
-        residual = felt[0] - step.constant - float(row @ ekf.mean)
-        variance = step.variance + felt[1]
+        residual = increment[0] - step.constant - float(row @ ekf.mean)
+        variance = step.variance + increment[1]
         expected = float(row @ ekf.covariance @ row) + variance
         lacking = chi_square_gate(residual, expected, self._gate)
-        nis = smoothed_nis(self.state.felt_nis, min(residual**2 / expected, self._gate))
-        self.state = self.state._replace(felt_nis=nis)
+        nis = smoothed_nis(self.state.acceleration_nis, min(residual**2 / expected, self._gate))
+        self.state = self.state._replace(acceleration_nis=nis)
         ekf.fuse([Row(residual, row, variance + lacking)])
         return lacking
 
     def combined(self, step: SpeedStep, dt: float, window: InertialWindow) -> SpeedStep:
         """Return the prediction with the wheels combined with the accelerometer's over `dt` [s]."""
-        felt = self.felt(dt, window)
-        if felt is None:
+        increment = self.velocity_increment(dt, window)
+        if increment is None:
             return step
-        accelerated, noise = felt
+        accelerated, noise = increment
         weight = noise / (noise + step.variance)  # of the wheels
         return SpeedStep(
             weight * step.speed_gain + (1.0 - weight),
@@ -386,12 +386,12 @@ class SpeedProcess(Component[SpeedState]):
             return step
         most = _MOST_EQUILIBRIUM_SLIP
         slip = most if buried else self._equilibrium_slip.at(demand, beyond=most)
-        usual = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
+        ratio = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
         keep = math.exp(-abs(rim) * cycle.dt / length)
         return SpeedStep(
             keep * step.speed_gain,
             keep * step.bias_gain,
-            keep * step.constant + (1.0 - keep) * usual * rim,
+            keep * step.constant + (1.0 - keep) * ratio * rim,
             keep * keep * step.variance + (1.0 - keep * keep) * (_EQUILIBRIUM_SLIP_STD * rim) ** 2,
         )
 
@@ -423,48 +423,48 @@ class SpeedProcess(Component[SpeedState]):
     def begin(self, ekf: GatedFilter, rims: RimSpeeds) -> None:
         """Initialise the speed at the first wheel rates: the wheels may roll, spin or rest."""
         if isnan(self.state.rims.typical) and not isnan(rims.typical):
-            spread = max(_FIRST_SIGHT_SHARE * abs(rims.typical), self._rover.rest_speed)
+            spread = max(_FIRST_SPEED_SHARE * abs(rims.typical), self._rover.rest_speed)
             ekf.set(SPEED, self.state.ratio * rims.typical, spread * spread)
 
     def remove_start_transient(self, ekf: GatedFilter, cycle: Cycle) -> None:
         """At a start without a reference velocity, reset the speed to the slip of the last drive.
 
-        A transient of the accelerometer weighs much while the wheels turn slowly; a rover that
-        slides, or wheels that spin up at once, differ by more than it makes.
+        While the wheels turn slowly a transient of the accelerometer dominates the speed. A slide,
+        or wheels that spin up, make a greater difference than such a transient.
         """
         rim = cycle.yaw_compensated.typical
-        usual = self.state.ratio * rim
-        off = abs(float(ekf.mean[SPEED]) - usual)
-        transient = _START_SHARE * abs(usual) < off < _START_TRANSIENT
+        expected = self.state.ratio * rim
+        off = abs(float(ekf.mean[SPEED]) - expected)
+        transient = _START_SHARE * abs(expected) < off < _MOST_TRANSIENT
         if transient and abs(rim) > self._rover.low_rim:
-            ekf.set(SPEED, usual, (self.state.ratio_std * rim) ** 2)
+            ekf.set(SPEED, expected, (self.state.ratio_std * rim) ** 2)
 
     def keep_with_rims(self, ekf: GatedFilter, rims: RimSpeeds) -> None:
         """Without a reference velocity, set the speed to 0 where it opposes the wheels.
 
-        Only a slide does that, and no force of its wheels would ever end it.
+        Only a slide does that, and the saturated forces of its wheels would never end the error.
         """
         if abs(rims.typical) > self._rover.low_rim and rims.oppose(float(ekf.mean[SPEED])):
-            _put_right(ekf, 0.0, rims)
+            _reset_speed(ekf, 0.0, rims)
 
     def keep_behind_driving_wheels(self, ekf: GatedFilter, cycle: Cycle) -> None:
         """Without a reference velocity, bound the speed by that of the slowest driving wheel.
 
-        The soil turns a wheel that it drags; one that stalls drives, however slowly it turns.
+        A wheel that the soil drags along turns; one that turns slowly under a torque has stalled.
         """
         rims, loads = cycle.yaw_compensated, cycle.loads.load
-        way = math.copysign(1.0, rims.typical)
+        sign = math.copysign(1.0, rims.typical)
         driving = [
-            max(way * rim, 0.0)
+            max(sign * rim, 0.0)
             for rim, torque, load, radius in zip(
                 rims.each, cycle.torque, loads, self._rover.slip_radius, strict=True
             )
-            if way * torque > _DRIVING * load * radius
+            if sign * torque > _DRIVING_TORQUE * load * radius
         ]
         slowest = min(known(driving), default=math.inf)
-        doubt = _SURELY * math.sqrt(float(ekf.covariance[SPEED, SPEED]))
-        if way * float(ekf.mean[SPEED]) - slowest > doubt:
-            _put_right(ekf, way * slowest, rims)
+        margin = _BOUND_DEVIATIONS * math.sqrt(float(ekf.covariance[SPEED, SPEED]))
+        if sign * float(ekf.mean[SPEED]) - slowest > margin:
+            _reset_speed(ekf, sign * slowest, rims)
 
     def keep_least_variance(self, ekf: GatedFilter, rims: Floats) -> None:
         """Keep the deviation of v / rim speed above `LEAST_SLIP_STD`, by covariance inflation."""
@@ -482,7 +482,7 @@ class SpeedProcess(Component[SpeedState]):
         settled: bool,
         turning: bool = False,
     ) -> None:
-        """Remember what the next cycle needs; the slip of sharp turns is none to start with."""
+        """Keep what the next cycle needs; v / rim speed is not kept from sharp turns."""
         state, rim = self.state, rims.typical
         inflation = state.inflation * math.exp(-self.since_cycle(time) / _INFLATION_TIME)
         ratio, ratio_std = state.ratio, state.ratio_std
@@ -501,7 +501,7 @@ class SpeedProcess(Component[SpeedState]):
         )
 
 
-def _put_right(ekf: GatedFilter, speed: float, rims: RimSpeeds) -> None:
+def _reset_speed(ekf: GatedFilter, speed: float, rims: RimSpeeds) -> None:
     """Reset an impossible speed [m/s], with at least the variance of an initial slip."""
     least = (_FIRST_RATIO_STD * rims.typical) ** 2
     ekf.set(SPEED, speed, max(float(ekf.covariance[SPEED, SPEED]), least))
