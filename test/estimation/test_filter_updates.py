@@ -223,10 +223,10 @@ def test_a_fast_rover_is_not_stopped_at_once(parts):
 # -- Sinkage ----------------------------------------------------------------------------------
 
 
-def read_sinkage(parts, update, ekf, time, depth, count=1, dug=0.0):
+def read_sinkage(parts, update, ekf, time, depth, count=1, unmodelled_std=0.0):
     """Fuse the sum of some readings of the first wheel; return its mean, None where it stays."""
     sums = SinkageSums((depth,) + (0.0,) * 5, (count,) + (0,) * 5)
-    rows = update.update(ekf, time, sums, parts.sensors.sinkage_std**2, np.full(6, dug))
+    rows = update.update(ekf, time, sums, parts.sensors.sinkage_std**2, np.full(6, unmodelled_std))
     ekf.fuse(rows)
     return float(ekf.mean[parts.layout.sinkage.start]) if rows else None
 
@@ -281,9 +281,9 @@ def test_two_readings_of_the_sinkage_are_the_textbook_update(parts, ekf, sinkage
 def test_the_first_reading_of_a_wheel_that_dug_in_is_believed(parts, ekf, sinkage_update):
     ekf.set(parts.layout.sinkage.start, 0.03, 0.002**2)
     assert read_sinkage(parts, sinkage_update, ekf, 0.0, 0.11) is None, 'a spike'
-    assert read_sinkage(parts, sinkage_update, ekf, 0.1, 0.11, dug=0.08) == pytest.approx(
-        0.11, abs=0.001
-    )
+    assert read_sinkage(
+        parts, sinkage_update, ekf, 0.1, 0.11, unmodelled_std=0.08
+    ) == pytest.approx(0.11, abs=0.001)
 
 
 def sinkage_predicted(parts, x, loads=None, angle=NAN, angle_std=0.0, rims=FORWARD):
@@ -315,7 +315,7 @@ def test_digging_leaves_the_sinkage_open_until_it_is_read_or_the_wheel_rolls_on(
         for _ in range(round(10 * seconds)):
             process.predict(Prediction.unchanged(ekf.mean), ekf.mean, parts.cycle(FORWARD))
             process.end_cycle(ekf, ekf.mean[parts.layout.sinkage].copy(), unread, 0.1)
-        return process.state.dug
+        return process.state.unmodelled_std
 
     assert goes_on(20.0, 0.0, read=[2])[[1, 2]] == pytest.approx([0.1 * 0.05 * 20.0, 0.0])
     assert (goes_on(10.0, 0.05) < 2e-3).all()

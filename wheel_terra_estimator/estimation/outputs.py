@@ -97,8 +97,8 @@ class Outputs:
         layout, rover, n = self._layout, self._rover, self._rover.wheel_count
         slip_velocity, slip_velocity_std = self._slip_velocity(given)
         variance = np.diagonal(given.covariance)[layout.sinkage]
-        open_variance = self._sinkage_zero**2 + given.sinkage.dug**2
-        sinkage_std = np.sqrt(np.maximum(variance, 0.0) + open_variance)
+        added_variance = self._sinkage_zero**2 + given.sinkage.unmodelled_std**2
+        sinkage_std = np.sqrt(np.maximum(variance, 0.0) + added_variance)
         soil_covariance = with_model_errors(given.mean, given.covariance, layout)
         names, soil, soil_std = self.learned_soil(given.mean, soil_covariance)
         load_std, pull_std = self._force_deviations(given)

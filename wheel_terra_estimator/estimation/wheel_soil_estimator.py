@@ -293,8 +293,11 @@ class WheelSoilEstimator:
             self._fuse_reference(cycle, reference)
         self._zero_velocity.update(ekf, cycle, sliding=time < self._reference.state.sliding_until)
 
-        variance, dug = self._noise.variance('sinkage'), self._sinkage_process.state.dug
-        rows = self._sinkage.update(ekf, time, self._sinkages.take(), variance, dug)
+        variance, unmodelled = (
+            self._noise.variance('sinkage'),
+            self._sinkage_process.state.unmodelled_std,
+        )
+        rows = self._sinkage.update(ekf, time, self._sinkages.take(), variance, unmodelled)
         self._unloaded.update(cycle)
         forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
         if cycle.still:
@@ -341,7 +344,9 @@ class WheelSoilEstimator:
             ),
             stationary=stationary,
             sideways=self._lateral_forces(cycle),
-            tilt_std=math.hypot(*(self._sinkage_process.state.dug * self._rover.rut_tilt)),
+            tilt_std=math.hypot(
+                *(self._sinkage_process.state.unmodelled_std * self._rover.rut_tilt)
+            ),
         )
         tilt = rut_tilt(self._rover, layout, ekf.mean)
         self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from wheel_terra_estimator.estimation.scalars import TINY, clipped, known
 
-_GAIN = 0.05  # of the running mean, per reading: a memory of 20 readings
-_LARGEST = 100.0  # NIS that enters the mean: one outlier does not fill it
+_GAIN = 0.05  # of the running mean, per reading: a memory of 20 readings [-]
+_LARGEST = 100.0  # limit of one NIS in the mean, for outliers [-]
 CONSISTENT = 1.0
-"""Normalised innovation squared (NIS) of a scalar reading, on average, in a filter that is right
+"""Mean of the normalised innovation squared (NIS) of scalar readings in a consistent filter [-]
 (Bar-Shalom, Li and Kirubarajan 2001, section 5.4)."""
 SAME_GROUND = 0.15
-"""Rim travel over which the errors of the models are the same [m]; tuned on seeds 1000, 1001."""
+"""Rim travel over which model errors are fully correlated [m]; tuned on seeds 1000 and 1001."""
 _MOST_CYCLES = 100.0
 
 
@@ -28,11 +28,11 @@ def excess(mean_nis: float | None) -> float:
 
 
 def correlated_cycles(rims: tuple[float, ...], dt: float) -> float:
-    """Return how many cycles of length `dt` [s] share the model error of the same ground.
+    """Return how many cycles of length `dt` [s] share one model error, that of the same ground.
 
-    Fused as independent, each linearised at another noisy state, they give spurious information
-    along the unobservable direction T(s) = const, in which strength, K and slip then drift (the
-    inconsistency known from EKF-SLAM, Julier and Uhlmann 2001).
+    Fused as independent readings, each linearised at another noisy state, they would give spurious
+    information along the unobservable direction T(s) = const, and strength, K and slip would drift
+    along it (the inconsistency of EKF-SLAM, Julier and Uhlmann 2001).
     """
     travel = dt * max((abs(rim) for rim in known(rims)), default=0.0)
     return clipped(SAME_GROUND / max(travel, TINY), 1.0, _MOST_CYCLES)

@@ -1,11 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""filterpy's extended Kalman filter with gates, kept symmetric, positive and finite.
+"""Extended Kalman filter with considered states, kept symmetric, positive and finite.
 
-filterpy holds the state and predicts; the update is its own (covariance in Joseph form) with a
-gain that leaves considered entries alone and one factorisation in place of an inverse. Innovation,
-its covariance and the gate come before each update, so that a bad reading never touches the state.
-``h`` and ``H`` come from one pass over the models and are handed in as they are.
+filterpy holds the state and predicts. The update is written here: covariance in Joseph form, a gain
+of zero for considered entries (Schmidt), a Cholesky factorisation in place of an inverse. Callers
+gate a reading before it is fused, and pass residual and Jacobian from one evaluation of the models.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ _LEAST_DIAGONAL = 1e-14  # of the covariance
 
 
 class Row(NamedTuple):
-    """One scalar measurement, linearised: z - h(x), dh/dx (n,), variance of z."""
+    """One scalar measurement, linearised: z - h(x), Jacobian dh/dx (n,), variance of z."""
 
     residual: float
     jacobian: FloatArray
@@ -138,11 +137,11 @@ class GatedFilter:
     ) -> None:
         """Fuse m readings: residual z - h(x) (m,), H (m, n), variances (m,).
 
-        Entries that are `considered` (Schmidt) keep mean and variance: their uncertainty counts,
-        but these readings must not teach them.
+        Entries that are `considered` (Schmidt) keep mean and variance; their uncertainty counts in
+        the innovation covariance.
         """
-        # In units of its own deviation each innovation has variance 1: whatever the readings, the
-        # inverse of their covariance exists. A share below the floor is lost in rounding.
+        # Each innovation is scaled to variance 1, so that their covariance can be factorised
+        # whatever the units. A noise share below the floor would be lost in rounding.
         HP = H @ self._ekf.P
         variance = np.einsum('ij,ij->i', HP, H) + noise
         scale = 1.0 / np.sqrt(np.maximum(variance, _LEAST_VARIANCE))
@@ -160,7 +159,7 @@ class GatedFilter:
             self.update(np.array(residuals), np.array(jacobians), np.array(variances), considered)
 
     def set(self, index: int, value: float, variance: float) -> None:
-        """Give one entry a value known from elsewhere and cut its correlations."""
+        """Set one entry to a value known from elsewhere, without correlations."""
         before = self._present()
         ekf = self._ekf
         ekf.x[index] = value

@@ -21,21 +21,21 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 # Tuned on simulated drives, seeds 1000 to 1019.
-_WEIGHT_STD = 0.005  # of the weight: error of curvature, ruts and mass
-_GROUND_STD = 0.04  # of the weight, per cycle: noise beyond it is vibration, not ground
+_WEIGHT_STD = 0.005  # error by curvature, ruts and mass, over the weight [-]
+_GROUND_STD = 0.04  # noise per cycle over the weight [-]; beyond it is vibration, not ground
 _SIDE_SHARE = 0.5
-"""Of the load: the side force that a steered wheel may give, which acts along the body by the
-sine of its angle (friction angle of sand)."""
-_MODEL_SHARE = 0.1  # of the load: pull error at a shear-model deviation of 1
+"""Deviation of the side force of a steered wheel over its load [-] (friction angle of sand); its
+component along the body grows with the sine of the steering angle."""
+_MODEL_SHARE = 0.1  # pull error over the load at a relative deviation of 1 of the shear model [-]
 
 
 class SumOfPulls(NamedTuple):
     """Sum of the pulls by the accelerometer (mass times specific force)."""
 
-    along: float  # [N] if the body lay along the ground
-    weight: float  # [N] of which a tilt of the body by its ruts adds a component
+    along: float  # for a body parallel to the ground [N]
+    weight: float  # [N]; a tilt of the body by its ruts takes `weight` times it off `along`
     variance: float  # [N^2]
-    vibration: float  # part of it that is white, independent from cycle to cycle
+    vibration: float  # part of the variance that is independent from cycle to cycle [N^2]
 
 
 class ForceBalance(Component['float | None']):
@@ -96,23 +96,23 @@ class ForceBalance(Component['float | None']):
             jacobian = np.array(headings.along) @ forces.pull_rows
         else:
             jacobian = forces.pull_rows.sum(axis=0)
-        pull_sum = open_variance = 0.0
+        pull_sum = added_variance = 0.0
         for i, (load, standing) in enumerate(zip(loads, stationary, strict=True)):
             along, side = headings.along[i], headings.across[i] * _SIDE_SHARE * load
-            open_variance += side * side
+            added_variance += side * side
             if standing is None:
                 pull_sum += along * float(forces.pull[i])
-                open_variance += model_variance * (_MODEL_SHARE * load) ** 2
-                open_variance += float(forces.pull_noise[i]) ** 2
+                added_variance += model_variance * (_MODEL_SHARE * load) ** 2
+                added_variance += float(forces.pull_noise[i]) ** 2
             else:
                 pull_sum += along * standing.expected
-                open_variance += standing.std**2
+                added_variance += standing.std**2
         tilt = rut_tilt(self._rover, self._layout, ekf.mean)
         for i, gain in enumerate(self._rover.rut_tilt):
             # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
             jacobian[self._layout.sinkage.start + i] += total.weight * gain
         residual = total.along - (pull_sum + total.weight * tilt)
-        variance = repeats * (total.variance - total.vibration) + total.vibration + open_variance
+        variance = repeats * (total.variance - total.vibration) + total.vibration + added_variance
         expected = float(jacobian @ ekf.covariance @ jacobian) + variance
         self.state = smoothed_nis(self.state, residual * residual / expected)
         gate = chi_square_gate(residual, expected, self._gate)

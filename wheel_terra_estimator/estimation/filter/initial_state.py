@@ -46,13 +46,12 @@ class PriorTuning:
     mound_mean: float = 0.05  # where the configured soil knows no mound [-]
     mound_std: float = 0.1
     slip_per_demand_mean: float = 1.0
-    """Slip for each share of the load that is asked: the inverse slope of a traction curve. Wheels
-    have 0.5 on firm ground to 3 near the greatest pull (docs/models/validation.md)."""
+    """Slip per required traction coefficient: the inverse slope of a traction curve [-], 0.5 on
+    firm ground to 3 near the greatest pull (docs/models/validation.md)."""
     slip_per_demand_std: float = 1.0
     rut_share_mean: float = 0.3
     rut_share_std: float = 0.4
-    shear_radius_std: float = 0.03
-    """Of the slip radius: a third of a lug's height on most wheels."""
+    shear_radius_std: float = 0.03  # over the slip radius [-]: a third of a lug's height
     sinkage_share: float = 0.5  # of the sinkage at rest
     sinkage_floor: float = 0.005  # [m]
     own_stiffness_share: float = 0.5
@@ -61,13 +60,13 @@ class PriorTuning:
     least_shear_modulus_std: float = 0.3  # [ln]
     least_stiffness_std: float = 0.2  # [ln]
     unstated_strength_std: float = 0.3
-    """Where nobody states a soil: the spread of the shipped soils (config/soils) [ln]."""
+    """Where no soil is stated: the spread of the shipped soils (config/soils) [ln]."""
     unstated_shear_modulus_std: float = 1.0  # [ln]
     unstated_stiffness_std: float = 1.3  # of the pressure one centimetre deep [ln]
     most_deviations: float = 3.0
-    """Of the soil from the configured one, in prior deviations, where that is beyond the bounds."""
+    """Least bounds of soil parameters about the configured ones, in prior deviations."""
     kept_share: float = 0.5
-    """Share of the old covariance, against that of a start, where soil is kept in a new run."""
+    """Weight of the old covariance, against that of a start, where a new run keeps the soil [-]."""
     most_speed: float = 20.0  # [m/s]
     most_gravity_bias: float = 2.0  # [m/s^2]
     most_strength: float = 1.0  # [ln]
@@ -81,7 +80,7 @@ class PriorTuning:
     most_stiffness: float = 3.0  # [ln]
     most_shear_error: float = 1.5  # [ln]
     most_torque_zero: float = 1e4  # [N m]
-    highest: float = 0.02  # a wheel above the surface, of the radius
+    highest: float = 0.02  # of a wheel above the surface, over its radius [-]
 
 
 PRIORS = PriorTuning()
@@ -89,7 +88,7 @@ PRIORS = PriorTuning()
 
 @dataclass(frozen=True)
 class SoilPriors:
-    """Prior standard deviations of the soil [ln], and of the errors of the shear model; n1."""
+    """Prior standard deviations of the soil and of the errors of the shear model [ln]; n1."""
 
     strength_std: float
     shear_modulus_std: float
@@ -100,7 +99,7 @@ class SoilPriors:
 
     @classmethod
     def from_configuration(cls, configuration: Configuration) -> SoilPriors:
-        """Derive them from the deviations of the configured soil, if anybody stated one."""
+        """Derive them from the deviations of the configured soil, if one is stated."""
         figures = configuration.filter
         strength, modulus, stiffness = _soil_deviations(configuration)
         return cls(
@@ -137,7 +136,7 @@ def _soil_deviations(configuration: Configuration) -> tuple[float, float, float]
 
 
 def gravity_bias_std(rover: Rover, sensors: SensorFigures, orientation_std: float) -> float:
-    """Return what is not known of accelerometer bias and gravity leaking in at first [m/s^2]."""
+    """Return the initial deviation of accelerometer bias plus gravity component [m/s^2]."""
     return math.hypot(sensors.specific_force_bias_std, rover.gravity * orientation_std)
 
 
@@ -145,7 +144,7 @@ _LEAST_SINE = 0.05  # of sin(phi) cos(phi): soil without friction
 
 
 def layout_of(rover: Rover, sensors: SensorFigures) -> StateLayout:
-    """Return what the state of a rover with such sensors consists of."""
+    """Return the layout of the state for a rover with these sensors."""
     return StateLayout(
         rover.wheel_count, sensors.torque_zero_std > 0.0, sensors.reference_wander_std > 0.0
     )
@@ -218,9 +217,9 @@ def bounds(rover: Rover, layout: StateLayout, priors: SoilPriors) -> tuple[Float
         upper[layout.reference_error] = PRIORS.most_speed
     lower = -upper
     lower[[SLIP_PER_DEMAND, RUT_SHARE]] = 0.0
-    # Slip makes a wheel sink, never rise: else wheels that leave soft ground tell of slip.
+    # Slip makes a wheel sink, never rise; else wheels that leave soft ground would seem to slip.
     lower[SLIP_SINKAGE] = -max(priors.slip_sinkage, 0.0)
-    # Ground may be harder than any soil. K of decimetres is none: it makes every slope a trap.
+    # Ground may be harder than any soil (K small), but no soil has a K of decimetres.
     lower[SHEAR_MODULUS] = -max(PRIORS.most_shear_modulus, most * priors.shear_modulus_std)
     upper[layout.sinkage] = rover.rim_radius
     lower[layout.sinkage] = [-PRIORS.highest * r for r in rover.rim_radius]
@@ -228,7 +227,7 @@ def bounds(rover: Rover, layout: StateLayout, priors: SoilPriors) -> tuple[Float
 
 
 def with_soil_of(old: FilterMemory, start: FilterMemory, layout: StateLayout) -> FilterMemory:
-    """Return the start of a run that keeps soil and biases of an old one, widened."""
+    """Return the start of a run that keeps soil and biases of an old one, inflated."""
     kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND]
     kept += [SLIP_PER_DEMAND, RUT_SHARE, SHEAR_RADIUS]
     kept += range(layout.size)[layout.stiffness]

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Update with a reference velocity; inflates the speed variance if outliers agree."""
+"""Update with a reference velocity; consistent outliers inflate the variance of the speed."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ alarm rate falls, between 5 and 0.05 % [-]."""
 
 # Tuned on simulated drives, seeds 1000 to 1019, and the nine snow immobilisations.
 _KNOWN_TIME = 5.0
-"""Age [s] up to which a reference separates slip from soil; after that the soil is held."""
+"""Age of the last reference up to which slip counts as observed [s]."""
 _FRESH_TIME = 10.0
-"""Age [s] up to which the stuck warning takes the speed as measured."""
-_LONGEST_GAP = 10.0  # between references that is remembered [s]
+"""The same up to which the stuck warning takes the speed as measured [s]."""
+_LONGEST_GAP = 10.0  # between references, in its smoothed value [s]
 _GAP_GAIN = 0.3  # smoothing of it, per reference
 _MOVING_STD = 3.0  # deviations from 0 of a reference that shows motion
 _MOVING_REST = 2.0  # times ``rest_speed``
-_SLIDE_GAPS = 2.0  # gaps for which a slide on locked wheels is assumed to last
+_SLIDE_GAPS = 2.0  # duration assumed for a slide on locked wheels, in gaps of the references
 _SHORTEST_SLIDE = 1.0  # [s]
 _MEAN_COUNT = 6.0
 """References over which their innovations' mean is taken."""
@@ -40,13 +40,13 @@ _MOST_DEVIATIONS = 3.0  # limit of one normalised innovation in that mean
 _MOST_VARIANCE_FACTOR = 100.0
 _RUN_EXCESS = 4.0
 """Square of that mean over its variance above which the innovations are biased [-]."""
-_BEYOND_RIM = 1.5  # times the fastest rim speed: no rover drives faster than its wheels
-_BEYOND_STD = 5.0
+_BEYOND_RIM = 1.5  # over the fastest rim speed: no rover drives faster than its wheels [-]
+_BEYOND_STD = 5.0  # deviations added to that bound
 _SAME_STD = 4.0  # deviations within which two references disagree by the same amount
 _COUNT_BEYOND = 4  # consistent outliers beyond the rim speed that are accepted
-_COUNT = 2  # consistent outliers that are accepted
-_GATE = 4.0  # to which the NIS of an outlier is reduced
-_GATE_BEYOND = 0.01
+_COUNT = 2  # other consistent outliers that are accepted
+_GATE = 4.0  # NIS to which that of an outlier is reduced [-]
+_GATE_BEYOND = 0.01  # the same for one beyond the rim speed [-]
 
 
 class ReferenceState(NamedTuple):
@@ -54,7 +54,7 @@ class ReferenceState(NamedTuple):
 
     time: float = -math.inf  # of the last one [s]
     slip_time: float = -math.inf
-    """Of the last one that shows slip [s]: wheels turned, and it was not rejected."""
+    """Of the last one that shows the slip [s]: not rejected, and not at rest."""
     slip_time_before: float = -math.inf  # of the one before it [s]
     gap: float = 10.0  # between them, smoothed [s]
     sliding_until: float = -1.0  # a slide on locked wheels is assumed until then [s]
@@ -108,7 +108,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         return time - self.state.slip_time < _KNOWN_TIME
 
     def known_twice(self, time: float) -> bool:
-        """Return whether the last two are; the first may average over a start."""
+        """Return whether the last two are: one alone may average over a start."""
         return time - self.state.slip_time_before < _KNOWN_TIME
 
     def fresh(self, time: float) -> bool:
@@ -120,9 +120,9 @@ class ReferenceUpdate(Component[ReferenceState]):
         """Factor on the variance of the wheel-soil models [-]: 1 while the references scatter.
 
         Innovations of a consistent filter are white. If several keep one sign, model errors bias
-        the speed, which a gate on single innovations cannot detect.
-        The running mean of white innovations has variance 1 / (2 n - 1) over n. Above one
-        reference a second the limit rises, so that the rate of false alarms per second is kept.
+        the speed, which a gate on single innovations cannot detect. The running mean of white
+        normalised innovations with gain 1/n has the variance 1 / (2 n - 1). For more than one
+        reference a second the limit rises, so that the rate of false alarms per second is the same.
         """
         square = self.state.mean_innovation**2 * (2.0 * _MEAN_COUNT - 1.0)
         gap = clipped(self.state.gap, _LEAST_GAP, 1.0)
@@ -161,23 +161,23 @@ class ReferenceUpdate(Component[ReferenceState]):
         if nis <= self._gate or state.rejected_in_a_row:  # a single outlier is no bias
             mean = state.mean_innovation
             state = state._replace(mean_innovation=mean + (score - mean) / _MEAN_COUNT)
-        opened = False
+        inflated = False
         if nis > self._gate:
             beyond = abs(reference.forward) > (
                 _BEYOND_RIM * fastest_rim + _BEYOND_STD * math.sqrt(total)
             )
-            apart = abs(residual - state.last_rejected)
-            same = apart < _SAME_STD * math.sqrt(2.0 * variance + total)
+            change = abs(residual - state.last_rejected)
+            same = change < _SAME_STD * math.sqrt(2.0 * variance + total)
             agreeing = state.rejected_in_a_row + 1
-            opened = same and agreeing >= (_COUNT_BEYOND if beyond else _COUNT)
-            if opened:
+            inflated = same and agreeing >= (_COUNT_BEYOND if beyond else _COUNT)
+            if inflated:
                 ekf.inflate(SPEED, residual * residual)
             else:
                 gate = _GATE_BEYOND if beyond else _GATE
                 variance += chi_square_gate(residual, total, gate)
             state = state._replace(
                 rejected=state.rejected + 1,
-                rejected_in_a_row=0 if opened else agreeing,
+                rejected_in_a_row=0 if inflated else agreeing,
                 last_rejected=residual,
             )
         else:
@@ -187,10 +187,10 @@ class ReferenceUpdate(Component[ReferenceState]):
         if not rests and not state.rejected_in_a_row:
             state = state._replace(slip_time=time, slip_time_before=state.slip_time)
         self.state = state
-        return opened
+        return inflated
 
     def variance(self, reference: ReferenceVelocity) -> float:
-        """Return the variance that a reading states, by default the sensor's [(m/s)^2]."""
+        """Return the variance that a reading states, else that of the sensor [(m/s)^2]."""
         sensors = self._sensors
         stated = reference.variance
         variance = stated if stated > 0.0 else sensors.reference_std**2
@@ -199,7 +199,7 @@ class ReferenceUpdate(Component[ReferenceState]):
     def _note_slide(self, ekf: GatedFilter, time: float, forward: float, variance: float) -> None:
         """With all wheels at rest, decide between standstill and a slide on locked wheels.
 
-        One reference that shows motion may be an outlier: two in a row make a slide.
+        A single reference that shows motion may be an outlier; two in a row are a slide.
         """
         noise = _MOVING_STD * math.sqrt(variance)
         until = time

@@ -18,11 +18,11 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
 
 # Tuned on simulated drives, seeds 1000 to 1019.
-_BELIEVED_AFTER = 3
-"""Rejected readings in a row after which they are no spikes: the wheel is somewhere else."""
-_FIRST_BELIEVED_AFTER = 2
-"""The same at the start, where the configured soil or the first reading may be far off; later
-those that are rejected have to outnumber those that were used."""
+_ACCEPTED_AFTER = 3
+"""Rejected readings in a row from which on they are accepted: the sinkage has really changed."""
+_FIRST_ACCEPTED_AFTER = 2
+"""The same at the start, where the configured soil or the first reading may be far off. In between
+the rejected readings must outnumber those used before."""
 _AGE = 2.0  # up to which a reading counts as known [s]
 FLOOR_VARIANCE = 1e-10  # of a reading [m^2]
 
@@ -32,9 +32,9 @@ class SinkageUpdateState(NamedTuple):
 
     time: tuple[float, ...]  # of the last reading that was used [s], -inf = none yet
     rejected_in_a_row: tuple[int, ...]
-    used: tuple[int, ...]  # readings, counted up to `believed_after`
-    rejected: int = 0  # of all wheels
-    nis: float | None = None
+    used: tuple[int, ...]  # number of readings used, at most `_ACCEPTED_AFTER`
+    rejected: int = 0  # readings of all wheels
+    nis: float | None = None  # running mean; None = no reading yet
 
 
 class SinkageUpdate(Component[SinkageUpdateState]):
@@ -56,12 +56,12 @@ class SinkageUpdate(Component[SinkageUpdateState]):
         time: float,
         sums: SinkageSums,
         reading_variance: float,
-        open_std: FloatArray,
+        unmodelled_std: FloatArray,
     ) -> list[Row]:
-        """Return the rows of the readings of a cycle; inflates the covariance if outliers repeat.
+        """Return the rows of the readings of a cycle; repeated outliers inflate the covariance.
 
-        `reading_variance` is that of one reading [m^2], `open_std` (n,) the deviation of the
-        sinkages by unmodelled slip-sinkage, not in the covariance [m].
+        `reading_variance` is that of one reading [m^2], `unmodelled_std` (n,) the deviation of the
+        sinkages by slip-sinkage that the bearing law does not model [m].
         """
         if not any(sums.readings):
             return []
@@ -72,20 +72,20 @@ class SinkageUpdate(Component[SinkageUpdateState]):
             if not count:
                 continue
             index = self._layout.sinkage.start + i
-            if open_std[i] > 0.0:
-                ekf.inflate(index, float(open_std[i]) ** 2)
+            if unmodelled_std[i] > 0.0:
+                ekf.inflate(index, float(unmodelled_std[i]) ** 2)
             variance = reading_variance / count + FLOOR_VARIANCE
             residual = total / count - float(ekf.mean[index])
             nis = residual * residual / (float(ekf.covariance[index, index]) + variance)
             if nis > self._gate:
                 rejected += 1
                 in_a_row[i] += 1
-                needed = max(used[i] + 1, _FIRST_BELIEVED_AFTER)
-                if in_a_row[i] < min(needed, _BELIEVED_AFTER):
+                needed = max(used[i] + 1, _FIRST_ACCEPTED_AFTER)
+                if in_a_row[i] < min(needed, _ACCEPTED_AFTER):
                     continue
                 ekf.inflate(index, residual * residual)
             in_a_row[i] = 0
-            used[i] = min(used[i] + 1, _BELIEVED_AFTER)
+            used[i] = min(used[i] + 1, _ACCEPTED_AFTER)
             mean_nis = smoothed_nis(mean_nis, min(nis, self._gate))
             when[i] = time
             jacobian = np.zeros(self._layout.size)

@@ -29,24 +29,24 @@ from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 
 # Tuned on simulated drives, seeds 1000 to 1019, where no other source is given.
-_RESTING_WALK = 1e-10  # of a wheel that does not turn [m^2/s]
-_LIFTED_WALK = 1e-4  # of a wheel in the air [m^2/s]
-_WALK = 1e-9  # [m^2/s]
-_SPIN_TRAVEL = 0.1  # of the slip velocity that counts as travel over new soil
-_SPIN_RELAXATION = 0.3  # of it that counts for the relaxation
+_RESTING_WALK = 1e-10  # random walk of the sinkage of a wheel that does not turn [m^2/s]
+_LIFTED_WALK = 1e-4  # the same of a wheel in the air [m^2/s]
+_WALK = 1e-9  # the same of a wheel that rolls, added to the model error [m^2/s]
+_SPIN_TRAVEL = 0.1  # share of the slip velocity that counts as travel over new soil [-]
+_SPIN_RELAXATION = 0.3  # share of it that counts for the relaxation [-]
 _LEAST_CONTACT = 0.02  # length of a contact [m]
 _LEAST_CONTACT_SINKAGE = 1e-3  # [m]
 _LEAST_SINKAGE = 5e-4  # [m], for the step on log sinkage
 _RATIO_STEP = 0.02  # of v / rim speed, for the derivative of the bearing law
 _PRESSURE_POWER = 0.5
 """Load goes with z^(N + 1/2): pressure with z^N, length of the contact with its root."""
-_LONGEST_STEP = 0.7  # ln of the sinkage in one cycle
-_RELAXATION_SLOPE = 0.9  # of the relaxation that acts on the covariance
-_LEAST_MEMORY = 0.05  # of the sinkage in the covariance
-_LAW_ERROR = 0.05  # of the sinkage per contact length
-_DIGGING = 0.05  # of the slip velocity times slip
-_OPEN_DIGGING = 0.1
-"""The same, lasting, where nothing measures the sinkage: 0 to 0.1 in simulators of four hands."""
+_LONGEST_STEP = 0.7  # change of ln sinkage in one cycle [-]
+_RELAXATION_SLOPE = 0.9  # share of the relaxation that acts on the covariance [-]
+_LEAST_MEMORY = 0.05  # least derivative of a sinkage by the one before [-]
+_LAW_ERROR = 0.05  # error of the bearing law per contact length, over the sinkage [-]
+_DIGGING = 0.05  # deviation of the slip-sinkage, over slip velocity times slip [-]
+_UNMODELLED_DIGGING = 0.1
+"""The same, lasting, where nothing measures the sinkage [-]: 0 to 0.1 in four simulators."""
 _SLOPE_KEEP = 0.9  # smoothing of the derivatives over about a second of cycles
 _RATE_TIME = 0.5  # time constant of the published rate [s]
 _FIRST_RATE_STD = 1.0  # [m/s], before anything is known
@@ -59,24 +59,24 @@ class SinkageState(NamedTuple):
     """(2, n) smoothed derivatives of ln(load carried) by v / rim speed and by n1; nan = none."""
     rate: Floats  # of each wheel [m/s]
     rate_std: Floats
-    dug: FloatArray
-    """(n,) deviation of each sinkage by slip-sinkage that the bearing law does not model [m]."""
+    unmodelled_std: FloatArray
+    """(n,) deviation of each sinkage by slip-sinkage that the bearing law does not model [m]; not
+    in the covariance of the filter."""
 
 
 class _Motion(NamedTuple):
-    """Of turning wheels, in their direction of rolling, (n,) each."""
+    """Motion of turning wheels, in their direction of rolling, (n,) each."""
 
-    speed: FloatArray  # [m/s]
+    speed: FloatArray  # of the ground below [m/s]
     rim: FloatArray  # [m/s]
-    by_speed: FloatArray
-    """Speed of each wheel by that of the body [-]."""
+    by_speed: FloatArray  # derivative of `speed` by that of the body [-]
     dt: float  # [s]
 
 
 class SinkageProcess(Component[SinkageState]):
-    """Predicts the sinkage of all wheels; keeps its rate.
+    """Predicts the sinkage of all wheels, and tracks its rate.
 
-    `leaving_angle_std` is that of a measured leaving angle as it is used, smoothed [rad].
+    `leaving_angle_std` is the deviation of a measured leaving angle after smoothing [rad].
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class SinkageProcess(Component[SinkageState]):
         carried, exponents, log_depths = self._models.bearing(
             states._replace(speed_ratio=states.speed_ratio - slower)
         )
-        # One Newton step on log load over log sinkage, bounded: relaxation does the rest.
+        # One bounded Newton step on ln load over ln sinkage; the relaxation follows it anyway.
         power = exponents[0] + _PRESSURE_POWER
         most = _LONGEST_STEP
         growth = np.clip(np.log(states.load / carried[0]) / power, -most, most)
@@ -151,10 +151,12 @@ class SinkageProcess(Component[SinkageState]):
         slopes = smoothed_slopes(self.state.slopes, raw, _SLOPE_KEEP)
         # Model error: a share of the sinkage per contact length, and unmodelled slip-sinkage.
         spun = np.maximum(slip, 0.0) ** 2 * rim * dt
-        dug = (self.state.dug + _OPEN_DIGGING * spun) * np.exp(-np.abs(speed) * dt / length)
+        unmodelled_std = (self.state.unmodelled_std + _UNMODELLED_DIGGING * spun) * np.exp(
+            -np.abs(speed) * dt / length
+        )
         self.state = self.state._replace(
             slopes=np.where(relaxes, slopes, self.state.slopes),
-            dug=np.where(relaxes, dug, self.state.dug),
+            unmodelled_std=np.where(relaxes, unmodelled_std, self.state.unmodelled_std),
         )
         noise = (_LAW_ERROR * floored) ** 2 * 2.0 * alpha + (_DIGGING * spun) ** 2 + _WALK * dt
         if states.leaving_angle is not None:
@@ -179,9 +181,9 @@ class SinkageProcess(Component[SinkageState]):
 
         The deviation by unmodelled slip-sinkage is kept for wheels whose sinkage is `unread`.
         """
-        dug = np.zeros(len(before))
-        dug[unread] = self.state.dug[unread]
-        self.state = self.state._replace(dug=dug)
+        unmodelled_std = np.zeros(len(before))
+        unmodelled_std[unread] = self.state.unmodelled_std[unread]
+        self.state = self.state._replace(unmodelled_std=unmodelled_std)
         if dt <= 0.0:
             return
         part = self._layout.sinkage

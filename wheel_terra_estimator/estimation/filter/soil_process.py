@@ -31,26 +31,24 @@ class SoilTuning:
     Tuned on simulated drives, seeds 1000 to 1019.
     """
 
-    memory: float = 100.0  # [m] over which soil returns to the nominal one
+    memory: float = 100.0  # travel over which the soil reverts to the configured one [m]
     strength_walk: float = 0.1  # [ln]
     shear_modulus_walk: float = 0.1  # [ln]
     slip_sinkage_walk: float = 0.05
     centroid_walk: float = 0.05
     mound_walk: float = 0.05
     rut_share_walk: float = 0.02
-    shear_radius_length: float = 20.0
-    """Travel [m] over which the radius at which soil is sheared changes."""
+    shear_radius_length: float = 20.0  # correlation length of the shear radius [m]
     stiffness_walk: float = 0.15  # of all wheels together [ln]
     own_stiffness_walk: float = 0.3  # of each wheel [ln]
-    soft_is_weak: float = 0.7
-    """Correlation of a wheel's own stiffness and strength."""
+    soft_is_weak: float = 0.7  # correlation of a wheel's own stiffness and strength [-]
     common_error_length: float = 5.0
-    """Travel [m] over which the error of the shear model that all wheels share changes: it is the
-    law's, not the place's. What a wheel has of its own changes over ``filter.shear_error_length``.
-    Tuned on seeds 1001 (simulators A, B) and 5003 (C)."""
+    """Correlation length [m] of the error of the shear model common to all wheels, which is that of
+    the law. A wheel's own error, that of the place, has ``filter.shear_error_length``. Tuned on
+    seeds 1001 (simulators A, B) and 5003 (C)."""
     strength_spread: float = 2.0
-    """How much more the strength differs from wheel to wheel than what torque shows as errors of
-    the shear model."""
+    """Spread of the strength between wheels over that of the errors of the shear model that torques
+    show [-]."""
 
 
 _TUNING = SoilTuning()
@@ -103,7 +101,7 @@ class SoilProcess:
         shared = self._mean_variance * (1.0 - common * common)
         Q[e, e] = own * self._each + (shared - own) * self._mean
         if not torque_known:
-            # Softer ground is weaker ground: where no torque says how weak, the sinkage does.
+            # Softer ground is weaker ground: without torques the sinkage indicates the strength.
             Q[e, e] += (_TUNING.strength_spread**2 - 1.0) * own * self._each
             both = _TUNING.own_stiffness_walk * math.sqrt(walk * own) * _TUNING.strength_spread
             Q[k, e] = Q[e, k] = _TUNING.soft_is_weak * both * self._each

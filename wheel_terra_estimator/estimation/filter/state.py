@@ -6,10 +6,10 @@
 entry            unit   why it is there
 ===============  =====  ===========================================================================
 speed            m/s    Body speed. The process follows the rim speed (v / rim speed changes only
-                        with the terrain) and the accelerometer, weighted by what each is worth.
+                        with the terrain) and the accelerometer, weighted by their variances.
                         Speed itself, not the ratio, so that locked wheels can slide.
-gravity_bias     m/s^2  Accelerometer bias plus gravity that leaks in through attitude errors: what
-                        is wrong with the accelerometer as a sensor of dv/dt.
+gravity_bias     m/s^2  Accelerometer bias plus the gravity component by attitude errors: the error
+                        of the accelerometer as a sensor of dv/dt.
 shear_strength   ln     Common factor on cohesion and tan(phi); wheels of nearly equal load do
                         not separate the two.
 shear_modulus    ln     Common factor on K; seen at low slip, as shear_strength is at high slip.
@@ -20,31 +20,30 @@ centroid         -      Common shift of the centroid of the contact stress, as a
 mound            -      The part of that shift that comes with slip, (s - onset)+^2: soil piles up
                         behind the wheel and pushes it (the effect ``soil_mound``). Seen where slip
                         changes.
-slip_per_demand  -      Slip for each share of the load that the ground asks along the body: what a
-                        change of slope costs at once, before the next reference velocity shows it.
-                        Learned from them, since it is the inverse slope of a traction curve that
-                        no soil file knows.
+slip_per_demand  -      Change of slip by that of the required traction coefficient: the inverse
+                        slope of the traction curve. It predicts the slip on a change of slope
+                        before the next reference velocity shows it, and is learned from these.
 sinkage (n)      m      Rim below the surface.
 stiffness (n)    ln     Factor on the bearing modulus, per wheel: wheels enter a patch one by one.
 shear_error (n)  ln     Error of the shear model, per wheel, first-order Gauss-Markov over travel:
-                        a wheel's own changes with the place, what all share is the law's.
-                        It makes ten equal residuals at constant slip one piece of information,
-                        and carries what torque says of a wheel's pull in another soil.
+                        a wheel's own error changes with the place, the common one is that of the
+                        law. By it ten equal residuals at constant slip count as one, and the torque
+                        of a wheel corrects its pull in another soil.
 torque_zero (n)  N m    Zero of each torque sensor, constant. Seen where loads and slip change:
                         the soil's share of a torque goes with the load, the zero does not.
 rut_share        -      Share of the rut of the wheel before that stays pressed: a wheel which
                         follows begins there (multi-pass), so that its contact is shorter than its
                         sinkage below the undisturbed surface says. Seen as axles differ.
-shear_radius     -      By which share soil is sheared beyond what the slip says: the radius of the
-                        shear is not that of the slip, and a measured traction curve seldom begins
-                        at the origin. Gauss-Markov over travel.
-reference_error  m/s    Only with ``sensors.reference_wander_std``: what lasts of the error of the
-                        reference velocity, first-order Gauss-Markov over time. Fifty readings of a
-                        satellite receiver that is off by 3 cm/s are off by 3 cm/s.
+shear_radius     -      Relative difference of shear radius and slip radius: the soil is sheared at
+                        another radius than that of the slip, and a measured traction curve seldom
+                        begins at the origin. Gauss-Markov over travel.
+reference_error  m/s    Only with ``sensors.reference_wander_std``: correlated part of the error of
+                        the reference velocity, first-order Gauss-Markov over time, as of a
+                        satellite receiver whose error lasts over many readings.
 ===============  =====  ===========================================================================
 
-Not in it: c and phi apart, n0 apart from the stiffness, zeros of sinkage sensors (constant, not
-observable at the same time as the soil: they enter the published deviations).
+Not in it: c and phi separately, n0 beside the stiffness, zeros of sinkage sensors (constant, not
+observable beside the soil: they enter the published deviations).
 """
 
 from __future__ import annotations
@@ -98,13 +97,13 @@ class StateLayout:
         object.__setattr__(self, 'reference_error', each if self.reference_wanders else None)
 
     def considered(self, *, settled: bool, opposes_rims: bool, unread: Sequence[int]) -> list[int]:
-        """Return the entries that measurements must not teach (Schmidt 1966: considered).
+        """Return the considered entries (Schmidt 1966), which measurements must not change.
 
-        Their uncertainty counts, but they keep mean and variance: else what the models get wrong
-        would end up there. The rut that forms at a start, or is left behind after a spin on the
-        spot (contacts that are not `settled`), shows no speed. Where the rover moves against its
-        wheels (`opposes_rims`), their forces are the same at any such speed. Of wheels without a
-        sinkage reading (`unread`), sinkage and errors of the shear model are not separable.
+        Their uncertainty counts, but they keep mean and variance; else model errors would be taken
+        for them. On contacts that are not `settled` (at a start, after a turn on the spot) forces
+        do not show the speed. Where the rover moves against its wheels (`opposes_rims`), their
+        forces are the same at any such speed. Of wheels without a sinkage reading (`unread`),
+        sinkage and errors of the shear model are not separable.
         """
         entries = []
         if not settled or opposes_rims:
@@ -125,6 +124,6 @@ class Prediction(NamedTuple):
 
     @classmethod
     def unchanged(cls, mean: FloatArray) -> Prediction:
-        """Return the prediction that everything stays as it is."""
+        """Return the prediction of an unchanged state without process noise."""
         size = len(mean)
         return cls(mean.copy(), np.eye(size), np.zeros((size, size)))

@@ -19,27 +19,27 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover
 
 _FLOOR_VARIANCE = 1e-6  # [N^2 m^2]
-_APART_STD = 0.025
-"""By how much torques differ from one another beyond the models, over their mean [-]: each wheel
-has its own load and ground. Tuned without references on simulators A, B and a foreign one."""
-_APART_LENGTH = 5.0  # rim travel over which it lasts [m]
-_GAIN = 0.1  # of the NIS of a wheel per reading: its mean goes over the last ten
-_LEAST_APART = 2  # wheels that can differ
+_SPREAD_STD = 0.025
+"""Deviation of the torques from one another beyond the models, over their mean [-]: each wheel has
+its own load and ground. Tuned without references on simulators A, B and C."""
+_SPREAD_LENGTH = 5.0  # rim travel over which that difference lasts [m]
+_GAIN = 0.1  # of the running mean of a wheel's NIS, per reading [-]
+_LEAST_COMPARED = 2  # torques that can differ from one another
 
 
 class TorqueUpdate(Component['tuple[float | None, ...]']):
     """Turns the torques of turning wheels into rows of the update.
 
-    Keeps the running mean of the NIS of each wheel, None = no torque came yet: a wheel whose
-    torque stays off the model, by a stone or a failing drive, gets a greater variance. A change
-    of soil looks like an outlier: a row beyond the gate is down-weighted, not rejected.
+    Keeps the running mean of the NIS of each wheel, None = no torque yet: a torque that disagrees
+    with the model for long, by a stone or a failing drive, gets a greater variance. A change of
+    soil looks like an outlier, so a row beyond the gate is down-weighted, not rejected.
     """
 
     def __init__(self, configuration: Configuration, rover: Rover, layout: StateLayout) -> None:
         super().__init__((None,) * layout.wheel_count)
         self._gate = float(configuration.filter.gate)
         self._zeros = layout.torque_zero
-        # Where the zeros stand in the rows, as indices that numpy need not convert in each cycle.
+        # Entries of the zeros in the rows, as index arrays made once.
         columns = np.arange(layout.size)[layout.torque_zero]
         self._ones = (np.arange(len(columns)), columns)
         self._known = bool(len(columns))
@@ -48,7 +48,7 @@ class TorqueUpdate(Component['tuple[float | None, ...]']):
 
     @property
     def nis(self) -> float | None:
-        """Mean of the NIS of the wheels; None = no torque came yet."""
+        """Mean of the NIS of the wheels; None = no torque yet."""
         known = [nis for nis in self.state if nis is not None]
         return sum(known) / len(known) if known else None
 
@@ -68,10 +68,10 @@ class TorqueUpdate(Component['tuple[float | None, ...]']):
     ) -> list[Row]:
         """Return the rows of the torques of a cycle.
 
-        Without a reference velocity the slip follows what all torques say, and only little what
-        they differ by. The forces were worked out at the state of the filter; `variance` is that of
-        a reading [N^2 m^2], `model_variance` that of the shear model, over its square [-];
-        `repeats` cycles are one piece of information.
+        Without a reference velocity the slip follows the mean of the torques, and hardly their
+        differences. The forces are those at the state of the filter; `variance` is that of a
+        reading [N^2 m^2], `model_variance` the relative one of the shear model [-]; the errors of
+        `repeats` cycles are one and the same (same ground).
         """
         rows, means = [], list(self.state)
         H, zeros = forces.torque_rows, self.zeros(ekf.mean)
@@ -92,18 +92,18 @@ class TorqueUpdate(Component['tuple[float | None, ...]']):
             gate = chi_square_gate(residual, expected, self._gate)
             rows.append(Row(residual, H[i], total * excess(mean) ** 2 + gate))
         self.state = tuple(means)
-        if cycle.reference_known or len(rows) < _LEAST_APART:
+        if cycle.reference_known or len(rows) < _LEAST_COMPARED:
             return rows
-        return _independent(rows, _APART_STD * float(np.abs(forces.torque).mean()), repeats)
+        return _independent(rows, _SPREAD_STD * float(np.abs(forces.torque).mean()), repeats)
 
 
-def _independent(rows: list[Row], apart: float, repeats: float) -> list[Row]:
-    """Return rows with independent errors for rows that differ by a lasting `apart` [N m] as well.
+def _independent(rows: list[Row], spread: float, repeats: float) -> list[Row]:
+    """Return the rows with a lasting `spread` [N m] about their mean, whitened to variances of 1.
 
-    That is about the mean of all, so the mean is known as well as before.
+    The spread adds no variance to the mean of all torques.
     """
     residuals, jacobians, variances = zip(*rows, strict=True)
-    n, lasting = len(rows), apart**2 * repeats * _APART_LENGTH / SAME_GROUND
+    n, lasting = len(rows), spread**2 * repeats * _SPREAD_LENGTH / SAME_GROUND
     root = np.linalg.cholesky(np.diag(variances) + lasting * (np.eye(n) - 1.0 / n))
     whole = np.linalg.solve(root, np.column_stack([residuals, jacobians]))
     return [Row(float(row[0]), row[1:], 1.0) for row in whole]

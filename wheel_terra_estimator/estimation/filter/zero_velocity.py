@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Zero-velocity update where all wheels stand; zero of the gyro."""
+"""Zero-velocity update while all wheels stand; zero-rate offset of the gyro."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from wheel_terra_estimator.estimation.scalars import NAN
 _SETTLING_TIME = 0.15  # [s] of standing wheels before the rover counts as standing
 _STD = 0.0005  # of a rover that stands [m/s]
 _COASTING = 0.1
-"""Deceleration [g] of a fast rover that slides on: so long it is not stopped against its
-accelerometer."""
-_COASTING_GATE = 9.0
+"""Deceleration of a rover that slides on after its wheels have stopped [g]; as long as that takes
+the update is gated."""
+_COASTING_GATE = 9.0  # greatest NIS of the update meanwhile [-]
 _GYRO_SETTLING_TIME = 0.5  # [s]
-_MOST_YAW_RATE = 0.05  # [rad/s]: what turns faster does not stand
-_MOST_CYCLES = 200.0  # over which the zero of the gyro is a mean
-_KEPT_SHARE = 0.5  # of the weight of the zeros, in a run that keeps soil and biases
+_MOST_YAW_RATE = 0.05  # of a rover at rest, by the zero of the gyro [rad/s]
+_MOST_CYCLES = 200.0  # in the running mean of the zero
+_KEPT_SHARE = 0.5  # weight of a zero kept in a new run, over that in the old one [-]
 
 
 class ZeroVelocityState(NamedTuple):
@@ -38,26 +38,23 @@ class ZeroVelocityState(NamedTuple):
 
 
 class ZeroVelocityUpdate(Component[ZeroVelocityState]):
-    """Fuses standing still; learns the zero of the gyro meanwhile."""
+    """Fuses zero velocity at rest, and learns the zero of the gyro meanwhile."""
 
     def __init__(self, gravity: float) -> None:
         super().__init__(ZeroVelocityState())
         self._coasting = _COASTING * gravity  # [m/s^2]
 
     def keep_zero_of(self, old: ZeroVelocityState) -> None:
-        """Begin a run with the gyro's zero of an old one, at less weight."""
+        """Begin a run with the gyro's zero of an old one, at a lower weight."""
         weight = _KEPT_SHARE * old.weight
         self.state = ZeroVelocityState(zero=old.zero, weight=weight)
 
     def standing(self) -> bool:
-        """Say whether all wheels stand."""
+        """Return whether all wheels stand."""
         return not isnan(self.state.since)
 
     def update(self, ekf: GatedFilter, cycle: Cycle, *, sliding: bool) -> None:
-        """Fuse what the wheels say of a rover that stands.
-
-        `sliding` says that by a reference it slides on them.
-        """
+        """Fuse zero velocity where all wheels stand; not while the rover is `sliding` on them."""
         time, window, yaw_rate = cycle.time, cycle.window, cycle.yaw_rate
         if not cycle.still:
             if self.standing():
