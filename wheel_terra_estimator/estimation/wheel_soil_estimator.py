@@ -1,10 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Filter, classes and warnings of one rover: one step per stamp, estimates on demand.
+"""Estimator of one rover: filter, slips and warnings; one step per stamp, estimates on demand.
 
 Between two cycles of the filter (``filter.period``) readings are only summed and the speed is
 extrapolated, so that wheel odometry at 100 Hz costs little more than at 10 Hz. A cycle is
-`WheelSoilEstimator._run_cycle`: predict, fuse the readings since the last one, compute outputs.
+`WheelSoilEstimator._run_cycle`: predict, fuse the readings since the last one, compute the pulls.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ _PERIOD_ROUNDING = 1e-4
 _TURN = 0.1
 """Lateral speed ratio above which the yaw moment balance constrains the pulls [-]."""
 _SHARP_TURN = 0.3
-"""Lateral speed ratio above which slip is due to turning, so no symptom of entrapment [-]."""
+"""Lateral speed ratio above which slip is due to turning and is no sign of entrapment [-]."""
 _ANGLE_KNOWN = 0.6  # slip angle std up to which lateral forces are used [rad]
 
 
@@ -114,7 +114,7 @@ class Instant(NamedTuple):
     sources: Sources
     """Speed as filtered; mean and covariance are empty: the smoother supplies its own."""
     cycle: SpeedAndVariance  # of the filter at its last cycle
-    usual: SpeedAndVariance | None  # by the typical slip at the measured torques
+    by_torque: SpeedAndVariance | None  # by the typical slip at the measured torques
 
 
 class _Clock(NamedTuple):
@@ -209,7 +209,7 @@ class WheelSoilEstimator:
         self._clock = _Clock(stamp, stamp)
         if keep_soil:
             self._inertial.keep_stated(stated)
-            self._begin_with(stated)
+            self._reset_gravity_bias(stated)
             self._ekf.restore(with_soil_of(soil, self._ekf.snapshot(), self._layout))
             self._zero_velocity.keep_zero_of(gyro)
             self._reference.state = self._reference.state._replace(rejected=rejected[0])
@@ -241,8 +241,8 @@ class WheelSoilEstimator:
             floor = self._sensors.reference_std_floor**2
             self._sideways.correct(inputs.reference.lateral, max(stated, floor))
         is_due = (rolled or silent) and self._is_due(time, self._speed.state.cycle_time)
-        heard_again = rolled and isnan(self._speed.state.rims.typical)
-        if inputs.reference is not None or is_due or heard_again:
+        resumes = rolled and isnan(self._speed.state.rims.typical)
+        if inputs.reference is not None or is_due or resumes:
             self._run_cycle(time, inputs.reference)
         if rolled or silent:
             self._judge(time)
@@ -254,7 +254,7 @@ class WheelSoilEstimator:
             before = self._inertial.stated
             self._inertial.update(time, inputs.inertial, self._zero_velocity.state.zero)
             if self._inertial.stated is not before:
-                self._begin_with(self._inertial.stated, before)
+                self._reset_gravity_bias(self._inertial.stated, before)
         if inputs.sinkage is not None:
             self._sinkages.update(inputs.sinkage)
         if inputs.leaving_angle is not None:
@@ -264,20 +264,22 @@ class WheelSoilEstimator:
             if inputs.wheel_odometry.steering is not None:
                 self._steering.update(inputs.wheel_odometry.steering)
 
-    def _begin_with(self, stated: StatedNoise, before: StatedNoise = NOTHING_STATED) -> None:
+    def _reset_gravity_bias(
+        self, stated: StatedNoise, before: StatedNoise = NOTHING_STATED
+    ) -> None:
         """Reset the variance of the gravity bias to the orientation noise that the IMU reports."""
         if stated.orientation_std != before.orientation_std:
             std = gravity_bias_std(self._rover, self._sensors, stated.orientation_std)
             self._ekf.set(GRAVITY_BIAS, float(self._ekf.mean[GRAVITY_BIAS]), std**2)
 
     def _is_due(self, time: float, before: float) -> bool:
-        """Return whether the period is over that began `before` [s]; nan = it never did."""
+        """Return whether the period that began at `before` [s] is over; nan = none began."""
         return isnan(before) or time - before >= self._rover.period - _PERIOD_ROUNDING
 
     # -- One cycle of the filter -----------------------------------------------------------------
 
     def _run_cycle(self, time: float, reference: ReferenceVelocity | None) -> None:
-        """Predict to a time [s], fuse the readings since the last cycle, compute the outputs."""
+        """Predict to a time [s], fuse the readings since the last cycle, compute the pulls."""
         ekf, layout = self._ekf, self._layout
         cycle = self._begin_cycle(time)
         sinkage_before = ekf.mean[layout.sinkage].copy()
@@ -293,11 +295,10 @@ class WheelSoilEstimator:
             self._fuse_reference(cycle, reference)
         self._zero_velocity.update(ekf, cycle, sliding=time < self._reference.state.sliding_until)
 
-        variance, unmodelled = (
-            self._noise.variance('sinkage'),
-            self._sinkage_process.state.unmodelled_std,
+        unmodelled_std = self._sinkage_process.state.unmodelled_std
+        rows = self._sinkage.update(
+            ekf, time, self._sinkages.take(), self._noise.variance('sinkage'), unmodelled_std
         )
-        rows = self._sinkage.update(ekf, time, self._sinkages.take(), variance, unmodelled)
         self._unloaded.update(cycle)
         forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
         if cycle.still:
@@ -355,7 +356,7 @@ class WheelSoilEstimator:
             self._buffer.mark((evidence, ekf.mean.copy()), present)
 
     def _begin_cycle(self, time: float) -> Cycle:
-        """Work out turning, loads and rim speeds; note what changes under the wheels."""
+        """Update turning, loads, demand and direction of the drive; return the new cycle."""
         ekf, speed, rover = self._ekf, self._speed, self._rover
         dt = speed.since_cycle(time)
         window = self._inertial.take()
@@ -427,7 +428,7 @@ class WheelSoilEstimator:
         return self._contact_age.state.direction * sum(torque for torque, _ in torques) / most
 
     def _note_climb(self, demand: float, rim: float, dt: float, *, slip_known: bool) -> None:
-        """Note what is asked and the slip, where a reference shows it and the rover rolls on."""
+        """Update the steepest climb with demand [-] and slip, while it is steady and observed."""
         steady = slip_known and self._contact_age.settled and abs(rim) >= self._rover.low_rim
         straight = self._turning.state.lateral_motion <= _SHARP_TURN
         slip = 1.0 - float(self._ekf.mean[SPEED]) / rim if steady and straight else NAN
@@ -439,7 +440,7 @@ class WheelSoilEstimator:
         inflation = speed.state.inflation if cycle.reference_known else 0.0
         by_wheels = expected = speed.by_wheels(cycle.dt, cycle.yaw_compensated, inflation)
         unseen = not cycle.still and not cycle.reference_known
-        # No slip is usual where the ground holds the rover.
+        # There is no equilibrium slip where the ground holds the rover.
         held, buried = self._clock.assessment.holds, self._clock.assessment.buried
         length = HELD_LENGTH if held and not buried else EQUILIBRIUM_LENGTH
         if unseen:
@@ -535,12 +536,11 @@ class WheelSoilEstimator:
         """Return whether the sinkage of most wheels is measured."""
         return 2 * len(self._sinkage.unread(time)) < self._rover.wheel_count
 
-    # -- What it means ---------------------------------------------------------------------------
+    # -- Slip, stuck warning, margins ------------------------------------------------------------
 
     def _judge(self, time: float) -> None:
         """Judge the slip of each wheel and the stuck warning at a time [s]."""
-        rover, wheels = self._rover, self._wheels
-        rims = wheels.rim_speeds(time)
+        rims = self._wheels.rim_speeds(time)
         present = self._present_speed(rims)
         motion = self._turning.state
         body = BodyMotion(
@@ -554,32 +554,17 @@ class WheelSoilEstimator:
         )
         slips = self._slips.update(time, rims, body)
         ekf = self._ekf
-        sinkage = ekf.mean[self._layout.sinkage].tolist()
-        motions, onward = [], max(known(rims), key=abs, default=0.0)
-        stands = abs(onward) <= rover.rest_speed
-        if stands:
-            onward = self._contact_age.state.direction  # of the last drive, 0 before one
-        for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
-            limit, torque = rover.torque_limit[i], wheels.state.torque[i]
-            motions.append(
-                WheelMotion(
-                    wheel.slip,
-                    wheel.std,
-                    rim,
-                    abs(rim) > rover.rest_speed and not wheel.resting,
-                    # A locked wheel is driven, or dragged, in the direction of the others.
-                    driving_share(torque, limit, rim if abs(rim) > rover.rest_speed else onward),
-                    sinkage[i],
-                    rover.rim_radius[i],
-                )
-            )
+        fastest = max(known(rims), key=abs, default=0.0)
+        stands = abs(fastest) <= self._rover.rest_speed
+        # Where all wheels stand that of the last drive, 0 before one.
+        drive_sign = self._contact_age.state.direction if stands else fastest
         loads = self._loads.state
         assessment = self._stuck.update(
             time,
             RoverMotion(
                 present.speed,
                 self._reference.fresh(time),
-                tuple(motions),
+                self._wheel_motions(rims, slips, drive_sign),
                 turning=motion.lateral_motion > _SHARP_TURN
                 or sides_oppose(rims, body.headings.by_yaw_rate),
                 depth_read=self._depth_read(time),
@@ -598,6 +583,31 @@ class WheelSoilEstimator:
             self._follow_sideways(time, body, rims)
         if self._buffer is not None:
             self._buffer.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
+
+    def _wheel_motions(
+        self, rims: Floats, slips: tuple[WheelSlip, ...], drive_sign: float
+    ) -> tuple[WheelMotion, ...]:
+        """Return what the stuck warning needs of each wheel.
+
+        The sign of `drive_sign` is the direction in which a locked wheel is driven or dragged.
+        """
+        rover, torques = self._rover, self._wheels.state.torque
+        sinkage = self._ekf.mean[self._layout.sinkage].tolist()
+        motions = []
+        for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
+            turns = abs(rim) > rover.rest_speed
+            motions.append(
+                WheelMotion(
+                    wheel.slip,
+                    wheel.std,
+                    rim,
+                    turns and not wheel.resting,
+                    driving_share(torques[i], rover.torque_limit[i], rim if turns else drive_sign),
+                    sinkage[i],
+                    rover.rim_radius[i],
+                )
+            )
+        return tuple(motions)
 
     def _holding_share(self) -> float:
         """Return the share of all torque limits that holds the rover on its slope [-]."""
@@ -673,13 +683,13 @@ class WheelSoilEstimator:
             mean=nothing, covariance=nothing, speed=speed, speed_variance=variance
         )
         cycle = SpeedAndVariance(float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED]))
-        return Instant(time, body, sources, cycle, self._usual_speed(rims))
+        return Instant(time, body, sources, cycle, self._speed_by_torque(rims))
 
     def _present_speed(self, rims: Floats) -> SpeedAndVariance:
         """Return speed [m/s] and variance at the present stamp."""
         rolling = self._yaw_compensated(rims)
         filtered = self._filtered_speed(rolling)
-        usual = self._usual_speed(rolling)
+        usual = self._speed_by_torque(rolling)
         return filtered if usual is None else pooled(filtered, usual)
 
     def _yaw_compensated(self, rims: Floats) -> RimSpeeds:
@@ -694,7 +704,7 @@ class WheelSoilEstimator:
             *self._speed.present(self._ekf, time, rims, window, inflated=slip_known)
         )
 
-    def _usual_speed(self, rims: RimSpeeds) -> SpeedAndVariance | None:
+    def _speed_by_torque(self, rims: RimSpeeds) -> SpeedAndVariance | None:
         """Return speed [m/s] and variance by the typical slip at the measured torques.
 
         None with a reference velocity, without torques, in turns, on forming contacts, or while

@@ -190,8 +190,8 @@ class _SmoothedOutputs:
         speed = given.speed + float(now.mean[SPEED]) - instant.cycle.speed
         carried = max(given.speed_variance - instant.cycle.variance, 0.0)
         variance = float(now.covariance[SPEED, SPEED]) + carried
-        if instant.usual is not None:
-            speed, variance = pooled(SpeedAndVariance(speed, variance), instant.usual)
+        if instant.by_torque is not None:
+            speed, variance = pooled(SpeedAndVariance(speed, variance), instant.by_torque)
         rims = known(given.rims)
         typical = sum(map(abs, rims)) / len(given.rims)
         least = max(typical * LEAST_SLIP_STD, _LEAST_STD_SHARE * instant.motion.speed_std)
