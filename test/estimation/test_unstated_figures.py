@@ -194,7 +194,7 @@ def test_loads_are_open_where_no_balance_gives_them(wheels, stated, std):
     rover = {k: v[:wheels] if isinstance(v, list) else v for k, v in TEN_LINES.items()}
     configuration = reader.from_parameters({**rover, **stated})
     told = Rover.from_configuration(configuration)
-    assert told.open_load_std == pytest.approx(std)
+    assert told.indeterminate_load_std == pytest.approx(std)
     estimator = WheelSoilEstimator(configuration)
     estimator.step(*step_inputs(0.0, np.ones(wheels), np.ones(wheels)))
     published = estimator.estimates().normal_load_std / (MASS * GRAVITY / wheels)

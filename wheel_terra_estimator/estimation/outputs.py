@@ -181,7 +181,9 @@ class Outputs:
         if sum(load) < _BELIEVED_LOAD * rover.mass * rover.gravity:
             # Upside down, in free fall or wrongly mounted: nothing is known.
             return [share] * len(load), [share] * len(load)
-        mean_load_std = math.hypot(rover.load_std, rover.open_load_std) * sum(load) / len(load)
+        mean_load_std = (
+            math.hypot(rover.load_std, rover.indeterminate_load_std) * sum(load) / len(load)
+        )
         loads = [mean_load_std if given.loads.force_known else w for w in load]
         pulls = [
             min(std, w + w_std) for std, w, w_std in zip(given.pulls.std, load, loads, strict=True)

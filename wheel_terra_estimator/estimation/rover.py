@@ -40,7 +40,7 @@ class Rover:
     gravity: float
     load: LoadDistribution
     load_std: float  # relative
-    open_load_std: float
+    indeterminate_load_std: float
     """What the balances leave open of the loads, relative. The filter does without: each wheel's
     own error of the shear model takes it up."""
     rut_tilt: tuple[float, ...]
@@ -95,7 +95,7 @@ class Rover:
                 bogie_wheels=rover.bogie_wheels,
             ),
             load_std=_load_std(configuration),
-            open_load_std=_open_load_std(configuration),
+            indeterminate_load_std=_indeterminate_load_std(configuration),
             rut_tilt=_floats(tilt),
             rest_speed=rest_speed,
             rest_time=float(tuning.rest_time),
@@ -126,19 +126,19 @@ def _load_std(configuration: Configuration) -> float:
     return _UNSTATED_LOAD_STD
 
 
-_OPEN_LOAD_STD = 0.2
+_INDETERMINATE_LOAD_STD = 0.2
 """Deviation of a wheel's load over the mean load under a rigid chassis on natural ground: rms 0.09
 in simulator B, 0.2 in C."""
 _SUPPORTED = 3  # wheels whose loads follow from the balances
 
 
-def _open_load_std(configuration: Configuration) -> float:
+def _indeterminate_load_std(configuration: Configuration) -> float:
     """Return what the balances leave open of the load of a wheel, over the mean load."""
-    open_ones = (
+    indeterminate = (
         configuration.rover.suspension == 'rigid' and configuration.wheels.count > _SUPPORTED
     )
     stated = 'rover.load_std' in configuration.stated
-    return _OPEN_LOAD_STD if open_ones and not stated else 0.0
+    return _INDETERMINATE_LOAD_STD if indeterminate and not stated else 0.0
 
 
 _UNSTATED_TORQUE = {'torque_std': 0.015, 'torque_zero_std': 0.02}

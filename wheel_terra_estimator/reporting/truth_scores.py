@@ -97,7 +97,7 @@ def truth_errors(
         if rows.any():
             quantities.append(_error(name, unit, error[rows], std[rows]))
     slip = None if truth.slip is None else at_stamps(truth.slip, history.stamp)
-    begins = None if slip is None else entrapments(history.seconds, slip).there
+    begins = None if slip is None else entrapments(history.seconds, slip).entrapped
     entrapped = float(history.seconds[begins[0]]) if begins is not None and begins.size else None
     return TruthErrors(
         source=truth.source,

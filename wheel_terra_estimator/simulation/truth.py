@@ -165,7 +165,7 @@ def entrapped(stamp: IntArray, slip: FloatArray) -> BoolArray:
     median[turning] = np.nanmedian(np.abs(slip[turning]), axis=1)
     result = np.zeros(len(stamp), dtype=bool)
     time = np.asarray(stamp * 1e-9, dtype=np.float64)
-    result[entrapments(time, slip).there] = True
+    result[entrapments(time, slip).entrapped] = True
     since_low, stuck = None, False
     for i, now in enumerate(time):
         low = median[i] < 0.6

@@ -207,8 +207,8 @@ def warnings(truth: Truth, record: Record, slip_radius: FloatArray) -> Warnings:
     outcomes = [v.outcome for v in verdicts(time, truth.slip, spans)]
     rim = np.abs(truth.wheel_rate * slip_radius).mean(axis=1)
     travel = np.concatenate([[0.0], np.cumsum(rim[1:] * np.diff(time))])
-    there = entrapments(time, truth.slip).there
-    entrapped = float(time[there[0]]) if there.size else None
+    rows = entrapments(time, truth.slip).entrapped
+    entrapped = float(time[rows[0]]) if rows.size else None
     lead = None if entrapped is None else lead_of(entrapped, spans)
     lead_travel = None
     if entrapped is not None and lead is not None:

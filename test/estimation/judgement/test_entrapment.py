@@ -30,14 +30,14 @@ def test_only_what_lasts_a_second_is_an_entrapment():
     slip[95:] = np.nan
     found = entrapments(TIME, slip)
     assert found.begins.tolist() == [40, 80]
-    assert found.there.tolist() == [50, 90]
+    assert found.entrapped.tolist() == [50, 90]
     assert np.flatnonzero(found.under_way).tolist() == [*range(40, 60), *range(80, 91)]
 
 
 @pytest.mark.parametrize('value', [-1.0, 0.9, np.nan])
 def test_skidding_the_border_and_rest_are_none(value):
     found = entrapments(TIME, np.full((TIME.size, 2), value))
-    assert not found.there.size and not found.under_way.any()
+    assert not found.entrapped.size and not found.under_way.any()
 
 
 def test_a_warning_was_right_a_near_miss_false_or_late():

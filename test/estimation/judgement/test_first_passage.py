@@ -15,8 +15,8 @@ from wheel_terra_estimator.estimation.judgement.stuck.forecast import (
     RETURN_LENGTH,
     SCATTER,
     TRAVELS,
-    USUAL_SLIP,
-    USUAL_STD,
+    TYPICAL_SLIP,
+    TYPICAL_STD,
     StuckSettings,
     outlook,
     passage_probability,
@@ -74,10 +74,10 @@ def simulated(slip, std, deepening, travel, paths=40_000):
     """Share of simulated paths that come above 0.9, in steps of 5 cm, exact in each."""
     rng, step = np.random.default_rng(1), 0.05
     # The present slip: what is seen and what slips usually are, each with its own weight.
-    weight = USUAL_STD**2 / (USUAL_STD**2 + std**2)
-    s = USUAL_SLIP + weight * (slip - USUAL_SLIP)
+    weight = TYPICAL_STD**2 / (TYPICAL_STD**2 + std**2)
+    s = TYPICAL_SLIP + weight * (slip - TYPICAL_SLIP)
     s = s + math.sqrt(weight) * std * rng.standard_normal(paths)
-    level = DIGGING * deepening * (USUAL_SLIP + weight * (slip - USUAL_SLIP))
+    level = DIGGING * deepening * (TYPICAL_SLIP + weight * (slip - TYPICAL_SLIP))
     rate = 1.0 / RETURN_LENGTH
     spread = SCATTER * math.sqrt((1.0 - math.exp(-2.0 * rate * step)) / (2.0 * rate))
     there = s > ENTRAPPED_SLIP

@@ -319,7 +319,7 @@ def test_sensors_read_the_truth_with_their_errors(trap):
 def test_every_kind_is_what_its_name_says(kind):
     found = simulator.simulate(kind, 7)
     check(found)
-    assert bool(entrapments_of(found).there.size) == (kind in ENTRAPMENTS)
+    assert bool(entrapments_of(found).entrapped.size) == (kind in ENTRAPMENTS)
     heard = {type(a.measurement) for a in found.arrivals}
     plan = KINDS[kind]
     if plan.reference_period == 0.0:

@@ -1,12 +1,12 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Slip classes of the slips that are published, with hysteresis and dwell.
+"""Slip classes of the published slips, with hysteresis and dwell time.
 
-A class stands until the published |s| has been outside of it, by half the hysteresis, for the dwell
-time; then it becomes that of |s|. Behind unknown it is that of |s| at once, the highest one after
-the dwell: where wheels begin to turn, their speed comes before that of the body. It is unknown
-where a wheel is not judged (at rest, no rate) or where the deviation of its slip exceeds
-``filter.class_std``; nothing else depends on the deviation.
+A class lasts until the published |s| has been outside of it, by half the hysteresis, for the dwell
+time; then it becomes that of |s|. After *unknown* it is that of |s| at once, except for the highest
+class, which needs the dwell time: when wheels start, their speed rises before that of the body. A
+class is unknown where a wheel is not judged (at rest, no rate) or where the deviation of its slip
+exceeds ``filter.class_std``.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ UNKNOWN = int(SlipClass.UNKNOWN)
 
 
 class ClassState(NamedTuple):
-    """What is remembered of one wheel's class."""
+    """Class of one wheel, and how long |s| has been outside of it."""
 
     current: int = UNKNOWN
-    left: float = NAN  # [s], since when |s| has been outside of it; nan = it is inside
+    outside_since: float = NAN  # [s], since when |s| has been outside of it; nan = it is inside
 
 
 def instantaneous_class(slip: float, borders: Sequence[float]) -> int:
@@ -62,7 +62,7 @@ class SlipClassifier:
 
     def update(self, state: ClassState, time: float, slip: float) -> ClassState:
         """Return the class of a wheel that is judged, at a time [s], from its published slip."""
-        current, left = state
+        current, outside_since = state
         if current == UNKNOWN:
             target = instantaneous_class(slip, self._borders)
             if target < len(self._borders):
@@ -71,7 +71,7 @@ class SlipClassifier:
             target = self._target(current, abs(slip))
             if target == current:
                 return ClassState(current)
-        since = time if isnan(left) else left
+        since = time if isnan(outside_since) else outside_since
         if time - since >= self._dwell - TIME_ROUNDING:
             return ClassState(target)
         return ClassState(current, since)
@@ -86,7 +86,7 @@ class SlipClassifier:
 
 
 class PublishedClasses:
-    """Gives the sets of a drive their classes, in the order in which they are published."""
+    """Sets the classes of the estimates of a drive, in the order in which they are published."""
 
     def __init__(self, configuration: Configuration) -> None:
         self._count = configuration.wheels.count
@@ -106,14 +106,14 @@ class PublishedClasses:
     def reset(self) -> None:
         """Forget the classes: a new run begins."""
         self._states = [ClassState()] * self._count
-        self._outlook: FloatArray | None = None  # that was published last
+        self._outlook: FloatArray | None = None  # as published last, (3, n)
 
     def follow(self, estimates: EstimateSet) -> EstimateSet:
         """Return a set with the classes that follow from its slips and those before it.
 
-        A wheel whose class is unknown in the set given stays so, and its outlook is held; under a
-        warning also that of one whose slip is in doubt. One that drives and is stuck has no rim
-        travel and no time left.
+        A wheel whose class is unknown in the set given stays so, and keeps its last outlook; under
+        a warning so does a wheel whose slip is too uncertain for a class. A driving wheel of class
+        *stuck* has no rim travel and no time left.
         """
         time = estimates.stamp * NANOSECOND
         update, most_std = self._classifier.update, self._most_std

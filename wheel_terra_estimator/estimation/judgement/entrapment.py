@@ -20,21 +20,21 @@ from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.estimation.scalars import TIME_ROUNDING
 
 ENTRAPPED_SLIP = 0.9
-"""Median driving slip above which a rover makes no way that matters: class *stuck*."""
+"""Median driving slip above which a rover hardly moves: class *stuck* [-]."""
 HELD = 1.0
 """Time for which the slip stays above it in an entrapment [s]."""
 NEAR_MISS_SLIP = 0.75
-"""Median |slip| above which a warning without an entrapment was a near miss."""
+"""Median |slip| above which a warning without an entrapment was a near miss [-]."""
 FORESIGHT = 20.0
-"""Time within which a warning comes true, or was false [s]."""
+"""Time after a warning within which its outcome is judged [s]."""
 
 
 class Entrapments(NamedTuple):
     """Entrapments of a drive of k rows, as row numbers (m,) and a mask (k,)."""
 
-    begins: NDArray[np.int64]  # the slip passes 0.9
-    there: NDArray[np.int64]  # it has been above for the second: the rover is entrapped
-    under_way: BoolArray
+    begins: NDArray[np.int64]  # the slip exceeds 0.9
+    entrapped: NDArray[np.int64]  # it has done so for a second
+    under_way: BoolArray  # from the begin until the slip falls below 0.9
 
 
 class Outcome(Enum):
@@ -46,14 +46,14 @@ class Outcome(Enum):
 
 
 class Verdict(NamedTuple):
-    """What came of a warning, and how long before the entrapment it stood [s] (negative: late)."""
+    """Outcome of a warning, and its time before the entrapment [s] (negative: late)."""
 
     outcome: Outcome
     lead: float | None = None
 
 
 class Span(NamedTuple):
-    """A warning, from its rise until it was taken back [s]; inf: it stands at the end."""
+    """Start and end of a warning [s]; inf: it lasts to the end of the drive."""
 
     start: float
     end: float = np.inf
@@ -66,22 +66,22 @@ def entrapments(time: FloatArray, slip: FloatArray) -> Entrapments:
     """
     above = np.concatenate([[False], _median(slip) > ENTRAPPED_SLIP, [False]]).astype(int)
     starts, ends = np.flatnonzero(np.diff(above) == 1), np.flatnonzero(np.diff(above) == -1)
-    begins, there = [], []
+    begins, entrapped = [], []
     under_way = np.zeros(len(time), dtype=bool)
     for start, end in zip(starts, ends, strict=True):
         full = int(np.searchsorted(time, time[start] + HELD - TIME_ROUNDING))
         if full < end:
             begins.append(start)
-            there.append(full)
+            entrapped.append(full)
             under_way[start:end] = True
-    return Entrapments(np.array(begins, dtype=int), np.array(there, dtype=int), under_way)
+    return Entrapments(np.array(begins, dtype=int), np.array(entrapped, dtype=int), under_way)
 
 
 def verdicts(time: FloatArray, slip: FloatArray, warnings: Sequence[Span]) -> tuple[Verdict, ...]:
-    """Return what came of warnings; time and slip as in `entrapments`."""
+    """Return the outcomes of warnings; time and slip as in `entrapments`."""
     found = entrapments(time, slip)
     over = np.append(~found.under_way, True)
-    ends = [row + int(np.argmax(over[row:])) for row in found.there]
+    ends = [row + int(np.argmax(over[row:])) for row in found.entrapped]
     high = _median(np.abs(slip)) > NEAR_MISS_SLIP
     verdicts = []
     for start, taken_back in warnings:
@@ -90,7 +90,7 @@ def verdicts(time: FloatArray, slip: FloatArray, warnings: Sequence[Span]) -> tu
         ).tolist()
         ahead = [
             row
-            for begin, row, end in zip(found.begins, found.there, ends, strict=True)
+            for begin, row, end in zip(found.begins, found.entrapped, ends, strict=True)
             if end > first and begin < last
         ]
         if ahead:

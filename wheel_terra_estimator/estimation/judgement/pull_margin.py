@@ -13,10 +13,9 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 
-# Where and how often the greatest pull is looked for.
 _SLIPS = (0.3, 0.6, 0.9)
-"""Slips at which the pull is tried: traction curves are flat around their top."""
-_PERIOD = 1.0  # [s]
+"""Slips whose greatest pull counts [-]: traction curves are flat around their maximum."""
+_PERIOD = 1.0  # between two updates [s]
 
 
 class MarginState(NamedTuple):
@@ -38,9 +37,9 @@ class PullMargin(Component[MarginState]):
         return time - self.state.time >= _PERIOD
 
     def update(self, time: float, wheels: WheelStates, demand: float) -> None:
-        """Work out the margins of all wheels at a time [s]; their speed ratios do not matter.
+        """Compute the margins of all wheels at a time [s]; their speed ratios are not used.
 
-        `demand` is the pull that the ground asks in the direction of driving, over the load [-].
+        `demand` is the required traction coefficient in the direction of the drive [-].
         """
         ratios = 1.0 - np.array(_SLIPS)
         _, pull = self._models.torque_and_pull(wheels._replace(speed_ratio=ratios[:, None]))

@@ -14,9 +14,9 @@ from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, TIME_ROUNDING
 
-# Deviations of the slip that no model of the filter has.
+# Deviations of the slip beyond those of the filter.
 _DRIFT = 0.05
-"""Sideways over forward speed that no sensor of a steered rover reads: 3 degrees."""
+"""Unmeasured lateral over forward speed of a steered rover [-]: 3 degrees."""
 _FORGETTING = 0.02  # growth of the deviation per stamp where no rate is known
 _LEAST_STD = 1e-3
 
@@ -97,9 +97,9 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
 def slip_and_deviation(
     rim: float, v: float, v_std: float, rim_std: float, rest_speed: float
 ) -> tuple[float, float]:
-    """Return the slip ratio and its standard deviation, not both speeds being at rest.
+    """Return the slip ratio and its standard deviation, where rim and ground are not both at rest.
 
-    Rim speed, ground speed `v` and their deviations [m/s]; below `rest_speed` a rim stands.
+    Rim speed, ground speed `v` and their deviations in [m/s]; below `rest_speed` a rim stands.
     """
     both = math.hypot(v_std, rim_std)
     if abs(rim) <= rest_speed:
@@ -108,7 +108,7 @@ def slip_and_deviation(
         return 1.0, both / abs(rim)
     if abs(v) <= abs(rim):
         slip = 1.0 - v / rim
-        # On a rover that stands noise may be all that turns.
+        # On a rover at rest the rim speed may be noise alone.
         stands = abs(v) < max(rest_speed, 2.0 * v_std)
         std = both if stands else math.hypot(v_std, (1.0 - slip) * rim_std)
         return slip, std / abs(rim)

@@ -1,23 +1,23 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a slope would cost: the slip expected on slopes, from the curve that the drive teaches.
+"""Slip to expect on slopes, from the traction curve learned in the drive.
 
-With the demand p, the pull that the ground asks over the load (tan of the slope at constant speed),
-the shear law of Janosi and Hanamoto (1961) turned round gives the slip that it costs:
+For a demand p, the required pull over the load (tan of the slope at constant speed), the shear law
+of Janosi and Hanamoto (1961), inverted, gives the slip:
 
     s = a - s_0 ln(1 - p / p_max)
 
-a: what level ground costs (rolling resistance), and what the curve does not know (another soil, a
-wrong radius) [-]; s_0: slip that mobilises the soil [-]; p_max: greatest pull over the load [-].
-The thrust of the soil is what is asked and the rolling resistance. It is zero at s = 0 where level
-ground costs slip (a > 0); where less is asked, the soil brakes by the same law:
+a: slip on level ground, by rolling resistance and by errors such as a wrong radius [-]; s_0: slip
+that mobilises the soil [-]; p_max: greatest pull over the load [-]. The thrust balances demand and
+rolling resistance. For a > 0 it vanishes at s = 0; for a smaller demand the soil brakes by the same
+law:
 
     s = s_0 ln(2 - (1 - p / p_max) e^(-a/s_0))
 
-Where a is negative no rolling resistance is seen: s = a + s_0 ln(1 + p / p_max) for p < 0.
-An extended Kalman filter of (a, ln s_0, ln p_max) is corrected by the published slip. It needs
-nothing else of the estimator. Beyond the demands that were driven nothing says that the law goes
-on, nor that the soil does: there p_max is less known, in proportion to how far beyond.
+For a negative a there is no rolling resistance: s = a + s_0 ln(1 + p / p_max) for p < 0.
+An extended Kalman filter of (a, ln s_0, ln p_max) is corrected by the published slip, and needs
+nothing else of the estimator. Beyond the demands that occurred neither law nor soil is known to go
+on: the deviation of p_max grows in proportion to the distance.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ _LEVEL = 0.05  # demand within which nothing is seen of braking [-]; assumed
 
 
 class Instant(NamedTuple):
-    """What a curve learns from at one time."""
+    """Inputs of the curve at one time."""
 
     time: float  # [s]
     demand: float  # in the direction of driving [-]; nan = unknown
@@ -66,11 +66,11 @@ class Instant(NamedTuple):
 
 
 class CurveState(NamedTuple):
-    """What was learned."""
+    """Estimate of the curve: (a, ln s_0, ln p_max)."""
 
     mean: FloatArray  # (3,)
     covariance: FloatArray  # (3, 3)
-    driven: tuple[float, float] = (0.0, 0.0)  # least and greatest demand that taught
+    driven: tuple[float, float] = (0.0, 0.0)  # least and greatest demand so far [-]
     demand: float = math.nan  # low-passed
     time: float = math.nan  # [s]
     direction: float = 0.0
@@ -79,7 +79,7 @@ class CurveState(NamedTuple):
 
 
 class SlopeCurve(Component[CurveState]):
-    """Learns the curve of a drive and reads it at the slopes once a second."""
+    """Learns the curve of a drive, and evaluates it at the slopes once a second."""
 
     def __init__(self) -> None:
         super().__init__(CurveState(np.array(MEAN), np.diag(np.array(STD) ** 2)))
@@ -108,12 +108,12 @@ class SlopeCurve(Component[CurveState]):
         """Return the deviation of ln p_max at the slopes (11,) for demands that were not driven."""
         least, greatest = driven
         beyond = np.maximum(np.maximum(_DEMANDS - greatest, least - _DEMANDS), 0.0)
-        # Where nobody drove downhill, how well the soil brakes is as unknown as at the start.
+        # Before any downhill drive the braking of the soil is as unknown as at the start.
         unseen = (_DEMANDS < 0.0) & (least > -_LEVEL)
         return np.hypot(_BEYOND_STD * beyond, STD[2] * unseen)
 
     def _linearised(self, mean: FloatArray, demand: float) -> tuple[float, FloatArray]:
-        """Return the slip that the curve has for a demand, and its gradient by the curve, (3,)."""
+        """Return the slip for a demand, and its gradient by a, ln s_0 and ln p_max, (3,)."""
         offset, scale, greatest = mean[0], math.exp(mean[1]), math.exp(mean[2])
         rolling = max(offset, 0.0)
         share = min(demand / greatest, _MOST_SHARE)
@@ -204,7 +204,7 @@ def slips_at(
 
 
 class OncePerSecond:
-    """Leaves the slips on slopes to the first set at or after each second of a run."""
+    """Selects the first set at or after each second of a run, which carries the slips on slopes."""
 
     def __init__(self) -> None:
         self.reset()
@@ -215,7 +215,7 @@ class OncePerSecond:
         self._second = -1
 
     def due(self, stamp: int) -> bool:
-        """Return whether the set of a stamp [ns] states them."""
+        """Return whether the set of a stamp [ns] carries them."""
         if self._first is None:
             self._first = stamp
         second = (stamp - self._first) // SECOND

@@ -46,8 +46,8 @@ _LEAST_STD = 1e-3
 RETURN_LENGTH = 0.3  # L [m]
 SCATTER = 0.8  # sigma [1/sqrt(m)]
 DIGGING = 45.0  # k [1]: over the present slip and the sinkage gained per rim travel
-USUAL_SLIP = 0.06  # of a rover in loose soil
-USUAL_STD = 0.28
+TYPICAL_SLIP = 0.06  # of a rover in loose soil
+TYPICAL_STD = 0.28
 """Deviation of slips around it: a slip that is hardly known is worth no more than this."""
 
 
@@ -60,8 +60,8 @@ def passage_probability(
     gains over rim travel [m/m]; s_0 is the median slip.
     """
     variance = np.square(np.maximum(std, _LEAST_STD))
-    known = USUAL_STD**2 / (USUAL_STD**2 + variance)
-    mean = USUAL_SLIP + known * (np.asarray(slip) - USUAL_SLIP)
+    known = TYPICAL_STD**2 / (TYPICAL_STD**2 + variance)
+    mean = TYPICAL_SLIP + known * (np.asarray(slip) - TYPICAL_SLIP)
     below = ndtr((_EDGES - mean[:, None]) / np.sqrt(known * variance)[:, None])
     weights = np.diff(below, axis=1)
     weights[:, 0] += below[:, 0]
@@ -168,9 +168,9 @@ def outlook(s: Situation, settings: StuckSettings) -> Outlook:
             if left < NO_ENTRAPMENT_IN_SIGHT:
                 time = min(left / abs(wheel.rim_speed), LONGEST_TIME)
             found.append(WheelForecast(likely, time, left))
-    telling = [
+    known_ones = [
         ahead.probability
         for ahead, wheel, stands in zip(found, wheels, s.stalled, strict=True)
         if wheel.known or (stands and s.moving)
     ]
-    return Outlook(tuple(found), median(telling) if telling else 0.0, reach)
+    return Outlook(tuple(found), median(known_ones) if known_ones else 0.0, reach)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.stuck.forecast import (
-    USUAL_STD,
+    TYPICAL_STD,
     Outlook,
     StuckSettings,
     WheelForecast,
@@ -88,24 +88,24 @@ class StuckMonitor(Component[StuckState]):
         old, settings = self.state, self._settings
         situation = observe(old.memory, time, motion)
         ahead = outlook(situation, settings)
-        digs = situation.slip > _DIGGING_SLIP and situation.slip_std < USUAL_STD
+        digs = situation.slip > _DIGGING_SLIP and situation.slip_std < TYPICAL_STD
         at_once = motion.slip_known and _stands(situation) and not motion.turning
         digs = digs and (situation.settled or at_once)
         likely = ahead.probability > settings.threshold or digs
-        there = likely and not situation.braked, situation.standing, situation.burying
+        criteria = likely and not situation.braked, situation.standing, situation.burying
         since = tuple(
             (time if isnan(begun) else begun) if met else NAN
-            for met, begun in zip(there, old.since, strict=True)
+            for met, begun in zip(criteria, old.since, strict=True)
         )
         slip_hold = SINKING_HOLD if situation.digging > _SINKING else HOLD
         border = _BORDER_RADII * situation.radius / max(situation.rim, 1e-9)
         times = zip(since, (slip_hold, STANDING_HOLD, max(HOLD, border)), strict=True)
         held = [time - begun > hold for begun, hold in times]
-        stays = any(there) or situation.sunk
+        stays = any(criteria) or situation.sunk
         state = old._replace(memory=situation.memory, since=since, clear_since=NAN)
         if any(held) and not old.stuck:
             memory = situation.memory
-            direction = memory.way if time - memory.way_since > SINKING_HOLD else 0
+            direction = memory.direction if time - memory.direction_since > SINKING_HOLD else 0
             reason = _in_words(situation, ahead, settings, held)
             state = state._replace(
                 stuck=True, reason=reason, direction=direction, demand=motion.demand
@@ -115,7 +115,7 @@ class StuckMonitor(Component[StuckState]):
             free = time - clear >= settings.clear_time
             state = StuckState(situation.memory) if free else state._replace(clear_since=clear)
         self.state = state
-        ways = state.direction * situation.memory.way
+        ways = state.direction * situation.memory.direction
         holds = state.stuck and ways >= 0 and not motion.demand < state.demand - _EASED
         return StuckAssessment(
             state.stuck,
@@ -136,7 +136,7 @@ def _confirmed(s: Situation) -> bool:
     In a wrong unit rim speeds make a slip near 1 of any speed, but no speed of zero; torques are
     then far beyond their limit.
     """
-    return _stands(s) or NEAR_LIMIT < s.strain < 1.0 / NEAR_LIMIT
+    return _stands(s) or NEAR_LIMIT < s.torque_share < 1.0 / NEAR_LIMIT
 
 
 def _stands(s: Situation) -> bool:

@@ -27,13 +27,17 @@ friction of loose soil pulls forward."""
 _DEEPENING_RADII, _DEEPENED = 5.0, 0.1
 """Rim travel over which a depth is usual, and how much more is none; both over the radius [-]."""
 _CRUISE_TIME = 5.0  # [s] in which the speed before is forgotten
-_SLOWED = 0.2  # of the rim speed: more is missing where wheels are held, or stopped
-_CREEP = 0.1  # of the speed before: below it no direction is taken, wheels settle as they stop
+_SLOWING = 0.2  # of the rim speed: more is missing where wheels are held, or stopped
+_DIRECTION_SHARE = (
+    0.1  # of the speed before: below it no direction is taken, wheels settle as they stop
+)
 NEAR_LIMIT = 0.7
 """Of the torque limit: below it nothing holds the wheels, above it nobody stops them."""
-_AT_REST = 0.9  # of the torque limit: below it a rover may be parked on a slope
+_STALL_SHARE_AT_REST = 0.9  # of the torque limit: below it a rover may be parked on a slope
 _BEYOND_SLOPE = 0.15  # mean share of the torque limits beyond what holds a rover on its slope
-_PULLING_AWAY = 1.0  # [s] that a wheel of a rover at rest may pull near its limit before it turns
+_STALL_TIME_AT_REST = (
+    1.0  # [s] that a wheel of a rover at rest may pull near its limit before it turns
+)
 
 
 class WheelMotion(NamedTuple):
@@ -85,8 +89,8 @@ class Memory(NamedTuple):
     cruise: float = 0.0  # typical rim speed, a lower one followed slowly [m/s]
     ruts: tuple[float, ...] = ()  # sinkage of each wheel, followed over its rim travel [m]
     depth: float = NAN  # usual typical sinkage over the radius [-]
-    way: int = 0  # of the rims: 1 forward, -1 backward, 0 both
-    way_since: float = NAN  # [s]
+    direction: int = 0  # of the rims: 1 forward, -1 backward, 0 both
+    direction_since: float = NAN  # [s]
     pulls_since: float = NAN
     """Since when all wheels stand and one pulls near its limit [s]; nan = it is not so."""
 
@@ -181,7 +185,7 @@ class Situation:
         )
 
     @cached_property
-    def strain(self) -> float:
+    def torque_share(self) -> float:
         """Share of the torque limit of the second strongest wheel [-]; 0 where it is unknown.
 
         One wheel alone may stand against a stone.
@@ -192,41 +196,41 @@ class Situation:
     @cached_property
     def slowed(self) -> bool:
         """Whether the wheels are slower than in the last seconds."""
-        return self.rim < (1.0 - _SLOWED) * self.memory.cruise
+        return self.rim < (1.0 - _SLOWING) * self.memory.cruise
 
     @property
     def braked(self) -> bool:
         """Whether the wheels are being stopped: a reference stands half a second before them."""
-        return self.slowed and self.strain < NEAR_LIMIT
+        return self.slowed and self.torque_share < NEAR_LIMIT
 
     @cached_property
     def standing(self) -> bool:
         """Whether the rover stands for want of power, or is about to."""
         if self.pulls_at_rest:
-            return self.strain > _AT_REST
-        return self._held(self.strain) and (
-            self.slowed or self.rim < (1.0 - _SLOWED) * self.fastest
+            return self.torque_share > _STALL_SHARE_AT_REST
+        return self._near_limit(self.torque_share) and (
+            self.slowed or self.rim < (1.0 - _SLOWING) * self.fastest
         )
 
     @cached_property
     def pulls_at_rest(self) -> bool:
         """Whether the rover stands, and has for too long not turned a wheel that pulls."""
-        return self.memory.time - self.memory.pulls_since > _PULLING_AWAY
+        return self.memory.time - self.memory.pulls_since > _STALL_TIME_AT_REST
 
     @cached_property
     def stalled(self) -> tuple[bool, ...]:
         """Wheels that pull near their limit and hardly turn while another turns, or all stand."""
         if self.pulls_at_rest:
-            return tuple([w.torque_share > _AT_REST for w in self.motion.wheels])
+            return tuple([w.torque_share > _STALL_SHARE_AT_REST for w in self.motion.wheels])
         return tuple(
             [
-                self._held(w.torque_share) and abs(w.rim_speed) < _STALL_RATIO * self.fastest
+                self._near_limit(w.torque_share) and abs(w.rim_speed) < _STALL_RATIO * self.fastest
                 for w in self.motion.wheels
             ]
         )
 
-    def _held(self, strain: float) -> bool:
-        return self.settled and strain > NEAR_LIMIT
+    def _near_limit(self, torque_share: float) -> bool:
+        return self.settled and torque_share > NEAR_LIMIT
 
     @property
     def slip_magnitude(self) -> float:
@@ -244,13 +248,13 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
     fresh = rolled < _START_TRAVEL
     ruts = memory.ruts or tuple([w.sinkage for w in motion.wheels])
     usual = now.depth if isnan(memory.depth) else memory.depth
-    way = memory.way
-    if moves and now.rim > _CREEP * memory.cruise:
+    direction = memory.direction
+    if moves and now.rim > _DIRECTION_SHARE * memory.cruise:
         forward = sum([1 if w.rim_speed > 0.0 else -1 for w in now.moving])
-        way = (forward > 0) - (forward < 0)
+        direction = (forward > 0) - (forward < 0)
     stands = not moves and not any(isnan(w.rim_speed) for w in motion.wheels)
     shares = [w.torque_share for w in motion.wheels if not isnan(w.torque_share)]
-    pulls = stands and max(shares, default=0.0) > _AT_REST
+    pulls = stands and max(shares, default=0.0) > _STALL_SHARE_AT_REST
     pulls = pulls and sum(shares) / len(shares) - motion.holding_share > _BEYOND_SLOPE
     since = time if isnan(memory.pulls_since) else memory.pulls_since
     return Situation(
@@ -271,8 +275,8 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
             ),
             depth=usual
             + gain_of(now.rim * dt, _DEEPENING_RADII * now.radius) * (now.depth - usual),
-            way=way,
-            way_since=memory.way_since if way == memory.way else time,
+            direction=direction,
+            direction_since=memory.direction_since if direction == memory.direction else time,
             pulls_since=since if pulls else NAN,
         ),
     )
