@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Outlook of a rover: probability of an entrapment, time and rim travel left.
 
-The probability is that the slip first passes 0.9 within a rim travel.
-Over the rim travel x the slip goes as an Ornstein-Uhlenbeck process
+It is the probability of a first passage of 0.9 by the slip within a rim travel. Over the rim travel
+x the slip is modelled as an Ornstein-Uhlenbeck process
 
     ds = -(s - k z' s_0) / L dx + sigma dW
 
-What soil and ground vary pushes it (sigma), it returns (L), and wheels that sink by z' as they slip
-by s_0 dig themselves in, since what they climb grows (k). The border 0.9 absorbs. The probability
-of having been there follows backwards, step by step, from the transitions between the cells of a
-grid (Chapman-Kolmogorov); it is tabulated once over the slip, k z' s_0 and the travel.
+Variations of soil and ground disturb the slip (sigma), it reverts (L), and wheels that sink by z'
+per rim travel at a slip s_0 dig themselves in (k), as they must climb out of an ever deeper rut.
+The border 0.9 absorbs. The probability of absorption is computed backwards by the transitions
+between the cells of a grid (Chapman-Kolmogorov), and tabulated over the slip, k z' s_0 and the
+travel.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import Situation
 from wheel_terra_estimator.estimation.scalars import clipped, median
 
 _LOWEST = -0.5
-"""Lower end of the grid: what comes below stays in its last cell [-]."""
+"""Lower end of the grid [-]; a lower slip counts in its first cell."""
 _CELLS = 48
 _EDGES = np.linspace(_LOWEST, ENTRAPPED_SLIP, _CELLS + 1)
 _STEP = 0.05
@@ -42,13 +43,13 @@ TRAVELS = _STEP * np.arange(_STEPS + 1)
 _LEVELS = np.linspace(0.0, 1.6, 9) * ENTRAPPED_SLIP
 _LEAST_STD = 1e-3
 
-# Near the greatest likelihood of what came, on tuning drives of simulators A, B and C.
+# Near the maximum of the likelihood on tuning drives of simulators A, B and C.
 RETURN_LENGTH = 0.3  # L [m]
 SCATTER = 0.8  # sigma [1/sqrt(m)]
 DIGGING = 45.0  # k [1]: over the present slip and the sinkage gained per rim travel
 TYPICAL_SLIP = 0.06  # of a rover in loose soil
 TYPICAL_STD = 0.28
-"""Deviation of slips around it: a slip that is hardly known is worth no more than this."""
+"""Deviation of the slips around it [-], the prior of an uncertain slip."""
 
 
 def passage_probability(
@@ -92,7 +93,7 @@ def _table() -> FloatArray:
 
 
 LONGEST_TIME = 600.0
-"""Time to entrapment that is said where none is in sight [s]."""
+"""Time to entrapment that stands for none in sight [s]."""
 
 
 class StuckSettings(NamedTuple):
@@ -115,8 +116,8 @@ class StuckSettings(NamedTuple):
 class WheelForecast(NamedTuple):
     """Outlook of one wheel.
 
-    Time and travel are those within which an entrapment is as likely as not, or the wheel is in
-    too deep to climb out, if that comes first; while a warning stands no more than it expects.
+    Time and travel are those after which an entrapment is as likely as not, or after which the
+    wheel is too deep to climb out, if that comes first; under a warning at most its horizon.
     """
 
     probability: float  # of an entrapment within the horizon [-]
@@ -128,11 +129,11 @@ class Outlook(NamedTuple):
     """What lies ahead of a rover."""
 
     wheels: tuple[WheelForecast, ...]
-    probability: float  # median of the wheels that tell [-]
+    probability: float  # median of the wheels whose slip is known or that stall [-]
     reach: float  # rim travel within which a warning expects an entrapment [m]
 
     def under_warning(self, s: Situation, horizon: float) -> tuple[WheelForecast, ...]:
-        """Return what lies ahead of the wheels while a warning of a horizon [s] stands."""
+        """Return the outlook of the wheels under a warning with a horizon [s]."""
         return tuple(
             [
                 ahead._replace(time=min(ahead.time, horizon), travel=min(ahead.travel, self.reach))
@@ -144,7 +145,7 @@ class Outlook(NamedTuple):
 
 
 def outlook(s: Situation, settings: StuckSettings) -> Outlook:
-    """Return what lies ahead in a situation; before a start is over only what is under way."""
+    """Return the outlook in a situation; until a start is over only of a present entrapment."""
     wheels = s.motion.wheels
     within = passage_probability([w.slip for w in wheels], [w.slip_std for w in wheels], s.digging)
     reach = max(settings.horizon * s.fastest, settings.travel)

@@ -1,10 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps the stuck warning over a restart, until the rover has driven free.
+"""Keeps the stuck warning over a restart of the estimator, until the rover has driven free.
 
-A new beginning is a restart of the node, a clock that stepped back, a filter that failed, or a late
-input that changed what the estimator remembers: it knows nothing of the warning any more, which
-was published and stands.
+After a restart of the node, a clock that stepped back, a failed filter or a late input that changed
+its state, the estimator may have lost a warning that has been published.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ _LONGEST_GAP = 1.0  # [s] between two sets of one drive, or two of their periods
 
 
 class StuckMemory:
-    """Keeps a warning over a restart of the estimator; `state` is the present one.
+    """Keeps a warning over a restart of the estimator; `state` is the published one.
 
-    ``filter.stuck_clear_slip`` and ``filter.stuck_clear_time`` say when the rover is free.
+    The rover is free by ``filter.stuck_clear_slip`` and ``filter.stuck_clear_time``.
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -42,7 +41,7 @@ class StuckMemory:
         self._longest_gap = max(_LONGEST_GAP, 2.0 / rate if rate > 0.0 else 0.0)
 
     def restore(self, state: StuckState) -> None:
-        """Take over a warning as it was written before."""
+        """Take over a warning from a file."""
         self.state = state
         self.begin_anew()
 
@@ -57,7 +56,7 @@ class StuckMemory:
         self.restore(StuckState())
 
     def follow(self, estimates: EstimateSet, *, run_again: bool = False) -> EstimateSet:
-        """Return the set with the warning that stands; take it over.
+        """Return the set with the warning that holds, and remember it.
 
         `run_again`: a late input was fused at its own stamp since the set before.
         """
@@ -82,7 +81,7 @@ class StuckMemory:
         return estimates
 
     def _is_clear(self, estimates: EstimateSet) -> bool:
-        """Whether the rover has moved with little slip for long enough; rest proves nothing."""
+        """Return whether the rover has moved with little slip for long enough; rest is no proof."""
         known = estimates.slip_class != SlipClass.UNKNOWN
         free = (
             not estimates.stuck

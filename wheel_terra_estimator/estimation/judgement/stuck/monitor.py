@@ -1,10 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Stuck warning: raised by any of three criteria, cleared when none has been there for a while.
+"""Stuck warning: raised by any of three criteria, cleared when none has been met for a while.
 
-Slip: an entrapment, ahead or under way, is more likely than the threshold, or the median slip is
-above 0.8. Standing: the wheels stand for want of power. Burying: without a speed, most wheels are
-read too deep to climb out and sink on. Only driving slip counts, and a single wheel never raises a
+Slip: the probability of an entrapment exceeds the threshold, or the median slip is above 0.8.
+Standing: the wheels stall at their torque limit. Burying: without a measured speed, most wheels are
+too deep to climb out and sink on. Only driving slip counts, and a single wheel never raises a
 warning.
 """
 
@@ -32,18 +32,17 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
 from wheel_terra_estimator.estimation.scalars import NAN
 
 ADVICE = 'stop, back out'
-"""What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
+"""Advice where wheels dig themselves in: they climb their own ruts better than fresh soil."""
 HOLD, SINKING_HOLD, STANDING_HOLD = 0.95, 0.45, 0.15
-"""Times [s] that a criterion must hold, half a cycle short of 1, 0.5, 0.2 s: slip, slip of wheels
-that sink, standing (two readings of wheel odometry). Where the rover stops, a reference stands up
-to 0.9 s before the wheels do, and none of them sinks."""
+"""Times for which a criterion must hold [s], half a cycle short of 1, 0.5 and 0.2 s: slip, slip of
+wheels that sink, standing. At a stop the reference is at rest up to 0.9 s before the wheels."""
 _BORDER_RADII = 10.0
-"""Rim travel for which burying must hold, over the radius [-]: behind a border to soft soil wheels
-sink for less."""
+"""Rim travel for which burying must hold, over the radius [-]; after a border to softer soil wheels
+sink over less."""
 _SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
-_DIGGING_SLIP = 0.8  # median slip above which a rover that drives on digs itself in
+_DIGGING_SLIP = 0.8  # median slip above which a rover that drives on digs itself in [-]
 _EASED = 0.05
-"""By how much less the ground asks where it may let a rover go [-]: three degrees of slope."""
+"""Decrease of the demand after which the ground may no longer hold the rover [-]: 3 degrees."""
 
 
 class StuckAssessment(NamedTuple):
@@ -57,15 +56,15 @@ class StuckAssessment(NamedTuple):
     digging: float = 0.0
     """Sinkage gained over rim travel by more than half of the wheels [m/m]."""
     confirmed: bool = False
-    """Whether something says so that no wrong sign or unit of the wheels' readings makes up."""
+    """Whether there is evidence that no wrong sign or unit of the wheels' readings can produce."""
     holds: bool = False
-    """Whether the ground holds the rover still: it drives on, and is asked for no less."""
+    """Whether the ground still holds the rover: same direction, no smaller demand."""
     buried: bool = False
-    """Whether it does, and most wheels are read too deep to climb out."""
+    """Whether it does, and most wheels are measured too deep to climb out."""
 
 
 class StuckState(NamedTuple):
-    """What the monitor remembers."""
+    """Memory of the monitor."""
 
     memory: Memory = Memory()
     since: tuple[float, ...] = (NAN, NAN, NAN)  # when each criterion was met [s], nan = it is not
@@ -131,21 +130,21 @@ class StuckMonitor(Component[StuckState]):
 
 
 def _confirmed(s: Situation) -> bool:
-    """Whether the rover stands by a reference, or two wheels are at their torque limit.
+    """Return whether the rover stands by a reference, or two wheels are at their torque limit.
 
-    In a wrong unit rim speeds make a slip near 1 of any speed, but no speed of zero; torques are
-    then far beyond their limit.
+    Rim speeds in a wrong unit make the slip of a moving rover near 1, but not its speed zero;
+    torques in a wrong unit are far beyond their limit.
     """
     return _stands(s) or NEAR_LIMIT < s.torque_share < 1.0 / NEAR_LIMIT
 
 
 def _stands(s: Situation) -> bool:
-    """Whether a reference says that the rover stands, to the accuracy of the slip."""
+    """Return whether the rover stands by a reference, within the deviation of the slip."""
     return s.motion.speed_known and abs(s.motion.speed) < s.slip_std * s.fastest
 
 
 def _in_words(s: Situation, ahead: Outlook, settings: StuckSettings, held: list[bool]) -> str:
-    """Return what is seen, how likely an entrapment is, and what to do."""
+    """Return the reason of the warning, with what to do."""
     count = sum(s.stalled)
     if held[1] and count > 1:
         text = f'{count} wheels stalled near their torque limit'

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the stuck warning gets of the rover, what it remembers, and what it derives from both."""
+"""Inputs and memory of the stuck warning, and the quantities that follow from both."""
 
 from __future__ import annotations
 
@@ -13,39 +13,36 @@ from typing import NamedTuple
 from wheel_terra_estimator.estimation.scalars import NAN, gain_of, known, median
 
 # Set on simulators A, B and C and nine snow immobilisations.
-_START_TRAVEL = (
-    0.25  # [m] of rim travel in which slip, sinkage, torque settle after a start or turn
-)
-_STALL_RATIO = 0.6  # of the fastest rim speed: a wheel below it hardly turns
-_RUT_LENGTH = 0.08  # [m] of rim travel over which the growth of the sinkage is taken
+_START_TRAVEL = 0.25
+"""Rim travel over which slip, sinkage and torque settle after a start or turn [m]."""
+_STALL_RATIO = 0.6  # rim speed over the fastest one below which a wheel hardly turns [-]
+_RUT_LENGTH = 0.08  # rim travel over which the growth of the sinkage is taken [m]
 _DIGS, _DIGS_AT = 0.02, 0.2
-"""Sinkage gained over rim travel [m/m], and slip, above which a wheel digs in."""
+"""Sinkage gained over rim travel [m/m] and slip [-] above which a wheel digs in."""
 _DEEP = 0.4
-"""Sinkage over the radius from which a wheel does not climb out: its entrance angle is 53 degrees
-there, and the normal stress, centred at about half of it, leans back by 27 degrees, as much as the
-friction of loose soil pulls forward."""
+"""Sinkage over the radius from which a wheel does not climb out [-]: its entrance angle is 53
+degrees, and the normal stress, centred at about half of it, leans back by 27 degrees, as much as
+the friction of loose soil pulls forward."""
 _DEEPENING_RADII, _DEEPENED = 5.0, 0.1
-"""Rim travel over which a depth is usual, and how much more is none; both over the radius [-]."""
-_CRUISE_TIME = 5.0  # [s] in which the speed before is forgotten
-_SLOWING = 0.2  # of the rim speed: more is missing where wheels are held, or stopped
-_DIRECTION_SHARE = (
-    0.1  # of the speed before: below it no direction is taken, wheels settle as they stop
-)
+"""Rim travel of the running mean of the depth, and depth above that mean of a rover that sinks on;
+both over the radius [-]."""
+_CRUISE_TIME = 5.0  # time constant with which a greater rim speed is forgotten [s]
+_SLOWING = 0.2  # loss of rim speed above which wheels are held or being stopped [-]
+_DIRECTION_SHARE = 0.1
+"""Rim speed over the recent one below which the direction is kept [-]: wheels rock as they stop."""
 NEAR_LIMIT = 0.7
-"""Of the torque limit: below it nothing holds the wheels, above it nobody stops them."""
-_STALL_SHARE_AT_REST = 0.9  # of the torque limit: below it a rover may be parked on a slope
-_BEYOND_SLOPE = 0.15  # mean share of the torque limits beyond what holds a rover on its slope
-_STALL_TIME_AT_REST = (
-    1.0  # [s] that a wheel of a rover at rest may pull near its limit before it turns
-)
+"""Torque over its limit [-]: below it wheels are not held, above it they are not being stopped."""
+_STALL_SHARE_AT_REST = 0.9  # the same at rest [-]; below it a rover may be parked on a slope
+_BEYOND_SLOPE = 0.15  # mean of that share beyond what holds the rover on its slope [-]
+_STALL_TIME_AT_REST = 1.0  # for which a wheel may pull near its limit before it turns [s]
 
 
 class WheelMotion(NamedTuple):
-    """What the warning needs of one wheel."""
+    """Inputs of the warning for one wheel."""
 
-    slip: float
+    slip: float  # [-]
     slip_std: float
-    rim_speed: float  # [m/s], signed; nan = no rate came of late
+    rim_speed: float  # [m/s], signed; nan = no recent rate
     known: bool  # a rate is known and the wheel is not at rest
     torque_share: float
     """Torque over its limit; negative where the soil turns or drags the wheel against its drive;
@@ -69,30 +66,28 @@ class RoverMotion(NamedTuple):
     """All inputs of the warning."""
 
     speed: float  # [m/s]
-    speed_known: bool
-    """Whether the speed rests on more than a guess."""
+    speed_known: bool  # by a recent reference
     wheels: tuple[WheelMotion, ...]
-    turning: bool = False
-    """Sharply: slip due to turning does not predict entrapment."""
-    depth_read: bool = True  # sensors tell the sinkage of most wheels
-    slip_known: bool = False  # by two references of the last seconds, while wheels turned
+    turning: bool = False  # sharply: slip due to turning does not predict entrapment
+    depth_read: bool = True  # the sinkage of most wheels is measured
+    slip_known: bool = False  # by two recent references while wheels turned
     demand: float = NAN  # required traction coefficient in the direction of the drive [-]
     holding_share: float = 0.0
     """Share of all torque limits that holds a rover at rest on its slope [-]."""
 
 
 class Memory(NamedTuple):
-    """What is remembered from update to update."""
+    """Memory from update to update."""
 
     time: float = NAN  # [s]
-    rolled: float = 0.0  # rim travel since the wheels stood or turned the rover [m]
-    cruise: float = 0.0  # typical rim speed, a lower one followed slowly [m/s]
-    ruts: tuple[float, ...] = ()  # sinkage of each wheel, followed over its rim travel [m]
-    depth: float = NAN  # usual typical sinkage over the radius [-]
+    rolled: float = 0.0  # rim travel since the last rest or sharp turn [m]
+    cruise: float = 0.0  # recent rim speed: the typical one, with a slow decay [m/s]
+    ruts: tuple[float, ...] = ()  # running mean of each sinkage over rim travel [m]
+    depth: float = NAN  # running mean of the typical sinkage over the radius [-]
     direction: int = 0  # of the rims: 1 forward, -1 backward, 0 both
     direction_since: float = NAN  # [s]
     pulls_since: float = NAN
-    """Since when all wheels stand and one pulls near its limit [s]; nan = it is not so."""
+    """Since when all wheels stand and one pulls near its limit [s]; nan = this is not the case."""
 
 
 @dataclass(frozen=True)
@@ -137,8 +132,7 @@ class Situation:
     def digging(self) -> float:
         """Sinkage gained over rim travel by more than half of the wheels [m/m].
 
-        Half of the wheels sink where the first axle of two enters other soil: that is a step, and
-        no rover that digs itself in.
+        Half is not enough: at a border to softer soil the first of two axles sinks alone.
         """
         growths = sorted(self.growths)
         return growths[(len(growths) - 1) // 2] if growths else 0.0
@@ -163,19 +157,19 @@ class Situation:
 
     @property
     def sunk(self) -> bool:
-        """Whether the wheels are read too deep to climb out, and no speed says that they do."""
+        """Whether wheels are too deep to climb out, and no measured speed shows that they do."""
         return self.motion.depth_read and not self.motion.speed_known and self.depth > _DEEP
 
     @property
     def burying(self) -> bool:
-        """Whether they sink on besides: a rover that gets on has a depth that stays."""
+        """Whether they also sink on: of a rover that moves on the depth stays the same."""
         return self.settled and self.sunk and self.depth - self.memory.depth > _DEEPENED
 
     @cached_property
     def travel_until_too_deep(self) -> tuple[float, ...]:
-        """Rim travel after which each wheel is in too deep for its lugs to climb out [m].
+        """Rim travel after which each wheel is too deep to climb out [m].
 
-        It sinks as it turns, as over its last travel; infinite where it does not.
+        Extrapolated from its sinkage over the last travel; infinite where it does not dig in.
         """
         return tuple(
             max(_DEEP * wheel.radius - wheel.sinkage, 0.0) / growth
@@ -200,12 +194,12 @@ class Situation:
 
     @property
     def braked(self) -> bool:
-        """Whether the wheels are being stopped: a reference stands half a second before them."""
+        """Whether the wheels are being stopped, at low torque."""
         return self.slowed and self.torque_share < NEAR_LIMIT
 
     @cached_property
     def standing(self) -> bool:
-        """Whether the rover stands for want of power, or is about to."""
+        """Whether the wheels stall at their torque limit, or are about to."""
         if self.pulls_at_rest:
             return self.torque_share > _STALL_SHARE_AT_REST
         return self._near_limit(self.torque_share) and (
@@ -214,12 +208,12 @@ class Situation:
 
     @cached_property
     def pulls_at_rest(self) -> bool:
-        """Whether the rover stands, and has for too long not turned a wheel that pulls."""
+        """Whether all wheels stand, and one has pulled near its limit for too long."""
         return self.memory.time - self.memory.pulls_since > _STALL_TIME_AT_REST
 
     @cached_property
     def stalled(self) -> tuple[bool, ...]:
-        """Wheels that pull near their limit and hardly turn while another turns, or all stand."""
+        """Wheels that pull near their limit and hardly turn, while another turns or all stand."""
         if self.pulls_at_rest:
             return tuple([w.torque_share > _STALL_SHARE_AT_REST for w in self.motion.wheels])
         return tuple(
@@ -239,7 +233,7 @@ class Situation:
 
 
 def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
-    """Return the situation at a time [s], with the memory that it leaves."""
+    """Return the situation at a time [s], with the memory after it."""
     dt = 0.0 if isnan(memory.time) else max(time - memory.time, 0.0)
     now = Situation(motion, memory)
     moves = bool(now.moving)
