@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The last look at a set before it leaves: no field is ever nan or infinite."""
+"""Final check of a set of estimates: no published field is ever nan or infinite."""
 
 from __future__ import annotations
 
@@ -29,10 +29,7 @@ _SCALARS = attrgetter(*_SCALAR_FIELDS)
 
 
 class OutputGuard:
-    """Holds values that became nan or infinite, and says how little is known of them.
-
-    The configuration says what an unknown quantity can be at most.
-    """
+    """Holds the last good values of fields that became nan or infinite, with large deviations."""
 
     def __init__(self, configuration: Configuration) -> None:
         self._blank = blank_estimates(configuration)
@@ -47,9 +44,9 @@ class OutputGuard:
                 outcome = replace(outcome, stamp=stamp)
             self._good = outcome
             return outcome, False
-        return self._held(stamp, self._mended(outcome), 'an estimate was NaN'), True
+        return self._held(stamp, self._repaired(outcome), 'an estimate was NaN'), True
 
-    def _mended(self, estimates: EstimateSet) -> EstimateSet:
+    def _repaired(self, estimates: EstimateSet) -> EstimateSet:
         changes: dict[str, Any] = {}
         for name in _WHEEL_FIELDS:
             values = getattr(estimates, name)
@@ -71,7 +68,7 @@ class OutputGuard:
         return replace(estimates, **changes)
 
     def _held(self, stamp: int, estimates: EstimateSet, words: str) -> EstimateSet:
-        """Return a set whose values stand still and whose deviations say that nothing is known."""
+        """Return a set with the deviations of unknown quantities."""
         blank = self._blank
         held = replace(
             estimates,
@@ -81,7 +78,7 @@ class OutputGuard:
             reasons=blank.reasons,
             forward_velocity_variance=blank.forward_velocity_variance,
             yaw_rate_variance=blank.yaw_rate_variance,
-            sideways=estimates.sideways_known.doubted(blank.normal_load),
+            sideways=estimates.sideways_known.with_unknown_std(blank.normal_load),
             **{name: getattr(blank, name) for name in _WHEEL_FIELDS if name.endswith('_std')},
         )
         self._good = held

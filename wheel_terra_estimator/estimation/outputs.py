@@ -33,9 +33,8 @@ from wheel_terra_estimator.estimation.taught import with_model_errors
 from wheel_terra_estimator.estimation.words import reasons_in_words
 
 _UNKNOWN_STD = 1.0  # of a slip velocity [m/s]
-_BELIEVED_LOAD = 0.1
-"""Sum of the loads over the rover's weight below which the specific force is none of a rover on
-its wheels."""
+_LEAST_LOAD_SHARE = 0.1
+"""Sum of the loads over the rover's weight below which the rover is not on its wheels [-]."""
 _LEAST_FORCE_STD = 1e-4
 """Least deviation of a load or a pull, over a wheel's share of the weight."""
 _NOTHING_AHEAD = WheelForecast(0.0, LONGEST_TIME, NO_ENTRAPMENT_IN_SIGHT)
@@ -48,11 +47,11 @@ _LEARNED = (
     'soil.frictional_modulus',
     'soil.cohesive_modulus',
 )
-"""Names of what is learned of the soil, in the order of the values."""
+"""Configuration keys of the learned soil parameters, in the order of the values."""
 
 
 class Sources(NamedTuple):
-    """What the estimator knows at a stamp."""
+    """Quantities from which the outputs of a stamp are computed."""
 
     stamp: int  # [ns]
     mean: FloatArray  # (size,) of the filter
@@ -74,7 +73,7 @@ class Sources(NamedTuple):
 
 
 class Outputs:
-    """Writes sets of estimates of one rover."""
+    """Composes the sets of estimates of one rover."""
 
     def __init__(
         self,
@@ -119,7 +118,7 @@ class Outputs:
             'stuck_probability': [wheel.probability for wheel in ahead],
             'time_to_stuck': [wheel.time for wheel in ahead],
         }
-        # One array for all of them: making fourteen small ones takes longer.
+        # One array is faster than fourteen small ones.
         rows = np.array(list(per_wheel.values()))
         return EstimateSet(
             stamp=given.stamp,
@@ -149,7 +148,7 @@ class Outputs:
     def learned_soil(
         self, mean: FloatArray, covariance: FloatArray
     ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-        """Return name, value and standard deviation of what was learned of the soil."""
+        """Return names, values and standard deviations of the learned soil parameters."""
         k = self._layout.stiffness
         strength = math.exp(float(mean[SHEAR_STRENGTH]))
         strength_std = math.sqrt(float(covariance[SHEAR_STRENGTH, SHEAR_STRENGTH]))
@@ -178,7 +177,7 @@ class Outputs:
         """Return the deviations of load and pull of each wheel [N], never 0."""
         rover, load = self._rover, given.loads.load
         share = rover.mass * rover.gravity / rover.wheel_count
-        if sum(load) < _BELIEVED_LOAD * rover.mass * rover.gravity:
+        if sum(load) < _LEAST_LOAD_SHARE * rover.mass * rover.gravity:
             # Upside down, in free fall or wrongly mounted: nothing is known.
             return [share] * len(load), [share] * len(load)
         mean_load_std = (

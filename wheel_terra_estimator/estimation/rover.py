@@ -18,7 +18,7 @@ _LEAST_LOW_RIM = 0.005
 """Rim speed [m/s] below which v / rim speed is lost in the noise of encoders."""
 _LOW_RIM_OVER_REST = 3.0
 _SKID_LENGTH = 0.3
-"""Length between the axles over the track above which turning is skidding."""
+"""Wheelbase over track above which a rover without steering must skid to turn [-]."""
 _SAME_AXLE = 1e-3  # [m]
 _CONTACT_SHARE = 0.5
 """Contact length over the rim radius: an entrance angle of 30 degrees, as of rovers in sand."""
@@ -41,8 +41,8 @@ class Rover:
     load: LoadDistribution
     load_std: float  # relative
     indeterminate_load_std: float
-    """What the balances leave open of the loads, relative. The filter does without: each wheel's
-    own error of the shear model takes it up."""
+    """Statically indeterminate part of the loads, relative. Not in the filter, where the error of
+    each wheel's shear model absorbs it."""
     rut_tilt: tuple[float, ...]
     """Body pitch up per metre of sinkage of each wheel [rad/m]."""
     rest_speed: float  # [m/s]
@@ -53,12 +53,12 @@ class Rover:
     low_rim: float
     """Rim speed below which v / rim speed is lost in noise [m/s]."""
     contact_length: float
-    """Travel after which a contact is new all along, and its shear that of the model [m]."""
+    """Travel after which a contact is entirely new, and its shear that of the steady model [m]."""
     skids: bool
     """Whether it has to skid to turn: wheels in several rows, none of which steers."""
     width: tuple[float, ...]  # [m]
     leader: tuple[int | None, ...]
-    """Next wheel before each in the same rut, None = none."""
+    """Next wheel ahead of each in the same rut, None = none."""
     leader_in_reverse: tuple[int | None, ...]
     curvature_length: float
     """Half the distance between the first and the last axle [m]."""
@@ -112,10 +112,10 @@ class Rover:
 
 
 _UNSTATED_LOAD_STD = 0.2
-"""Deviation of a wheel's load over the mean load where nobody states the suspension of more than
-four wheels: pivots off the middle load the axles of a rocker-bogie by 1.28, 0.83 and 0.91 of what a
-rigid chassis does."""
-_FEW_WHEELS = 4  # up to which the suspension hardly matters
+"""Deviation of a wheel's load over the mean load where the suspension of more than four wheels is
+not stated: the axles of a rocker-bogie may carry 1.28, 0.83 and 0.91 of the loads of a rigid
+chassis."""
+_FEW_WHEELS = 4  # number up to which the suspension hardly matters
 
 
 def _load_std(configuration: Configuration) -> float:
@@ -133,7 +133,7 @@ _SUPPORTED = 3  # wheels whose loads follow from the balances
 
 
 def _indeterminate_load_std(configuration: Configuration) -> float:
-    """Return what the balances leave open of the load of a wheel, over the mean load."""
+    """Return the deviation of the statically indeterminate part of a load, over the mean load."""
     indeterminate = (
         configuration.rover.suspension == 'rigid' and configuration.wheels.count > _SUPPORTED
     )
@@ -142,8 +142,8 @@ def _indeterminate_load_std(configuration: Configuration) -> float:
 
 
 _UNSTATED_TORQUE = {'torque_std': 0.015, 'torque_zero_std': 0.02}
-"""Deviations of a torque by the motor's current, of the mean load times radius, where nobody states
-them: 2 kg and 900 kg have no newton metres in common."""
+"""Deviations of a torque measured by the motor's current, over mean load times radius [-], where
+they are not stated: no default in N m fits rovers of 2 kg and of 900 kg."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ class SensorFigures:
 
     @classmethod
     def from_configuration(cls, configuration: Configuration) -> SensorFigures:
-        """Take the figures of a configuration; those of torques by the rover where not stated."""
+        """Take the figures of a configuration; torque noise not stated scales with the rover."""
         sensors = configuration.sensors
         figures = {name: float(getattr(sensors, name)) for name in cls.__annotations__}
         wheels, rover = configuration.wheels, configuration.rover
@@ -189,7 +189,7 @@ def _floats(values: np.ndarray) -> tuple[float, ...]:
 
 
 def _leaders(x: np.ndarray, y: np.ndarray, width: np.ndarray) -> tuple[int | None, ...]:
-    """Return the next wheel before each whose rut it meets, driving towards +x."""
+    """Return for each wheel the next one ahead whose rut it meets, driving towards +x."""
     found: list[int | None] = []
     for i, half in enumerate(0.5 * width):
         before = np.flatnonzero((x > x[i] + _SAME_AXLE) & (np.abs(y - y[i]) < half))

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Known errors of the sensors: the zeros, gains, biases and stamp offsets of the configuration.
 
-A sensor reads ``gain * true + zero``; an IMU reads its bias on top, in ``base_link``; stamps are
-late by their offset. Readings are corrected once, where they enter the estimator core or the rows
-of a drive; the simulator makes readings the other way round. An instrument effect in a model
-(``torque_gain``, ``sinkage_offset``) is what is left after this correction.
+A sensor reads ``gain * true + zero``; an IMU adds its bias, in ``base_link``; stamps are late by
+their offset. Readings are corrected once, where they enter the estimator core or the rows of a
+drive; the simulator applies the same errors. An instrument effect in a model (``torque_gain``,
+``sinkage_offset``) is an error that remains after this correction.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ class LinearErrors:
 
     @cached_property
     def none(self) -> bool:
-        """Whether the readings are true."""
+        """Whether the readings have no error."""
         return not self.zero.any() and bool((self.gain == 1.0).all())
 
     def true(self, reading: FloatArray) -> FloatArray:
-        """Return what was there: (reading - zero) / gain."""
+        """Return the true values: (reading - zero) / gain."""
         return (reading - self.zero) / self.gain
 
     def reading(self, true: FloatArray) -> FloatArray:
-        """Return what the sensor says: gain * true + zero."""
+        """Return what the sensor reads: gain * true + zero."""
         return self.gain * true + self.zero
 
 
@@ -69,7 +69,7 @@ class SensorErrors:
         self._imu_position: FloatArray = sensors.imu_position
         inertial = self.specific_force_bias, self.angular_rate_bias, self._imu_position
         self._none_inertial = not any(values.any() for values in inertial)
-        self._late: dict[type, int] = {
+        self._stamp_offset: dict[type, int] = {
             WheelOdometry: round(sensors.wheel_odometry_stamp_offset * SECOND),
             InertialReading: round(sensors.imu_stamp_offset * SECOND),
             SinkageReading: round(sensors.sinkage_stamp_offset * SECOND),
@@ -79,8 +79,8 @@ class SensorErrors:
     def corrected(self, measurement: Measurement) -> Measurement:
         """Return a measurement without the stated errors; itself where none is stated.
 
-        A message with the wrong number of wheels, and an accelerometer that is not running, are
-        returned as they are, for the checks of the inputs to refuse.
+        A message with the wrong number of wheels, and zeros of an accelerometer that is not
+        running, are returned as they are; the checks of the inputs refuse them.
         """
         measurement = self._stamped(measurement, -1)
         if isinstance(measurement, WheelOdometry):
@@ -107,17 +107,19 @@ class SensorErrors:
         return measurement
 
     def _stamped(self, measurement: Measurement, sign: int) -> Measurement:
-        late = self._late.get(type(measurement), 0)
-        if not late or measurement.stamp <= 0:  # 0 stays no stamp
+        offset = self._stamp_offset.get(type(measurement), 0)
+        if not offset or measurement.stamp <= 0:  # 0 stays no stamp
             return measurement
-        return replace(measurement, stamp=measurement.stamp + sign * late)
+        return replace(measurement, stamp=measurement.stamp + sign * offset)
 
     def _inertial(self, reading: InertialReading, sign: float) -> InertialReading:
-        """Take off (sign -1) or put on biases and the centripetal acceleration w x (w x r)."""
+        """Remove (sign -1) or add (1) biases and the centripetal acceleration w x (w x r)."""
         if self._none_inertial or not np.any(reading.specific_force):
             return reading
         corrected_rate = reading.angular_rate + sign * self.angular_rate_bias
-        rate = corrected_rate if sign < 0.0 else reading.angular_rate  # the true one
-        felt = np.cross(rate, np.cross(rate, self._imu_position))
-        force = reading.specific_force + sign * (self.specific_force_bias + np.nan_to_num(felt))
+        rate = corrected_rate if sign < 0.0 else reading.angular_rate  # the true rate
+        centripetal = np.cross(rate, np.cross(rate, self._imu_position))
+        force = reading.specific_force + sign * (
+            self.specific_force_bias + np.nan_to_num(centripetal)
+        )
         return replace(reading, specific_force=force, angular_rate=corrected_rate)

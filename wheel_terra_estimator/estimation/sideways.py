@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the body and its wheels slide sideways: on cross slopes, in turns, with steered wheels.
 
-The accelerometer feels the sum of the lateral forces of the soil (specific force along y times
-mass, gravity across the slope and the centripetal force with it). Each wheel resists being pushed
-sideways as its soil is sheared, along and across on one friction circle (Janosi and Hanamoto, with
+The accelerometer measures the sum of the lateral forces of the soil: mass times specific force
+along y, which holds gravity across the slope and the centripetal force. Each wheel resists lateral
+motion as its soil is sheared, along and across on one friction circle (Janosi and Hanamoto, with
 the displacement at one place of the contact; Ishigami et al. 2007, doi 10.1002/rob.20187). The
-lateral speed at which these forces add up to the felt one is that of the body; a measured
-lateral speed corrects the model. Without one the deviation is that of the model: wide.
-
-Everything here is plain numbers: any estimator that knows speed, turning, loads and soil can ask.
+lateral speed of the body is the one at which these forces add up to the measured sum. A measured
+lateral speed corrects this model; without one the deviation is that of the model, which is large.
 """
 
 from __future__ import annotations
@@ -28,29 +26,32 @@ from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.estimation.scalars import TINY
 
 _NO_LOAD = 1e-3  # of all wheels [N]
+_LEAST_STD = 1e-3  # of a lateral force [N]
+_LEAST_SINKAGE = 1e-4  # [m]
+_STEP = 0.02  # step for the stiffness, over the greatest speed [-]
 _PLACES = np.array([0.1 * u + 0.9 * u**3 for u in np.linspace(-1.0, 1.0, 49)])
-"""Lateral speeds that are looked at, over the greatest: close together where forces change most.
-Between them the force is a straight line: 0.003 of the speed."""
+"""Lateral speeds at which forces are computed, over the greatest [-]: closest where forces change
+most. Linear interpolation between them errs by 0.003 of the speed."""
 UNKNOWN_ANGLE_STD = math.pi / math.sqrt(3.0)
-"""Deviation of a slip angle of which nothing is known: even over the whole turn [rad]."""
+"""Deviation of an unknown slip angle, uniform over the whole turn [rad]."""
 
 
-# What the model is worth; the law was chosen on cross slopes of simulator A.
+# Errors of the model; the law was chosen on cross slopes of simulator A.
 _CONTACT_SHARE = 0.6
 """Place in the contact, as a share of the entrance angle behind the entry, whose shear
 displacement stands for all of it."""
-_SOIL_SHARE = 0.4  # of a lateral speed that the soil allows: shear modulus, contact length
-_STRENGTH_SHARE = 0.25  # of the lateral force that the soil gives: strength, flank
-_FORCE_SHARE = 0.3  # of the lateral force of one wheel: how the sum is shared out
-_LOAD_SHARE = 0.03  # of the weight: forces of ruts, stones and toe
-_SPEED_SHARE = 0.02  # of the speed: lateral speed that nothing here measures
-_MEMORY = 5.0  # travel over which what a reference showed of the model fades [m]
-_SMOOTHING = 0.5  # time constant of the felt force: vibration slides no wheel [s]
-_BLIND_FORCE = 2.0  # lateral specific force without an accelerometer [m/s^2]
+_SOIL_SHARE = 0.4  # error of the lateral speed by shear modulus and contact length, relative
+_STRENGTH_SHARE = 0.25  # error of the lateral force by strength and flank, relative
+_FORCE_SHARE = 0.3  # error of the lateral force of one wheel in their sum, relative
+_LOAD_SHARE = 0.03  # forces of ruts, stones and toe angle, over the weight [-]
+_SPEED_SHARE = 0.02  # unmodelled lateral speed, over the speed [-]
+_MEMORY = 5.0  # travel over which a correction by a reference decays [m]
+_SMOOTHING = 0.5  # time constant of the lateral specific force, against vibration [s]
+_BLIND_FORCE = 2.0  # deviation of the lateral specific force without an accelerometer [m/s^2]
 
 
 class SidewaysInputs(NamedTuple):
-    """What is known of the rover at a stamp; one entry per wheel where there are several."""
+    """State of the rover at a stamp; tuples have one entry per wheel."""
 
     speed: float  # of the body along x [m/s]
     speed_std: float
@@ -81,38 +82,38 @@ class Sideways:
 
     @classmethod
     def unknown(cls, loads: Sequence[float] | FloatArray) -> Sideways:
-        """Return what is known of wheels under these loads [N] before anything moved."""
+        """Return the estimate for wheels under these loads [N] of which nothing is known."""
         zero = (0.0,) * len(loads)
         angle_std = (UNKNOWN_ANGLE_STD,) * len(loads)
         return cls(zero, angle_std, zero, _floats(np.maximum(loads, 1.0)), 0.0, 1.0)
 
     @property
     def finite(self) -> bool:
-        """Whether every number is one."""
+        """Whether every number is finite."""
         wheels = self.angle, self.angle_std, self.force, self.force_std
         return all(map(math.isfinite, (*map(sum, wheels), self.velocity, self.velocity_variance)))
 
-    def doubted(self, loads: Sequence[float] | FloatArray) -> Sideways:
-        """Return the values held, with the deviations of nothing known."""
+    def with_unknown_std(self, loads: Sequence[float] | FloatArray) -> Sideways:
+        """Return the same values with the deviations of an unknown motion."""
         return replace(
             Sideways.unknown(loads), angle=self.angle, force=self.force, velocity=self.velocity
         )
 
 
 class SidewaysState(NamedTuple):
-    """Memory: what a reference showed of the model, and the last estimate."""
+    """Memory: correction of the model by references, and the last estimate."""
 
     time: float = math.nan  # [s]
     error: float = 0.0  # of the model's lateral speed over the rover's speed [-]
-    doubt: float = 1.0  # share of the model's variance that is left of it [-]
-    pace: float = 0.0  # fastest of rims and hubs [m/s]
-    felt: float = math.nan  # smoothed specific force along y [m/s^2]
-    model_variance: float = 0.0  # of the model's lateral speed alone [(m/s)^2]
+    variance_share: float = 1.0  # variance after the correction over that of the model [-]
+    fastest: float = 0.0  # fastest of rims and hubs [m/s]
+    lateral_force: float = math.nan  # smoothed specific force along y [m/s^2]
+    model_variance: float = 0.0  # of the model's lateral speed alone [(m/s)^2]; 0 at rest
     latest: Sideways | None = None
 
 
 class SidewaysMotion(Component[SidewaysState]):
-    """Follows how the rover slides sideways."""
+    """Estimates the lateral motion of the rover."""
 
     def __init__(self, rover: Rover) -> None:
         super().__init__(SidewaysState())
@@ -121,47 +122,50 @@ class SidewaysMotion(Component[SidewaysState]):
     def update(self, time: float, given: SidewaysInputs) -> Sideways:
         """Return slip angles, lateral forces and lateral speed at a time [s]."""
         state = self.state
-        pace = _pace(self._rover, given)
+        fastest = _fastest(self._rover, given)
         since = 0.0 if isnan(state.time) else max(time - state.time, 0.0)
-        travel = pace * since
-        felt = given.lateral_force
-        if not isnan(state.felt) and not isnan(felt):
-            felt = state.felt + (felt - state.felt) * since / (_SMOOTHING + since)
-        given = given._replace(lateral_force=felt)
+        travel = fastest * since
+        lateral_force, before = given.lateral_force, state.lateral_force
+        if not (isnan(before) or isnan(lateral_force)):
+            lateral_force = before + (lateral_force - before) * since / (_SMOOTHING + since)
+        given = given._replace(lateral_force=lateral_force)
         fading = math.exp(-travel / _MEMORY)
-        error, doubt = state.error * fading, 1.0 + (state.doubt - 1.0) * fading * fading
-        if pace < self._rover.rest_speed or sum(given.loads) <= _NO_LOAD:
+        error = state.error * fading
+        share = 1.0 + (state.variance_share - 1.0) * fading * fading
+        if fastest < self._rover.rest_speed or sum(given.loads) <= _NO_LOAD:
             latest = self._at_rest(given)
-            self.state = SidewaysState(time, error, doubt, pace, felt, 0.0, latest)
+            self.state = SidewaysState(time, error, share, fastest, lateral_force, 0.0, latest)
             return latest
         contacts = _contacts(self._rover, given)
         model, model_variance = model_speed(self._rover, given, contacts)
-        latest = self._estimated(given, contacts, model + error * pace, doubt * model_variance)
-        self.state = SidewaysState(time, error, doubt, pace, felt, model_variance, latest)
+        latest = self._estimated(given, contacts, model + error * fastest, share * model_variance)
+        self.state = SidewaysState(
+            time, error, share, fastest, lateral_force, model_variance, latest
+        )
         return latest
 
     def correct(self, lateral: float, variance: float) -> None:
         """Take the lateral speed of the body from a slip-free reference [m/s], [(m/s)^2]."""
         state = self.state
-        if state.latest is None or state.pace < self._rover.rest_speed or not state.model_variance:
+        if state.latest is None or not state.model_variance:
             return
-        prior = state.doubt * state.model_variance
+        prior = state.variance_share * state.model_variance
         gain = prior / (prior + variance)
-        error = state.error + gain * (lateral - state.latest.velocity) / state.pace
-        self.state = state._replace(error=error, doubt=(1.0 - gain) * state.doubt)
+        error = state.error + gain * (lateral - state.latest.velocity) / state.fastest
+        self.state = state._replace(error=error, variance_share=(1.0 - gain) * state.variance_share)
 
     def _at_rest(self, given: SidewaysInputs) -> Sideways:
-        """Return the answer of wheels that stand: angles held, the felt force shared by load."""
+        """Return the estimate for wheels that stand: angles held, forces in proportion to load."""
         loads = np.array(given.loads)
         last = self.state.latest or Sideways.unknown(given.loads)
-        total, std = _felt_force(self._rover, given)
+        total, std = _measured_force(self._rover, given)
         share = loads / max(float(loads.sum()), TINY)
         force_std = np.hypot(np.abs(total * share), std * share) + _LOAD_SHARE * loads
         return Sideways(
             last.angle,
             (UNKNOWN_ANGLE_STD,) * len(loads),
             _floats(total * share),
-            _floats(np.maximum(force_std, 1e-3)),
+            _floats(np.maximum(force_std, _LEAST_STD)),
             0.0,
             (0.5 * self._rover.rest_speed) ** 2,
         )
@@ -172,9 +176,9 @@ class SidewaysMotion(Component[SidewaysState]):
         rover = self._rover
         x, y = np.array(rover.longitudinal), np.array(rover.lateral)
         sine, cosine, forward, turning = contacts[:4]
-        aside = velocity + turning
-        along, across = forward * cosine + aside * sine, aside * cosine - forward * sine
-        # How far speed, turning and lateral speed are known, turned into the wheel.
+        sideward = velocity + turning
+        along, across = forward * cosine + sideward * sine, sideward * cosine - forward * sine
+        # Variances of speed, yaw rate and lateral speed, rotated into the wheel's heading.
         var_yaw_rate = given.yaw_rate_std**2
         var_forward = given.speed_std**2 + var_yaw_rate * y * y
         var_aside = variance + var_yaw_rate * x * x
@@ -183,7 +187,7 @@ class SidewaysMotion(Component[SidewaysState]):
         angle = np.arctan2(across, along)
         angle_std = _angle_std(along, across, np.sqrt(var_along), np.sqrt(var_across))
         forces = _wheel_forces(contacts, velocity, rover.rest_speed, given.shear_modulus)
-        _, std = _felt_force(rover, given)
+        _, std = _measured_force(rover, given)
         loads = np.array(given.loads)
         shared = std * loads / max(float(loads.sum()), TINY)
         force_std = np.hypot(_FORCE_SHARE * np.abs(forces), shared)
@@ -191,7 +195,7 @@ class SidewaysMotion(Component[SidewaysState]):
             _floats(angle),
             _floats(np.minimum(angle_std, UNKNOWN_ANGLE_STD)),
             _floats(forces),
-            _floats(np.maximum(force_std, 1e-3)),
+            _floats(np.maximum(force_std, _LEAST_STD)),
             float(velocity),
             max(variance, TINY),
         )
@@ -200,9 +204,9 @@ class SidewaysMotion(Component[SidewaysState]):
 def _angle_std(
     along: FloatArray, across: FloatArray, along_std: FloatArray, across_std: FloatArray
 ) -> FloatArray:
-    """Return the deviation of the direction of two speeds: one deviation to either side of each.
+    """Return the deviation of the direction of two speeds, by one deviation to either side of each.
 
-    Not by derivatives: where a speed is known no better than its size, those at the mean are small.
+    Derivatives at the mean would be too small where a deviation is as large as the speed.
     """
     here = np.arctan2(across, along)
     there = (
@@ -211,8 +215,8 @@ def _angle_std(
         np.arctan2(across, along + along_std),
         np.arctan2(across, along - along_std),
     )
-    apart = [(angle - here + np.pi) % (2.0 * np.pi) - np.pi for angle in there]
-    return np.asarray(np.sqrt(0.5 * sum(step**2 for step in apart)))
+    differences = [(angle - here + np.pi) % (2.0 * np.pi) - np.pi for angle in there]
+    return np.asarray(np.sqrt(0.5 * sum(step**2 for step in differences)))
 
 
 def _floats(values: FloatArray) -> Floats:
@@ -220,7 +224,7 @@ def _floats(values: FloatArray) -> Floats:
 
 
 class _Contacts(NamedTuple):
-    """The wheels, their motion but for the lateral speed of the body, and their soil, (n,) each."""
+    """Wheels, their motion without the lateral speed of the body, and their soil, (n,) each."""
 
     sine: FloatArray  # of the steering angle
     cosine: FloatArray
@@ -228,14 +232,14 @@ class _Contacts(NamedTuple):
     turning: FloatArray  # its speed along y by the yaw rate [m/s]
     rim: FloatArray  # [m/s], nan = unknown
     radius: FloatArray  # [m]
-    swept: FloatArray  # by the rim since the soil met it [rad]
-    covered: FloatArray  # by the hub, over the radius
-    strength: FloatArray  # greatest force [N]
+    swept: FloatArray  # angle by which the rim has turned since it met the soil [rad]
+    covered: FloatArray  # distance that the hub has covered meanwhile, over the radius [-]
+    strength: FloatArray  # greatest shear force [N]
 
 
 def _contacts(rover: Rover, given: SidewaysInputs) -> _Contacts:
     radius = np.array(rover.rim_radius)
-    entry = np.arccos(1.0 - np.minimum(np.maximum(given.sinkage, 1e-4) / radius, 1.0))
+    entry = np.arccos(1.0 - np.minimum(np.maximum(given.sinkage, _LEAST_SINKAGE) / radius, 1.0))
     swept = _CONTACT_SHARE * entry
     strength = given.tan_friction * np.array(given.loads)
     return _Contacts(
@@ -259,52 +263,52 @@ def _wheel_forces(
     `lateral` broadcasts against (n,).
     """
     sine, cosine, forward, turning, rim, radius, swept, covered, strength = contacts
-    aside = lateral + turning
-    along, across = forward * cosine + aside * sine, aside * cosine - forward * sine
+    sideward = lateral + turning
+    along, across = forward * cosine + sideward * sine, sideward * cosine - forward * sine
     turned = np.where(np.isnan(rim), along, rim)
     fastest = np.maximum(np.maximum(np.abs(turned), np.hypot(along, across)), rest_speed)
     scale = radius / fastest
-    back, aside = scale * (turned * swept - along * covered), scale * across * swept
-    displacement = np.maximum(np.hypot(back, aside), TINY)
+    back, side = scale * (turned * swept - along * covered), scale * across * swept
+    displacement = np.maximum(np.hypot(back, side), TINY)
     share = -np.expm1(-displacement / shear_modulus)
-    return np.asarray(-strength * share * aside / displacement)
+    return np.asarray(-strength * share * side / displacement)
 
 
 def model_speed(rover: Rover, given: SidewaysInputs, contacts: _Contacts) -> tuple[float, float]:
     """Return the lateral speed of the body by forces alone [m/s], and its variance."""
-    pace = _pace(rover, given)
-    felt, felt_std = _felt_force(rover, given)
-    reach = 2.0 * pace + abs(given.yaw_rate) * max(abs(x) for x in rover.longitudinal)
+    fastest = _fastest(rover, given)
+    total, total_std = _measured_force(rover, given)
+    reach = 2.0 * fastest + abs(given.yaw_rate) * max(abs(x) for x in rover.longitudinal)
     speeds = reach * _PLACES
     forces = _wheel_forces(contacts, speeds[:, None], rover.rest_speed, given.shear_modulus)
     against = -(forces @ contacts.cosine)  # grows with the speed
     free = float(np.interp(0.0, against, speeds))
-    if not against[0] < -felt < against[-1]:
-        # More than this soil gives: sliding, anywhere up to the bound.
-        lateral = 0.5 * math.copysign(reach, -felt)
+    if not against[0] < -total < against[-1]:
+        # More than this soil can give: the rover slides, at any speed up to the bound.
+        lateral = 0.5 * math.copysign(reach, -total)
         return lateral, lateral**2
-    lateral = float(np.interp(-felt, against, speeds))
-    step = 0.02 * pace
+    lateral = float(np.interp(-total, against, speeds))
+    step = _STEP * fastest
     ends = np.interp((lateral - step, lateral + step), speeds, against)
     stiffness = float(ends[1] - ends[0]) / (2.0 * step)
-    # Softer towards the limit of the strength: there little is known of a speed.
-    doubt = math.hypot(felt_std, _STRENGTH_SHARE * felt)
-    std = min(doubt / max(stiffness, TINY), reach)
+    # The stiffness falls towards the limit of the strength, where a force hardly shows a speed.
+    error = math.hypot(total_std, _STRENGTH_SHARE * total)
+    std = min(error / max(stiffness, TINY), reach)
     variance = std**2 + (_SOIL_SHARE * (lateral - free)) ** 2
-    return lateral, variance + (_SPEED_SHARE * pace) ** 2
+    return lateral, variance + (_SPEED_SHARE * fastest) ** 2
 
 
-def _pace(rover: Rover, given: SidewaysInputs) -> float:
+def _fastest(rover: Rover, given: SidewaysInputs) -> float:
     turning = abs(given.yaw_rate) * max(abs(y) for y in rover.lateral)
     rims = [abs(rim) for rim in given.rims if not isnan(rim)]
     return max(abs(given.speed) + turning, *rims) if rims else abs(given.speed) + turning
 
 
-def _felt_force(rover: Rover, given: SidewaysInputs) -> tuple[float, float]:
-    """Return the sum of lateral forces along y of the body that is felt, and its deviation [N]."""
+def _measured_force(rover: Rover, given: SidewaysInputs) -> tuple[float, float]:
+    """Return the sum of the lateral forces along y by the accelerometer, and its deviation [N]."""
     weight = sum(given.loads)
     pulled = sum(f * math.sin(d) for f, d in zip(given.pulls, given.steering, strict=True))
     if isnan(given.lateral_force):
         return -pulled, rover.mass * _BLIND_FORCE
-    felt = rover.mass * given.lateral_force - pulled
-    return felt, math.hypot(rover.mass * given.lateral_force_std, _LOAD_SHARE * weight)
+    total = rover.mass * given.lateral_force - pulled
+    return total, math.hypot(rover.mass * given.lateral_force_std, _LOAD_SHARE * weight)
