@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates: what the core gives, one set for each distinct stamp of the wheel odometry."""
+"""Sets of estimates, the output of the estimator core."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SLOPE_NAMES = tuple(f'slope_{slope:.0f}deg' for slope in SLOPES)
 
 
 class SlipOnSlope(NamedTuple):
-    """What the `SLOPES` would cost a rover that drives forward on this soil, (11,) each."""
+    """Slip to expect on the `SLOPES` when driving forward on this soil, (11,) each."""
 
     slip: FloatArray  # expected [-]
     std: FloatArray
@@ -45,8 +45,8 @@ class SlipOnSlope(NamedTuple):
 class EstimateSet:
     """All outputs that belong to one stamp; every array is (n,) in the order of ``wheels.names``.
 
-    No field is ever nan or infinite: what cannot be estimated is held (0 where there never was a
-    value), its standard deviation says how little is known.
+    No published field is nan or infinite: what cannot be estimated keeps its last value (0 before
+    the first), with a large standard deviation.
     """
 
     stamp: int  # [ns]
@@ -63,7 +63,7 @@ class EstimateSet:
     normal_load: FloatArray  # [N]
     normal_load_std: FloatArray
     slip_class: NDArray[np.uint8]
-    """The estimator says only which wheels are not judged (255); the core gives the classes."""
+    """From the estimator only which wheels have no class (255); the core sets the classes."""
     rim_travel_left: FloatArray  # [m]
     pull_margin: FloatArray  # [N]
     soil_names: tuple[str, ...]
@@ -76,14 +76,14 @@ class EstimateSet:
     stuck: bool
     stuck_probability: FloatArray  # (n,) [-]
     time_to_stuck: FloatArray  # (n,) [s]
-    reasons: tuple[str, ...]  # (n,) why the wheel is called what it is called, in words
+    reasons: tuple[str, ...]  # (n,) text on the class of the wheel and on a warning
     faults: dict[str, str] = field(default_factory=dict)  # input or state -> words, for diagnostics
     stuck_direction: int = 0  # of the rims that led to `stuck`: 1, -1; 0 none, both or unknown
-    stuck_confirmed: bool = False  # by what no wrong sign or unit of the wheels makes up
+    stuck_confirmed: bool = False  # by evidence that no wrong sign or unit can produce
     slip_on_slope: SlipOnSlope | None = None  # once a second; None = not in this set
     sideways: Sideways | None = None  # slip angles, lateral force and speed; None = unknown
 
     @property
     def sideways_known(self) -> Sideways:
-        """Slip angles, lateral forces and speed, with what is unknown said so."""
+        """Slip angles, lateral forces and speed; with large deviations where unknown."""
         return Sideways.unknown(self.normal_load) if self.sideways is None else self.sideways

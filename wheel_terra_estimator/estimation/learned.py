@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a drive taught of soil and sensors, as parameters that the next drive starts from."""
+"""Soil and sensor parameters learned in a drive, as configuration for the next one."""
 
 from __future__ import annotations
 
@@ -30,19 +30,18 @@ _LEVEL = Climbed()
 NamedSoil = Callable[[FloatArray, FloatArray], tuple[tuple[str, ...], FloatArray, FloatArray]]
 
 
-# By how much soil varies from place to place, one standard deviation of the logarithm [-]. Mean
-# coefficients of variation of sand within a site (Phoon and Kulhawy 1999, Canadian Geotechnical
-# Journal 36, tables 1 and 3): friction angle 9 %, cone resistance 38 %. The first is 12 % of the
-# tangent at 37.6 degrees; the second stands for the stiffness, and for want of a source of its own
-# for the shear deformation modulus too.
+# Variation of soil from place to place, standard deviation of the logarithm [-]. Mean coefficients
+# of variation of sand within a site (Phoon and Kulhawy 1999, Canadian Geotechnical Journal 36,
+# tables 1 and 3): friction angle 9 %, that is 12 % of the tangent at 37.6 degrees, and cone
+# resistance 38 %, taken for the stiffness and, in lack of a source, for the shear modulus.
 _STRENGTH_SPREAD = 0.12
 _STIFFNESS_SPREAD = 0.38
 
 
 class Learned:
-    """Writes what was learned as parameters of the configuration that the drive started with.
+    """Converts the state of the filter into parameters of the configuration of the drive.
 
-    `start` is the covariance of the filter at the start of a run; `named_soil` gives keys, values
+    `start` is the covariance of the filter at the start of a run; `named_soil` returns keys, values
     and deviations of the soil for mean and covariance of the filter.
     """
 
@@ -63,14 +62,14 @@ class Learned:
     ) -> dict[str, Any]:
         """Return configuration key -> value, with the deviations ``_std``.
 
-        Soil: the values of ``~/soil``, with deviations widened to hold in another place. Biases:
-        those stated plus what was learned; torques and sinkages: as stated, since a zero of theirs
-        cannot be separated from the soil. The deviations of sensors are those stated: a start may
-        bring another bias of the same kind.
+        Soil: the values of ``~/soil``, with deviations that include the variation from place to
+        place. Biases: those stated plus the learned ones. Torques and sinkages: as stated, since
+        their zeros cannot be separated from the soil. Deviations of sensors: as stated, since a new
+        start may bring another bias of the same kind.
 
-        The filter learns the strength beside errors of its models that no parameter of the soil
-        holds; without them it may be one that could not have carried the rover. Then it is the
-        least that would have, at the slip seen.
+        The filter estimates model errors beside the strength. Without these the learned strength
+        may be too low for the steepest climb of the drive; then it is the least one that gives that
+        pull at the slip observed there.
         """
         found: dict[str, Any] = {}
         mean = mean.copy()
@@ -95,7 +94,7 @@ class Learned:
         return found
 
     def _strength_that_carried(self, mean: FloatArray, climbed: Climbed) -> float:
-        """Return the learned strength, or the least at which the soil gives what it gave."""
+        """Return the learned strength, or the least one for the steepest climb, if greater."""
         learned = float(mean[SHEAR_STRENGTH])
         stated = 0.0  # of the configured soil
         if not climbed.slip > 0.0 or learned >= stated:
@@ -128,17 +127,16 @@ class Learned:
     def _force_bias(self, mean: FloatArray) -> float:
         """Return the part of the state's bias that is the accelerometer's [m/s^2].
 
-        The rest leaks in through the attitude; the two share it as their variances stand.
+        The rest is gravity by attitude errors; both have shares in proportion to their variances.
         """
         own = float(self._configuration.sensors.specific_force_bias_std) ** 2
         both = float(self._start[GRAVITY_BIAS, GRAVITY_BIAS])
         return float(mean[GRAVITY_BIAS]) * own / both if both > 0.0 else 0.0
 
     def _widened(self, covariance: FloatArray) -> FloatArray:
-        """Return the covariance with what soil varies from place to place.
+        """Return the covariance with the variation of the soil from place to place added.
 
-        Never wider than at the start of the drive for this alone: no place was left where nothing
-        was learned, and restarts in one place do not add up.
+        Not beyond that at the start of the drive, so that restarts in one place do not add up.
         """
         wide, stiffness = covariance.copy(), self._layout.stiffness
         for entry, spread in (
@@ -148,6 +146,6 @@ class Learned:
         ):
             learned, before = float(covariance[entry].mean()), float(self._start[entry].mean())
             wide[entry] = max(learned, min(learned + spread**2, before))
-        # What wheels have of their own a start adds again.
+        # The start of the next run adds the wheels' own part again.
         wide[stiffness, stiffness] /= 1.0 + PRIORS.own_stiffness_share**2 / self._layout.wheel_count
         return wide

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Typed measurements: what the estimator hears, whatever brought it (a topic, a bag row, a test).
+"""Typed measurements: the inputs of the estimator, whatever their source (topic, bag, test).
 
 All stamps are integer nanoseconds, of the time of measurement; all vectors are in ``base_link``
 (REP 103: x forward, y left, z up) in SI units. ``nan`` marks a wheel that the message did not hold
@@ -94,10 +94,10 @@ Measurement: TypeAlias = (
 
 @dataclass(frozen=True)
 class StepInputs:
-    """All measurements of one stamp, merged: what one step of the estimator gets.
+    """Merged measurements of one step of the estimator; None where there was none.
 
-    None where the stamp brought no such measurement. Within a channel the later arrival wins wheel
-    by wheel, so that messages which hold some of the wheels only complete one another.
+    Where several messages have the same stamp, the later arrival counts wheel by wheel, so that
+    messages with some of the wheels complete one another.
     """
 
     wheel_odometry: WheelOdometry | None = None

@@ -1,10 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a drive has taught: of each parameter the deviation before and after, and the bits between.
+"""Information gained in a drive on each parameter: deviation before and after, and bits.
 
-A Gaussian whose standard deviation falls from s0 to s has lost log2(s0 / s) bits of entropy. Where
-it hardly falls, the drive says nothing of the parameter, or something of a sum with another alone:
-then it would be known if that other one were.
+A Gaussian whose standard deviation falls from s0 to s loses log2(s0 / s) bits of entropy. Where it
+hardly falls, either nothing was learned, or only a combination with another parameter: the two are
+confounded if the deviation would fall with the other one known.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from wheel_terra_estimator.estimation.filter.state import (
 
 LEARNED, ASSUMED, CONFOUNDED = 'learned', 'assumed', 'confounded'
 LEARNED_SHARE = 0.7
-"""Of the prior deviation: what has no less was not learned [-]; half a bit."""
+"""Deviation over the prior one below which a parameter counts as learned [-]: half a bit."""
 RELATIVE = 'of its value'
-"""Unit of deviations that are those of a logarithm."""
+"""Unit of the deviation of a logarithm."""
 
 STRENGTH_ERROR, SHEAR_MODULUS_ERROR, STIFFNESS_ERROR = 0.05, 0.2, 0.25
-"""What the models put into these factors that is not the soil's, and no length of drive averages
-out [ln] (simulator A, whose soil follows the filter's laws)."""
+"""Deviation of these factors by model errors that no length of drive averages out [ln] (simulator
+A, whose soil follows the filter's laws)."""
 MOVED_SHARE = 0.4
-"""And as a share of how far a number was moved from that of the soil file [-]: a soil of another
-law moves it to where this one fits (set on simulators A, B and C, seeds 8500 to 8507)."""
+"""The same as a share of the change from the configured value [-], for soils that follow other laws
+(set on simulators A, B and C, seeds 8500 to 8507)."""
 _STRENGTH, _STIFFNESS = 'soil.friction_angle_deg', 'soil.frictional_modulus'
 _COMMON = (
     (_STRENGTH, RELATIVE, SHEAR_STRENGTH),
@@ -61,12 +61,12 @@ _MODEL_ERRORS = (
     (SLIP_SINKAGE, 0.0),
 )
 _SAME_FACTOR = {'soil.cohesion': _STRENGTH, 'soil.cohesive_modulus': _STIFFNESS}
-"""What the filter scales by one factor with another parameter, and so never separates from it."""
+"""Parameters that the filter scales by one common factor, and so never separates."""
 
 
 @dataclass(frozen=True)
 class Taught:
-    """What a drive taught of one parameter."""
+    """Information gained on one parameter."""
 
     name: str
     unit: str
@@ -93,7 +93,7 @@ class Taught:
 
 
 def with_model_errors(mean: FloatArray, covariance: FloatArray, layout: StateLayout) -> FloatArray:
-    """Return a (size, size) covariance of the filter with what its models get wrong of the soil."""
+    """Return the (size, size) covariance of the filter with the model errors of the soil added."""
     P, moved = covariance.copy(), MOVED_SHARE * mean
     for i, error in _MODEL_ERRORS:
         P[i, i] += error**2 + moved[i] ** 2
@@ -109,11 +109,11 @@ class Parameter(NamedTuple):
     unit: str
     row: FloatArray  # (size,)
     like: str = ''
-    """Parameter that no drive separates it from, whatever the filter makes of it."""
+    """Parameter from which no drive separates it, whatever its variance in the filter."""
 
 
 class Teaching:
-    """Compares the covariance of the filter with that of its start, (size, size)."""
+    """Compares the covariance of the filter with that at its start, (size, size)."""
 
     def __init__(self, parameters: Sequence[Parameter], start: FloatArray) -> None:
         self._parameters = parameters
@@ -122,21 +122,21 @@ class Teaching:
 
     @classmethod
     def of_filter(cls, layout: StateLayout, start: FloatArray) -> Teaching:
-        """Return the comparison for what the estimator's filter learns."""
+        """Return the comparison for the parameters of the estimator's filter."""
         identity = np.eye(layout.size)
         parameters = [Parameter(name, unit, identity[i]) for name, unit, i in _COMMON]
         mean = identity[layout.stiffness].mean(axis=0)
         parameters.append(Parameter(_STIFFNESS, RELATIVE, mean))
         zeros = identity[layout.torque_zero]
         if len(zeros):
-            # What the models get wrong of a torque ends in its zero (simulator B: 5 of 10 that
-            # counted as learned were more than two deviations off).
+            # Model errors of a torque end in its zero (simulator B: 5 of 10 that counted as learned
+            # were more than two deviations off).
             row = zeros.sum(axis=0) / math.sqrt(len(zeros))
             parameters.append(Parameter('torque zeros', 'N m', row, _STRENGTH))
         return cls(parameters, start)
 
     def judged(self, covariance: FloatArray) -> tuple[Taught, ...]:
-        """Return what was taught, given the (size, size) covariance after a drive."""
+        """Return the information gained, by the (size, size) covariance after a drive."""
         P = self._rows @ covariance @ self._rows.T
         std = _deviations(P)
         found: dict[str, Taught] = {}

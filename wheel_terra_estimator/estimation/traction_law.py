@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Traction limiter: how much of a velocity command a rover should follow, as a plain function.
 
-Sinkage grows with slip and rim travel, and slip grows with what is asked of the soil. Slowing down
-alone does not lower the slip that a slope asks for; what it buys is time to notice, and it takes
-away the dynamic part of the demand. So the law slows down as the median slip leaves the low
-class and as the rim travel left shrinks, and stops before the wheels dig.
+Sinkage grows with slip and rim travel, and slip with the required traction coefficient. Slowing
+down does not reduce the slip on a slope, but it gives time to react and removes the dynamic part of
+the demand. So the law slows down as the median slip leaves the low class and as the rim travel left
+shrinks, and stops before the wheels dig in.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class LimiterTuning:
     Raises
     ------
     UserError
-        A bound is not below the one that it must be below.
+        Two bounds are in the wrong order.
     """
 
     comfortable_slip: float = _parameter(
@@ -62,7 +62,7 @@ class LimiterTuning:
     )
 
     def __post_init__(self) -> None:
-        """Check the bounds that belong together."""
+        """Check the order of the bounds."""
         for lower, upper in (
             ('comfortable_slip', 'critical_slip'),
             ('stop_rim_travel', 'slow_rim_travel'),
@@ -87,7 +87,7 @@ def traction_scale(
     """
     # The median: a single spinning wheel (on a stone, lifted off) is no entrapment, nor is braking.
     typical = median([max(s, 0.0) for s in slip])
-    # Two wheels that dig in are the begin of an entrapment, whatever the others still do.
+    # Two wheels that dig in are the begin of an entrapment, whatever the others do.
     nearest = sorted(rim_travel_left)
     travel = nearest[min(1, len(nearest) - 1)]
     if travel <= tuning.stop_rim_travel:
