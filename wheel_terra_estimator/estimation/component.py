@@ -12,8 +12,8 @@ State = TypeVar('State')
 class Component(Generic[State]):
     """A part of the estimator whose whole memory is one immutable value.
 
-    ``update`` replaces that value; it never changes it. So a snapshot is a reference, and no part
-    can be changed behind its back. `state` is the present memory, for everyone to read.
+    ``update`` replaces that value; it never changes it. So `state`, the present memory, is a
+    snapshot for everyone to read, and setting it goes back to one.
     """
 
     def __init__(self, start: State) -> None:
@@ -23,11 +23,3 @@ class Component(Generic[State]):
     def reset(self) -> None:
         """Go back to the start of a run."""
         self.state = self._start
-
-    def snapshot(self) -> State:
-        """Return the present memory."""
-        return self.state
-
-    def restore(self, snapshot: State) -> None:
-        """Go back to a snapshot."""
-        self.state = snapshot

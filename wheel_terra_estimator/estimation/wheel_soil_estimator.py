@@ -201,7 +201,7 @@ class WheelSoilEstimator:
 
     def begin_run(self, stamp: int, keep_soil: bool) -> None:
         """Restart at a stamp [ns]; `keep_soil` keeps soil and biases with inflated covariance."""
-        soil, gyro = self._ekf.snapshot(), self._zero_velocity.snapshot()
+        soil, gyro = self._ekf.state, self._zero_velocity.state
         rejected = self._reference.state.rejected, self._sinkage.state.rejected
         stated = self._inertial.stated
         for part in self._parts:
@@ -210,20 +210,20 @@ class WheelSoilEstimator:
         if keep_soil:
             self._inertial.keep_stated(stated)
             self._reset_gravity_bias(stated)
-            self._ekf.restore(with_soil_of(soil, self._ekf.snapshot(), self._layout))
+            self._ekf.state = with_soil_of(soil, self._ekf.state, self._layout)
             self._zero_velocity.keep_zero_of(gyro)
             self._reference.state = self._reference.state._replace(rejected=rejected[0])
             self._sinkage.state = self._sinkage.state._replace(rejected=rejected[1])
 
     def snapshot(self) -> tuple[Any, ...]:
-        """Return a copy of the complete state, for `restore`."""
-        return self._clock, tuple([part.snapshot() for part in self._parts])
+        """Return the complete state, for `restore`."""
+        return self._clock, tuple([part.state for part in self._parts])
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Go back to a snapshot."""
         self._clock, states = snapshot
         for part, state in zip(self._parts, states, strict=True):
-            part.restore(state)
+            part.state = state
 
     # -- One stamp -------------------------------------------------------------------------------
 
@@ -282,7 +282,7 @@ class WheelSoilEstimator:
         """Predict to a time [s], fuse the readings since the last cycle, compute the pulls."""
         ekf, layout = self._ekf, self._layout
         cycle = self._begin_cycle(time)
-        sinkage_before = ekf.mean[layout.sinkage].copy()
+        sinkage_before = ekf.mean[layout.sinkage]
 
         self._torque_coefficient.update(
             self._torque_over_load(cycle), cycle.dt, settled=self._contact_age.settled
@@ -353,7 +353,7 @@ class WheelSoilEstimator:
         self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)
         if self._buffer is not None:
             present = Gaussian(ekf.mean, ekf.covariance)
-            self._buffer.mark((evidence, ekf.mean.copy()), present)
+            self._buffer.mark((evidence, ekf.mean), present)
 
     def _begin_cycle(self, time: float) -> Cycle:
         """Update turning, loads, demand and direction of the drive; return the new cycle."""

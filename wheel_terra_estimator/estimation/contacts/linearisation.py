@@ -89,7 +89,7 @@ class Linearisation(Component[FloatArray]):
         rows = np.zeros((2, n, layout.size))
         if not any(turns):
             nothing = np.zeros(n)
-            return ContactForces(x.copy(), nothing, nothing, rows[0], rows[1], nothing, nothing)
+            return ContactForces(x, nothing, nothing, rows[0], rows[1], nothing, nothing)
         turning = np.array(turns)
         rim, load, rut = np.where(turning, cycle.rims, 1.0), np.array(loads), np.array(ruts)
         direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
@@ -124,7 +124,7 @@ class Linearisation(Component[FloatArray]):
         pull, torque = (
             np.where(turning, direction * force, 0.0) for force in (forces.pull, forces.torque)
         )
-        return ContactForces(x.copy(), pull, torque, rows[0], rows[1], pull_noise, torque_noise)
+        return ContactForces(x, pull, torque, rows[0], rows[1], pull_noise, torque_noise)
 
     def _noise_of_angle(
         self, states: WheelStates, forces: WheelForces, turning: BoolArray

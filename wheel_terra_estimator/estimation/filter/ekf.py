@@ -34,7 +34,7 @@ class Row(NamedTuple):
 
 
 class FilterMemory(NamedTuple):
-    """What `GatedFilter.restore` needs."""
+    """What a filter goes back to: arrays that nobody changes."""
 
     mean: FloatArray
     covariance: FloatArray
@@ -74,7 +74,7 @@ class _SchmidtFilter(ExtendedKalmanFilter):
 
 
 class GatedFilter:
-    """State, covariance, gates and counters.
+    """State, covariance, gates and counters. What changes them makes new arrays.
 
     Parameters
     ----------
@@ -98,6 +98,7 @@ class GatedFilter:
         self._ekf.P = covariance.copy()
         self._start = FilterMemory(mean.copy(), covariance.copy(), 0)
         self._lower, self._upper = lower, upper
+        self._identity = np.eye(size)
         self.restarts = 0
         self.buffer: HistoryBuffer | None = None
 
@@ -110,7 +111,7 @@ class GatedFilter:
         """Go back to the start; restarts count from 0."""
         if self.buffer is not None:
             self.buffer.cut()
-        self.restore(self._start)
+        self.state = self._start
 
     @property
     def mean(self) -> FloatArray:
@@ -124,11 +125,9 @@ class GatedFilter:
 
     def predict(self, mean: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
         """Go to a predicted mean with transition matrix F and process noise Q."""
-        before = self._present()
-        self._ekf.predicted = mean
-        self._ekf.F = transition
-        self._ekf.Q = noise
-        self._ekf.predict()
+        before, ekf = self.state, self._ekf
+        ekf.predicted, ekf.F, ekf.Q = mean, transition, noise
+        ekf.predict()
         self._enforce_bounds()
         self._keep_transition(before, transition)
 
@@ -160,40 +159,34 @@ class GatedFilter:
 
     def set(self, index: int, value: float, variance: float) -> None:
         """Set one entry to a value known from elsewhere, without correlations."""
-        before = self._present()
-        ekf = self._ekf
-        ekf.x[index] = value
-        ekf.P[index, :] = 0.0
-        ekf.P[:, index] = 0.0
-        ekf.P[index, index] = variance
-        transition = np.eye(len(ekf.x))
-        transition[index, index] = 0.0
-        self._keep_transition(before, transition)
+        before, keep = self.state, self._identity.copy()
+        keep[index, index] = 0.0
+        mean, covariance = keep @ before.mean, keep @ before.covariance @ keep
+        mean[index], covariance[index, index] = value, variance
+        self.state = before._replace(mean=mean, covariance=covariance)
+        self._keep_transition(before, keep)
 
     def inflate(self, index: int, variance: float) -> None:
         """Add variance to one entry."""
-        before = self._present()
-        self._ekf.P[index, index] += variance
-        self._keep_transition(before, np.eye(len(self._ekf.x)))
+        before = self.state
+        covariance = before.covariance.copy()
+        covariance[index, index] += variance
+        self._ekf.P = covariance
+        self._keep_transition(before, self._identity)
 
-    def snapshot(self) -> FilterMemory:
-        """Return copies of mean and covariance and the count of restarts."""
-        return FilterMemory(self._ekf.x.copy(), self._ekf.P.copy(), self.restarts)
+    @property
+    def state(self) -> FilterMemory:
+        """Mean, covariance and the count of restarts."""
+        return FilterMemory(self._ekf.x, self._ekf.P, self.restarts)
 
-    def restore(self, snapshot: FilterMemory) -> None:
-        """Go back to a snapshot."""
-        mean, covariance, self.restarts = snapshot
-        self._ekf.x, self._ekf.P = mean.copy(), covariance.copy()
+    @state.setter
+    def state(self, memory: FilterMemory) -> None:
+        self._ekf.x, self._ekf.P, self.restarts = memory
 
-    def _present(self) -> Gaussian | None:
-        """Return a copy of the state where there is a buffer to keep it."""
-        if self.buffer is None:
-            return None
-        return Gaussian(self._ekf.x.copy(), self._ekf.P.copy())
-
-    def _keep_transition(self, before: Gaussian | None, transition: FloatArray) -> None:
-        if self.buffer is not None and before is not None:
-            self.buffer.add(before, transition, Gaussian(self._ekf.x, self._ekf.P))
+    def _keep_transition(self, before: FilterMemory, transition: FloatArray) -> None:
+        if self.buffer is not None:
+            after = Gaussian(self._ekf.x, self._ekf.P)
+            self.buffer.add(Gaussian(before.mean, before.covariance), transition, after)
 
     def _enforce_bounds(self) -> None:
         """Keep mean and covariance finite, within their bounds and positive."""

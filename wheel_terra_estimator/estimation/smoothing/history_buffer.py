@@ -151,7 +151,7 @@ class HistoryBuffer:
         """Keep inputs that belong to the present state."""
         position = len(self)
         self.marks.append(Mark(position, content))
-        self._end = position, Gaussian(present.mean.copy(), present.covariance.copy())
+        self._end = position, present
 
     @property
     def end(self) -> Gaussian | None:
@@ -165,14 +165,15 @@ class HistoryBuffer:
     def reset(self) -> None:
         """Keep everything: a new run of the same recording follows after the cut."""
 
-    def snapshot(self) -> tuple[int, int]:
-        """Return the numbers of transitions and marks."""
+    @property
+    def state(self) -> tuple[int, int]:
+        """How far the buffer is: transitions and marks; setting it winds back."""
         return len(self), len(self.marks)
 
-    def restore(self, snapshot: tuple[int, int]) -> None:
-        """Truncate the buffer to a snapshot."""
-        self._transitions.truncate(snapshot[0])
-        self.marks.truncate(snapshot[1])
+    @state.setter
+    def state(self, lengths: tuple[int, int]) -> None:
+        self._transitions.truncate(lengths[0])
+        self.marks.truncate(lengths[1])
 
 
 def packed(state: Gaussian) -> tuple[FloatArray, FloatArray]:
