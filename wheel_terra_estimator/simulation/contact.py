@@ -150,9 +150,9 @@ class ContactModel:
         contact.sinkage = depth
         self._terms.apply('on_outputs', contact)
         return SoilForces(
-            pull=contact.drawbar_pull,
+            pull=np.asarray(contact.drawbar_pull),
             side_force=side_force,
-            torque=contact.torque,
+            torque=np.asarray(contact.torque),
             support_ratio=support,
             sinkage_exponent=np.broadcast_to(contact.sinkage_exponent, shape),
             contact_angle=np.broadcast_to((t1 - tm) + (tm - t2), shape),

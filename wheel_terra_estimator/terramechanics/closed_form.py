@@ -1,21 +1,20 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The closed form of the contact: each side of the peak stress as one force at its centroid.
+"""Closed form of the contact: the stress on each side of its peak as one force at its centroid.
 
 Area and centroid of the normal stress follow from its exponent, the mobilised share of the shear
 strength from the shear displacement at that centroid, that of cohesion from the one at the middle
 of the side (docs/models). Nothing is fitted; over the validation family its error is some ten times
 smaller than that of triangular stresses (coefficients A, B, C).
 
-Where the rim skids, shear displacement turns back inside the contact and no one place stands for
-a side: there four nodes on each side take the place of the centroid, and where the wheel slides
-sideways, where the displacement turns its direction.
+Where the rim skids the shear displacement reverses inside the contact, and where the wheel slides
+sideways its direction changes along it, so that one place does not represent a side: there four
+nodes on each side replace the centroid.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -24,18 +23,17 @@ from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms
 
-# Skid beyond pure rolling, v/(w R) - 1, from which and over which the nodes take over from the
-# centroid; below the first, one place per side is within 1.3 % of the load.
-_TAKE_OVER_AT, _TAKE_OVER = 0.07, 0.1
-# Lateral speed v_y/(w R) over which they do where the wheel slides sideways.
-_SIDEWAYS_TAKE_OVER = 0.03
+# Skid beyond pure rolling, v/(w R) - 1, at which the nodes begin to replace the centroid, and over
+# which they do [-]; below the first, one place per side is within 1.3 % of the load.
+_BLEND_FROM, _BLEND = 0.07, 0.1
+_SIDEWAYS_BLEND = 0.03  # lateral speed v_y/(w R) over which they do [-]
 _NO_DISPLACEMENT = 1e-300  # over K [-]; keeps the direction of none finite
 _RULE = stresses.gauss_rule(4)
 # Nodes and weights on (0, 1), squared towards 0, where the stress starts like v^N.
 _NODES = tuple((place * place, 2.0 * weight * place) for place, weight in _RULE)
 
 
-def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Any, Any, Any]:
+def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Quantity, Quantity, Quantity]:
     """Area, centroid and spread of the stress on one side of its peak, as shares.
 
     For small angles the stress is [v (1 + q (1 - v))]^N of its peak, with v = 0 at the edge of the
@@ -52,9 +50,9 @@ def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Any, Any, Any]:
 class BranchForces:
     """Forces of a contact whose peak and leaving angle are fixed shares of the entrance angle.
 
-    All that does not depend on the entrance angle is prepared once, so that a load balance costs
-    little more than sines. Angles below half a turn's quarter are assumed: cosines come from
-    sines, cos tm - cos t1 = 2 sin((t1 + tm)/2) sin((t1 - tm)/2).
+    All that does not depend on the entrance angle is computed once, so that a load balance costs
+    little more than sines. Angles below pi/2 are assumed: cosines are computed from sines,
+    cos tm - cos t1 = 2 sin((t1 + tm)/2) sin((t1 - tm)/2).
 
     ``contact``: arrays of one shape, or shapes that broadcast; its angles are not read.
     ``peak_share``, ``leaving_share``: tm/t1 and t2/t1 [-].
@@ -69,9 +67,7 @@ class BranchForces:
         '_turns_back', '_width',
     )  # fmt: skip
 
-    def __init__(
-        self, contact: Contact[Quantity], peak_share: Quantity, leaving_share: Quantity
-    ) -> None:
+    def __init__(self, contact: Contact, peak_share: Quantity, leaving_share: Quantity) -> None:
         self._exponent = n = contact.sinkage_exponent
         front, rear = 1.0 - peak_share, peak_share - leaving_share
         area, centroid, spread = branch_moments(n, front / (1.0 + peak_share))
@@ -89,48 +85,50 @@ class BranchForces:
         self._turn = turn = R / self._modulus
         skid = contact.velocity_ratio / R - 1.0
         self._turns_back = bool(np.any(skid > 0.0))
-        # Where nodes take over from the centroids.
-        share = np.maximum((skid - _TAKE_OVER_AT) / _TAKE_OVER, 0.0)
+        # Weight of the nodes against the centroids.
+        share = np.maximum((skid - _BLEND_FROM) / _BLEND, 0.0)
         if self._sideways:
-            share = share + np.abs(contact.lateral_ratio / R) / _SIDEWAYS_TAKE_OVER
+            share = share + np.abs(contact.lateral_ratio / R) / _SIDEWAYS_BLEND
         share = np.minimum(share, 1.0)
         self._skidding = bool(np.any(share > 0.0))
         self._skid = share * share * (3.0 - 2.0 * share)
         self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
         square_front, square_rear = front * front, rear * rear
-        # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
+        # On an arc the resultant is a little smaller than the sum of the stresses.
         half_spread = 0.5 * spread
         self._arc_front, self._arc_rear = half_spread * square_front, half_spread * square_rear
         self._edge_front, self._edge_rear = square_front / 24.0, square_rear / 24.0
-        # Shear is spread evenly where cohesion gives it: nearer to the edge in front, where it
-        # is larger behind, both per displacement at the stress's centroid.
+        # The strength by cohesion is uniform, with its centroid at the middle of the side. Factors
+        # from the displacement at the centroid of the normal stress to the one there.
         self._nearer = 0.125 / centroid
         self._further = (place_rear - self._middle_rear) / (1.0 - place_rear)
         self._bearing_modulus = contact.bearing_modulus
         self._shape = (2.0 * r / contact.reference_depth) ** n  # of the stress, per bearing modulus
         self._share = area * self._shape
         self._normal_front, self._normal_rear = r * front, r * rear
-        grip, cling = R * contact.tan_friction, R * contact.cohesion
-        self._friction_front, self._friction_rear = grip * front, grip * rear
-        self._cohesion_front, self._cohesion_rear = cling * front, cling * rear
+        friction, cohesion = R * contact.tan_friction, R * contact.cohesion
+        self._friction_front, self._friction_rear = friction * front, friction * rear
+        self._cohesion_front, self._cohesion_rear = cohesion * front, cohesion * rear
 
     @property
-    def exponent(self) -> Any:
+    def exponent(self) -> Quantity:
         """Exponent N of the normal stress [-]; the load grows with about 2 N + 1."""
         return self._exponent
 
-    def forces(self, angle: Quantity) -> tuple[Any, Any, Any]:
+    def forces(self, angle: Quantity) -> tuple[Quantity, Quantity, Quantity]:
         """Load [N], pull [N] and torque [N m] at an entrance angle."""
         stressed, sticking = self._parts(angle)
         modulus = self._bearing_modulus
         load, pull, torque = (modulus * s + c for s, c in zip(stressed, sticking, strict=True))
         return load, pull, torque
 
-    def balanced(self, angle: Quantity, load: Quantity, shift: Quantity = 0.0) -> tuple[Any, Any]:
+    def balanced(
+        self, angle: Quantity, load: Quantity, shift: Quantity = 0.0
+    ) -> tuple[Quantity, Quantity]:
         """Pull [N] and torque [N m] at an entrance angle under a normal load [N].
 
-        The bearing modulus is the one that carries the load: that of the contact is not read.
-        `shift` turns all stresses about the hub, towards the front [rad].
+        The bearing modulus is the one that carries the load, not that of the contact. `shift`
+        rotates all stresses about the hub, towards the front [rad].
         """
         (lift, push, turn), (lift_c, push_c, turn_c) = self._parts(angle)
         cosine, sine = np.cos(shift), np.sin(shift)
@@ -138,12 +136,12 @@ class BranchForces:
         pull = modulus * (push * cosine - lift * sine) + push_c * cosine - lift_c * sine
         return pull, modulus * turn + turn_c
 
-    def lateral_force(self, angle: Quantity) -> Any:
+    def lateral_force(self, angle: Quantity) -> Quantity:
         """Force of the soil under the rim at an entrance angle, positive left [N]."""
         stressed, sticking = self._node_parts(angle)
         return self._bearing_modulus * stressed[3] + sticking[3]
 
-    def _parts(self, angle: Quantity) -> tuple[Sequence[Any], Sequence[Any]]:
+    def _parts(self, angle: Quantity) -> tuple[Sequence[Quantity], Sequence[Quantity]]:
         """Load, pull, torque per bearing modulus of stress and friction; those of cohesion."""
         sin, sqrt, square = np.sin, np.sqrt, angle * angle
         top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
@@ -181,7 +179,7 @@ class BranchForces:
         )
         if not self._skidding:
             return stressed, sticking
-        by_nodes = self._node_parts(angle)  # their share grows with the skid
+        by_nodes = self._node_parts(angle)
         return (
             [s + self._skid * (n - s) for s, n in zip(stressed, by_nodes[0], strict=False)],
             [c + self._skid * (n - c) for c, n in zip(sticking, by_nodes[1], strict=False)],
@@ -189,10 +187,10 @@ class BranchForces:
 
     def _mobilised(
         self, angle: Quantity, top: Quantity, front: Quantity, rear: Quantity, cos_rear: Quantity
-    ) -> Any:
+    ) -> tuple[Quantity, Quantity, Quantity, Quantity]:
         """Return mean mobilised shares [-]: friction in front and behind, cohesion likewise.
 
-        Given are the sines of the entrance angle and of the places of both centroids.
+        `top`, `front`, `rear`: sines of the entrance angle and of the angles of both centroids.
         """
         roll, square = self._roll, angle * angle
         # Mean shares of strength: 1 minus the mean of exp(-j/K) over the side. In front, where j
@@ -229,14 +227,15 @@ class BranchForces:
             share_rear, even_rear = share_rear * sign_rear, even_rear * sign_rear
         return share_front, share_rear, even_front, even_rear
 
-    def _node_parts(self, angle: Quantity) -> tuple[Sequence[Any], Sequence[Any]]:
+    def _node_parts(self, angle: Quantity) -> tuple[Sequence[Quantity], Sequence[Quantity]]:
         """`_parts`, and the lateral force [N], from nodes on either side of the peak."""
         sin = np.sin
         R, roll = self._shear_radius, self._roll
         front, top = 2.0 * self._half, sin(angle)
         leaving = 2.0 * self._middle_rear - (1.0 - front)
         rear = 1.0 - front - leaving
-        stressed, sticking = [0.0] * 4, [0.0] * 4
+        stressed: list[Quantity] = [0.0] * 4
+        sticking: list[Quantity] = [0.0] * 4
         for place, weight in _NODES:
             ahead = 1.0 - front * place
             depth = sin(0.5 * (1.0 + ahead) * angle) * sin(0.5 * front * place * angle)
@@ -273,7 +272,7 @@ class BranchForces:
             [factor * part for factor, part in zip(factors, sticking, strict=True)],
         )
 
-    def _node_shares(self, x: Any, y: Any) -> tuple[Any, Any]:
+    def _node_shares(self, x: Quantity, y: Quantity) -> tuple[Quantity, Quantity]:
         """Mobilised shares along and across the rim [-], for displacements over K."""
         if not self._sideways:
             return np.copysign(-np.expm1(-np.abs(x)), x), 0.0
@@ -281,10 +280,10 @@ class BranchForces:
         share = -np.expm1(-length) / length
         return share * x, share * y
 
-    def small_angle(self, load: Quantity) -> Any:
-        """Entrance angle at which the normal stress alone carries a load, for small angles.
+    def small_angle(self, load: Quantity) -> Quantity:
+        """Entrance angle at which the normal stress alone carries a load, for small angles [rad].
 
-        1 to 5 % from the balance: a start, not an answer.
+        A first guess, 1 to 5 % from the balance.
         """
         n, span = self._exponent, self._normal_front + self._normal_rear
         stress = self._bearing_modulus * self._share
@@ -294,7 +293,7 @@ class BranchForces:
 
 def coefficients(
     entrance_angle: Quantity, peak_angle: Quantity, leaving_angle: Quantity
-) -> tuple[Any, Any, Any]:
+) -> tuple[Quantity, Quantity, Quantity]:
     """Integrals A, B, C of a unit triangle times cos t, sin t and 1 over the contact.
 
     A = (cos tm - cos t2)/(tm - t2) + (cos tm - cos t1)/(t1 - tm), B the same with sines,
@@ -307,7 +306,7 @@ def coefficients(
     return a, b, 0.5 * (entrance_angle - leaving_angle)
 
 
-def peak_stresses(contact: Contact[Any], terms: Terms) -> tuple[Any, Any]:
+def peak_stresses(contact: Contact, terms: Terms) -> tuple[Quantity, Quantity]:
     """Normal and shear stress at the peak angle, effects included [Pa]."""
     peak = contact.peak_angle
     contact.angle = peak
@@ -317,18 +316,18 @@ def peak_stresses(contact: Contact[Any], terms: Terms) -> tuple[Any, Any]:
     return sigma, stresses.shear_stress(contact, peak, sigma)
 
 
-def forces(contact: Contact[Quantity], terms: Terms) -> tuple[Quantity, Quantity, Quantity]:
+def forces(contact: Contact, terms: Terms) -> tuple[Quantity, Quantity, Quantity]:
     """Load [N], pull [N] and torque [N m] from branch moments, angles given."""
     t1 = contact.entrance_angle
     form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1)
-    result = form.forces(t1)
+    load, pull, torque = form.forces(t1)
     if terms.stages['on_normal_stress']:
-        added = _added_stress_forces(contact, terms)[:3]
-        result = tuple(a + b for a, b in zip(result, added, strict=True))
-    return result
+        added = _added_stress_forces(contact, terms)
+        load, pull, torque = load + added[0], pull + added[1], torque + added[2]
+    return load, pull, torque
 
 
-def lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
+def lateral_force(contact: Contact, terms: Terms) -> Quantity:
     """Force of the soil under the rim on the wheel, positive left [N], angles given."""
     t1 = contact.entrance_angle
     if contact.straight:
@@ -340,7 +339,7 @@ def lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
     return force
 
 
-def proportional_forces(contact: Contact[Quantity]) -> BranchForces:
+def proportional_forces(contact: Contact) -> BranchForces:
     """Forces for all entrance angles at once, peak and leaving angle in proportion to them.
 
     They are where no effect moves the angles or adds stress.
@@ -351,11 +350,14 @@ def proportional_forces(contact: Contact[Quantity]) -> BranchForces:
     return BranchForces(contact, peak, leaving)
 
 
-def _added_stress_forces(contact: Contact[Quantity], terms: Terms) -> tuple[Any, ...]:
+def _added_stress_forces(contact: Contact, terms: Terms) -> tuple[Quantity, ...]:
     """Load, pull, torque, lateral force of what effects add to the normal stress, friction too."""
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     R = contact.shear_radius
-    load = pull = torque = lateral = 0.0
+    load: Quantity = 0.0
+    pull: Quantity = 0.0
+    torque: Quantity = 0.0
+    lateral: Quantity = 0.0
     for low, high, behind in ((tm, t1, False), (t2, tm, True)):
         for point, weight in _RULE:
             angle = low + (high - low) * point

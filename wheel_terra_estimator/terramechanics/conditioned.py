@@ -12,12 +12,11 @@ from __future__ import annotations
 import math
 from copy import copy
 from dataclasses import astuple
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wheel_terra_estimator.arrays import Quantity
+from wheel_terra_estimator.arrays import FloatArray, Quantity
 from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.closed_form import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
@@ -112,7 +111,7 @@ class ConditionedForces:
         gain = readings[1] - readings[0]
         return 1.0 if abs(gain - 1.0) < _NO_GAIN else 1.0 / gain
 
-    def forces(self, inputs: ConditionedInputs) -> tuple[Any, Any]:
+    def forces(self, inputs: ConditionedInputs) -> tuple[FloatArray, FloatArray]:
         """Return torque [N m] and pull [N] of all wheels, positive forward, (..., n) each."""
         inputs = _within_the_model(inputs)
         contact, angle = self._contact(inputs)
@@ -121,9 +120,9 @@ class ConditionedForces:
         pull, torque = form.balanced(angle, contact.normal_load, inputs.centroid_shift)
         contact.torque, contact.drawbar_pull = contact.direction * torque, contact.direction * pull
         self._on_forces.apply('on_outputs', contact)
-        return contact.torque, contact.drawbar_pull
+        return np.asarray(contact.torque), np.asarray(contact.drawbar_pull)
 
-    def _contact(self, inputs: ConditionedInputs) -> tuple[Contact[Any], NDArray[np.float64]]:
+    def _contact(self, inputs: ConditionedInputs) -> tuple[Contact, FloatArray]:
         """Return the contacts with the terms on inputs done, and their entrance angles [rad]."""
         contact = copy(self._as_built)
         contact.slip = slip_of_speed_ratio(inputs.speed_ratio)
@@ -160,14 +159,14 @@ def _within_the_model(inputs: ConditionedInputs) -> ConditionedInputs:
     return inputs._replace(leaving_angle=leaving, **numbers)
 
 
-def contacts_as_built(wheel: Wheel, soil: Soil, gravity: float) -> Contact[Any]:
+def contacts_as_built(wheel: Wheel, soil: Soil, gravity: float) -> Contact:
     """Return the contacts of all wheels with geometry and soil filled in, (n,) each."""
     radius, width, height, count, thickness = np.broadcast_arrays(
         *(np.atleast_1d(np.asarray(value, float)) for value in astuple(wheel))
     )
     for column in (radius, width, height, count, thickness):
         column.flags.writeable = False  # a term changes its own contact, never these
-    contact: Contact[Any] = Contact(**dict.fromkeys(Contact.__dataclass_fields__, 0.0))
+    contact: Contact = Contact(**dict.fromkeys(Contact.__dataclass_fields__, 0.0))
     contact.radius = contact.shear_radius = contact.rim_radius = radius
     contact.width, contact.rim_share = width, 1.0
     contact.lug_height, contact.lug_count, contact.lug_thickness = height, count, thickness

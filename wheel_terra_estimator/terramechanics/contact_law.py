@@ -1,18 +1,18 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Rival laws of the wheel-soil contact: operating points in, sinkage and forces out."""
+"""Alternative laws of the wheel-soil contact: operating points in, sinkage and forces out."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Quantity
 from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
-from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
+from wheel_terra_estimator.terramechanics.kinematics import STEADY_SLIP, speed_ratio
 from wheel_terra_estimator.terramechanics.load_balance import solve_entrance_angle
 from wheel_terra_estimator.terramechanics.model import (
     OUTSIDE_VALIDITY,
@@ -32,7 +32,7 @@ _NODES = 24  # on the rim
 _START = 0.3  # first guess of the entrance angle [rad]
 
 
-def stress_maps(tilt: Any, direction: Any) -> tuple[Any, Any]:
+def stress_maps(tilt: Quantity, direction: Quantity) -> tuple[FloatArray, FloatArray]:
     """Vertical and horizontal stress per depth on a plate of the generic medium [N/cm^3].
 
     ``tilt``: of the plate from the horizontal, positive where it rises towards +x [rad].
@@ -50,7 +50,7 @@ def stress_maps(tilt: Any, direction: Any) -> tuple[Any, Any]:
 
 
 class ResistiveForce:
-    """Steady wheel-soil contact by resistive force theory: one scale is all it knows of a soil.
+    """Steady wheel-soil contact by resistive force theory, with one scale as the only soil number.
 
     Each small plate of the wheel meets a stress that grows with its depth and depends on its tilt
     and on the direction in which it moves, as if the others were not there (Li, Zhang and Goldman
@@ -89,7 +89,7 @@ class ResistiveForce:
         direction = np.where(points.angular_velocity < 0.0, -1.0, 1.0)
         none = np.zeros(len(points))
         flags = np.where(carries, 0, OVERLOADED)
-        outside = (np.abs(points.slip) > 0.95) | (np.asarray(points.wheel.lug_height) > 0.0)
+        outside = (np.abs(points.slip) > STEADY_SLIP) | (np.asarray(points.wheel.lug_height) > 0.0)
         flags = flags + np.where(outside, OUTSIDE_VALIDITY, 0)
         return SteadyState(
             np.asarray(points.wheel.radius) * (1.0 - np.cos(angle)),
@@ -121,8 +121,8 @@ def rim_integrals(motion: FloatArray, entrance_angle: FloatArray) -> FloatArray:
     """Integrate the generic stress over the leading side of a rim of radius 1 m and width 1 m.
 
     ``motion``: angle whose tangent is (v/(r w) - 1) over the entrance angle [rad].
-    ``entrance_angle``: [rad]. Returns (..., 5): lift of the stress normal to the rim and what it
-    pushes back; lift, push ahead and torque of the tangential stress [N/cm^3].
+    ``entrance_angle``: [rad]. Returns (..., 5): lift and backward push of the stress normal to the
+    rim; lift, forward push and torque of the tangential stress [N/cm^3].
     """
     x, w = np.polynomial.legendre.leggauss(_NODES)
     motion, whole = (v[..., None] for v in np.broadcast_arrays(motion, entrance_angle))
@@ -153,8 +153,8 @@ def contact_law(
     soil: Soil,  # floats
     # Switched-on effects, a ``learned_closure`` among them; ``resistive_force`` has none
     effects: EffectSettings,
-    # Width at which the laws have the same pressure [m]: where ``wong_reece`` takes over Bekker's
-    # moduli, and of the plate that ``resistive_force`` takes its scale from
+    # Width at which the laws have the same pressure [m]: that at which ``wong_reece`` converts
+    # Bekker's moduli, and of the plate that gives ``resistive_force`` its scale
     width: float,
     gravity: float = STANDARD_GRAVITY,  # at which the soil's numbers hold [m/s^2]
 ) -> ContactLaw:
@@ -192,5 +192,5 @@ def plate_scale(soil: Soil, width: float, gravity: float = STANDARD_GRAVITY) -> 
     """Scale of the resistive stress with which a flat plate meets the soil's pressure [-]."""
     modulus, depth = soil.bearing(width, gravity)
     pressure = modulus * (PLATE_DEPTH / depth) ** soil.sinkage_exponent
-    generic = 1e6 * float(stress_maps(0.0, 0.5 * np.pi)[0]) * PLATE_DEPTH
+    generic = PER_CUBIC_METRE * float(stress_maps(0.0, 0.5 * np.pi)[0]) * PLATE_DEPTH
     return float(pressure) / generic

@@ -4,21 +4,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-from wheel_terra_estimator.arrays import Quantity
+from wheel_terra_estimator.arrays import FloatArray, Quantity
 
 # A locked wheel (s = -1) has v/w without bound; this floor on 1 + s keeps it finite, with a shear
 # that is saturated long before.
 _LOCKED = 1e-6
+STEADY_SLIP = 0.95  # |s| above which no steady state is known [-]
 
 
-def slip_ratio(
-    speed: Quantity, rim_speed: Quantity, rest_speed: float = 2e-3
-) -> NDArray[np.float64]:
+def slip_ratio(speed: Quantity, rim_speed: Quantity, rest_speed: float = 2e-3) -> FloatArray:
     """Slip ratio s of a wheel from its ground speed and its rim speed.
 
     Driving (``|v| <= |r w|``): s = 1 - v/(r w). Braking or skidding: s = r w/v - 1. Symmetric in
@@ -40,14 +36,14 @@ def slip_ratio(
     return np.clip(np.where(turning | moving, slip, np.nan), -1.0, 1.0)
 
 
-def speed_ratio(slip: Quantity) -> Any:
+def speed_ratio(slip: Quantity) -> FloatArray:
     """Return v/(r w) for a slip ratio [-]."""
     driving = 1.0 - slip
     braking = 1.0 / np.maximum(1.0 + slip, _LOCKED)
     return np.where(slip >= 0.0, driving, braking)
 
 
-def slip_of_speed_ratio(ratio: Quantity) -> Any:
+def slip_of_speed_ratio(ratio: Quantity) -> FloatArray:
     """Return the slip ratio for u = v/(r w); the inverse of `speed_ratio` for u >= 0 [-]."""
     driving = 1.0 - np.maximum(ratio, 0.0)
     braking = 1.0 / np.maximum(ratio, 1.0) - 1.0

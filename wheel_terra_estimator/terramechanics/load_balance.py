@@ -23,7 +23,7 @@ _STEP = 1e-6
 _TOLERANCE = _REST = 1e-10  # of the load: of Newton, and what interpolation may leave
 
 
-def explicit_entrance_angle(contact: Contact[Quantity]) -> FloatArray:
+def explicit_entrance_angle(contact: Contact) -> FloatArray:
     """First guess from the normal stress alone, small angles, triangular stress (10 to 20 %)."""
     n = contact.sinkage_exponent
     rise = 0.5 * contact.radius * np.maximum(1.0 - contact.peak_ratio**2, 0.05)
@@ -57,9 +57,9 @@ def balance(
         y2 = np.log(w2 / load)
         second, third = _inverse(y2 - y1), _inverse(y2 - y0)
 
-        def at_load(v0: FloatArray, v1: FloatArray, v2: FloatArray) -> FloatArray:
+        def at_load(v0: Quantity, v1: Quantity, v2: Quantity) -> FloatArray:
             slope = (v2 - v1) * second
-            return v2 - y2 * (slope - y1 * (slope - (v1 - v0) * first) * third)
+            return np.asarray(v2 - y2 * (slope - y1 * (slope - (v1 - v0) * first) * third))
 
         angle = np.exp(at_load(x0, x1, x2))
         pull, torque = at_load(f0, f1, f2), at_load(t0, t1, t2)
@@ -68,7 +68,9 @@ def balance(
     if settled.all():
         return angle, pull, torque, settled
     start = np.clip(np.where(np.isfinite(angle), angle, 0.3), 1e-3, 1.4)
-    found, carries = solve_entrance_angle(lambda angles: form.forces(angles)[0], load, start)
+    found, carries = solve_entrance_angle(
+        lambda angles: np.asarray(form.forces(angles)[0]), load, start
+    )
     angle = np.where(settled, angle, found)
     _, by_pull, by_torque = form.forces(angle)
     pull, torque = np.where(settled, pull, by_pull), np.where(settled, torque, by_torque)

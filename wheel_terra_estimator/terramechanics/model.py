@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from wheel_terra_estimator.terramechanics import closed_form, quadrature
 from wheel_terra_estimator.terramechanics.checks import check_range, common_length
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import EffectSettings, check_settings
+from wheel_terra_estimator.terramechanics.kinematics import STEADY_SLIP
 from wheel_terra_estimator.terramechanics.load_balance import (
     balance,
     explicit_entrance_angle,
@@ -30,17 +31,17 @@ from wheel_terra_estimator.terramechanics.terms import (
     set_angles,
 )
 
-_FORCES: Mapping[str, Any] = {'quadrature': quadrature, 'closed_form': closed_form}
+_FORCES: Mapping[str, ModuleType] = {'quadrature': quadrature, 'closed_form': closed_form}
 METHODS = tuple(_FORCES)
 
 OVERLOADED = 1  # the soil cannot carry the load: values belong to a sinkage of one radius
-# |slip| above 0.95, where no steady state is known; or effects made the strength negative.
+# |slip| above `STEADY_SLIP`, or effects made the strength negative.
 OUTSIDE_VALIDITY = 2
 
 
 @dataclass(frozen=True)
 class SteadyState:
-    """Steady answer of the soil, one entry per operating point."""
+    """Steady state of the contact, one entry per operating point."""
 
     # ``sinkage``, ``drawbar_pull``, ``torque``: (N,) as the instruments of the model would read
     # them [m], [N], [N m]
@@ -85,7 +86,7 @@ class WheelSoilModel:
         self._soil = {name: getattr(soil, name) for name in SOIL_NUMBERS}
 
     @property
-    def _law(self) -> Any:
+    def _law(self) -> ModuleType:
         return _FORCES[self.method]  # no attribute: a module cannot be pickled
 
     def steady_state(self, points: OperatingPoints) -> SteadyState:
@@ -128,10 +129,10 @@ class WheelSoilModel:
         contact.drawbar_pull = contact.direction * pull
         contact.torque = contact.direction * torque
         terms.apply('on_outputs', contact)  # as the instruments read them
-        return _answer(contact, points, angle, carries)
+        return _steady_state(contact, points, angle, carries)
 
-    def _check(self, contact: Contact[Quantity]) -> None:
-        """Complain of what effects, or the width, made of the soil."""
+    def _check(self, contact: Contact) -> None:
+        """Raise ValueError where effects, or the width, leave no strength."""
         law = 'kc/b + kphi' if self.soil.pressure_law == 'bekker' else "c kc' + rho g b kphi'"
         check_range(f'bearing modulus {law}', contact.bearing_modulus, 0.0, open_lower=True)
         if self.strict and self.effects:
@@ -147,7 +148,7 @@ class WheelSoilModel:
                 )
 
     def _entrance_angle(
-        self, contact: Contact[Quantity], load: FloatArray, points: OperatingPoints, terms: Terms
+        self, contact: Contact, load: FloatArray, points: OperatingPoints, terms: Terms
     ) -> tuple[FloatArray, BoolArray]:
         def carried(angle: FloatArray) -> FloatArray:
             set_angles(contact, angle, points.leaving_angle, terms)
@@ -157,13 +158,13 @@ class WheelSoilModel:
         return solve_entrance_angle(carried, load, explicit_entrance_angle(contact))
 
 
-def _answer(
-    contact: Contact[Quantity], points: OperatingPoints, angle: FloatArray, carries: BoolArray
+def _steady_state(
+    contact: Contact, points: OperatingPoints, angle: FloatArray, carries: BoolArray
 ) -> SteadyState:
     flags = np.where(carries, 0, OVERLOADED)
     weakened = (np.asarray(contact.cohesion) < 0.0) | (np.asarray(contact.tan_friction) < 0.0)
     weakened |= np.asarray(contact.sinkage_exponent) <= 0.0
-    flags = flags + np.where((np.abs(points.slip) > 0.95) | weakened, OUTSIDE_VALIDITY, 0)
+    flags = flags + np.where((np.abs(points.slip) > STEADY_SLIP) | weakened, OUTSIDE_VALIDITY, 0)
 
     def whole(value: Quantity) -> FloatArray:
         return np.array(np.broadcast_to(value, angle.shape))

@@ -29,7 +29,7 @@ def _rule(nodes: int, dimensions: int) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def forces(
-    contact: Contact[Quantity], terms: Terms, nodes: int | None = None
+    contact: Contact, terms: Terms, nodes: int | None = None
 ) -> tuple[Quantity, Quantity, Quantity]:
     """Vertical force, longitudinal force and torque on the wheel, angles given.
 
@@ -49,7 +49,7 @@ def forces(
     return load, pull, width * contact.shear_radius * np.add.reduce(shear)
 
 
-def lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
+def lateral_force(contact: Contact, terms: Terms) -> Quantity:
     """Force of the soil under the rim on the wheel, positive left [N], angles given.
 
     Ishigami et al. 2007 (doi 10.1002/rob.20187), without the flank: F_y = b R Int tau_y.
@@ -63,7 +63,7 @@ def lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
 
 
 def stressed(
-    contact: Contact[Quantity], terms: Terms, nodes: int | None = None
+    contact: Contact, terms: Terms, nodes: int | None = None
 ) -> tuple[Quantity, Quantity, Quantity]:
     """Set angle and normal stress of the nodes; return their weights [rad], cosines and sines."""
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle

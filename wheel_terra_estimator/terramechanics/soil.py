@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -55,7 +54,7 @@ class Soil:
         check_range('leaving angle ratio', self.leaving_angle_ratio, -1.5, 0.0)
         check_range('density', self.density, 0.0, unit='kg/m^3')
 
-    def bearing(self, width: Quantity, gravity: float) -> tuple[Any, Any]:
+    def bearing(self, width: Quantity, gravity: float) -> tuple[Quantity, Quantity]:
         """Pressure at the reference depth [Pa], and that depth [m], of a wheel of a width [m]."""
         return bearing_law(
             self.pressure_law,

@@ -7,8 +7,6 @@ Bekker 1969 (book), Janosi and Hanamoto 1961 (proceedings): no DOI.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
@@ -16,7 +14,7 @@ from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
 
 
-def gauss_rule(nodes: int) -> list[tuple[Any, Any]]:
+def gauss_rule(nodes: int) -> list[tuple[Quantity, Quantity]]:
     """Return nodes and weights of Gauss and Legendre on (0, 1)."""
     x, w = np.polynomial.legendre.leggauss(nodes)
     return list(zip((0.5 * (x + 1.0)).tolist(), (0.5 * w).tolist(), strict=True))
@@ -32,7 +30,7 @@ def bearing_law(
     width: Quantity,
     cohesion: Quantity,
     weight_density: Quantity,
-) -> tuple[Any, Any]:
+) -> tuple[Quantity, Quantity]:
     """Pressure at the reference depth [Pa], and that depth [m], of a law of ``Soil``.
 
     Reece: c kc' + rho g b kphi' at one width, p = k (z/b)^n; Bekker 1969: kc/b + kphi at 1 m.
@@ -54,9 +52,7 @@ def rolling_sinkage(
     return (3.0 * load / force) ** (2.0 / (2.0 * exponent + 1.0))
 
 
-def front_stress(
-    contact: Contact[Quantity], angle: Quantity, cosine: Quantity | None = None
-) -> Quantity:
+def front_stress(contact: Contact, angle: Quantity, cosine: Quantity | None = None) -> Quantity:
     """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa].
 
     Wong and Reece 1967 (doi 10.1016/0022-4898(67)90105-X); Ding et al. 2010 eq. 17
@@ -75,7 +71,7 @@ def mobilised_share(displacement: Quantity, shear_modulus: Quantity) -> Quantity
 
 
 def mobilised_shares(
-    contact: Contact[Quantity], angle: Quantity, sine: Quantity | None = None
+    contact: Contact, angle: Quantity, sine: Quantity | None = None
 ) -> tuple[Quantity, Quantity]:
     """Signed shares of the shear strength along the wheel (forward) and across it (left) [-].
 
@@ -98,7 +94,7 @@ def mobilised_shares(
 
 
 def shear_stress(
-    contact: Contact[Quantity],
+    contact: Contact,
     angle: Quantity,
     normal_stress: Quantity,
     sine: Quantity | None = None,

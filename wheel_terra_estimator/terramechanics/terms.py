@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
@@ -47,15 +46,15 @@ class Terms:
                 if (term := getattr(effect, stage)) is not None
             ]
 
-    def apply(self, stage: str, contact: Contact[Any]) -> None:
+    def apply(self, stage: str, contact: Contact) -> None:
         """Run all terms of a stage on the contact."""
         for term, parameters in self.stages[stage]:
             term(contact, parameters)
 
 
 def build_contact(
-    points: OperatingPoints, soil: Mapping[str, Any], pressure_law: str, terms: Terms
-) -> Contact[Quantity]:
+    points: OperatingPoints, soil: Mapping[str, Quantity], pressure_law: str, terms: Terms
+) -> Contact:
     """Return the contacts before the load balance, with stage ``on_inputs`` done.
 
     ``soil``: value of each of `SOIL_NUMBERS`, any shape that broadcasts against (N,).
@@ -106,7 +105,7 @@ def build_contact(
     return contact
 
 
-def _lateral_ratio(points: OperatingPoints, contact: Contact[Quantity]) -> Quantity:
+def _lateral_ratio(points: OperatingPoints, contact: Contact) -> Quantity:
     """Return v_y/w [m], positive left; the float 0.0 where no wheel slides sideways."""
     stated = ~np.isnan(points.lateral_speed_ratio)
     if not (np.any(points.slip_angle) or np.any(stated)):
@@ -119,7 +118,7 @@ def _lateral_ratio(points: OperatingPoints, contact: Contact[Quantity]) -> Quant
 
 
 def set_angles(
-    contact: Contact[Any], entrance_angle: Quantity, measured_leaving: Quantity | None, terms: Terms
+    contact: Contact, entrance_angle: Quantity, measured_leaving: Quantity | None, terms: Terms
 ) -> None:
     """Set entrance, leaving and peak angle; a measured leaving angle overrides the law."""
     contact.entrance_angle = entrance_angle

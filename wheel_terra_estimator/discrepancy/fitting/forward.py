@@ -151,7 +151,7 @@ class Forward:
         outputs[..., 3] = contact.lateral_force
         if self.readings is not None:
             outputs[..., :3] = self.readings.read(outputs[..., :3])
-        return load - contact.normal_load, outputs
+        return np.asarray(load - contact.normal_load), outputs
 
     def _resting_value(self, coordinate: Coordinate) -> float:
         """Value of a coordinate in hypotheses that do not have it."""

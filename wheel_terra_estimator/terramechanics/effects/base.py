@@ -20,7 +20,7 @@ STAGES = ('on_inputs', 'on_contact', 'on_normal_stress', 'on_outputs')
 
 # A term changes the contact in place; `parameters.kd` is the value of the parameter ``kd``;
 # its quantities are numbers or arrays.
-Term: TypeAlias = Callable[[Contact[Any], SimpleNamespace], None]
+Term: TypeAlias = Callable[[Contact, SimpleNamespace], None]
 REFERENCE_PRESSURE = 3000.0  # [Pa]; 80 N on 165 mm x 157 mm, the wheel of Ding et al. 2010
 # Effect name -> parameter -> value; ``form`` names the form where it is not the first one.
 EffectSettings: TypeAlias = Mapping[str, Mapping[str, Any]]
@@ -224,7 +224,7 @@ class Effect:
         }
 
 
-def relative_pressure(contact: Contact[Quantity]) -> Quantity:
+def relative_pressure(contact: Contact) -> Quantity:
     """Mean pressure W/(b r) over `REFERENCE_PRESSURE` [-]: what grows with the load."""
     return contact.normal_load / (contact.width * contact.rim_radius * REFERENCE_PRESSURE)
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,21 +21,22 @@ from wheel_terra_estimator.terramechanics.effects.base import (
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 
-_BLEND = 0.001  # [m]; the layer comes in over a millimetre, so that derivatives exist
+_BLEND = 0.001  # depth over which the layer comes in, so that derivatives exist [m]
+_LN_2 = math.log(2.0)
 
 
-def _layer(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _layer(contact: Contact, p: SimpleNamespace) -> None:
     contact.normal_stress = contact.normal_stress + _support(contact, contact.angle, p)
 
 
-def _bearing(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _bearing(contact: Contact, p: SimpleNamespace) -> None:
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     mirrored = t1 - (contact.angle - t2) * (t1 - tm) / (tm - t2)
     angle = np.where(contact.angle >= tm, contact.angle, mirrored)
     contact.normal_stress = contact.normal_stress + _support(contact, angle, p)
 
 
-def _support(contact: Contact[Quantity], angle: Quantity, p: SimpleNamespace) -> Quantity:
+def _support(contact: Contact, angle: Quantity, p: SimpleNamespace) -> Quantity:
     """Stress that the layer adds where the rim is as deep as at an angle [Pa]."""
     depth = contact.radius * (np.cos(angle) - np.cos(contact.entrance_angle))
     inside = np.maximum(depth - p.depth, 0.0)
@@ -77,12 +79,12 @@ HARD_LAYER = Effect(
 )
 
 
-def _compacted(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _compacted(contact: Contact, p: SimpleNamespace) -> None:
     gain = p.stiffening * _earlier_passes(contact)
     contact.bearing_modulus = contact.bearing_modulus * (1.0 + gain)
 
 
-def _rut_stress(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _rut_stress(contact: Contact, p: SimpleNamespace) -> None:
     rut = p.rut * _earlier_passes(contact) / contact.reference_depth
     share = np.maximum(contact.normal_stress / contact.bearing_modulus, 0.0)
     depth = share ** (1.0 / contact.sinkage_exponent)  # below the bottom of the rut, over z0
@@ -90,14 +92,14 @@ def _rut_stress(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.normal_stress = np.where(rut > 0.0, stress, contact.normal_stress)
 
 
-def _rut_depth(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _rut_depth(contact: Contact, p: SimpleNamespace) -> None:
     contact.sinkage = contact.sinkage + p.rut * _earlier_passes(contact)
 
 
-def _earlier_passes(contact: Contact[Quantity]) -> Quantity:
+def _earlier_passes(contact: Contact) -> Quantity:
     """Weight of the earlier passes, 0, 1, 3/2, 7/4, ...: each does half as much as the last."""
     earlier = np.maximum(contact.pass_number - 1.0, 0.0)
-    return 2.0 * (1.0 - np.exp(-0.6931471805599453 * earlier))
+    return 2.0 * (1.0 - np.exp(-_LN_2 * earlier))
 
 
 MULTIPASS = Effect(
@@ -131,29 +133,29 @@ MULTIPASS = Effect(
 )
 
 
-def _sliding(contact: Contact[Quantity]) -> Quantity:
+def _sliding(contact: Contact) -> Quantity:
     """Speed of the rim through the soil over the faster of rim and hub; |s| without side slip."""
     if contact.straight:
         return np.abs(contact.slip)
     forward = speed_ratio(contact.slip)
-    back, aside = 1.0 - forward, contact.lateral_ratio / contact.rim_radius
-    fastest = np.maximum(np.sqrt(forward * forward + aside * aside), 1.0)
-    return np.sqrt(back * back + aside * aside) / fastest
+    back, lateral = 1.0 - forward, contact.lateral_ratio / contact.rim_radius
+    fastest = np.maximum(np.sqrt(forward * forward + lateral * lateral), 1.0)
+    return np.sqrt(back * back + lateral * lateral) / fastest
 
 
-def _exponent(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _exponent(contact: Contact, p: SimpleNamespace) -> None:
     skid = np.maximum(-contact.slip, 0.0)
     growth = p.n1 * _sliding(contact) + p.n2 * skid
     contact.sinkage_exponent = contact.sinkage_exponent + growth
     if not contact.straight:
-        # Soil that comes in past the flank was never rolled over: it bears less.
+        # Soil that enters past the flank has not been rolled over: it bears less.
         cosine, sine = contact.heading()
-        aside = contact.rim_radius * np.abs(sine)
-        share = aside / (aside + contact.width * cosine)
+        flank = contact.rim_radius * np.abs(sine)
+        share = flank / (flank + contact.width * cosine)
         contact.bearing_modulus = contact.bearing_modulus * (1.0 - p.side * share * share)
 
 
-def _lyasko(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _lyasko(contact: Contact, p: SimpleNamespace) -> None:
     slip = _sliding(contact)
     gain = 1.0 + p.gain * ((1.0 + slip) / (1.0 - 0.5 * slip) - 1.0)
     # The load grows with k z^(N + 1/2): this modulus gives the sinkage `gain` times as much.
@@ -161,7 +163,7 @@ def _lyasko(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.bearing_modulus = contact.bearing_modulus * weaker
 
 
-def _with_load(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _with_load(contact: Contact, p: SimpleNamespace) -> None:
     growth = p.nw * np.log(relative_pressure(contact)) + p.n1 * _sliding(contact)
     contact.sinkage_exponent = contact.sinkage_exponent + growth
 

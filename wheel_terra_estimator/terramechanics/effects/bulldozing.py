@@ -16,7 +16,7 @@ from wheel_terra_estimator.terramechanics.stresses import gauss_rule, mobilised_
 _LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it
 
 
-def wedge_resistance(contact: Contact[Quantity], depth: Quantity) -> Quantity:
+def wedge_resistance(contact: Contact, depth: Quantity) -> Quantity:
     """Passive resistance of soil to an upright wall, per width [N/m] (Hegedus 1960, no DOI).
 
     D1 (c h + D2 rho g h^2/2) at the depth h [m] of its foot.
@@ -30,7 +30,7 @@ def wedge_resistance(contact: Contact[Quantity], depth: Quantity) -> Quantity:
     return d1 * (contact.cohesion * depth + 0.5 * d2 * weight * depth**2)
 
 
-def _blade(contact: Contact[Quantity]) -> Quantity:
+def _blade(contact: Contact) -> Quantity:
     """Width of the wheel as a plate across its motion, its share along the wheel [m].
 
     b without sideways motion, none at a slip angle of 90 degrees.
@@ -39,13 +39,13 @@ def _blade(contact: Contact[Quantity]) -> Quantity:
     return (contact.width * cosine + 2.0 * contact.rim_radius * np.abs(sine)) * cosine
 
 
-def _push(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _push(contact: Contact, p: SimpleNamespace) -> None:
     depth = contact.radius * (1.0 - np.cos(contact.entrance_angle))
     resistance = _blade(contact) * wedge_resistance(contact, depth)
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 
-def _earth_pressure(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _earth_pressure(contact: Contact, p: SimpleNamespace) -> None:
     friction = np.arctan(np.maximum(contact.soil_friction, _LEAST_FRICTION))
     tan, cos = np.tan(friction), np.cos(friction)
     half = 0.25 * np.pi + 0.5 * friction
@@ -102,12 +102,12 @@ _NODES = gauss_rule(8)  # over the flank in the soil
 _CENTRE = 2.0 / 3.0  # distance from the hub at which soil rubs on the flank, share of the radius
 
 
-def _push_aside(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _push_aside(contact: Contact, p: SimpleNamespace) -> None:
     if contact.straight:
         return
     t1, r = contact.entrance_angle, contact.radius
     span, edge = t1 - contact.leaving_angle, np.cos(t1)
-    force = 0.0
+    force: Quantity = 0.0
     for place, weight in _NODES:
         behind_entry = place * span
         cosine = np.cos(t1 - behind_entry)
@@ -117,7 +117,7 @@ def _push_aside(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.lateral_force = contact.lateral_force - p.ks * span * force
 
 
-def _plate(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _plate(contact: Contact, p: SimpleNamespace) -> None:
     if contact.straight:
         return
     t1, t2, r = contact.entrance_angle, contact.leaving_angle, contact.radius
@@ -126,7 +126,7 @@ def _plate(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     span = t1 - t2
     # Soil surface along the flank: straight from where the rim goes in to where it leaves.
     fall = (np.cos(t2) - np.cos(t1)) / (np.sin(t1) - np.sin(t2))
-    force = 0.0
+    force: Quantity = 0.0
     for place, weight in _NODES:
         angle = t1 - place * span
         behind = r * (np.sin(t1) - np.sin(angle))

@@ -22,13 +22,13 @@ SMALLEST_ROOM = 1e-12
 """Height left below the hub over r [-]; contact that leaves above the hub has none."""
 
 
-def _mound(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _mound(contact: Contact, p: SimpleNamespace) -> None:
     """Raise the rear contact height by kappa z ((s - onset)+/(1 - onset))^2."""
     excess = np.maximum(contact.slip - p.onset, 0.0) / (1.0 - p.onset)
     _raise(contact, p.kappa * excess * excess * (1.0 - np.cos(contact.entrance_angle)))
 
 
-def _conveyed(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _conveyed(contact: Contact, p: SimpleNamespace) -> None:
     """Raise the rear contact height by kappa z (q/(q + z))^2, q conveyed per unit of advance."""
     depth = 1.0 - np.cos(contact.entrance_angle)  # over r
     slip = np.maximum(contact.slip, 0.0)
@@ -38,7 +38,7 @@ def _conveyed(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     _raise(contact, p.kappa * share * share * depth)
 
 
-def _raise(contact: Contact[Quantity], rise: Quantity) -> None:
+def _raise(contact: Contact, rise: Quantity) -> None:
     """Raise the rear contact by a height over r, below the hub."""
     # 1 - cos is the contact height over r. The slope of a circle is steeper the higher one gets, so
     # the height saturates below the hub (1 - exp keeps it smooth).
@@ -98,12 +98,12 @@ SOIL_MOUND = Effect(
 )
 
 
-def _shift(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _shift(contact: Contact, p: SimpleNamespace) -> None:
     skid = np.maximum(-contact.slip, 0.0)
     contact.peak_ratio = contact.peak_ratio + p.c2 * contact.slip + p.skid * skid
 
 
-def _retreat(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _retreat(contact: Contact, p: SimpleNamespace) -> None:
     contact.peak_ratio = contact.peak_ratio - p.retreat * contact.slip
 
 

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
@@ -21,15 +20,15 @@ from wheel_terra_estimator.terramechanics.effects.base import (
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio, speed_ratio
 
 
-def _gain(quantity: str, contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _gain(quantity: str, contact: Contact, p: SimpleNamespace) -> None:
     setattr(contact, quantity, getattr(contact, quantity) * (1.0 + p.gain))
 
 
-def _offset(quantity: str, contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _offset(quantity: str, contact: Contact, p: SimpleNamespace) -> None:
     setattr(contact, quantity, getattr(contact, quantity) + p.offset)
 
 
-def _tilt(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _tilt(contact: Contact, p: SimpleNamespace) -> None:
     contact.drawbar_pull = contact.drawbar_pull + contact.stated_load * np.sin(p.bias)
 
 
@@ -129,16 +128,16 @@ EFFECTS = (
 )
 
 
-def _friction(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _friction(contact: Contact, p: SimpleNamespace) -> None:
     contact.torque = contact.torque + contact.direction * p.torque
 
 
-def _in_proportion(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _in_proportion(contact: Contact, p: SimpleNamespace) -> None:
     lost = p.share * np.abs(contact.torque)
     contact.torque = contact.torque + contact.direction * lost
 
 
-def _viscous(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _viscous(contact: Contact, p: SimpleNamespace) -> None:
     known = contact.rim_speed > 0.0  # not where it is nan
     rate = np.where(known, contact.rim_speed, 0.0) / contact.rim_radius
     contact.torque = contact.torque + contact.direction * p.damping * rate
@@ -184,7 +183,7 @@ DRIVETRAIN_FRICTION = Effect(
 )
 
 
-def _bias(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _bias(contact: Contact, p: SimpleNamespace) -> None:
     scale = 1.0 + p.bias
     contact.scale_speed(1.0 / scale)
     ratio = speed_ratio(contact.slip) / scale
@@ -207,12 +206,12 @@ WHEEL_RADIUS_BIAS = Effect(
 )
 
 
-def _load(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _load(contact: Contact, p: SimpleNamespace) -> None:
     lost = contact.stated_load * (1.0 - np.cos(contact.slope))
     contact.normal_load = contact.normal_load - p.share * lost
 
 
-def _pull(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _pull(contact: Contact, p: SimpleNamespace) -> None:
     down_hill = contact.stated_load * np.sin(contact.slope)
     contact.drawbar_pull = contact.drawbar_pull - p.share * down_hill
 

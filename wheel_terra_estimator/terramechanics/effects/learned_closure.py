@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
@@ -51,7 +50,7 @@ class Target:
 class Feature:
     """A dimensionless feature of a row."""
 
-    value: Callable[[Contact[Quantity]], Quantity]  # (contact) -> feature
+    value: Callable[[Contact], Quantity]  # (contact) -> feature
     # Range over which it usually varies; the prior of a coefficient is in proportion to 1/spread
     spread: float
     columns: tuple[str, ...]  # columns of a table of which one must vary; none: always available
@@ -75,15 +74,15 @@ TARGETS: Mapping[str, Target] = {
 }
 
 
-def _over(onset: float) -> Callable[[Contact[Quantity]], Quantity]:
-    def excess(contact: Contact[Quantity]) -> Quantity:
+def _over(onset: float) -> Callable[[Contact], Quantity]:
+    def excess(contact: Contact) -> Quantity:
         return np.maximum(np.abs(contact.slip) - onset, 0.0)
 
     return excess
 
 
-def _near(middle: float) -> Callable[[Contact[Quantity]], Quantity]:
-    def band(contact: Contact[Quantity]) -> Quantity:
+def _near(middle: float) -> Callable[[Contact], Quantity]:
+    def band(contact: Contact) -> Quantity:
         away = (np.abs(contact.slip) - middle) / _BAND
         inside = np.maximum(1.0 - away * away, 0.0)
         return inside * inside
@@ -91,23 +90,23 @@ def _near(middle: float) -> Callable[[Contact[Quantity]], Quantity]:
     return band
 
 
-def _weight(contact: Contact[Quantity]) -> Quantity:
+def _weight(contact: Contact) -> Quantity:
     """Weight of soil of the wheel's size, rho g b r^2 [N]: what loads are compared with."""
     return contact.density * contact.gravity * contact.width * contact.radius * contact.radius
 
 
-def _load(contact: Contact[Quantity]) -> Quantity:
+def _load(contact: Contact) -> Quantity:
     share = contact.stated_load / _weight(contact)
     return np.log(np.maximum(share, _LEAST)) / np.log(10.0)
 
 
-def _rim_speed(contact: Contact[Quantity]) -> Quantity:
+def _rim_speed(contact: Contact) -> Quantity:
     speed = np.maximum(contact.rim_speed / REFERENCE_SPEED, 1e-3)
     decades = np.log(speed) / np.log(10.0)
     return np.where(np.isnan(contact.rim_speed), 0.0, decades)
 
 
-def _torque_squared(contact: Contact[Quantity]) -> Quantity:
+def _torque_squared(contact: Contact) -> Quantity:
     lever = np.maximum(contact.stated_load * contact.radius, _LEAST)
     square = contact.torque * np.abs(contact.torque) * contact.direction
     return square / (lever * _weight(contact) * contact.radius)
@@ -225,11 +224,9 @@ def coefficients_of(
     return found
 
 
-def changes(
-    contact: Contact[Quantity], p: SimpleNamespace, targets: Iterable[str]
-) -> dict[str, Any]:
+def changes(contact: Contact, p: SimpleNamespace, targets: Iterable[str]) -> dict[str, Quantity]:
     """Return target -> bounded change x' for those targets that the law has."""
-    total: dict[str, Any] = {}
+    total: dict[str, Quantity] = {}
     for name, coefficient in vars(p).items():
         target, feature = pair_of(name)
         if target in targets:
@@ -245,7 +242,7 @@ _BEFORE = tuple(name for name in TARGETS if name not in OUTPUTS)
 _IN_CONTACT = {'bearing_pressure': 'bearing_modulus', 'friction': 'tan_friction'}
 
 
-def _change_closures(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _change_closures(contact: Contact, p: SimpleNamespace) -> None:
     for target, x in changes(contact, p, _BEFORE).items():
         if target == 'exponent':
             contact.sinkage_exponent = np.maximum(contact.sinkage_exponent + x, 0.1)
@@ -258,7 +255,7 @@ def _change_closures(contact: Contact[Quantity], p: SimpleNamespace) -> None:
             setattr(contact, name, getattr(contact, name) * np.exp(x))
 
 
-def _change_outputs(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _change_outputs(contact: Contact, p: SimpleNamespace) -> None:
     for target, x in changes(contact, p, OUTPUTS).items():
         if target == 'sinkage':
             contact.sinkage = contact.sinkage + x * contact.radius

@@ -11,17 +11,16 @@ import numpy as np
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, Form, magnitude, shape
+from wheel_terra_estimator.terramechanics.kinematics import STEADY_SLIP
 
-_STEADY = 0.95  # slip above which a steady state is not known; the term grows no further there
 
-
-def _dig(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _dig(contact: Contact, p: SimpleNamespace) -> None:
     slip = np.maximum(contact.slip, 0.0)
-    again = slip / (1.0 - np.minimum(slip, _STEADY))  # lugs per advance, less the first
+    again = slip / (1.0 - np.minimum(slip, STEADY_SLIP))  # lugs per advance, less the first
     contact.sinkage = contact.sinkage + p.kd * contact.lug_height * slip * (1.0 + p.rework * again)
 
 
-def _saturating(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _saturating(contact: Contact, p: SimpleNamespace) -> None:
     slip = np.maximum(contact.slip, 0.0)
     dug = -np.expm1(-slip / p.range)
     contact.sinkage = contact.sinkage + p.kd * contact.lug_height * dug
@@ -70,7 +69,7 @@ LUG_DIGGING = Effect(
 )
 
 
-def _radius(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _radius(contact: Contact, p: SimpleNamespace) -> None:
     contact.shear_radius = contact.shear_radius + p.lam * contact.lug_height
 
 
@@ -90,12 +89,12 @@ LUG_SHEAR_RADIUS = Effect(
 )
 
 
-def _support(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _support(contact: Contact, p: SimpleNamespace) -> None:
     lifted = np.where(contact.lug_height > 0.0, p.dz4, 0.0)
     contact.sinkage = contact.sinkage - lifted
 
 
-def _by_height(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _by_height(contact: Contact, p: SimpleNamespace) -> None:
     high = np.maximum(contact.lug_height - p.free_height, 0.0)
     contact.sinkage = contact.sinkage - p.share * high
 
@@ -139,24 +138,24 @@ LUG_SUPPORT = Effect(
 )
 
 
-def _thrust(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _thrust(contact: Contact, p: SimpleNamespace) -> None:
     slip = np.maximum(contact.slip, 0.0)
     passive = _passive_coefficient(contact)
     _push(contact, p.share, (passive - 1.0) * slip, slip)
 
 
-def _textbook(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _textbook(contact: Contact, p: SimpleNamespace) -> None:
     slip = np.maximum(contact.slip, 0.0)
     _push(contact, p.share, _passive_coefficient(contact), slip)
 
 
-def _passive_coefficient(contact: Contact[Quantity]) -> Quantity:
+def _passive_coefficient(contact: Contact) -> Quantity:
     """Rankine's Np = tan^2(pi/4 + phi/2) [-]."""
     friction = np.arctan(contact.soil_friction)
     return np.tan(0.25 * np.pi + 0.5 * friction) ** 2
 
 
-def _push(contact: Contact[Quantity], share: float, of_surcharge: Quantity, slip: Quantity) -> None:
+def _push(contact: Contact, share: float, of_surcharge: Quantity, slip: Quantity) -> None:
     """Add the thrust of the lugs in the contact, with the given factor on the surcharge q h."""
     span = contact.entrance_angle - contact.leaving_angle
     engaged = contact.lug_count * span / (2.0 * np.pi)
@@ -207,7 +206,7 @@ GROUSER_THRUST = Effect(
 )
 
 
-def _carry(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _carry(contact: Contact, p: SimpleNamespace) -> None:
     slip = np.maximum(contact.slip, 0.0)
     layer = p.fill * contact.lug_height * slip
     weight = contact.density * contact.gravity * contact.width * layer  # per rim travel

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
@@ -20,7 +19,7 @@ from wheel_terra_estimator.terramechanics.effects.base import (
 )
 
 
-def _cohesion(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _cohesion(contact: Contact, p: SimpleNamespace) -> None:
     contact.cohesion = contact.cohesion + p.delta
 
 
@@ -46,7 +45,7 @@ COHESION = Effect(
 REFERENCE_SPEED = 0.05  # [m/s]; rover speed, below which Ding et al. 2010 saw no influence
 
 
-def _rate(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _rate(contact: Contact, p: SimpleNamespace) -> None:
     known = contact.rim_speed > 1e-4
     speed = np.where(known, contact.rim_speed, REFERENCE_SPEED)
     decades = np.log(speed / REFERENCE_SPEED)
@@ -72,7 +71,7 @@ RATE_DEPENDENCE = Effect(
 )
 
 
-def _slide(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _slide(contact: Contact, p: SimpleNamespace) -> None:
     bare = np.exp(-contact.lug_height / p.ring_height)
     contact.rim_share = 1.0 - p.loss * bare
     contact.tan_friction = contact.tan_friction * contact.rim_share
@@ -106,11 +105,11 @@ RIM_FRICTION = Effect(
 )
 
 
-def _factor(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _factor(contact: Contact, p: SimpleNamespace) -> None:
     contact.shear_modulus = contact.shear_modulus * np.exp(p.log_factor)
 
 
-def _with_pressure(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _with_pressure(contact: Contact, p: SimpleNamespace) -> None:
     growth = np.exp(p.growth * np.log(relative_pressure(contact)))
     contact.shear_modulus = contact.shear_modulus * growth
 

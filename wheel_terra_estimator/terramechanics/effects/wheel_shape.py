@@ -14,12 +14,12 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, magnitude
 from wheel_terra_estimator.terramechanics.stresses import rolling_sinkage
 
 
-def _layer(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _layer(contact: Contact, p: SimpleNamespace) -> None:
     contact.radius = contact.radius + p.thickness
     contact.shear_radius = contact.shear_radius + p.thickness
 
 
-def _below_the_rim(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _below_the_rim(contact: Contact, p: SimpleNamespace) -> None:
     contact.sinkage = contact.sinkage - p.thickness
 
 
@@ -43,7 +43,7 @@ SOIL_ADHESION = Effect(
 _LEAST = 1e-9  # keeps a wheel without load free of divisions by zero [m]
 
 
-def _widening(contact: Contact[Quantity], p: SimpleNamespace) -> Quantity:
+def _widening(contact: Contact, p: SimpleNamespace) -> Quantity:
     """Circle of the same chord over the rim, r*/r = 1 + f/z0; nothing of the contact's shape."""
     modulus = np.maximum(contact.bearing_modulus, 1.0) / (
         contact.reference_depth**contact.sinkage_exponent
@@ -54,7 +54,7 @@ def _widening(contact: Contact[Quantity], p: SimpleNamespace) -> Quantity:
     return 1.0 + p.compliance * contact.normal_load / np.maximum(sinkage, _LEAST)
 
 
-def _flatten(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _flatten(contact: Contact, p: SimpleNamespace) -> None:
     """Widen the contact."""
     flatter = _widening(contact, p)
     contact.radius = contact.radius * flatter
@@ -63,7 +63,7 @@ def _flatten(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.scale_speed(flatter)
 
 
-def _arm(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+def _arm(contact: Contact, p: SimpleNamespace) -> None:
     """Keep the arm of the shear at the height of the hub."""
     contact.torque = contact.torque / _widening(contact, p)
 
