@@ -115,7 +115,7 @@ def check_width(cells: Sequence[Any], columns: int, where: str) -> None:
 
 
 def number(cell: Any, where: str, decimal_comma: bool = False) -> float:
-    """Return the number in a cell; nan where nothing was measured.
+    """Return the number in a cell; nan where the cell is empty.
 
     Raises UserError for what is not a number, or not a finite one; it names ``where``: file, line,
     column.
@@ -132,7 +132,7 @@ def number(cell: Any, where: str, decimal_comma: bool = False) -> float:
 
 
 def value_of(cell: Any, decimal_comma: bool) -> float | None:
-    """Return the number in a cell, nan where nothing was measured, None for something else."""
+    """Return the number in a cell, nan where the cell is empty, None for something else."""
     try:
         return float(cell)
     except (TypeError, ValueError):

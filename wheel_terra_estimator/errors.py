@@ -27,7 +27,7 @@ _OF_THE_MACHINE = frozenset(
         errno.ESTALE,
     }
 )
-"""What a full disk, a missing permission or a limit of the machine says."""
+"""Message of a full disk, a missing permission or a limit of the machine."""
 
 
 class UserError(Exception):

@@ -19,7 +19,7 @@ LARGEST_TABLE = 128 * 2**20
 def check_regular(path: Path) -> int:
     """Return the size of a regular file [byte]; never wait for a pipe, never read a device.
 
-    Raises UserError where there is nothing, or no regular file.
+    Raises UserError where there is no regular file.
     """
     try:
         found = path.stat()

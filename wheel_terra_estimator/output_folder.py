@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where a command writes: folders and files that are whole or not there, and never anybody else's.
+"""Where a command writes: folders and files that are complete or absent, and never those of others.
 
 Every command that writes, and the node, uses this module. A folder::
 
@@ -42,7 +42,7 @@ from wheel_terra_estimator.errors import UserError
 MARKER = '.wheel-terra.json'
 """File in an output folder that lists what the program wrote there; folders end in ``/``."""
 
-LEAST_ROOM = 2**16  # room on the disk [byte] without which nothing is begun
+LEAST_ROOM = 2**16  # free space on the disk below which no output is begun [byte]
 
 BESIDE = '.wheel-terra-'
 """In the name of a hidden folder in which an output is written, beside its place."""
@@ -60,7 +60,7 @@ def check_target(
     # ever replaced
     folder: bool = False,
     # Takes a file that is there and returns why it is none of this program, empty where it is one.
-    # Empty files are not asked about: they hold nothing.
+    # Empty files may be replaced.
     foreign: Callable[[Path], str] = lambda path: '',
 ) -> None:
     """Decide whether a file (or a folder) may be written at ``path``; the only place that does.
@@ -184,11 +184,11 @@ def working_folder(
     entries: Iterable[str],
     inputs: Iterable[Path] = (),
 ) -> Iterator[None]:
-    """Make a folder that a command fills in place in the block, so that it can go on after an end.
+    """Make a folder that a command fills in place in the block, so that it can be resumed.
 
     Where the block ends with no result the folder goes, and the place is free for the next try.
 
-    ``resume``: whether to go on with a folder as it is, where an earlier run of the command made
+    ``resume``: whether to continue a folder as it is, where an earlier run of the command made
     it. ``entries``: all names that the command may write there, as in `mark`. Raises UserError as
     `check_folder`.
     """
@@ -223,7 +223,7 @@ def working_folder(
             if path.is_dir():
                 found = [path / name for name in _own_files(path)]
                 if not any(e.lstat().st_size for e in found if not e.is_dir()):
-                    _remove_own_files(path)  # what is empty is no result
+                    _remove_own_files(path)  # an empty folder is no result
 
 
 def mark(
@@ -278,7 +278,7 @@ def is_ours(folder: Path) -> bool:
 
 
 class CannotWriteError(UserError):
-    """The disk takes no more, or takes nothing here."""
+    """The disk is full, or the path is not writable."""
 
 
 def cannot_write(path: Path, error: OSError) -> CannotWriteError:
@@ -300,7 +300,7 @@ def refuse_inputs(path: Path, inputs: Iterable[Path]) -> None:
         try:
             source = given.resolve()
             same = target.exists() and source.exists() and target.samefile(source)
-        except (OSError, RuntimeError):  # whoever reads it will say so
+        except (OSError, RuntimeError):  # its reader will report it
             continue
         if same or source == target or target in source.parents or source in target.parents:
             raise UserError(
@@ -384,7 +384,7 @@ def _own_files(folder: Path) -> list[str]:
         )
     listed = _listed(folder) if is_ours(folder) else set()
     whole = {name for name in listed if name.endswith('/')}
-    lists = {name for name in whole if is_ours(folder / name)}  # these say themselves what is ours
+    lists = {name for name in whole if is_ours(folder / name)}  # these files name their own program
     for name in lists:
         _own_files(folder / name)
     foreign = [n for n in there if n not in listed and not n.startswith(tuple(whole))]

@@ -26,7 +26,7 @@ Task = TypeVar('Task')
 Result = TypeVar('Result')
 
 _MOST_DIGITS = 4  # of a number of processes
-CONNECT_TIMEOUT = 10  # time [s] in which a Dask scheduler has to answer
+CONNECT_TIMEOUT = 10  # timeout of a Dask scheduler [s]
 WORKER_TIMEOUT = 120  # time [s] in which a cluster has to have a worker
 
 
@@ -111,7 +111,7 @@ def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     try:
         yield pool
     except BaseException:
-        sender.send_bytes(b'stop')  # nobody takes it out, so that every worker sees it
+        sender.send_bytes(b'stop')  # never removed, so that every worker sees it
         raise
     finally:
         pool.shutdown(cancel_futures=True)
@@ -120,7 +120,7 @@ def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _watch(receiver: Connection) -> None:
-    """Let a worker end when its parent has ended or says so; Ctrl-C is the parent's affair."""
+    """End a worker with its parent or at its request; Ctrl-C is handled by the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     parent = multiprocessing.parent_process()
@@ -152,7 +152,7 @@ def _on_cluster(
                 yield index[future.key], _outcome(future)
                 done += 1
         except BaseException:
-            with suppress(Exception):  # of a cluster that is gone there is nothing to call off
+            with suppress(Exception):  # a cluster that is gone has nothing to cancel
                 client.cancel(futures)
             raise
 

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments of the Python interface: what is of another kind is said with an example."""
+"""Arguments of the Python interface: a wrong type is reported with an example."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 NANOSECONDS = 1_000_000_000
 LONGEST_STEP = 5.0
-"""Median time between rows of a log [s]; after half a second without rates nothing is known."""
+"""Median time between rows of a log [s]; after half a second without rates slip is unknown."""
 LATEST = 2.0**31  # time that the stamp of a message can hold [s]
 AXES = ('x', 'y', 'z')
 PER_WHEEL = ('rate', 'torque', 'sinkage', 'leaving_angle', 'steering')
@@ -65,7 +65,7 @@ def estimate(
     ----------
     drive : path, DataFrame, mapping or SimulatedDrive
         A rosbag2 (folder, ``.mcap``, ``.db3``); what `simulate` gave; or logged values, one row per
-        instant in order of time, nan where a sensor said nothing: ``time`` [s]; per wheel
+        instant in order of time, nan where a sensor gave no reading: ``time`` [s]; per wheel
         ``rate.<wheel>`` [rad/s], ``torque.<wheel>`` [N m], ``sinkage.<wheel>`` [m],
         ``leaving_angle.<wheel>`` [rad], ``steering.<wheel>`` [rad]; ``specific_force.x`` (y, z)
         [m/s^2], ``angular_rate.x`` (y, z) [rad/s], ``orientation.x`` (y, z, w);

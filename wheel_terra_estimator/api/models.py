@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Curve:
-    """Steady answer of the soil over slip; every array is (N,).
+    """Steady state of the contact over slip; every array is (N,).
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Curve:
         return to_frame(self.columns())
 
     def __repr__(self) -> str:
-        """Return the ranges of slip, load and answers."""
+        """Return the ranges of slip, load and results."""
         return f'Curve of {self.slip.size} points' + ''.join(
             f'\n  {name} {np.nanmin(values):.4g} to {np.nanmax(values):.4g} {unit_of(name)}'
             for name, values in self.columns().items()

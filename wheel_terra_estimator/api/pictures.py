@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of curves, estimates and diagnoses; each returns matplotlib axes to go on with."""
+"""Pictures of curves, estimates and diagnoses; each returns its matplotlib axes."""
 
 from __future__ import annotations
 

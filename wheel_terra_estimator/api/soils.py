@@ -64,7 +64,7 @@ class Soil(terramechanics_soil.Soil):
     density : float
         Bulk density [kg/m^3].
     pressure_law : str
-        ``bekker`` or ``reece``; says how the two moduli are read.
+        ``bekker`` or ``reece``; how the two moduli are defined.
     std : mapping of str to float
         Field -> standard deviation in its unit, where a file states it or a fit found it.
     source : str
@@ -97,7 +97,7 @@ class Soil(terramechanics_soil.Soil):
     def load(cls, name: str | Path) -> Soil:
         """Return a shipped soil by its bare name, or that of a configuration file.
 
-        Raises UserError if no file answers to the name, or it states no soil.
+        Raises UserError if no file has the name, or it states no soil.
         """
         configuration = reader.load([name], complete=False)
         if not configuration.soil_stated:
@@ -120,7 +120,7 @@ class Soil(terramechanics_soil.Soil):
         """Return the soil with which the model comes nearest to steady measurements.
 
         A regularised least-squares fit: each number is taken as known to its own value around the
-        start, so that what the rows cannot tell (kc apart from kphi on one wheel width, angles
+        start, so that what the rows cannot separate (kc from kphi on one wheel width, angles
         without pull or torque) stays near it. Density and pressure law are those of the start;
         ``std`` has the deviation of each fitted number. Warns if more is left than noise and a
         model error of 2 % of the range permit, or if a zero error of the sinkage would mean
@@ -129,7 +129,7 @@ class Soil(terramechanics_soil.Soil):
         Parameters
         ----------
         table : DataFrame, mapping or path
-            Steady measurements, as for ``diagnose``; sinkage, pull and torque tell most.
+            Steady measurements, as for ``diagnose``; best with sinkage, pull and torque.
         wheel : Wheel
             The wheel, where the table has no columns of it.
         start : Soil or name, optional
@@ -238,7 +238,7 @@ class Soil(terramechanics_soil.Soil):
 
 
 def parameters_of(soil: terramechanics_soil.Soil) -> dict[str, ros_yaml.Value]:
-    """Return the parameters of files that say the same as a soil."""
+    """Return the parameters of a configuration file for a soil."""
     values: dict[str, ros_yaml.Value] = {'soil.pressure_law': soil.pressure_law}
     std: Mapping[str, float] = {}
     if isinstance(soil, Soil):
@@ -258,7 +258,7 @@ def configuration_of(
     slip_radius: str,
     gravity: float,
 ) -> Configuration:
-    """Return the parameters that say the same as these objects."""
+    """Return the configuration parameters of these objects."""
     of_files = "(of files: use Model.load('hit_wh3', 'hit_fit'))"
     check_kind(wheel, Wheel, 'wheel', f'Wheel(radius=0.13, width=0.16) {of_files}')
     check_kind(soil, terramechanics_soil.Soil, 'soil', f"Soil.load('dlr_mss') {of_files}")

@@ -45,7 +45,7 @@ def diagnose(
         Columns of steady measurements (``docs/tables.md``), a CSV file of them, or a rosbag2. Units
         stand in the titles (``sinkage [mm]``) or in ``attrs['units']`` of a DataFrame; else SI.
     model : Model, Configuration, or names of configuration files
-        The model believed in.
+        The prior model.
     reference : DataFrame, mapping or path, optional
         Measurements in which the effect in question is absent; fitted first, so that structural
         error common to both cancels.
@@ -91,7 +91,7 @@ def corrected_model(diagnosis: Diagnosis) -> Model:
 
     The same as ``Model.load`` of the configuration and the written ``model.yaml``. Warns if the
     verdict is open and a quantity is predicted worse on rows that the fit did not see than by the
-    model as configured: the refit makes up for what is missing.
+    model as configured: the refit compensates for a missing effect.
     """
     from wheel_terra_estimator.discrepancy.report.model_file import corrected
     from wheel_terra_estimator.discrepancy.result import OPEN

@@ -36,7 +36,7 @@ class BagFile:
         # Topics offered as transient local with depth 1; all others are volatile with depth 10
         latched: Collection[str] = (),
         overwrite: bool = False,
-        # What is read meanwhile: the bag is never written into it or over it
+        # The recording that is read meanwhile: the bag is never written into it or over it
         inputs: Iterable[Path] = (),
     ) -> None:
         self.path = path

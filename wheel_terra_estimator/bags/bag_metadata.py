@@ -27,7 +27,7 @@ Kind = TypeVar('Kind')
 
 @dataclass(frozen=True)
 class Metadata:
-    """Files and messages per topic, what is wrong with the file in words."""
+    """Files and messages per topic, and faults of the file as text."""
 
     files: tuple[str, ...] = ()
     counts: Mapping[str, int] = field(default_factory=dict)

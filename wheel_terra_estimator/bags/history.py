@@ -329,7 +329,7 @@ class _EstimateMessages:
             self._warnings[-1] = replace(self._warnings[-1], reason=words)
 
     def history(self) -> EstimateHistory:
-        """Return the sets that are whole; nan (class 255) for what no message of the bag told."""
+        """Return the sets that are whole; nan (class 255) for fields without a message."""
         told = set().union(*self._sets.values())
         wanted = told.intersection((*WHEEL_FIELDS, 'slip_class', 'forward_velocity'))
         whole = {stamp: row for stamp, row in self._sets.items() if wanted <= row.keys()}

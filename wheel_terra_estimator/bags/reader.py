@@ -69,7 +69,7 @@ class MeasurementReader:
 
     @property
     def notes(self) -> list[str]:
-        """What is not in the bag, and what that costs."""
+        """Topics that the bag lacks, and the consequence."""
         notes = [f'not in the bag: {", ".join(self.absent)}'] if self.absent else []
         if 'reference_odom' in self.absent:
             notes.append(
@@ -131,7 +131,7 @@ class MeasurementReader:
         self.topics[name] = topic
 
     def _advice(self, name: str) -> str:
-        """Say what is there and how to use it."""
+        """Return a message on the topics of the bag and how to use them."""
         there, chosen = self.bag.topics.values(), choose_topics(self.bag, {})
         remedy = f'name the right one with --remap {name}:={chosen.get(name, "/TOPIC")}'
         if name == 'reference_odom' and name not in chosen:

@@ -37,7 +37,7 @@ LARGEST_ARRIVAL_LOG = 256 * 2**20  # size [byte] of an arrival log of ten hours
 
 _MOST_MISSING = 0.1  # share of a log that the bag may lack: recorder and node start apart
 TRUTH_TOPICS = ('/ground_truth/', '/truth/')
-"""Topics that are compared with the estimates, never heard."""
+"""Topics that are compared with the estimates, never used as inputs."""
 
 SMOOTHED = 'smoothed: each estimate uses the whole drive; warnings are those given live'
 
@@ -47,12 +47,12 @@ class Event(NamedTuple):
 
     log_time: int
     estimates: EstimateSet | None = None
-    statuses: list[Status] | None = None  # what diagnostics said of it; None: not asked yet
+    statuses: list[Status] | None = None  # its diagnostics; None: not yet computed
 
 
 @dataclass(frozen=True)
 class Replay:
-    """What a replay gave: estimates, what was heard and refused, and what should be known."""
+    """Result of a replay: estimates, numbers of used and rejected messages, and notes."""
 
     history: EstimateHistory
     topics: dict[str, str]  # input topic of the estimator -> topic in the bag
@@ -156,7 +156,7 @@ def replay(
 def events(
     messages: Iterator[tuple[int, str, Any]], pipeline: Pipeline, interrupted: threading.Event
 ) -> Iterator[Event]:
-    """Yield the sets of a drive, and where the node says that there is no warning."""
+    """Yield the sets of a drive, and where the node publishes that there is no warning."""
     log_time = 0
     for count, (log_time, name, message) in enumerate(messages):
         if count == 0:
@@ -242,7 +242,7 @@ def _times(count: int) -> str:
 def _in_order_of(
     arrival: Path, reader: MeasurementReader, notes: list[str], smooth: bool
 ) -> Iterator[tuple[int, str, Any]]:
-    """Yield the messages of a bag in the order in which a live node heard them."""
+    """Yield the messages of a bag in the order in which a live node received them."""
     lines = read_text(arrival, LARGEST_ARRIVAL_LOG).splitlines()
     if smooth and any(line.startswith(TUNE) for line in lines):
         raise UserError(f'{arrival}: tuning changes in it, which a smoother cannot follow')

@@ -67,7 +67,7 @@ class Bag:
 
     @property
     def lost(self) -> float:
-        """Share of the messages that are known to be lost of those that were asked for [-]."""
+        """Share of the requested messages that are known to be lost [-]."""
         losses = [source.losses for source in self._sources]
         lost = sum(one.lost().total() for one in losses)
         return lost / max(lost + sum(sum(one.recovered.values()) for one in losses), 1)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A table of logged values as a rosbag2, row by row: for rovers that do not speak ROS.
 
-A map says which column is what, in which unit and with which sign (`EXAMPLE`).
+A map states quantity, unit and sign of each column (`EXAMPLE`).
 """
 
 from __future__ import annotations

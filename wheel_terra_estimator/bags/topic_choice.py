@@ -55,7 +55,7 @@ def choose_topics(bag: Bag, remaps: Mapping[str, str]) -> dict[str, str]:
         if not own or topic.name in remaps.values() or _rover_of(topic.name, rovers) in ('', own)
     ]
     chosen: dict[str, str] = {}
-    # A slip-free velocity first: what is left may be wheel odometry.
+    # A slip-free velocity first: another one may be wheel odometry.
     for name in sorted(INPUT_TYPES, key=lambda name: name == 'odom'):
         kind = INPUT_TYPES[name]
         wanted = remaps.get(name, f'/{name}')

@@ -104,7 +104,7 @@ class TrackRecorder:
             self._origin = estimates.stamp
         self._stamp = estimates.stamp
         if not 0.0 <= step <= PAUSE:
-            step = 0.0  # a pause, or a clock that steps back: nothing is known of the way
+            step = 0.0  # a pause, or a clock that steps back: the path between is unknown
         way = estimates.forward_velocity * step
         told = self._attitude(estimates.stamp)
         climb = 0.0
@@ -134,7 +134,7 @@ class TrackRecorder:
         )
 
     def _attitude(self, stamp: int) -> tuple[float, float] | None:
-        """Return heading [rad] and sine of the climb last known of late; None: not known."""
+        """Return heading [rad] and sine of the climb last known recently; None: unknown."""
         index = bisect_right(self._attitude_stamps, stamp) - 1
         if index < 0 or (stamp - self._attitude_stamps[index]) * _SECOND > PAUSE:
             return None

@@ -57,7 +57,7 @@ class WheelTruth:
 
 @dataclass(frozen=True)
 class Truth:
-    """What a recording knows of the truth; None where it says nothing."""
+    """Ground truth in a recording; None where it holds none."""
 
     source: str
     velocity: WheelTruth  # one column: body velocity along x [m/s]
@@ -107,7 +107,7 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
 
 
 def _told(series: WheelTruth) -> WheelTruth | None:
-    """Return what is known of a series; None of a topic that holds nothing."""
+    """Return a series of values; None of a topic without any."""
     known = series.known()
     return known if known.stamp.size else None
 

@@ -21,7 +21,7 @@ EXAMPLES = (
     'wheel-terra check my_drive --config my_rover.yaml --json',
 )
 
-NOTES = 'recording.notes'  # figure: what is damaged, or not read
+NOTES = 'recording.notes'  # figure: damaged, or not read
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,7 +3,7 @@
 """``wheel-terra demo``: two shipped drives through the real node, and a blind trial.
 
 The entrapment of a simulated six-wheel rover, whose ground truth is known, and a piece of a real
-drive of the Pathfinder rover. The node hears them over DDS; where rclpy or the laboratory is
+drive of the Pathfinder rover. The node receives them over DDS; where rclpy or the laboratory is
 missing the same drives go through ``wheel-terra replay``, which gives the same numbers. The trial
 is a table made by ``wheel-terra trial``, in which an effect is hidden: it is diagnosed blind, then
 compared with the withheld truth.
@@ -29,7 +29,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, working_folder
 
 SEAL_SHA256 = '78c7f9baa4662e0969d5b5dff2c94fbd5cbd89ae14923cf0fcc754b1af82c5c7'
-"""Of the shipped ``sealed.json``, which says what was hidden in the table beside it."""
+"""Of the shipped ``sealed.json``, which states the effect hidden in the table beside it."""
 NODE_NOT_FOUND = 4
 """Exit status of the laboratory's ``live_drive`` where DDS does not connect it with the node."""
 AT_ONCE = 2
@@ -80,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     output: Path = arguments.output
-    check_folder(output, arguments.overwrite)  # a demo does not go on with an earlier one
+    check_folder(output, arguments.overwrite)  # a demo does not continue an earlier one
     entries = [f'{drive.name}{end}' for drive in DRIVES for end in ('/', '.html')]
     try:
         with working_folder(output, arguments.overwrite, False, [*entries, 'trial/']):
@@ -123,7 +123,7 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
 
 
 def _told(title: str, part: Future[Ended]) -> int:
-    """Print the title, then what a part said once it has ended; return its status."""
+    """Print the title, then the output of a part; return its status."""
     print(f'\n=== {title}\n', flush=True)
     done = part.result()
     print(done.stdout, end='', flush=True)
@@ -131,7 +131,7 @@ def _told(title: str, part: Future[Ended]) -> int:
 
 
 def _run(command: Sequence[str], environment: Mapping[str, str]) -> Ended:
-    """Run a command of the package; return its status and what it said."""
+    """Run a command of the package; return its status and its output."""
     return subprocess.run(
         [sys.executable, '-m', *command],
         env={**os.environ, **environment},
@@ -189,7 +189,7 @@ def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:
 
 
 def _environment(number: int) -> dict[str, str]:
-    """Keep a drive to this machine, and apart from other robots on it and from the other drive."""
+    """Restrict a drive to this machine, and separate it from other robots and drives on it."""
     domain = int(os.environ.get('ROS_DOMAIN_ID') or os.getpid()) + number
     reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     return {

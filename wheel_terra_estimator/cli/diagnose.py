@@ -164,7 +164,7 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
 
 
 def _tell(diagnosis: Diagnosis, output: Path) -> None:
-    """Print the verdict, the gaps, what to do next and what was written."""
+    """Print the verdict, the gaps, the next measurement and the files written."""
     from wheel_terra_estimator.discrepancy.numbers import SHOWN, number
     from wheel_terra_estimator.discrepancy.report.words import soil_line, worth
     from wheel_terra_estimator.discrepancy.result import OPEN

@@ -96,7 +96,7 @@ def as_text(effects: Mapping[str, Effect]) -> str:
 
 
 def left_aside(effect: Effect) -> list[str]:
-    """Return which forms the discrepancy workflow leaves aside, and why."""
+    """Return which forms the discrepancy workflow does not try, and why."""
     found = []
     for form in effect.forms:
         if not form.candidate and not form.sparse:

@@ -109,7 +109,7 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
 
 
 def _apart(places: Sequence[float], distance: float | None) -> Sequence[float]:
-    """Return places the outermost of which are a measured distance apart, if there is one [m]."""
+    """Return places whose outermost have the measured distance, if there is one [m]."""
     low, high = min(places), max(places)
     if distance is None or low == high:
         return places

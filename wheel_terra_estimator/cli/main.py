@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Entry point of ``wheel-terra``: parse, run the sub-command, turn errors into one line.
 
-Exit status: 0 done, 1 where the sub-command says what it means, 2 input that cannot be used, 3 an
+Exit status: 0 done, 1 as the sub-command defines it, 2 input that cannot be used, 3 an
 error of the program itself, 130 interrupted.
 """
 
@@ -161,7 +161,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if unknown:
         _refuse(unknown[0], subs[arguments.command])
     try:
-        if arguments.debug:  # what is mended in silence is told, too
+        if arguments.debug:  # silent corrections are reported, too
             logging.basicConfig()
             logging.getLogger('wheel_terra_estimator').setLevel(logging.DEBUG)
         shown: Any = Harmless(sys.stdout)
@@ -189,7 +189,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _show_warning(
     command: str, others: Callable[..., None], message: Any, category: type[Warning], *where: Any
 ) -> None:
-    """Show what is doubtful in a configuration in one line, other warnings as Python does."""
+    """Print a warning on a configuration in one line, other warnings as Python does."""
     if issubclass(category, ConfigurationWarning):
         complain(f'wheel-terra {command}: warning: {message}')
     else:
@@ -197,7 +197,7 @@ def _show_warning(
 
 
 def _ended_by(error: BaseException, command: str) -> int:
-    """Say what ended a command; return the exit status."""
+    """Print the error that ended a command; return the exit status."""
     outside = outside_cause(error)
     if outside is not None:
         complain(f'wheel-terra {command}: {outside}')
@@ -210,7 +210,7 @@ def _ended_by(error: BaseException, command: str) -> int:
 
 
 def _refuse(word: str, parser: argparse.ArgumentParser) -> NoReturn:
-    """Complain of an argument that a sub-command does not know."""
+    """Exit with an error on an argument that a sub-command does not know."""
     if not word.startswith('-'):
         parser.error(f"one argument too many: '{word}'")
     options = [option for action in parser._actions for option in action.option_strings]

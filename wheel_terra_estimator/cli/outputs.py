@@ -1,8 +1,8 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Options of several commands: what is written, never to what is read, and ``--remap``.
+"""Options of several commands: paths that are written, never over inputs, and ``--remap``.
 
-An option that names what is written has ``action=Output``; one that names what is read has
+An option that names an output has ``action=Output``; one that names an input has
 ``type=Path``, or ``type=FileName`` where the bare name of a shipped file will do.
 """
 
@@ -80,7 +80,7 @@ def _inputs(arguments: argparse.Namespace, outputs: dict[str, Path]) -> Iterator
 
 
 def add_remaps(parser: argparse.ArgumentParser, condition: str = '') -> None:
-    """Declare ``--remap``; ``condition`` says when it counts, such as 'for a bag: '."""
+    """Declare ``--remap``; ``condition`` states when it applies, such as 'for a bag: '."""
     parser.add_argument(
         '--remap',
         action='append',

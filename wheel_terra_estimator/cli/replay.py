@@ -142,7 +142,7 @@ _ENDINGS = {
     'table': (('.csv', '.parquet'), 'a table ends in .csv or .parquet'),
     'track': (('.csv',), 'a track ends in .csv'),
 }
-"""Option that names a file -> how it may end, and what is said of another."""
+"""Option that names a file -> allowed endings, and the message on another."""
 
 
 def _files(arguments: argparse.Namespace) -> dict[str, Path]:
@@ -172,7 +172,7 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
 
 
 def _write_outputs(drive: Drive, arguments: argparse.Namespace) -> dict[str, Path]:
-    """Write what was asked for beside the bag of estimates; return what there is now."""
+    """Write the requested files beside the bag of estimates; return their descriptions."""
     drive.write(_files(arguments), arguments.overwrite)
     if arguments.save_soil:
         if not drive.result.learned:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What reaches the terminal: complaints of one line, and no control characters out of files."""
+"""Output on the terminal: errors of one line, no control characters from files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def open_closed_streams() -> None:
 
 
 def discard_output() -> None:
-    """Drop what is still to be written to standard output where it can no longer be."""
+    """Discard buffered standard output that can no longer be written."""
     try:
         sys.stdout.flush()
     except (OSError, ValueError):
@@ -54,7 +54,7 @@ class Harmless:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write a text as it can be shown."""
+        """Write a text without characters that the terminal cannot show."""
         shown = harmless(text)
         if not shown.isascii():
             encoding = getattr(self._stream, 'encoding', None) or 'utf-8'
@@ -87,10 +87,10 @@ UNUSABLE_INPUT = 2
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one line, with the nearest name that it knows."""
+    """A parser with errors of one line that suggest the nearest known name."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong in one line and end with status 2."""
+        """Print an error in one line and exit with status 2."""
         if 'invalid choice: ' in message:
             message = self._nearest_choice(message)
         complain(f'{self.prog}: {message} (help: {self.prog} --help)')
@@ -121,5 +121,5 @@ def complain(line: str) -> None:
         line = f'{line[:half]} ... {line[-half:]}'
     if sys.stderr.isatty() and not os.environ.get('NO_COLOR'):
         line = f'\033[31m{line}\033[0m'
-    with suppress(OSError):  # nobody hears it
+    with suppress(OSError):  # nobody receives it
         print(line, file=sys.stderr)

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Units that columns of a table may have, and how a user says which column is what."""
+"""Units that columns of a table may have, and the map that states quantity and unit of each."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The checked configuration: SI units and radians, arrays over wheels, nothing left to check."""
+"""The checked configuration: SI units and radians, arrays over wheels, all values checked."""
 
 from __future__ import annotations
 
@@ -150,13 +150,13 @@ class Configuration:
     def soil_source(self) -> str:
         """Class of the source of soil numbers whose deviation is not stated.
 
-        A soil that nobody stated is another soil.
+        A soil that is not stated is another soil.
         """
         return str(self._values['soil.source']) if self.soil_stated else 'proxy'
 
     @property
     def soil_std_stated(self) -> dict[str, float]:
-        """The part of ``soil_std`` that somebody stated number by number."""
+        """The part of ``soil_std`` that is stated number by number."""
         return {
             field: std
             for field, std in self.soil_std.items()
@@ -165,7 +165,7 @@ class Configuration:
 
     @property
     def soil_stated(self) -> bool:
-        """Whether anybody stated a soil, or how well it is known; else the default is a guess."""
+        """Whether a soil, or its deviations, are stated; else the default soil is a guess."""
         return any(key.startswith('soil.') and key not in _SOIL_LABELS for key in self.stated)
 
     @classmethod
@@ -277,7 +277,7 @@ def law(values: Mapping[str, Value], prefix: str) -> tuple[dict[str, float], dic
 class Readings:
     """Stated gains and zeros of sinkage [m], drawbar pull [N] and torque [N m].
 
-    A sensor reads ``gain * true + zero`` where the model says what is true.
+    A sensor reads ``gain * true + zero`` where the model gives the true value.
     """
 
     # ``gain``, ``zero``: (3,), or (N, 3) where rows differ
@@ -303,6 +303,6 @@ class Readings:
         return true * self.gain + self.zero
 
     def of_answer(self, state: SteadyState) -> dict[str, FloatArray]:
-        """Return the readings (N,) of each of `OUTPUTS` where the model gives an answer."""
+        """Return the readings (N,) of each of `OUTPUTS` where the model has them."""
         true = np.column_stack([getattr(state, name) for name in OUTPUTS])
         return dict(zip(OUTPUTS, self.read(true).T, strict=True))

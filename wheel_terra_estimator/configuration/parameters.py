@@ -5,7 +5,7 @@
 To add a parameter, add an entry to ``parameters.yaml``: the reader then accepts and checks the key,
 the node declares it, ``configuration.<section>.<name>`` has its value, and
 ``python tools/document_parameters.py`` writes it to ``docs/parameters.md``
-(a test says when that was forgotten). A key that goes moves to ``retired``, with what became of it.
+(checked by a test). A removed key moves to ``retired``, with its replacement.
 
 The keys ``effects.<name>.enabled``, ``effects.<name>.form`` (where there are several),
 ``effects.<name>.<parameter>`` and ``effects.<name>.<parameter>_std`` come from the catalogue of
@@ -83,7 +83,7 @@ def plain_table(path: Path) -> dict[str, Any]:
 def read_table(path: Path) -> tuple[tuple[Parameter, ...], dict[str, str]]:
     """Read a table of declarations.
 
-    ``path``: YAML file; `parameters.yaml` says what stands in it. Returns the parameters in the
+    ``path``: YAML file; format as described in `parameters.yaml`. Returns the parameters in the
     order of the file, and retired keys -> what became of them.
     """
     table = plain_table(path)
@@ -193,7 +193,7 @@ def by_spelling(table: Mapping[str, Parameter]) -> dict[str, Parameter]:
 def nearest(key: str, known: Iterable[str]) -> str:
     """Return the known key that looks most like ``key``.
 
-    A key that goes on where ``key`` ends wins, then a right name in a wrong section.
+    A key that begins with ``key`` is preferred, then a right name in a wrong section.
     """
     known = list(known)
     last = key.rsplit('.', 1)[-1]

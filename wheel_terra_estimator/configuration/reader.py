@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From parameter files and overrides to a checked ``Configuration``.
 
-Every complaint is one line that names the file, the key, what is allowed and, for an unknown key,
+Every error is one line that names the file, the key, what is allowed and, for an unknown key,
 the nearest known one.
 """
 
@@ -87,7 +87,7 @@ def _assigned(overrides: Iterable[str]) -> Iterator[tuple[str, str, Value]]:
 
 
 def warn_of_idle(given: Sequence[str], configuration: Configuration) -> None:
-    """Warn of parameters, given one by one, of effects that are off: nothing reads them."""
+    """Warn of parameters, given one by one, of effects that are off and so do not use them."""
     for key in given:
         section, _, name = key.rpartition('.')[0].partition('.')
         switch = f'{section}.{name}.enabled'
@@ -199,7 +199,7 @@ def _checked(
         values[key] = checked_value(parameter, stated, wheels)
     _cross_check(values, stated, sources)
     configuration = Configuration.from_values(values, stated)
-    typed = () if 'provenance' in stated else stated  # what was fitted needs no doubt
+    typed = () if 'provenance' in stated else stated  # fitted values need no such check
     for key, words in doubtful_units(configuration.soil, typed):
         _warn(f'{stated[key][1]}: {words}')
     if configuration.rover.contact_law == RESISTIVE_FORCE and configuration.effects:
@@ -215,7 +215,7 @@ def _warn(words: str) -> None:
 
 
 def _load_effect_file(sourced: Sequence[tuple[str, str, Any]], allowed: bool) -> None:
-    """Register a user's own effects before their keys are judged."""
+    """Register a user's own effects before their keys are checked."""
     for key, source, value in reversed(sourced):
         if key == 'effect_file' and value:
             if not Path(str(value)).is_file():
@@ -235,7 +235,7 @@ def _load_effect_file(sourced: Sequence[tuple[str, str, Any]], allowed: bool) ->
 
 
 def checked_value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:
-    """Return the checked value of one parameter, its default where nothing was stated."""
+    """Return the checked value of one parameter, its default where it is not stated."""
     if parameter.key not in stated:
         if parameter.size == 'wheels':
             return [parameter.default] * wheels
@@ -382,7 +382,7 @@ def _check_form(
     stated: _Sourced,
     refuse: Callable[[str, str], UserError],
 ) -> None:
-    """Refuse a parameter of another form where no form is chosen at all: nothing would read it.
+    """Refuse a parameter of another form where no form is chosen, since it would have no effect.
 
     Beside a form that is stated it is left alone: one file may hold the parameters of a model, and
     a later one choose another form.

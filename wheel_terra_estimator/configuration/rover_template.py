@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""A new rover file with comments: what must be stated, and what is worth stating."""
+"""A new rover file with comments: required values, and useful optional ones."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GUESSED = re.compile(rf'# ({A_GUESS}.*)\n +([\w.]+):')  # the comment, the key b
 
 @dataclass(frozen=True)
 class RoverSketch:
-    """What is known of a rover; nan-free, one entry per wheel, front to rear, left before right.
+    """Facts of a rover; nan-free, one entry per wheel, front to rear, left before right.
 
     ``guessed`` names the keys that are guesses and have to be looked at.
     """

@@ -84,7 +84,7 @@ def find(name: str | Path, kind: str = '', folder: Path | None = None) -> Path:
 
     A bare name (``frostyboy``) may have its folder in front (``soils/hit_lss1``); ``kind``: folder
     to search (``scenarios``), empty: all; ``folder``: where the shipped files lie, None: those of
-    the package. Raises UserError if nothing or more than one file answers to the name.
+    the package. Raises UserError if no file or more than one has the name.
     """
     path = Path(name).expanduser()
     if path.is_file():

@@ -49,7 +49,7 @@ def read_values(soil_file: Path) -> dict[str, Any]:
 def why_foreign(path: Path) -> str:
     """Return why a file is no soil file of this program; empty where it is one.
 
-    What bears the header and cannot be read otherwise is one: told of by whoever reads it.
+    A file with the header that cannot be read otherwise is one; its reader reports that.
     """
     try:
         first, _, _ = read_text(path).partition('\n')
@@ -136,7 +136,7 @@ class KeptSoil:
 
     def __init__(self, path: Path, inputs: Iterable[Path] = ()) -> None:
         self.path = path.resolve()
-        self.fault = ''  # why nothing is kept, in words; empty where it is
+        self.fault = ''  # reason why nothing is kept; empty where it is
         self._unusable = ''
         try:
             check_target(self.path, True, inputs, foreign=why_foreign)

@@ -29,7 +29,7 @@ DEEPEST_CHAIN = 1000
 BASE_LINKS = ('base_link', 'base_footprint')
 
 _ROUND = ('cylinder', 'sphere')
-_ACROSS = 0.1  # y of an axis below which nothing tells its sign
+_ACROSS = 0.1  # y of an axis below which its sign is unknown
 _NEAR = 0.01  # axles that differ less in height may be of wheels alike [m]
 _UPRIGHT = 0.8  # cosine between the axis of a joint that steers and the vertical, at least
 
@@ -45,7 +45,7 @@ def read_urdf(
 ) -> RoverSketch:
     """Return the rover that a URDF describes (xacro has to be expanded first).
 
-    ``wheels``: names of the wheel joints; default: continuous joints whose name or link says wheel.
+    ``wheels``: names of the wheel joints; default: continuous joints with wheel in name or link.
     ``data``: the document, where it does not stand in a file; ``path`` then names it in errors.
     ``radius``, ``width``: of the wheels [m], in place of those of the document.
     Raises UserError for no URDF, no wheels, or a wheel without a radius.
@@ -207,7 +207,7 @@ class _Robot:
         return pose
 
     def _link_pose(self, link: str) -> Pose | None:
-        """Return the pose of a link in the base; None if they hang on nothing in common."""
+        """Return the pose of a link in the base; None if they have no common ancestor."""
         top, pose = self._climbed(link, self.base)
         if top == self.base:
             return pose
@@ -226,7 +226,7 @@ class _Robot:
         raise UserError(f'{self.path}: the joints of link {start} form a loop')
 
     def shape(self, joint: ElementTree.Element) -> tuple[float, float]:
-        """Return radius and width of a wheel, the largest of its link; 0 for what is not told."""
+        """Return radius and width of a wheel, the largest of its link; 0 = unknown."""
         link = self._links.get(_link(joint, 'child'))
         for kind in ('collision', 'visual'):
             parts = link.iter(kind) if link is not None else ()

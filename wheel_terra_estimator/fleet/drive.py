@@ -28,7 +28,7 @@ QUICK_MESSAGES = 60_000  # messages of a topic that the checks before a replay l
 
 @dataclass(frozen=True)
 class Drive:
-    """What is known of a recording after its replay."""
+    """Summary of a recording after its replay."""
 
     configuration: Configuration
     checked: CheckReport
@@ -98,7 +98,7 @@ def summed_up(
     result: Replay,
     truth: Truth | None,
 ) -> Drive:
-    """Return what is known of a recording after its replay."""
+    """Return the summary of a recording after its replay."""
     errors = truth_scores.judged(result.history, truth, result.topics, configuration)
     notes = list(result.notes)
     if not configuration.soil_stated:
@@ -111,7 +111,7 @@ def summed_up(
 
 
 def check_before(bag: Bag, configuration: Configuration, remaps: Mapping[str, str]) -> CheckReport:
-    """Return what the checks found; nothing that fails there keeps the replay from its work."""
+    """Return the findings of the checks; a check that fails does not stop the replay."""
     report = CheckReport()
     recording = run_apart(
         report,

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Many recordings side by side: one folder each, a summary over all, interrupted runs go on.
+"""Many recordings side by side: a folder each, a summary of all, resumable after an end.
 
 The folder of a recording notes in its marker a digest of all that its content follows from
 (recording, configuration, remaps, version of the program) and the row of the summary. A later run
@@ -44,7 +44,7 @@ READ_AT_ONCE = 2**20  # bytes of a recording that are read at a time for its dig
 
 @dataclass(frozen=True)
 class Settings:
-    """What is the same for all recordings."""
+    """Settings common to all recordings."""
 
     configuration: Configuration
     remaps: Mapping[str, str]
@@ -108,7 +108,7 @@ def _replay_into(
 def _tasks(
     settings: Settings, paths: Sequence[Path], rows: dict[int, DriveRow]
 ) -> dict[int, _Task]:
-    """Return what is left to do, by number of the recording; what is not goes to `rows`."""
+    """Return the recordings left to do, by number; results of the others go to `rows`."""
     output, done = settings.output, {}
     for folder in sorted(output.iterdir()):
         facts = facts_of(folder) if folder.is_dir() else {}

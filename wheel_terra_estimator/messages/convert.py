@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of the inputs -> typed measurements, the same for node and replay.
 
-What the numbers are worth is judged by the estimator core, only what does not fit the layout of a
-message is refused here.
+Values are checked by the estimator core; only messages that do not fit the layout are
+refused here.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class InputConverter:
     def _odom(self, message: Message) -> WheelOdometry:
         """Wheel rates of a rover that publishes no joint states, from its wheel odometry."""
         forward, _, _, _, _, turn = message.numbers[0][:6].tolist()
-        with np.errstate(all='ignore'):  # absurd values are judged later, number by number
+        with np.errstate(all='ignore'):  # implausible values are rejected later, one by one
             rim_speed = forward - turn * self.wheels.y
             rate = rim_speed / self.wheels.slip_radius
         if np.isnan(rim_speed).any():
@@ -205,7 +205,7 @@ class InputConverter:
             return None
         forward, lateral, covariance = values[0], values[1], values[6:]
         variance = covariance[7]
-        # Zero is what a source that measures no lateral speed sends; 1e6 what it says of it.
+        # A source that measures no lateral speed sends 0, with a variance of 1e6 or 0.
         given = lateral != 0.0 and abs(lateral) < _FASTEST and not variance >= _FASTEST**2
         return ReferenceVelocity(
             message.stamp,

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages in, estimate sets out: what the node and the replay both are.
 
-They differ in nothing but who brings the messages and where the sets go.
+They differ only in the source of the messages and the destination of the sets.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Pipeline:
         self.diagnostics.begin_anew()
 
     def retune(self, configuration: Configuration) -> None:
-        """Go on with other tuning; wheels, sensors and soil must be the same."""
+        """Continue with other tuning; wheels, sensors and soil must be the same."""
         self.configuration = configuration
         self.core.retune(configuration)
 
@@ -105,7 +105,7 @@ class Pipeline:
         return result
 
     def _faults(self) -> list[tuple[str, str]]:
-        """Return what was lost and left out of the inputs since this was last asked, in words."""
+        """Return messages on inputs lost and rejected since the last call."""
         found = list(self.transport_faults())
         rejected = self.converter.rejected + self.core.rejected
         for (topic, reason), count in rejected.items():

@@ -69,7 +69,7 @@ class Message(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """What is alike in the messages of a topic: names, and where which numbers are.
+    """Layout common to the messages of a topic: names, and positions of the numbers.
 
     ``lists``: first byte and length of each list of numbers, as in `Message`.
     """

@@ -91,7 +91,7 @@ def _difference(
     return Difference(
         name=name,
         unit=unit_of(name),
-        mean=float(change.mean().round(12)),  # of equal sums nothing, no 1e-16
+        mean=float(change.mean().round(12)),  # equal sums have no difference, not 1e-16
         rms=float(np.sqrt(np.mean(change**2))),
         greatest=float(change[row, wheel]),
         where=f'{first.names[int(wheel)]} at {first.seconds[a[int(row)]]:.1f} s',

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What pictures of drives have in common: colours of the classes, and what is known at all."""
+"""Common style of the pictures of drives: colours of the classes, unknown values hidden."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What happened on a drive, in the words and numbers that an operator asks for first."""
+"""Summary of a drive for an operator."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LEAST_TRAVEL = 0.01
 class WarningSpan:
     """A stuck warning in seconds since the first set; ``end`` None: until the end.
 
-    ``later`` says whether the slip that was estimated afterwards bears it out.
+    ``later`` states whether the slip estimated afterwards confirms it.
     """
 
     start: float
@@ -65,7 +65,7 @@ class WheelSummary:
 
 @dataclass(frozen=True)
 class MessageRow:
-    """An input: how many messages were heard, and what was rejected, in words."""
+    """An input: number of used messages, and rejected ones as text."""
 
     name: str
     topic: str
@@ -75,7 +75,7 @@ class MessageRow:
 
 @dataclass(frozen=True)
 class DriveSummary:
-    """Everything that the terminal and the report say about a drive."""
+    """Content of the summary on the terminal and in the report."""
 
     title: str
     duration: float  # [s]

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Self-contained HTML pages: pictures and style lie in the file, nothing is loaded from elsewhere.
+"""Self-contained HTML pages: pictures and style are in the file, nothing is loaded from elsewhere.
 
 A report has a template that extends ``base.html`` and fills its blocks ``title``, ``headline`` and
 ``content``; own templates may lie in any folder, ``base.html`` is found from there.
@@ -28,7 +28,7 @@ _MARKUP = re.compile(r'<(script|style)\b.*?</\1>|<[^>]*>', re.DOTALL)
 
 
 def render(template: str, folder: Path = TEMPLATES, **context: Any) -> str:
-    """Return the page that a template makes of a context.
+    """Return the page of a template with a context.
 
     ``folder``: where it lies; templates of this package are found as well. ``**context``: values
     for the template; ``version`` is added, and what the words on the page mean.

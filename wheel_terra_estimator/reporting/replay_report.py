@@ -48,7 +48,7 @@ def write_replay_report(
 ) -> None:
     """Write the report of a drive.
 
-    ``errors`` are those against a truth that may judge the estimates.
+    ``errors`` are those against an independent truth.
     """
     from wheel_terra_estimator.terramechanics.effects import catalogue
 

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How all pictures look: colours that the colour-blind can tell apart, light frames, thin lines.
+"""Style of all pictures: colours that the colour-blind can distinguish, light frames, thin lines.
 
 Pictures are drawn for a light page; ``DARK`` says which of their colours follow a dark one.
 """

@@ -32,7 +32,7 @@ LONGEST_BRIDGE = 0.5
 """Truth further away than this [s] is not compared."""
 TRUE_CLASSES = (SlipClass.LOW, SlipClass.MODERATE, SlipClass.HIGH, SlipClass.STUCK)
 CLASSES = (*TRUE_CLASSES, SlipClass.UNKNOWN)
-LEAST_KNOWN = 0.5  # share of the time after a warning in which slip tells whether it was right [-]
+LEAST_KNOWN = 0.5  # share of the time after a warning in which slip must be known to judge it [-]
 COMPARED = (
     ('slip', 'slip', '-'),
     ('sinkage', 'sinkage', 'm'),
@@ -58,7 +58,7 @@ class QuantityError:
 
 @dataclass(frozen=True)
 class TruthErrors:
-    """Everything that the truth says; ``class_matrix`` (true, estimated) in shares of time."""
+    """Scores against a truth; ``class_matrix`` (true, estimated) in shares of time."""
 
     source: str
     quantities: tuple[QuantityError, ...]
@@ -115,7 +115,7 @@ def judged(
     heard: Mapping[str, str],
     configuration: Configuration,
 ) -> TruthErrors | None:
-    """Compare estimates with a truth, unless it is a topic ``heard``: a reference cannot judge."""
+    """Compare estimates with a truth, unless its topic is an input (``heard``)."""
     if truth is None or truth.source in heard.values():
         return None
     return truth_errors(history, truth, configuration.filter.class_thresholds)
@@ -166,7 +166,7 @@ def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[tuple[float, 
 
 
 def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
-    """Return for each warning whether the slip estimated after it bears it out, in a sentence."""
+    """Return for each warning whether the slip estimated after it confirms it, as a sentence."""
     slip = known(history, 'slip', border)
     there = np.asarray(np.isfinite(slip).any(axis=1))
     if not history.warnings:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How the inputs arrive: rate, age, delay and loss of each topic, and what is wrong in words.
+"""Arrival of the inputs: rate, age, delay and loss of each topic, and faults as text.
 
 Times are of a steady clock, so that silence is seen when nothing comes any more.
 """
@@ -25,14 +25,14 @@ _SMOOTHING = 0.1
 
 @dataclass(slots=True)
 class _Topic:
-    """What is known of one topic."""
+    """State of one topic."""
 
     received: int = 0
     last_time: float = 0.0
     period: float = 0.0
     delay: float = 0.0
     ahead: float = 0.0  # least of what the stamps were before the clock
-    latest: float = -math.inf  # greatest delay since this was last asked
+    latest: float = -math.inf  # greatest delay since the last report
     number: int | None = None  # of the publisher's last message
     gaps: int = 0  # in these numbers since the last look at the publishers
     mixed: bool = False  # a number from before: another publisher's, and so are the gaps
@@ -61,7 +61,7 @@ class InputWatch:
         if now - self._first_look > START:
             self._behind = max(now - self._looked_at - period, 0.0)
             self._worst = max(self._worst, self._behind)
-            # Who is always late would never report a silence.
+            # A topic that is always late would never be reported as silent.
             if self._behind > BEHIND and now - self.awake > UNKNOWN_PERIOD:
                 self.awake = now
         self._looked_at = now
@@ -123,7 +123,7 @@ class InputWatch:
         return min(age, now - self.awake) > max(least, PERIODS_TO_SILENCE * state.period)
 
     def faults(self, now: float) -> list[tuple[str, str]]:
-        """Return topics that are silent, losses and delays since this was last asked, in words."""
+        """Return topics that are silent, losses and delays since the last call, as text."""
         found = []
         if self._worst > BEHIND:
             words = f'read {self._worst:.1f} s late: this process lacks processor time'

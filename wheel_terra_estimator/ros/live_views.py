@@ -26,7 +26,7 @@ from wheel_terra_estimator.ros.outputs import make_publisher, time_message
 
 MARKER_PERIOD = 200_000_000
 """Least time between two sets of markers [ns of stamps]: an eye sees no more."""
-LIFETIME = 2  # markers of a node that says nothing more disappear after this time [s]
+LIFETIME = 2  # lifetime of the markers, for a node that has ended [s]
 ARROW_RADII = 3.0  # length of the arrow of a pull as great as the wheel's load, in wheel radii
 SURFACE_THICKNESS = 0.004  # of the plate that shows the surface of the soil [m]
 SURFACE_SHARE = 1.5  # of the wheel's diameter and width
@@ -62,7 +62,7 @@ def topic_names(names: Sequence[str]) -> list[str]:
 
 
 class LiveViews:
-    """Publishes ``~/wrench/<wheel>`` and ``~/markers``, as far as they are asked for."""
+    """Publishes ``~/wrench/<wheel>`` and ``~/markers``, as far as they are enabled."""
 
     def __init__(self, node: Node, configuration: Configuration) -> None:
         self._node = node
@@ -93,7 +93,7 @@ class LiveViews:
             self._node.destroy_publisher(self._markers)
 
     def publish(self, estimates: EstimateSet) -> None:
-        """Publish what somebody listens to."""
+        """Publish the topics that have subscribers."""
         stamp = time_message(estimates.stamp)
         for i, publisher, wrench in self._wrenches:
             if publisher.get_subscription_count():

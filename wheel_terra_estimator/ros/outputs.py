@@ -68,7 +68,7 @@ class EstimatePublisher:
             self._node.destroy_publisher(publisher)
 
     def publish(self, estimates: EstimateSet) -> None:
-        """Publish the messages of a set that somebody listens to."""
+        """Publish the messages of a set whose topics have subscribers."""
         wanted = {t for t, p in self._of_sets.items() if p.get_subscription_count()}
         if wanted:
             for topic, data in pack.pack(estimates, self._names, wanted):

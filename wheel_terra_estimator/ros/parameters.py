@@ -30,7 +30,7 @@ def overrides(node: Node) -> dict[str, Any]:
     """Return what the user gave a node.
 
     The node must have been made with ``automatically_declare_parameters_from_overrides``: only so
-    are parameters seen that nobody declares, misspelt ones above all.
+    are undeclared parameters found, such as misspelt ones.
     """
     return {
         name: node.get_parameter(name).value
@@ -47,7 +47,7 @@ def files(arguments: Sequence[str]) -> list[Path]:
 
 
 def unread(files: Iterable[Path], node: Node) -> str:
-    """Say which of the parameter files has sections, but none for this node."""
+    """Return which of the parameter files has sections, but none for this node."""
     refused = ''
     for path in files:
         try:
@@ -65,7 +65,7 @@ def unread(files: Iterable[Path], node: Node) -> str:
 
 
 def configuration(given: Mapping[str, Any], warn: Callable[[str], Any]) -> Configuration:
-    """Return the checked configuration; hand what is doubtful in it to ``warn``.
+    """Return the checked configuration; pass its warnings to ``warn``.
 
     Raises UserError if a parameter is unknown or its value cannot be used.
     """
@@ -80,7 +80,7 @@ def configuration(given: Mapping[str, Any], warn: Callable[[str], Any]) -> Confi
 def why_refused(given: Mapping[str, Any], changes: Mapping[str, Any]) -> str:
     """Return why one of the changes cannot be used, whatever the others are; empty where all can.
 
-    What hangs together is judged when the node is configured.
+    Conditions on several parameters are checked when the node is configured.
     """
     table = declared()
     wheels = len({**given, **changes}.get('wheels.names') or ())
@@ -95,7 +95,7 @@ def why_refused(given: Mapping[str, Any], changes: Mapping[str, Any]) -> str:
 
 
 def declare(node: Node, configuration: Configuration) -> None:
-    """Declare all parameters anew, with their values, units and ranges."""
+    """Declare all parameters again, with their values, units and ranges."""
     for name in overrides(node):
         node.undeclare_parameter(name)
     values = configuration.flat()

@@ -25,7 +25,7 @@ LOG_CURE = 'set ROS_LOG_DIR (or ROS_HOME) to a folder that can be written'
 
 
 class _Signals:
-    """First ends the process at once; while serving, asks it to end."""
+    """Before the node is served, exit at once; afterwards request the end."""
 
     def __init__(self) -> None:
         self.stopped = False
@@ -64,7 +64,7 @@ def run_node(module: str, name: str, args: list[str] | None = None) -> int:
         try:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         except Exception as error:  # rcl's: a parameter file or argument that cannot be read
-            # What rcl complains of, without the places in its source.
+            # Return the error of rcl without its source locations.
             words = str(error).splitlines()[0].partition(', at ')[0]
             words = f'unknown: {words}' if words.startswith('[') else words
             print(f'{words}; {LOG_CURE}' if 'logging' in words else words, file=sys.stderr)

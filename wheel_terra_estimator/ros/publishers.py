@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Why nothing comes from publishers of a topic, in words."""
+"""Reasons why no message arrives from the publishers of a topic."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def name_of(publisher: TopicEndpointInfo) -> str:
 
 
 def other_type(publishers: Iterable[TopicEndpointInfo], kind: str) -> str:
-    """Say which types come on a topic instead of that which is needed; empty: none."""
+    """Return a message on types published in place of the required one; empty: none."""
     others = sorted({p.topic_type for p in publishers} - {kind})
     return f'{", ".join(others)} is published there, {kind} is needed' if others else ''
 
 
 def other_quality(publishers: Iterable[TopicEndpointInfo], asked: QoSProfile) -> str:
-    """Say which publisher offers less than what is asked for, and in what; empty: none does."""
+    """Return a message on publishers with incompatible QoS; empty: none."""
     for publisher in publishers:
         compatible, reason = qos_check_compatible(publisher.qos_profile, asked)
         if compatible == QoSCompatibility.ERROR:

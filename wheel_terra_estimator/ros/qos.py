@@ -33,7 +33,7 @@ FREQUENT = ('joint_states', 'odom', 'imu/data')
 
 
 def input_profile(topic: str = '') -> QoSProfile:
-    """Best effort hears both kinds of publishers; a late sensor value is better not resent."""
+    """Best effort fits both kinds of publishers; a lost sensor value need not be resent."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=FAST_DEPTH if topic in FREQUENT else 10,
@@ -43,7 +43,7 @@ def input_profile(topic: str = '') -> QoSProfile:
 
 
 def output_profile(latched: bool = False) -> QoSProfile:
-    """Reliable; a latched topic gives its last message to those who come later."""
+    """Reliable; a latched topic gives its last message to late subscribers."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=1 if latched else 10,

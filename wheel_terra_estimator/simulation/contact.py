@@ -49,7 +49,7 @@ LEAST_ANGLE = 0.01
 
 
 class SunkWheels(NamedTuple):
-    """Wheels in the soil, seen in the direction of travel; (n,) where nothing else is said."""
+    """Wheels in the soil, seen in the direction of travel; (n,) unless stated otherwise."""
 
     # Name of ``terrain.SOIL_QUANTITIES`` -> factor on the base soil below the wheels
     factors: Mapping[str, FloatArray]
@@ -87,7 +87,7 @@ class ContactModel:
     def __init__(
         self,
         wheel: Wheel,  # (n,) geometry
-        soil: Soil,  # base soil; what is below each wheel differs by factors
+        soil: Soil,  # base soil; that below each wheel differs by factors
         slip_radius: FloatArray,  # (n,) radius that slip refers to [m]
         effects: Mapping[str, Mapping[str, float]],
         gravity: float,

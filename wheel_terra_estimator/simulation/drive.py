@@ -43,7 +43,7 @@ class SimulatedDrive:
         return self.scenario.configuration
 
     def __repr__(self) -> str:
-        """Return the scenario, the seed and what the truth says."""
+        """Return the scenario, the seed and the truth."""
         return f'SimulatedDrive, seed {self.seed}, {len(self.arrivals)} arrivals\n  {self.truth!r}'
 
 
@@ -54,7 +54,7 @@ class Drive:
     """
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
-        # Apart, so that one more draw of one kind does not change the others.
+        # Separate, so that one more draw of one kind does not change the others.
         variation, ground, noise = (
             np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3)
         )
@@ -84,7 +84,7 @@ class Drive:
         radius_factor = factor(draw.radius)
         if radius_factor != 1.0:
             changes['wheels.radius'] = (truth.wheels.radius * radius_factor).tolist()
-        # What is true of rover and base soil in this drive
+        # True rover and base soil of this drive
         self.configuration = truth.replace(changes)
         profile = scenario.profile
         fastest = self.speed_factor * float(
@@ -119,7 +119,7 @@ class Drive:
         self.last_truth: Truth = self.plant.truth()  # truth at the end of the last step
 
     def step(self, command: Command) -> list[Arrival]:
-        """Drive under a command for ``step_length`` and return what the sensors say."""
+        """Drive under a command for ``step_length`` and return the sensor readings."""
         self._set_wheel_faults()
         self.last_truth = self.plant.step(command, self.step_length)
         return self.sensors.measure(self.last_truth)

@@ -75,7 +75,7 @@ class Drives:
         return torque, np.where(np.abs(wanted) < limit, -self._gain, 0.0)
 
     def next_trial(self, rate: FloatArray, proposed: FloatArray) -> FloatArray:
-        """Return where Newton's method is to go on from ``rate``: not past a border of the limits.
+        """Return the next iterate of Newton's method from ``rate``, not beyond a limit.
 
         The torque has a kink there; a step across it was computed with the wrong slope.
         """

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Scenario files: which rover drives where, with which sensors and faults, and what is random.
+"""Scenario files: rover, course, sensors, faults and random variations.
 
 A scenario is a ROS parameter file like every configuration file. The keys in
 ``scenario_keys.yaml`` are all there are. What starts with ``variation.`` is drawn anew for each
@@ -65,7 +65,7 @@ class Scenario:
     # is to be given
     files: tuple[str, ...]
     parameters: tuple[str, ...]
-    configuration: Configuration  # what these say: rover, nominal soil, sensors
+    configuration: Configuration  # their content: rover, nominal soil, sensors
     truth: Configuration  # what holds in the simulation before the variations of a seed
     duration: float
     profile: DriveProfile

@@ -230,6 +230,6 @@ class SensorSuite:
 
 
 def _between(before: Truth, after: Truth, part: float) -> Truth:
-    """Return what is true between two times, linear in all."""
+    """Return the truth between two times, interpolated linearly."""
     ends = zip(vars(before).values(), vars(after).values(), strict=True)
     return Truth(*(first + part * (last - first) for first, last in ends))

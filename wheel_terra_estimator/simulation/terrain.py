@@ -31,7 +31,7 @@ class Patch:
 
 
 SOIL_QUANTITIES = ('stiffness', 'cohesion', 'friction', 'shear_modulus', 'slip_sinkage')
-"""What a patch or a variation scales; ``friction`` scales the tangent of the friction angle."""
+"""Factors of a patch or a variation; ``friction`` scales the tangent of the friction angle."""
 
 
 def smooth_noise(random: np.random.Generator, count: int, correlation_length: float) -> FloatArray:

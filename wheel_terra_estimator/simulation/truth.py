@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is true of the simulated rover at one time."""
+"""True state of the simulated rover at one time."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much of a recording is held in memory; a recording as a whole may have any size.
 
-What is larger is left out and said, never unpacked.
+Larger data are left out and reported, never unpacked.
 """
 
 from __future__ import annotations

@@ -15,14 +15,14 @@ LONGEST_END = 60_000_000_000  # [ns] behind the last message that was read
 
 @dataclass
 class Losses:
-    """What is known of a file's losses; grows while it is read."""
+    """Losses of a file, collected while it is read."""
 
     name: str  # of the file
     # Messages on each topic, as the file itself states; None where it does not
     declared: Mapping[str, int] | None = None
     # Messages on each topic that were read to the end
     recovered: dict[str, int] = field(default_factory=dict)
-    state: str = ''  # what is wrong with the file as a whole, empty if nothing is
+    state: str = ''  # fault of the file as a whole, empty if there is none
     # Place of a damage in the file -> log times [ns] between which it lies, None if unknown
     spans: dict[int, tuple[int, int] | None] = field(default_factory=dict)
     # Place of a chunk with a wrong checksum -> number of messages in it
@@ -43,7 +43,7 @@ class Losses:
         )
 
     def in_words(self) -> list[str]:
-        """Return what the reader should know of a file, nothing if nothing is wrong."""
+        """Return messages on the losses of a file, empty if there are none."""
         lost = self.lost()
         if not (self.state or self.spans or self.doubtful or self.left_out or lost):
             return []

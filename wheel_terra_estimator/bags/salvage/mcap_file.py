@@ -134,7 +134,7 @@ class McapFile:
         return found
 
     def _looks_like_one(self) -> bool:
-        """Whether a file whose first bytes are damaged ends, or goes on, as an MCAP file."""
+        """Return whether a file with damaged first bytes has the end or the records of MCAP."""
         if self._map[-len(mcap.MAGIC) :] == mcap.MAGIC:
             return True
         near = mcap.Possible(opcodes=(mcap.CHUNK, mcap.SCHEMA, mcap.CHANNEL))
@@ -144,7 +144,7 @@ class McapFile:
     # --- The way of a whole file: by its index. ---
 
     def _read_index(self) -> bool:
-        """Take pieces and channels from the summary; False unless it is surely right."""
+        """Take pieces and channels from the summary; False unless it is consistent."""
         content = self._map
         foot = self._size - _FOOTER
         if foot < len(mcap.MAGIC) or content[-len(mcap.MAGIC) :] != mcap.MAGIC:
@@ -304,7 +304,7 @@ class McapFile:
         return True
 
     def _add_gaps(self, gaps: list[mcap.Gap]) -> None:
-        """Say for gaps between pieces between which log times they lie."""
+        """Report the log times between which pieces are missing."""
         begins = [piece.begin for piece in self._pieces]
         latest = list(accumulate((piece.last for piece in self._pieces), max))
         earliest = list(accumulate((piece.start for piece in reversed(self._pieces)), min))[::-1]
@@ -492,7 +492,7 @@ class _Definitions:
         return found
 
     def undecided(self) -> list[str]:
-        """Return in words the channels whose copies differ while no checksum says which is right.
+        """Return the channels whose copies differ while no checksum decides which is right.
 
         Flipped bits may leave packed bytes that still unpack, so a majority is no proof.
         """

@@ -35,7 +35,7 @@ _LARGEST_NUMBER = 2**63 - 1
 class SqliteFile:
     """One ``.db3`` file; attributes as of `McapFile`.
 
-    Raises UserError where it is no rosbag2 file, or nothing of one is left.
+    Raises UserError where it is no rosbag2 file, or none of its messages is left.
     """
 
     def __init__(self, path: Path, stack: ExitStack) -> None:
@@ -166,7 +166,7 @@ class SqliteFile:
         return counts
 
     def _note_missing_numbers(self) -> None:
-        """Say between which log times rows are missing; many gaps are rows that were taken out.
+        """Report the log times between which rows are missing; many gaps: rows were deleted.
 
         Recorders number the rows of a file from 1 on, without a gap.
         """
