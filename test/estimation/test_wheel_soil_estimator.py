@@ -150,6 +150,15 @@ def test_each_contact_law_follows_a_climb_with_a_reference(climb, climbed, law):
     assert_followed(sets, climb.truth)
 
 
+def test_a_soil_configured_by_mistake_does_not_bias_slip_and_sinkage():
+    d = simulate(load({**kinds.KINDS['climb'], 'duration': 12.0, 'sensors.jitter': 0.0}), 1000)
+    snow = reader.load(['generic_six_wheel', 'snow_us'])  # 60 times softer, 3 cm deep
+    sets = estimate(d, estimator=WheelSoilEstimator(snow))
+    slip, sinkage = (last([getattr(s, name) for s in sets]) for name in ('slip', 'sinkage'))
+    assert slip == pytest.approx(last(d.truth.slip), abs=0.05)
+    assert sinkage == pytest.approx(last(d.truth.sinkage), abs=0.004)
+
+
 def test_snapshot_comes_back_to_the_bit(climb):
     inputs = merged(a.measurement for a in climb.arrivals)
     estimator = WheelSoilEstimator(climb.configuration)

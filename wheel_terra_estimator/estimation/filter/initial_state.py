@@ -77,7 +77,7 @@ class PriorTuning:
     most_rut_share: float = 0.9  # soil springs back
     most_shear_radius: float = 0.3
     most_slip_per_demand: float = 8.0  # near the top of the traction curve
-    most_stiffness: float = 3.0  # [ln]
+    most_stiffness: float = 8.0  # from fresh snow to rock [ln]
     most_shear_error: float = 1.5  # [ln]
     most_torque_zero: float = 1e4  # [N m]
     highest: float = 0.02  # of a wheel above the surface, over its radius [-]

@@ -24,6 +24,9 @@ _FIRST_ACCEPTED_AFTER = 2
 """The same at the start, where the configured soil or the first reading may be far off. In between
 the rejected readings must outnumber those used before."""
 _AGE = 2.0  # up to which a reading counts as known [s]
+MEASURED_STIFFNESS_STD = 2.0
+"""Deviation that the first reading of a wheel adds to its stiffness [ln]: sinkage sensors show
+the stiffness, so that a configured soil that is not the one driven on does not bias the slip."""
 FLOOR_VARIANCE = 1e-10  # of a reading [m^2]
 
 
@@ -84,6 +87,8 @@ class SinkageUpdate(Component[SinkageUpdateState]):
                 if in_a_row[i] < min(needed, _ACCEPTED_AFTER):
                     continue
                 ekf.inflate(index, residual * residual)
+            if not used[i]:
+                ekf.inflate(self._layout.stiffness.start + i, MEASURED_STIFFNESS_STD**2)
             in_a_row[i] = 0
             used[i] = min(used[i] + 1, _ACCEPTED_AFTER)
             mean_nis = smoothed_nis(mean_nis, min(nis, self._gate))
