@@ -42,6 +42,7 @@ NEEDED = 2  # judgements that agree before a fault is told
 MEMORY = 6  # judgements without a fault that are remembered when one is seen
 CAP = 4  # agreeing judgements beyond this many count no more
 LEAST_SURE = 0.5  # confidence from which a finding counts
+_OTHERS = 8  # numbers of IMU and reference in a `Row`
 DIGITS = 12  # decimals of means: those of one number, summed up elsewhere, differ behind them
 
 
@@ -56,10 +57,8 @@ class Row(NamedTuple):
     reference: Floats  # velocity [m/s], its variance
 
 
-def _mean(samples: list[Floats], count: int) -> Floats:
+def _mean(samples: tuple[list[float], ...]) -> Floats:
     """Return the means of (k, count) numbers without nan; the same where all are one number."""
-    if not samples:
-        return (math.nan,) * count
     table = np.array(samples)
     known = np.isfinite(table)
     number = np.where(known.any(axis=0), known.sum(axis=0), math.nan)
@@ -142,47 +141,43 @@ class OnlineChecks:
         self._begin: int | None = None  # of the bin [ns]
         self._rows: tuple[Row, ...] = ()
         self._verdicts = _Verdicts()
-        self._new_bin()
-
-    def _new_bin(self) -> None:
-        self._samples: tuple[list[Floats], ...] = ([], [], [], [], [])
+        self._samples: tuple[list[float], ...] = ()  # of the bin: numbers of a `Row`, by step
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return the state in a form that later steps leave alone."""
-        return self._begin, self._rows, self._verdicts, [one[:] for one in self._samples]
+        return self._begin, self._rows, self._verdicts, self._samples
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Return to a kept state."""
-        self._begin, self._rows, self._verdicts, samples = snapshot
-        self._samples = tuple(one[:] for one in samples)
+        self._begin, self._rows, self._verdicts, self._samples = snapshot
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Take all inputs of a stamp [ns], later than the one before."""
         if self._begin is None or stamp - self._begin > KEPT * BIN:  # the first one, or a pause
-            self._begin, self._rows = stamp, ()
-            self._new_bin()
+            self._begin, self._rows, self._samples = stamp, (), ()
         if stamp - self._begin >= BIN:
             self._close(stamp)
-        rate, torque, depth, inertial, velocity = self._samples
-        if inputs.wheel_odometry is not None:
-            rate.append(inputs.wheel_odometry.rate.tolist())
-            torque.append(inputs.wheel_odometry.torque.tolist())
-        if (felt := inputs.inertial) is not None:
-            inertial.append((*felt.specific_force.tolist(), *felt.angular_rate.tolist()))
+        n = len(self._radius)
+        sample = [math.nan] * (3 * n + _OTHERS)
+        if (rolled := inputs.wheel_odometry) is not None:
+            sample[: 2 * n] = rolled.rate.tolist() + rolled.torque.tolist()
         if inputs.sinkage is not None:
-            depth.append(inputs.sinkage.sinkage.tolist())
+            sample[2 * n : 3 * n] = inputs.sinkage.sinkage.tolist()
+        if (felt := inputs.inertial) is not None:
+            sample[3 * n : -2] = felt.specific_force.tolist() + felt.angular_rate.tolist()
         if inputs.reference is not None:
-            velocity.append((inputs.reference.forward, inputs.reference.variance))
+            sample[-2:] = inputs.reference.forward, inputs.reference.variance
+        self._samples += (sample,)
 
     def _close(self, stamp: int) -> None:
         """Close the bin before a stamp, and judge if it is time to."""
         assert self._begin is not None
         bins = (stamp - self._begin) // BIN
         self._begin += bins * BIN
-        counts = (len(self._radius),) * 3 + (6, 2)
-        means = [_mean(*of) for of in zip(self._samples, counts, strict=True)]
-        row = Row(self._begin - (bins - 1) * BIN, *means)
-        self._new_bin()
+        mean, n = _mean(self._samples), len(self._radius)
+        wheels = mean[:n], mean[n : 2 * n], mean[2 * n : 3 * n]
+        row = Row(self._begin - (bins - 1) * BIN, *wheels, mean[3 * n : -2], mean[-2:])
+        self._samples = ()
         old = next((i for i, r in enumerate(self._rows) if row.stamp - r.stamp < KEPT * BIN), 0)
         self._rows = (*self._rows[old:], row)
         rims = [abs(w * r) for w, r in zip(row.rate, self._radius, strict=True)]
