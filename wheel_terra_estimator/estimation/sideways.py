@@ -32,6 +32,8 @@ _STEP = 0.02  # step for the stiffness, over the greatest speed [-]
 _PLACES = np.array([0.1 * u + 0.9 * u**3 for u in np.linspace(-1.0, 1.0, 49)])
 """Lateral speeds at which forces are computed, over the greatest [-]: closest where forces change
 most. Linear interpolation between them errs by 0.003 of the speed."""
+_ASIDE, _ALONG = np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])[..., None]
+"""One deviation to either side of the speeds across and along."""
 UNKNOWN_ANGLE_STD = math.pi / math.sqrt(3.0)
 """Deviation of an unknown slip angle, uniform over the whole turn [rad]."""
 
@@ -208,15 +210,9 @@ def _angle_std(
 
     Derivatives at the mean would be too small where a deviation is as large as the speed.
     """
-    here = np.arctan2(across, along)
-    there = (
-        np.arctan2(across + across_std, along),
-        np.arctan2(across - across_std, along),
-        np.arctan2(across, along + along_std),
-        np.arctan2(across, along - along_std),
-    )
-    differences = [(angle - here + np.pi) % (2.0 * np.pi) - np.pi for angle in there]
-    return np.asarray(np.sqrt(0.5 * sum(step**2 for step in differences)))
+    there = np.arctan2(across + _ASIDE * across_std, along + _ALONG * along_std)
+    differences = (there - np.arctan2(across, along) + np.pi) % (2.0 * np.pi) - np.pi
+    return np.sqrt(0.5 * np.square(differences).sum(axis=0))
 
 
 def _floats(values: FloatArray) -> Floats:

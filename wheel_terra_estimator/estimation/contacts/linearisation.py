@@ -105,9 +105,9 @@ class Linearisation(Component[FloatArray]):
         forces = self._models.forces(states)
         torque_noise, pull_noise = self._noise_of_angle(states, forces, turning)
         self.state = self.smoothed(forces, load * np.array(self._rover.shear_radius), turning)
-        by_ratio, by_depth, by_strength, by_modulus, by_centroid, by_mound = np.moveaxis(
-            self.state[::-1], 1, 0
-        )
+        by_ratio, by_depth, by_strength, by_modulus, by_centroid, by_mound = self.state[
+            ::-1
+        ].transpose(1, 0, 2)
         wheels = np.arange(n)
         # The ratio is that of the direction of rolling: the two signs cancel.
         rows[:, :, SPEED] = by_ratio * (sheared * np.array(headings.by_speed) / rim)
@@ -121,9 +121,7 @@ class Linearisation(Component[FloatArray]):
         rows[:, :, CENTROID] = by_centroid * direction
         rows[:, :, MOUND] = by_mound * direction
         rows[:, ~turning] = 0.0
-        pull, torque = (
-            np.where(turning, direction * force, 0.0) for force in (forces.pull, forces.torque)
-        )
+        pull, torque = np.where(turning, direction * [forces.pull, forces.torque], 0.0)
         return ContactForces(x, pull, torque, rows[0], rows[1], pull_noise, torque_noise)
 
     def _noise_of_angle(
@@ -143,7 +141,7 @@ class Linearisation(Component[FloatArray]):
 
     def smoothed(self, forces: WheelForces, moment: FloatArray, turning: BoolArray) -> FloatArray:
         """Return the smoothed derivatives; `moment`: load times radius of each wheel [N m]."""
-        old, new = self.state, np.stack([forces.d_torque, forces.d_pull])
+        old, new = self.state, np.array([forces.d_torque, forces.d_pull])
         slopes = smoothed_slopes(old, new, _SLOPE_KEEP)
         # A wheel that comes free or locks has new derivatives at once.
         change = np.abs(new[0, STRENGTH] - old[0, STRENGTH])

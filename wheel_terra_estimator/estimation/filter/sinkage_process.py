@@ -140,12 +140,12 @@ class SinkageProcess(Component[SinkageState]):
         )
         # One bounded Newton step on ln load over ln sinkage; the relaxation follows it anyway.
         power = exponents[0] + _PRESSURE_POWER
-        most = _LONGEST_STEP
-        growth = np.clip(np.log(states.load / carried[0]) / power, -most, most)
+        growth = np.log(states.load / carried[0]) / power
+        growth = np.minimum(np.maximum(growth, -_LONGEST_STEP), _LONGEST_STEP)
         floored = np.maximum(z, _LEAST_SINKAGE)
         target = floored * np.exp(growth)
         sensitivity = alpha * target / power
-        raw = np.stack(
+        raw = np.array(
             [np.log(carried[0] / carried[1]) / _RATIO_STEP, np.abs(slip) * log_depths[0]]
         )
         slopes = smoothed_slopes(self.state.slopes, raw, _SLOPE_KEEP)

@@ -129,8 +129,10 @@ class PublishedClasses:
         ]
         classes = np.array([state.current for state in self._states], dtype=np.uint8)
         stuck = (classes == SlipClass.STUCK) & (estimates.slip > 0.0)
-        left = np.stack([estimates.rim_travel_left, estimates.time_to_stuck])
-        outlook = np.vstack([np.where(stuck, 0.0, left), estimates.stuck_probability])
+        outlook = np.array(
+            [estimates.rim_travel_left, estimates.time_to_stuck, estimates.stuck_probability]
+        )
+        outlook[:2, stuck] = 0.0
         if self._outlook is not None:
             given = classes if estimates.stuck else estimates.slip_class
             stalls = estimates.stuck_probability >= 1.0  # a wheel that is known to stand
