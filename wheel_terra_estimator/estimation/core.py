@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from math import isnan
 from typing import Any, Protocol
 
 import numpy as np
@@ -236,7 +237,7 @@ ReferenceVelocity
             self._clock_stepped = True
         for arrival in judgement.accepted:
             measured = arrival.measurement
-            whole = not (isinstance(measured, WheelOdometry) and np.isnan(measured.rate).any())
+            whole = not (isinstance(measured, WheelOdometry) and isnan(sum(measured.rate.tolist())))
             if not self._timeline.is_too_old(measured.stamp):
                 self._lags.note(arrival.channel, measured.stamp, whole=whole)
             sets += self._insert(arrival)

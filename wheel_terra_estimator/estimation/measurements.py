@@ -55,8 +55,8 @@ class InertialReading:
 
 
 def heading_of(orientation: FloatArray) -> Any:
-    """Return the heading [rad] of quaternions x, y, z, w (..., 4), from x of the world to y."""
-    x, y, z, w = np.moveaxis(orientation, -1, 0)
+    """Return the heading [rad] of quaternions x, y, z, w ((k,) 4), from x of the world to y."""
+    x, y, z, w = orientation.T
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 

@@ -122,21 +122,19 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         return mean
 
     def rim_speeds(self, time: float) -> Floats:
-        """Return the rim speeds [m/s], nan where the rate is unknown or too old."""
-        state, silence = self.state, self._silence
-        each = zip(state.rim_speed, state.rim_slope, state.rate_time, state.lag, strict=True)
-        return tuple(
-            [
-                self._extrapolated(rim, slope, time - when + lag) if time - when <= silence else NAN
-                for rim, slope, when, lag in each
-            ]
-        )
+        """Return the rim speeds [m/s], nan where the rate is unknown or too old.
 
-    def _extrapolated(self, rim: float, slope: float, age: float) -> float:
-        """Return a rim speed extrapolated over its age [s], to compensate the lag of smoothing."""
-        if abs(slope) <= self._least_slope or age > _LONGEST_EXTRAPOLATED:
-            return rim
-        return rim + slope * age
+        A change is extrapolated over the age and the lag of smoothing.
+        """
+        state, rims = self.state, []
+        for rim, slope, when, lag in zip(
+            state.rim_speed, state.rim_slope, state.rate_time, state.lag, strict=True
+        ):
+            age = time - when
+            extrapolated = abs(slope) > self._least_slope and age + lag <= _LONGEST_EXTRAPOLATED
+            now = rim + slope * (age + lag) if extrapolated else rim
+            rims.append(now if age <= self._silence else NAN)
+        return tuple(rims)
 
     def fastest(self) -> float:
         """Return the greatest known rim speed, whatever its direction or age [m/s]; 0 = none."""

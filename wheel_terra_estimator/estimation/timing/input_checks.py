@@ -68,9 +68,9 @@ def _differs(one: InertialReading, other: InertialReading) -> bool:
     """Return whether no rover could get from one reading to the other in the time between."""
     if abs(one.stamp - other.stamp) > OUTLIER_TIME:
         return False
-    force = np.abs(one.specific_force - other.specific_force).max()
-    rate = np.abs(one.angular_rate - other.angular_rate).max()
-    return bool(force > OUTLIER_FORCE or rate > OUTLIER_RATE)  # nan is not far
+    force = max(map(abs, (one.specific_force - other.specific_force).tolist()))
+    rate = max(map(abs, (one.angular_rate - other.angular_rate).tolist()))
+    return force > OUTLIER_FORCE or rate > OUTLIER_RATE  # nan is not far
 
 
 class InputChecks:

@@ -43,6 +43,7 @@ class LagLearner:
         self._lags = {c: deque[int](maxlen=_MEMORY) for c in (WHEEL_ODOMETRY, INERTIAL)}
         self._counts = dict.fromkeys(self._lags, 0)
         self._repeats = deque[bool](maxlen=_MEMORY)
+        self._in_parts = False
         self._odometry: int | None = None  # last stamp of it
         self._newest: int | None = None  # stamp of either channel
         self._gap = 0  # between the last two of these
@@ -95,6 +96,7 @@ class LagLearner:
         if channel == WHEEL_ODOMETRY:
             self._odometry_received = True
             self._repeats.append(stamp == self._odometry and not whole)
+            self._in_parts = sum(self._repeats) > _IN_PARTS * len(self._repeats)
             self._odometry = stamp
         newest = self._newest
         if newest is not None and stamp > newest:
@@ -120,5 +122,4 @@ class LagLearner:
             and self.present - self._first < 2 * LONGEST_HOLD
         ):
             return LONGEST_HOLD  # wheel odometry may still be on its way
-        in_parts = sum(self._repeats) > _IN_PARTS * len(self._repeats)
-        return min(max(*self.learned.values(), int(in_parts)), LONGEST_HOLD)
+        return min(max(*self.learned.values(), int(self._in_parts)), LONGEST_HOLD)
