@@ -62,7 +62,7 @@ class Parts:
             'headings': straight_headings(self.rover),
             'still': False,
             'torque': (math.nan,) * n,
-            'leaving_angles': (math.nan,) * n,
+            'leaving_angles': None,
             'loads': level._replace(load=loads or level.load, force_known=True),
             'turns': (True,) * n,
             'reference_known': True,

@@ -289,7 +289,7 @@ def test_the_first_reading_of_a_wheel_that_dug_in_is_believed(parts, ekf, sinkag
 def sinkage_predicted(parts, x, loads=None, angle=NAN, angle_std=0.0, rims=FORWARD):
     """Return the prediction over a tenth of a second, and the travel."""
     prediction = Prediction.unchanged(x)
-    cycle = parts.cycle(rims, loads, leaving_angles=(angle,) * 6)
+    cycle = parts.cycle(rims, loads, leaving_angles=np.full(6, angle))
     process = SinkageProcess(parts.rover, parts.layout, parts.models, angle_std)
     return prediction, process.predict(prediction, x, cycle)
 
@@ -405,7 +405,7 @@ def test_softer_ground_is_weaker_ground_where_no_torque_says_how_weak(parts):
 
 def linearised(parts, x, loads, angle=NAN, angle_std=0.05):
     linearisation = Linearisation(parts.rover, parts.layout, parts.models, angle_std)
-    cycle = parts.cycle(FORWARD, loads, leaving_angles=(angle,) * 6)
+    cycle = parts.cycle(FORWARD, loads, leaving_angles=np.full(6, angle))
     return linearisation.update(x, cycle, (0.0,) * 6)
 
 

@@ -194,4 +194,4 @@ def test_sinkage_and_leaving_angle_are_kept_wheel_by_wheel():
         angle.update(0.1 * i, LeavingAngleReading(0, np.array([-0.2, NAN])))
     assert angle.angles(3.0)[0] == pytest.approx(-0.2)
     assert math.isnan(angle.angles(3.0)[1])
-    assert math.isnan(angle.angles(4.0)[0])
+    assert angle.angles(4.0) is None

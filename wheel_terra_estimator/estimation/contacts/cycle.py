@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wheel_terra_estimator.arrays import Floats
+from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
@@ -69,7 +69,7 @@ class Cycle(NamedTuple):
     headings: Headings
     still: bool  # all wheels stand
     torque: Floats  # means since the last cycle [N m], nan = no reading
-    leaving_angles: Floats  # [rad], nan = unknown
+    leaving_angles: FloatArray | None  # [rad], nan = unknown; None = no wheel's is known
     loads: LoadState
     turns: tuple[bool, ...]
     """Wheels for which the contact models hold: they turn under a load."""

@@ -95,12 +95,11 @@ class Linearisation(Component[FloatArray]):
         direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
         rut_share, sheared = float(x[RUT_SHARE]), 1.0 - float(x[SHEAR_RADIUS])
         met = _met(x, layout, rut)
-        measured = np.array(cycle.leaving_angles)
         speed = direction * headings.speeds(float(x[SPEED]), cycle.yaw_rate)
         states = contact_states(x, layout, load, rut)._replace(
             speed_ratio=sheared * speed / rim,
             rim_speed=rim,
-            leaving_angle=None if np.isnan(measured).all() else measured,
+            leaving_angle=cycle.leaving_angles,
         )
         forces = self._models.forces(states)
         torque_noise, pull_noise = self._noise_of_angle(states, forces, turning)

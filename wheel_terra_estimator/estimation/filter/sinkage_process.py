@@ -87,6 +87,7 @@ class SinkageProcess(Component[SinkageState]):
         super().__init__(SinkageState(none, (0.0,) * n, (_FIRST_RATE_STD,) * n, np.zeros(n)))
         self._rover, self._layout, self._models = rover, layout, models
         self._leaving_angle_std = leaving_angle_std
+        self._entries = np.arange(layout.size)[layout.sinkage]
 
     def forget_slopes(self) -> None:
         """Reset the smoothed derivatives, when the wheels stand."""
@@ -95,10 +96,10 @@ class SinkageProcess(Component[SinkageState]):
     def predict(self, prediction: Prediction, x: FloatArray, cycle: Cycle) -> float:
         """Add the sinkages to a prediction from a state `x` (size,); return the travel [m]."""
         layout, rims, loads, dt = self._layout, cycle.rims, cycle.loads.load, cycle.dt
-        entries = range(layout.size)[layout.sinkage]
         turning = np.array([abs(rim) >= self._rover.rest_speed for rim in rims])  # known ones
         loaded = np.array(loads) > LEAST_LOAD
-        prediction.Q[entries, entries] = np.where(turning, _LIFTED_WALK, _RESTING_WALK) * dt
+        walk = np.where(turning, _LIFTED_WALK, _RESTING_WALK)
+        prediction.Q[self._entries, self._entries] = walk * dt
         if not turning.any():
             return 0.0
         rim = np.where(turning, rims, 1.0)
@@ -107,14 +108,13 @@ class SinkageProcess(Component[SinkageState]):
         travel = np.abs(speed) + _SPIN_TRAVEL * np.abs(rim - speed)
         relaxes = turning & loaded
         if relaxes.any():
-            measured = np.array(cycle.leaving_angles)
             states = WheelStates(
                 speed / rim,
                 x[layout.sinkage],
                 np.maximum(loads, LEAST_LOAD),
                 float(x[SHEAR_STRENGTH]),
                 float(x[SHEAR_MODULUS]),
-                leaving_angle=None if np.isnan(measured).all() else measured,
+                leaving_angle=cycle.leaving_angles,
                 stiffness=x[layout.stiffness],
                 slip_sinkage=float(x[SLIP_SINKAGE]),
             )
@@ -164,15 +164,15 @@ class SinkageProcess(Component[SinkageState]):
             there = self._models.bearing(states._replace(leaving_angle=angle)).load
             error = (sensitivity * np.log(carried[0] / there)) ** 2
             noise += np.where(np.isnan(angle), 0.0, error)
-        wheels = np.flatnonzero(relaxes)
-        zi = layout.sinkage.start + wheels
+        zi = self._entries[relaxes]
+        ki = zi - layout.sinkage.start + layout.stiffness.start
         memory = np.maximum(1.0 - alpha * _RELAXATION_SLOPE, _LEAST_MEMORY)
-        prediction.mean[zi] = (z + alpha * (target - z))[wheels]
-        prediction.F[zi, zi] = memory[wheels]
-        prediction.F[zi, layout.stiffness.start + wheels] = -sensitivity[wheels]
-        prediction.F[zi, SLIP_SINKAGE] = (-sensitivity * slopes[1])[wheels]
-        prediction.F[zi, SPEED] = (-sensitivity * slopes[0] / rim * by_speed)[wheels]
-        prediction.Q[zi, zi] = noise[wheels]
+        prediction.mean[zi] = (z + alpha * (target - z))[relaxes]
+        prediction.F[zi, zi] = memory[relaxes]
+        prediction.F[zi, ki] = -sensitivity[relaxes]
+        prediction.F[zi, SLIP_SINKAGE] = (-sensitivity * slopes[1])[relaxes]
+        prediction.F[zi, SPEED] = (-sensitivity * slopes[0] / rim * by_speed)[relaxes]
+        prediction.Q[zi, zi] = noise[relaxes]
 
     def end_cycle(
         self, ekf: GatedFilter, before: FloatArray, unread: Sequence[int], dt: float

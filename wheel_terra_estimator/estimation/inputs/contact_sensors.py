@@ -8,7 +8,9 @@ import math
 from math import isnan
 from typing import NamedTuple
 
-from wheel_terra_estimator.arrays import Floats
+import numpy as np
+
+from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import LeavingAngleReading, SinkageReading
 from wheel_terra_estimator.estimation.scalars import NAN
@@ -62,7 +64,6 @@ class LeavingAngleInput(Component[LeavingAngleState]):
 
     def __init__(self, wheel_count: int) -> None:
         super().__init__(LeavingAngleState((NAN,) * wheel_count, (-math.inf,) * wheel_count))
-        self._unknown = (NAN,) * wheel_count
 
     def update(self, time: float, reading: LeavingAngleReading) -> None:
         """Take a message at a time [s]; wheels that are nan were not read."""
@@ -74,12 +75,7 @@ class LeavingAngleInput(Component[LeavingAngleState]):
                 when[i] = time
         self.state = LeavingAngleState(tuple(angle), tuple(when))
 
-    def angles(self, time: float) -> Floats:
-        """Return the leaving angle of each wheel [rad]; nan where none is recent."""
-        state, longest = self.state, _LONGEST_AGE
-        if time - max(state.time) >= longest:
-            return self._unknown
-        return tuple(
-            angle if time - when < longest else NAN
-            for angle, when in zip(state.angle, state.time, strict=True)
-        )
+    def angles(self, time: float) -> FloatArray | None:
+        """Return the leaving angles (n,) [rad], nan where none is recent; None = none is."""
+        recent = [time - when < _LONGEST_AGE for when in self.state.time]
+        return np.where(recent, self.state.angle, NAN) if any(recent) else None
