@@ -48,6 +48,22 @@ def test_radius_track_and_mounting(seed):
     assert told['sensors.imu_mounting_pitch_deg'].after == pytest.approx(0.0, abs=0.3)
 
 
+def test_a_reference_without_stated_variance_or_noise_keeps_a_deviation_that_is_allowed():
+    """Noise is raised, never lowered; 0 would be refused by every command that reads the file."""
+    reference = rolling.recording().reference
+    stated = float(rolling.rover().sensors.reference_std)
+    told = {}
+    for noise in (0.0, 4.0 * stated):
+        scatter = noise * np.random.default_rng(1).standard_normal(reference.stamp.size)
+        velocity = reference.velocity.copy()
+        velocity[:, 0] = 0.3 * np.sign(velocity[:, 0]) + scatter
+        given = replace(reference, velocity=velocity, variance=0.0 * reference.variance)
+        calibration, _ = calibrated(reference=given)
+        told[noise] = {change.key: change.after for change in calibration.changes}
+    assert 'sensors.reference_std' not in told[0.0]
+    assert told[4.0 * stated]['sensors.reference_std'] == pytest.approx(4.0 * stated, rel=0.3)
+
+
 def test_a_reversed_gyro_leaves_the_wheels_on_their_sides():
     """Swapped sides are its rival; without starts nothing tells which of both it is."""
     imu = rolling.recording().imu

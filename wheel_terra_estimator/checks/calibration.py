@@ -155,7 +155,10 @@ SEEN = {
 
 
 def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
-    for key, figure in SEEN.items():
+    figures = dict(SEEN)
+    if report.figures.get('reference.stated_std_m_s') == 0.0:  # the messages state none
+        figures['sensors.reference_std'] = 'reference.noise_m_s'
+    for key, figure in figures.items():
         seen, stated = report.figures.get(figure), changes.number(key)
         if not seen or not math.isfinite(seen):
             continue
@@ -168,10 +171,6 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
             changes.add(key, float(f'{seen:.3g}'), NOISE_STD * seen, source)
         else:
             changes.add(key, round(seen, 2), None, 'median period of the stamps')
-    if report.figures.get('reference.stated_std_m_s') == 0.0:
-        seen = report.figures['reference.noise_m_s']
-        source = 'changes from message to message; the messages state none'
-        changes.add('sensors.reference_std', seen, NOISE_STD * seen, source)
 
 
 def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
