@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """``wheel-terra simulate``: the bag that a user gets, and one line for what cannot be done."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,18 @@ def test_the_bag_has_inputs_and_truth(bag_path):
         found = {name: topic.type for name, topic in bag.topics.items()}
     wanted = {f'/{name}': kind for name, kind in INPUT_TYPES.items() if name != 'leaving_angle'}
     assert found == {**wanted, **TRUTH_TOPICS}
+
+
+def test_the_way_driven_counts_both_ways(tmp_path, capsys):
+    scenario = tmp_path / 'there_and_back.yaml'
+    scenario.write_text("""
+configuration: [generic_six_wheel, test_sand]
+drive: {time: [0.0, 3.0, 3.0], forward: [0.1, 0.1, -0.1]}
+""")
+    drive = ['--scenario', str(scenario), '--duration', '6', '-o', str(tmp_path / 'drive')]
+    assert main(['simulate', *drive]) == 0
+    way = float(re.search(r'6 s, ([0-9.]+) m driven', capsys.readouterr().out)[1])
+    assert 0.4 < way < 0.6, 'twice 3 s of 0.1 m/s, less what starting, turning round and slip cost'
 
 
 @pytest.fixture(scope='module')

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from simulated_ground import drives, ground, rover
+from simulated_ground import SOIL, drives, ground, rover
 
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation import plant as plant_module
 from wheel_terra_estimator.simulation.drives import Command
@@ -93,6 +94,18 @@ def test_a_parked_rover_stays_where_it_is_and_feels_the_attitude_of_its_chassis(
     # The lower wheels carry more and are deeper: the chassis leans further than the ground.
     assert truth.pitch > np.radians(12.0)
     assert truth.roll > np.radians(5.0)
+
+
+def test_a_rover_with_one_axle_feels_the_slope_that_its_caster_runs_on(plant):
+    two = [
+        'wheels.names:=[left, right]', 'wheels.radius:=[0.1, 0.1]', 'wheels.width:=[0.1, 0.1]',
+        'wheels.x:=[0.0, 0.0]', 'wheels.y:=[0.2, -0.2]', 'rover.mass:=20.0',
+        'wheels.torque_limit:=[20.0, 20.0]',
+    ]  # fmt: skip
+    truth = drive(plant(reader.load([], [*SOIL, *two]), slope_deg=7.0), 5.0)
+    assert truth.specific_force[0] == pytest.approx(G * np.sin(np.radians(7.0)), abs=0.02)
+    assert truth.pitch == pytest.approx(np.radians(7.0), abs=1e-3)
+    assert truth.drawbar_pull.sum() == pytest.approx(20.0 * truth.specific_force[0], rel=0.02)
 
 
 def test_a_rover_parked_on_a_kink_is_held_against_the_slope_under_each_wheel(plant):

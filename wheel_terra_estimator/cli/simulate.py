@@ -64,6 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not SHORTEST <= duration <= LONGEST:
         raise UserError(f'--duration {duration:g}: must be {SHORTEST:g} to {LONGEST:g} s')
 
+    import numpy as np
     from tqdm import tqdm
 
     from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
@@ -77,9 +78,9 @@ def run(arguments: argparse.Namespace) -> int:
     bag = write_simulated_drive(drive, arguments.output, arguments.overwrite)
 
     truth = drive.truth
-    distance = abs(float(truth.position[-1, 0] - truth.position[0, 0]))
+    distance = float(np.hypot(*np.diff(truth.position[:, :2], axis=0).T).sum())
     title = Path(scenario.name).stem
-    print(f'{title}, seed {arguments.seed}: {duration:g} s, {distance:.2f} m along the path')
+    print(f'{title}, seed {arguments.seed}: {duration:g} s, {distance:.2f} m driven')
     for name, share in truth.time_in_class().items():
         print(f'  {name:8s} {100.0 * share:5.1f} % of the wheel time')
     stuck = truth.first_stuck()

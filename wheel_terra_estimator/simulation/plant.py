@@ -154,6 +154,8 @@ class RoverPlant:
         self._surface = terrain.height(wheel_x, wheel_y)
         self._sine = self._plane @ self._surface  # of slope along and across the body
         along = terrain.sine_of_slope(wheel_x) * cosine + terrain.sine_of_side_slope * sine
+        if not np.ptp(wheels.x):  # one axle: the third support runs on the same slope
+            self._sine[0] = along.mean()
         self._local_slope = along
         self._tilt = along - self._sine[0]  # small angle between ground at the wheel and body
         self._factors = terrain.soil_factors(wheel_x, wheel_y)
@@ -298,7 +300,7 @@ class RoverPlant:
         force = np.array([push / self._mass, on_body[1] / self._mass, up])  # along the ground
         loads = self._static_loads(force)
         self._load = self._load + (loads - self._load) * -np.expm1(-dt / LOAD_TIME)
-        chassis = self._plane @ (self._surface - self._memory.sinkage)
+        chassis = self._sine - self._plane @ self._memory.sinkage
         attitude = np.arcsin(np.clip(chassis, -0.9, 0.9))
         rates = (attitude - self._attitude) / dt
         self._angular_rate = np.array([rates[1], -rates[0], self._speeds[2]])
