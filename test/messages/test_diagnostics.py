@@ -59,7 +59,11 @@ def test_levels_follow_class_and_warning():
     classes = np.array([2, 3], dtype=np.uint8)
     found = Diagnostics(NAMES).due(at(0.0, slip_class=classes, stuck=True))
     assert levels(found) == [ERROR, WARN, ERROR]
-    assert 'stuck' in found[0].message
+    assert found[0].message == 'stuck: entrapment under way or close ahead'
+    why = ('slip; rover: digging in', 'at rest; rover: digging in')
+    assert (
+        Diagnostics(NAMES).due(at(0.0, stuck=True, reasons=why))[0].message == 'stuck: digging in'
+    )
     unknown = np.array([255, 255], dtype=np.uint8)
     resting = Diagnostics(NAMES).due(at(0.0, slip_class=unknown, reasons=('at rest', 'no rate')))
     assert levels(resting) == [OK, OK, WARN]
@@ -68,6 +72,28 @@ def test_levels_follow_class_and_warning():
     diagnostics.follow(at(0.0))
     found = diagnostics.due(at(1.0, slip_class=unknown, faults=silent))
     assert levels(found) == [WARN, STALE, STALE]
+
+
+UNKNOWN = np.array([255, 0], dtype=np.uint8)
+
+
+def test_an_unknown_class_is_called_so_with_the_slip_that_is_in_doubt():
+    reasons = ('slip 0.42 +- 0.35; rover: digging in', 'slip 0.10 +- 0.05')
+    told = Diagnostics(NAMES).due(at(0.0, slip_class=UNKNOWN, reasons=reasons))[1]
+    assert (told.level, told.message) == (WARN, f'unknown: {reasons[0]}')
+    silent = {'wheel_odometry': 'silent'}
+    told = Diagnostics(NAMES).due(at(0.0, slip_class=UNKNOWN, reasons=reasons, faults=silent))[1]
+    assert (told.level, told.message) == (STALE, 'no wheel rate')
+
+
+def test_one_wheel_without_a_rate_is_a_fault_of_the_node():
+    lacking = {'slip_class': UNKNOWN, 'reasons': ('no wheel rate', 'slip 0.10 +- 0.05')}
+    diagnostics = Diagnostics(NAMES)
+    assert levels(diagnostics.due(at(0.0, **lacking))) == [OK, STALE, OK], 'it may be on its way'
+    found = diagnostics.due(at(1.0, **lacking))
+    assert levels(found) == [WARN, STALE, OK]
+    assert found[0].message == 'left: no wheel rate'
+    assert diagnostics.due(at(4.0))[0].message == 'left: no wheel rate (3 s ago)'
 
 
 def test_a_sensor_that_was_never_there_is_no_fault_one_that_fell_silent_is():
@@ -121,8 +147,9 @@ def test_a_fault_is_told_until_it_was_published_and_for_ten_seconds():
     told = [(i, s[0]) for i, s in enumerate(said, 1) if s]
     for i, status in told:
         assert (status.level == WARN) is (i < 100)
-        told_both = status.message == '; '.join(f'{topic}: {words}' for topic, words in lost)
-        assert told_both is (i < 100)
+        ago = f' ({i // 10} s ago)' if i >= 10 else ''
+        both = '; '.join(f'{topic}: {words}{ago}' for topic, words in lost)
+        assert status.message == (both if i < 100 else 'running')
     assert said[0], 'at once'
     assert any(i > 100 for i, _ in told)
 

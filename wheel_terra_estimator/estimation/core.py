@@ -228,7 +228,9 @@ ReferenceVelocity
             if suspicion is Suspicion.BEHIND:
                 sets += self._insert(arrival)
             else:
-                self._checks.refuse(arrival.channel, 'stamp far ahead of all others')
+                self._checks.refuse(
+                    arrival.channel, 'stamp far ahead of all others (set its clock)'
+                )
         if judgement.stepped_back:
             self._clock_steps += 1
             sets += self._flushed()
@@ -330,7 +332,7 @@ ReferenceVelocity
         if self._clock_stepped:
             self._clock_stepped = False
             faults['clock'] = (
-                f'stamps went back, {self._clock_steps} times so far: a new run begins, soil is '
+                f'stamps went back ({self._clock_steps} so far): a new run begins, soil is '
                 'kept (a looped recording, a clock that was set, or sources of different clocks)'
             )
         for channel, by in self._lags.clock_offsets.items():
@@ -341,7 +343,7 @@ ReferenceVelocity
             )
         if silent:
             name, every = names[WHEEL_ODOMETRY], self._timeline.slow_odometry
-            words = f'no messages on {name}: wheel rates unknown'
+            words = f'no usable message on {name}: wheel rates unknown'
             if every:
                 words = f'{name} arrives every {every:.1f} s -> filter.silence: {2.5 * every:.1f}'
             faults['wheel_odometry'] = words

@@ -84,6 +84,15 @@ class EstimateSet:
     sideways: Sideways | None = None  # slip angles, lateral force and speed; None = unknown
 
     @property
+    def stuck_reason(self) -> str:
+        """Why the warning stands, or that it does not, in words."""
+        for reason in self.reasons:
+            _, mark, words = reason.partition('rover: ')
+            if mark:
+                return words
+        return 'entrapment under way or close ahead' if self.stuck else 'moving freely'
+
+    @property
     def sideways_known(self) -> Sideways:
         """Slip angles, lateral forces and speed; with large deviations where unknown."""
         return Sideways.unknown(self.normal_load) if self.sideways is None else self.sideways

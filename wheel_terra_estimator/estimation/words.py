@@ -24,6 +24,8 @@ COST = {
 }
 """Input that may be missing at a stamp -> that it is, and what that costs."""
 
+NO_RATE = 'no wheel rate'
+
 
 def reasons_in_words(
     rims: Floats, slips: tuple[WheelSlip, ...], assessment: StuckAssessment
@@ -34,7 +36,7 @@ def reasons_in_words(
     words = []
     for rim, stands, wheel in zip(rims, stalled, slips, strict=True):
         if isnan(rim):
-            text = 'no wheel rate'
+            text = NO_RATE
         elif stands:
             text = 'stalled: torque near its limit, hardly turning'
         elif wheel.resting:

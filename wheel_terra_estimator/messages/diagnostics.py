@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.words import COST
+from wheel_terra_estimator.estimation.words import COST, NO_RATE
 
-MEMORY = 10_000_000_000  # how long a fault stands in words after it was last seen [ns]
+SECOND = 1_000_000_000  # [ns]
+MEMORY = 10 * SECOND  # how long a fault stands in words after it was last seen [ns]
 
 _NUMBER = re.compile(r'[0-9]+(\.[0-9]+)?')
 
@@ -50,12 +51,16 @@ class FaultLog:
 
     def standing(self, now: int) -> list[str]:
         """Return the faults that stand, each with its subject in front; clear the others."""
-        for key, fault in list(self._faults.items()):
-            if now < fault.seen:
-                fault.seen = now
-            elif fault.published and now - fault.seen >= MEMORY:
-                del self._faults[key]
-        return [f'{subject}: {f.words}' for (subject, _), f in self._faults.items()]
+        told = []
+        for (subject, form), fault in list(self._faults.items()):
+            fault.seen = min(fault.seen, now)
+            age = now - fault.seen
+            if fault.published and age >= MEMORY:
+                del self._faults[subject, form]
+                continue
+            ended = f' ({age // SECOND} s ago)' if age >= SECOND else ''
+            told.append(f'{subject}: {fault.words}{ended}')
+        return told
 
     def publish(self) -> list[str]:
         """Take note that all faults are reported; return those that were not before."""
@@ -70,11 +75,11 @@ class FaultLog:
 OK, WARN, ERROR, STALE = range(4)
 
 NODE = 'wheel_terra_estimator'
-PERIOD = 1_000_000_000  # time between two messages when no level changes [ns]
+PERIOD = SECOND  # time between two messages when no level changes [ns]
 
 NO_TIME_TO_STUCK = 600.0  # time to an entrapment [s] that is said where none is in sight
 
-START = 1_000_000_000  # in the first second inputs may be on their way [ns]
+START = SECOND  # in the first second inputs may be on their way [ns]
 
 SMALLEST = 1e-12
 """Smaller numbers are written as 0: no unit of this package makes them anything else."""
@@ -150,6 +155,9 @@ class Diagnostics:
         self._awaited = faults.keys() & INPUTS if starts else set()
         passed_over = self._lacking | self._awaited
         self._log.note(((s, w) for s, w in faults.items() if s not in passed_over), now)
+        if not starts and 'wheel_odometry' not in faults:
+            wheels = zip(self._names, estimates.reasons, strict=True)
+            self._log.note(((name, NO_RATE) for name, r in wheels if r.startswith(NO_RATE)), now)
         self.look(estimates.stamp)
 
     def due(self, estimates: EstimateSet) -> list[Status]:
@@ -172,7 +180,7 @@ class Diagnostics:
 
     def now(self, estimates: EstimateSet) -> list[Status]:
         """Return the status of the node, then of each wheel."""
-        words = ['stuck, or about to be'] if estimates.stuck else []
+        words = [f'stuck: {estimates.stuck_reason}'] if estimates.stuck else []
         words += self._log.standing(self.clock(estimates.stamp))
         # Of these nothing is remembered: they hold for this set.
         lacking = sorted((self._lacking or set()) - self._awaited)
@@ -226,7 +234,7 @@ def _wheel_level(estimates: EstimateSet, i: int) -> int:
     slip_class = SlipClass(int(estimates.slip_class[i]))
     if slip_class in _CLASS_WORDS:
         return _CLASS_WORDS[slip_class][0]
-    if 'wheel_odometry' in estimates.faults:
+    if 'wheel_odometry' in estimates.faults or estimates.reasons[i].startswith(NO_RATE):
         return STALE
     return OK if estimates.reasons[i].startswith('at rest') else WARN
 
@@ -235,7 +243,11 @@ def _wheel_status(estimates: EstimateSet, i: int, name: str, node_name: str) -> 
     e = estimates
     reason = e.reasons[i]
     slip_class = SlipClass(int(e.slip_class[i]))
-    message = _CLASS_WORDS[slip_class][1] if slip_class in _CLASS_WORDS else reason
+    level, message = _wheel_level(e, i), reason
+    if slip_class in _CLASS_WORDS:
+        message = _CLASS_WORDS[slip_class][1]
+    elif reason.startswith('slip'):
+        message = NO_RATE if level == STALE else f'unknown: {reason}'
     numbers = {
         'slip': e.slip[i],
         'slip_stddev': e.slip_std[i],
@@ -252,7 +264,7 @@ def _wheel_status(estimates: EstimateSet, i: int, name: str, node_name: str) -> 
     }
     values = [*_values(numbers), ('slip_class', slip_class.name.lower()), ('reason', reason)]
     hardware = _hardware(node_name, name)
-    return Status(_wheel_level(e, i), f'{node_name}: {name}', message, hardware, values)
+    return Status(level, f'{node_name}: {name}', message, hardware, values)
 
 
 def _hardware(node_name: str, wheel: str) -> str:

@@ -480,9 +480,7 @@ class EstimatorNode(LifecycleNode):
             words = f'{LEVELS[level]}: {message}'
             if level == OK or expected:
                 log.info(words)
-            elif level == ERROR:
-                log.error(words)
-            else:
+            elif level != ERROR:  # the stuck warning was logged with its reason
                 log.warning(words)
                 return
         if new_faults:

@@ -76,7 +76,10 @@ class StuckMemory:
             return replace(estimates, stuck=True, stuck_direction=direction, reasons=reasons)
         if estimates.stuck != self.state.stuck:
             self.state = StuckState(
-                estimates.stuck, _reason(estimates), estimates.stamp, estimates.stuck_direction
+                estimates.stuck,
+                estimates.stuck_reason,
+                estimates.stamp,
+                estimates.stuck_direction,
             )
         return estimates
 
@@ -96,12 +99,3 @@ class StuckMemory:
             self._free = stamp, stamp
         self._free = self._free[0], stamp
         return (stamp - self._free[0]) * NANOSECOND >= self._clear_time
-
-
-def _reason(estimates: EstimateSet) -> str:
-    """Return why the warning stands, in words."""
-    for reason in estimates.reasons:
-        _, mark, words = reason.partition('rover: ')
-        if mark:
-            return words
-    return 'entrapment under way or close ahead' if estimates.stuck else 'moving freely'
