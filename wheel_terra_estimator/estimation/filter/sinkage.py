@@ -24,9 +24,10 @@ _FIRST_ACCEPTED_AFTER = 2
 """The same at the start, where the configured soil or the first reading may be far off. In between
 the rejected readings must outnumber those used before."""
 _AGE = 2.0  # up to which a reading counts as known [s]
-MEASURED_STIFFNESS_STD = 2.0
-"""Deviation that the first reading of a wheel adds to its stiffness [ln]: sinkage sensors show
-the stiffness, so that a configured soil that is not the one driven on does not bias the slip."""
+_LOAD_EXPONENT = 1.5
+"""Of sinkage in the load that a wheel bears: n + 1/2, with n = 1 of most soils (Bekker)."""
+_LEAST_SINKAGE = 1e-3
+"""Sinkage [m] below which readings are mostly noise."""
 FLOOR_VARIANCE = 1e-10  # of a reading [m^2]
 
 
@@ -88,7 +89,10 @@ class SinkageUpdate(Component[SinkageUpdateState]):
                     continue
                 ekf.inflate(index, residual * residual)
             if not used[i]:
-                ekf.inflate(self._layout.stiffness.start + i, MEASURED_STIFFNESS_STD**2)
+                # By as much as the configured soil is off, the stiffness is uncertain.
+                seen, expected = np.maximum((total / count, ekf.mean[index]), _LEAST_SINKAGE)
+                off = _LOAD_EXPONENT * math.log(seen / expected)
+                ekf.inflate(self._layout.stiffness.start + i, off**2)
             in_a_row[i] = 0
             used[i] = min(used[i] + 1, _ACCEPTED_AFTER)
             mean_nis = smoothed_nis(mean_nis, min(nis, self._gate))
