@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import main
-from wheel_terra_estimator.cli.terminal import Harmless
+from wheel_terra_estimator.cli.terminal import PrintableStream
 from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.scheduler import worker_pool
 
@@ -172,7 +172,7 @@ def test_output_that_fails_is_no_error_of_the_program(number, room, arguments):
 
 def test_a_terminal_that_knows_ascii_alone():
     plain = io.TextIOWrapper(io.BytesIO(), encoding='ascii')
-    print('3 \xb1 1 \x1b[2J', file=Harmless(plain), flush=True)
+    print('3 \xb1 1 \x1b[2J', file=PrintableStream(plain), flush=True)
     assert plain.buffer.getvalue() == rb'3 \xb1 1 \x1b[2J' + b'\n'
 
 

@@ -197,13 +197,13 @@ class Model:
             pass_number=np.asarray(pass_number),
         )
         state = self._model.steady_state(points)
-        answers = {name: getattr(state, name) for name in (f.name for f in fields(Curve)[3:])}
+        outputs = {name: getattr(state, name) for name in (f.name for f in fields(Curve)[3:])}
         # As the sensors of the wheel would read them (``sensors.*`` of the configuration).
-        answers |= Readings.of(self.configuration).of_answer(state)
+        outputs |= Readings.of(self.configuration).of_state(state)
         carried = (state.flags & OVERLOADED) == 0
-        answers = {name: np.where(carried, values, np.nan) for name, values in answers.items()}
+        outputs = {name: np.where(carried, values, np.nan) for name, values in outputs.items()}
         inputs = (np.array(values) for values in (points.slip, points.normal_load, points.slope))
-        return Curve(*inputs, **answers)
+        return Curve(*inputs, **outputs)
 
     def sweep(
         self,

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _KNOWN_TO = 1.0
 """Share of the start's value to which a fit of a soil takes each of its numbers as known."""
 _ZERO = {'sinkage_offset': {'offset': 0.0, 'offset_std': 0.003}}  # [m], of a sensor; assumed
-_TELLS = 2.0  # times what such a zero leaves open of the exponent: a shift that tells of it
+_SHIFT_FACTOR = 2.0  # shift of the exponent that shows such a zero, over its deviation by it [-]
 _DEGREES = 'friction_angle_deg'
 _MODULI = ('cohesive_modulus', 'frictional_modulus')
 """Without a unit in the law of Reece."""
@@ -159,9 +159,9 @@ class Soil(terramechanics_soil.Soil):
             start = cls.load(start)
         if start is None:
             start = _nearest(rows, wheel, [cls.load(name) for name in cls.available()], rest)
-        believed = configuration_of(wheel, start, *rest)
+        prior = configuration_of(wheel, start, *rest)
         options = Options(effects=(), soil_known_to=_KNOWN_TO)
-        diagnosis = diagnose(rows, believed, None, options)
+        diagnosis = diagnose(rows, prior, None, options)
         over = [name for name, gap in diagnosis.gap.items() if gap.fitted > gap.limit]
         if over:
             words = (
@@ -170,11 +170,11 @@ class Soil(terramechanics_soil.Soil):
             warnings.warn(words, stacklevel=2)
         fitted = cls._of(corrected(diagnosis)[0])
         if not over and 'sinkage' in rows.quantities and 'sinkage_offset' not in rest[0]:
-            believed = configuration_of(wheel, start, {**rest[0], **_ZERO}, *rest[1:])
-            free = cls._of(corrected(diagnose(rows, believed, None, options))[0])
+            prior = configuration_of(wheel, start, {**rest[0], **_ZERO}, *rest[1:])
+            free = cls._of(corrected(diagnose(rows, prior, None, options))[0])
             n, with_zero = float(fitted.sinkage_exponent), float(free.sinkage_exponent)
             own, std = fitted.std['sinkage_exponent'], free.std['sinkage_exponent']
-            if abs(with_zero - n) > _TELLS * max(math.sqrt(max(std**2 - own**2, 0.0)), own):
+            if abs(with_zero - n) > _SHIFT_FACTOR * max(math.sqrt(max(std**2 - own**2, 0.0)), own):
                 words = (
                     f'sinkage_exponent is {n:.2f}, or {with_zero:.2f} if the sinkage sensor has a '
                     'zero error of some millimetres: read it on a hard floor'
@@ -285,21 +285,21 @@ def _nearest(
     """Return the soil of Bekker's law whose plain model is nearest to the measured rows."""
     from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, operating_points
 
-    def answer_of(soil: Soil) -> SteadyState:
+    def state_of(soil: Soil) -> SteadyState:
         points = operating_points(table.columns, configuration_of(wheel, soil, *rest), table.name)
         return WheelSoilModel(soil, rest[0], 'closed_form', strict=False).steady_state(points)
 
     def distance(soil: Soil) -> float:
-        answer = answer_of(soil)
-        total = 10.0 * float(np.mean(answer.flags & OVERLOADED))  # rows that it does not carry
+        state = state_of(soil)
+        total = 10.0 * float(np.mean(state.flags & OVERLOADED))  # rows that it does not carry
         for quantity, measured in zip(QUANTITIES, table.measured.T, strict=True):
             if np.isfinite(measured).any():
-                error = np.sqrt(np.nanmean((getattr(answer, quantity) - measured) ** 2))
+                error = np.sqrt(np.nanmean((getattr(state, quantity) - measured) ** 2))
                 total += float(error / max(np.nanmax(np.abs(measured)), 1e-9))
         return total
 
     found = min((soil for soil in soils if soil.pressure_law == 'bekker'), key=distance)
-    if (answer_of(found).flags & OVERLOADED).any():
+    if (state_of(found).flags & OVERLOADED).any():
         raise UserError(
             f'{table.name}: no shipped soil carries these loads on this wheel; check the units of '
             'normal_load and wheel, or give the soil where the fit begins: start'

@@ -330,8 +330,8 @@ class _EstimateMessages:
 
     def history(self) -> EstimateHistory:
         """Return the sets that are whole; nan (class 255) for fields without a message."""
-        told = set().union(*self._sets.values())
-        wanted = told.intersection((*WHEEL_FIELDS, 'slip_class', 'forward_velocity'))
+        present = set().union(*self._sets.values())
+        wanted = present.intersection((*WHEEL_FIELDS, 'slip_class', 'forward_velocity'))
         whole = {stamp: row for stamp, row in self._sets.items() if wanted <= row.keys()}
         shape = len(whole), len(self._names)
         nothing = [np.nan] * len(self._names)

@@ -245,19 +245,19 @@ class _Sender:
             [self.value(line, row, columns.get(field)) for columns in joints.values()]
             for field in _JOINT
         )
-        if _any_told(rates):
+        if _any_given(rates):
             (before, was), rate = self.common, _mean(rates)
             seconds = (stamp - before) * 1e-9 if before else 0.0
             self.turned += 0.5 * (was + rate) * seconds
             self.squared += 0.5 * (was**2 + rate**2) * seconds
             self.common = stamp, rate
-        if _any_told(rates) or _any_told(angles):
+        if _any_given(rates) or _any_given(angles):
             message = pack.joint_state(
                 stamp,
                 tuple(joints),
                 velocity=rates,
-                effort=torques if _any_told(torques) else (),
-                position=angles if _any_told(angles) else (),
+                effort=torques if _any_given(torques) else (),
+                position=angles if _any_given(angles) else (),
             )
             self.bag.write('/joint_states', message, stamp)
         self._imu(line, row, stamp)
@@ -324,15 +324,15 @@ class _Sender:
     def _sinkage(self, line: int, row: list[str], stamp: int) -> None:
         columns = self.layout.sinkage
         depths = [self.value(line, row, column) for column in columns.values()]
-        if _any_told(depths):
+        if _any_given(depths):
             message = pack.joint_state(stamp, tuple(columns), position=depths)
             self.bag.write('/sinkage', message, stamp)
 
     def _reference(self, line: int, row: list[str], stamp: int, rates: list[float]) -> None:
         columns, arrival = self.layout.reference, stamp
         speed = self.value(line, row, columns.get('linear.x'))
-        told = self.value(line, row, columns.get('variance'))
-        variance = 0.0 if math.isnan(told) else told  # 0: the rover file decides
+        given = self.value(line, row, columns.get('variance'))
+        variance = 0.0 if math.isnan(given) else given  # 0: the rover file decides
         for pair in _PLACES:
             if set(pair) <= set(columns):
                 place = [self.value(line, row, columns[key]) for key in pair]
@@ -353,5 +353,5 @@ def _mean(values: list[float]) -> float:
     return sum(known) / len(known) if known else 0.0
 
 
-def _any_told(values: list[float]) -> bool:
+def _any_given(values: list[float]) -> bool:
     return not all(math.isnan(value) for value in values)

@@ -106,12 +106,12 @@ class TrackRecorder:
         if not 0.0 <= step <= PAUSE:
             step = 0.0  # a pause, or a clock that steps back: the path between is unknown
         way = estimates.forward_velocity * step
-        told = self._attitude(estimates.stamp)
+        attitude = self._attitude(estimates.stamp)
         climb = 0.0
-        if told is None:
+        if attitude is None:
             self._heading += estimates.yaw_rate * step
         else:
-            self._heading, climb = told
+            self._heading, climb = attitude
         level = way * math.sqrt(max(1.0 - climb * climb, 0.0))
         self._place[0] += level * math.cos(self._heading)
         self._place[1] += level * math.sin(self._heading)

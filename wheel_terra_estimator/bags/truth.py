@@ -103,10 +103,10 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
     angle = found['slip_angle']  # to be interpolated
     found['slip_angle'] = replace(angle, value=np.unwrap(angle.value, axis=0))
     source = '/ground_truth' if simulated else BODY_VELOCITY
-    return Truth(source, velocity, **{name: _told(series) for name, series in found.items()})
+    return Truth(source, velocity, **{name: _known(series) for name, series in found.items()})
 
 
-def _told(series: WheelTruth) -> WheelTruth | None:
+def _known(series: WheelTruth) -> WheelTruth | None:
     """Return a series of values; None of a topic without any."""
     known = series.known()
     return known if known.stamp.size else None

@@ -105,9 +105,9 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
         trial = pool.submit(_trial, output / 'trial')
         try:
             for drive, part in zip(DRIVES, drives, strict=True):
-                if status := _told(f'{drive.name}: {drive.title}', part):
+                if status := _ended(f'{drive.name}: {drive.title}', part):
                     return status
-            if status := _told('trial: which effect is missing in the model of a wheel?', trial):
+            if status := _ended('trial: which effect is missing in the model of a wheel?', trial):
                 return status
         finally:  # after Ctrl-C or an error nothing new begins
             pool.shutdown(wait=False, cancel_futures=True)
@@ -122,7 +122,7 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
     return 0
 
 
-def _told(title: str, part: Future[Ended]) -> int:
+def _ended(title: str, part: Future[Ended]) -> int:
     """Print the title, then the output of a part; return its status."""
     print(f'\n=== {title}\n', flush=True)
     done = part.result()
@@ -160,18 +160,18 @@ def _named(folder: Path) -> str:
         raise UserError(f'{path}: its checksum is wrong; reinstall the package')
     report = json.loads((folder / 'diagnosis' / 'report.json').read_text(encoding='utf-8'))
     hidden = ' + '.join(json.loads(sealed)['hidden'])
-    said = ' + '.join(effect['name'] for effect in report['effects']) or report['verdict']
-    judged = 'right' if said == hidden else 'wrong'
-    return f'hidden effect {hidden}, identified {said}: {judged}'
+    found = ' + '.join(effect['name'] for effect in report['effects']) or report['verdict']
+    judged = 'right' if found == hidden else 'wrong'
+    return f'hidden effect {hidden}, identified {found}: {judged}'
 
 
 def _drive(number: int, output: Path, live: bool) -> Ended:
     """Run a drive; where DDS does not connect it with the node, replay it."""
     done = _run(_command(DRIVES[number], output, live), _environment(number))
     if live and done.returncode == NODE_NOT_FOUND:
-        said = 'DDS does not reach the node on this machine: using `wheel-terra replay` instead.\n'
+        note = 'DDS does not reach the node on this machine: using `wheel-terra replay` instead.\n'
         done = _run(_command(DRIVES[number], output, False), _environment(number))
-        done.stdout = said + done.stdout
+        done.stdout = note + done.stdout
     return done
 
 

@@ -131,7 +131,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print((output / 'report.json').read_text(encoding='utf-8').rstrip())
     else:
-        _tell(diagnosis, output)
+        _print_result(diagnosis, output)
     return 0
 
 
@@ -163,7 +163,7 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
     return diagnosis
 
 
-def _tell(diagnosis: Diagnosis, output: Path) -> None:
+def _print_result(diagnosis: Diagnosis, output: Path) -> None:
     """Print the verdict, the gaps, the next measurement and the files written."""
     from wheel_terra_estimator.discrepancy.numbers import SHOWN, number
     from wheel_terra_estimator.discrepancy.report.words import soil_line, worth

@@ -95,7 +95,7 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
         if arguments.mass:
             guessed = sketch.guessed - {'rover.mass'}
             sketch = replace(sketch, mass=arguments.mass, guessed=guessed)
-        x, y = _apart(sketch.x, arguments.wheelbase), _apart(sketch.y, arguments.track)
+        x, y = _spread_to(sketch.x, arguments.wheelbase), _spread_to(sketch.y, arguments.track)
         sketch = replace(sketch, x=x, y=y)
         return replace(sketch, name=arguments.name or sketch.name)
     topic = _odometry_alone(arguments) if arguments.bag and wheels else ''
@@ -108,7 +108,7 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
     return replace(_from_measures(arguments, wheels), wheel_odometry='odom' if topic else '')
 
 
-def _apart(places: Sequence[float], distance: float | None) -> Sequence[float]:
+def _spread_to(places: Sequence[float], distance: float | None) -> Sequence[float]:
     """Return places whose outermost have the measured distance, if there is one [m]."""
     low, high = min(places), max(places)
     if distance is None or low == high:
@@ -183,7 +183,7 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
         words = {name: f'--{name} {unit} ({meaning})' for name, unit, meaning in _MEASURES}
         raise UserError(f'missing: {", ".join(words[name] for name in missing)}')
     sides = [side_of(name) for name in wheels]
-    told = 0 not in sides or arguments.wheels is not None  # whose order is asked for
+    order_known = 0 not in sides or arguments.wheels is not None  # whose order is asked for
     if 0 in sides:  # left before right, as the file has it
         sides = [1 if i % 2 == 0 else -1 for i in range(len(wheels))]
     if len(wheels) == 1:
@@ -195,7 +195,7 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
     count = len(wheels)
     guessed = {'rover.centre_of_gravity'} | (set() if measures['width'] else {'wheels.width'})
     guessed |= {'wheels.x'} if last > 1 else set()
-    guessed |= {'wheels.y'} if sum(sides) or not told else set()
+    guessed |= {'wheels.y'} if sum(sides) or not order_known else set()
     return RoverSketch(
         name=arguments.name or 'my rover',
         wheels=wheels,

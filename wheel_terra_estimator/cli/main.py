@@ -23,11 +23,11 @@ from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import outputs
 from wheel_terra_estimator.cli.terminal import (
     UNUSABLE_INPUT,
-    Harmless,
     Parser,
-    complain,
+    PrintableStream,
     discard_output,
     open_closed_streams,
+    print_error,
     suggestion,
     termination_as_interrupt,
 )
@@ -153,10 +153,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser, subs = _parsers([word for word in words if word in COMMANDS][:1])
         arguments, unknown = parser.parse_known_args(words)
     except KeyboardInterrupt:
-        complain('wheel-terra: interrupted')
+        print_error('wheel-terra: interrupted')
         return INTERRUPTED
     except UserError as error:
-        complain(f'wheel-terra {next(word for word in words if word in COMMANDS)}: {error}')
+        print_error(f'wheel-terra {next(word for word in words if word in COMMANDS)}: {error}')
         return UNUSABLE_INPUT
     if unknown:
         _refuse(unknown[0], subs[arguments.command])
@@ -164,7 +164,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.debug:  # silent corrections are reported, too
             logging.basicConfig()
             logging.getLogger('wheel_terra_estimator').setLevel(logging.DEBUG)
-        shown: Any = Harmless(sys.stdout)
+        shown: Any = PrintableStream(sys.stdout)
         with redirect_stdout(shown), termination_as_interrupt(), warnings.catch_warnings():
             warnings.simplefilter('always', ConfigurationWarning)
             warnings.showwarning = partial(_show_warning, arguments.command, warnings.showwarning)
@@ -173,7 +173,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
             return status
     except KeyboardInterrupt as interrupt:
-        complain(f'wheel-terra {arguments.command}: interrupted{interrupt}')
+        print_error(f'wheel-terra {arguments.command}: interrupted{interrupt}')
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output (head, less) has gone: not an error of ours.
@@ -191,7 +191,7 @@ def _show_warning(
 ) -> None:
     """Print a warning on a configuration in one line, other warnings as Python does."""
     if issubclass(category, ConfigurationWarning):
-        complain(f'wheel-terra {command}: warning: {message}')
+        print_error(f'wheel-terra {command}: warning: {message}')
     else:
         others(message, category, *where)
 
@@ -200,9 +200,9 @@ def _ended_by(error: BaseException, command: str) -> int:
     """Print the error that ended a command; return the exit status."""
     outside = outside_cause(error)
     if outside is not None:
-        complain(f'wheel-terra {command}: {outside}')
+        print_error(f'wheel-terra {command}: {outside}')
         return UNUSABLE_INPUT
-    complain(
+    print_error(
         f'wheel-terra {command}: error of the program '
         f'({type(error).__name__}: {error}); add --debug for the traceback to report'
     )

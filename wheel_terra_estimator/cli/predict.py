@@ -146,9 +146,9 @@ def run(arguments: argparse.Namespace) -> int:
     if sideways:
         result['slip_angle'] = columns['slip_angle']
     # As the sensors of the wheel would read them, like the tables of measurements.
-    answers = Readings.of(configuration, _wheel_index(arguments, configuration)).of_answer(state)
-    answers |= {SIDEWAYS: state.lateral_force} if sideways else {}
-    result |= {name: np.where(overloaded, np.nan, values) for name, values in answers.items()}
+    outputs = Readings.of(configuration, _wheel_index(arguments, configuration)).of_state(state)
+    outputs |= {SIDEWAYS: state.lateral_force} if sideways else {}
+    result |= {name: np.where(overloaded, np.nan, values) for name, values in outputs.items()}
     if arguments.noise is not None:
         result = _measured(result, arguments.noise, arguments.seed)
     _write(result, arguments, configuration)

@@ -109,10 +109,10 @@ def _run_one(arguments: argparse.Namespace) -> int:
         bag, configuration, remaps, arguments.output, _options(arguments), print_findings
     )
     if arguments.json:
-        told = as_dict(drive.summary)
-        told['findings'] = drive.checked.as_dict()['findings']
-        told['truth'] = truth_scores.as_dict(drive.errors) if drive.errors else None
-        print(json.dumps(told, indent=2))
+        content = as_dict(drive.summary)
+        content['findings'] = drive.checked.as_dict()['findings']
+        content['truth'] = truth_scores.as_dict(drive.errors) if drive.errors else None
+        print(json.dumps(content, indent=2))
     else:
         print(drive.as_text)
     written = _write_outputs(drive, arguments)

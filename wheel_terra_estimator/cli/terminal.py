@@ -26,7 +26,7 @@ _HARMFUL = re.compile(
 )
 
 
-def harmless(text: str) -> str:
+def printable(text: str) -> str:
     r"""Return a text whose control characters are written out (``\x1b``)."""
     return _HARMFUL.sub(lambda found: ascii(found[0])[1:-1], text)
 
@@ -47,7 +47,7 @@ def discard_output() -> None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-class Harmless:
+class PrintableStream:
     """A text stream that writes out control characters and what its encoding does not have."""
 
     def __init__(self, stream: IO[str]) -> None:
@@ -55,7 +55,7 @@ class Harmless:
 
     def write(self, text: str) -> int:
         """Write a text without characters that the terminal cannot show."""
-        shown = harmless(text)
+        shown = printable(text)
         if not shown.isascii():
             encoding = getattr(self._stream, 'encoding', None) or 'utf-8'
             shown = shown.encode(encoding, 'backslashreplace').decode(encoding)
@@ -93,7 +93,7 @@ class Parser(argparse.ArgumentParser):
         """Print an error in one line and exit with status 2."""
         if 'invalid choice: ' in message:
             message = self._nearest_choice(message)
-        complain(f'{self.prog}: {message} (help: {self.prog} --help)')
+        print_error(f'{self.prog}: {message} (help: {self.prog} --help)')
         self.exit(UNUSABLE_INPUT)
 
     def _nearest_choice(self, message: str) -> str:
@@ -113,9 +113,9 @@ def suggestion(wrong: str, known: Sequence[str]) -> str:
     return f"did you mean '{close[0]}'?" if close else f'there are {", ".join(known)}'
 
 
-def complain(line: str) -> None:
+def print_error(line: str) -> None:
     """Print a line on standard error, red on a terminal that wants colours (NO_COLOR: none)."""
-    line = harmless(line.replace('\n', ' '))
+    line = printable(line.replace('\n', ' '))
     if len(line) > LONGEST_LINE:
         half = LONGEST_LINE // 2
         line = f'{line[:half]} ... {line[-half:]}'

@@ -302,7 +302,7 @@ class Readings:
         """Return the readings of true values; quantities on the last axis."""
         return true * self.gain + self.zero
 
-    def of_answer(self, state: SteadyState) -> dict[str, FloatArray]:
+    def of_state(self, state: SteadyState) -> dict[str, FloatArray]:
         """Return the readings (N,) of each of `OUTPUTS` where the model has them."""
         true = np.column_stack([getattr(state, name) for name in OUTPUTS])
         return dict(zip(OUTPUTS, self.read(true).T, strict=True))

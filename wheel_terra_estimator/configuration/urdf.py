@@ -130,8 +130,8 @@ def _parse(path: Path, data: bytes | None) -> ElementTree.Element:
         raise UserError(f'{path}: not valid XML: {error}') from None
     if robot.tag != 'robot':
         raise UserError(f'{path}: the root is <{robot.tag}>, a URDF has <robot>')
-    told = re.sub(r'<!--.*?-->', '', text, flags=re.DOTALL)  # xacro leaves its banner there
-    if '${' in told or '<xacro:' in told:
+    uncommented = re.sub(r'<!--.*?-->', '', text, flags=re.DOTALL)  # xacro leaves its banner there
+    if '${' in uncommented or '<xacro:' in uncommented:
         raise UserError(f'{path}: is a xacro; expand it first: xacro {path.name} > rover.urdf')
     return robot
 

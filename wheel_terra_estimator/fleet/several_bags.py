@@ -98,11 +98,11 @@ def _replay_into(
         if isinstance(row, Exception):
             row = DriveRow(str(bags[i]), error=_words(row, paths[i]))
         rows[i] = row
-    told = [replace(rows[i], bag=str(bag)) for i, bag in enumerate(bags)]
+    ordered = [replace(rows[i], bag=str(bag)) for i, bag in enumerate(bags)]
     with new_file(output / SUMMARY_TABLE, overwrite=True) as path:
-        write_table(told, path)
-    write_summary_page(told, output / SUMMARY_PAGE, settings.files.get('report', ''))
-    return told
+        write_table(ordered, path)
+    write_summary_page(ordered, output / SUMMARY_PAGE, settings.files.get('report', ''))
+    return ordered
 
 
 def _tasks(

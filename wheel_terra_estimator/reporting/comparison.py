@@ -107,8 +107,8 @@ def as_text(comparison: Comparison) -> str:
         f'same slip class in {100 * c.same_class:.1f} % of the wheel time',
     ]
     for letter, starts in zip('AB', c.warnings, strict=True):
-        told = ', '.join(f'{start:.1f} s' for start in starts) or 'none'
-        lines.append(f'stuck warnings of {letter}: {told}')
+        listed = ', '.join(f'{start:.1f} s' for start in starts) or 'none'
+        lines.append(f'stuck warnings of {letter}: {listed}')
     lines += ['', f'  {"B minus A":24}{"mean":>11}{"rms":>11}{"greatest":>11}   where']
     for d in c.differences:
         label = f'{d.name} [{d.unit}]'

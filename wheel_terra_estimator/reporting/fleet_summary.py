@@ -97,12 +97,12 @@ def write_table(rows: Sequence[DriveRow], path: Path) -> None:
 
 
 def _figures(row: DriveRow) -> list[Any]:
-    def told(value: float | None, digits: int) -> str:
+    def text(value: float | None, digits: int) -> str:
         return '' if value is None else f'{value:.{digits}f}'
 
-    figures = [told(row.duration, 3), row.sets, row.stuck_warnings, told(row.first_warning, 3)]
-    figures += [told(row.seconds[c], 3) for c in CLASSES]
-    return [*figures, told(row.longest_stuck, 3), told(row.max_slip, 4), told(row.max_sinkage, 4)]
+    figures = [text(row.duration, 3), row.sets, row.stuck_warnings, text(row.first_warning, 3)]
+    figures += [text(row.seconds[c], 3) for c in CLASSES]
+    return [*figures, text(row.longest_stuck, 3), text(row.max_slip, 4), text(row.max_sinkage, 4)]
 
 
 def write_summary_page(rows: Sequence[DriveRow], path: Path, report: str = '') -> None:

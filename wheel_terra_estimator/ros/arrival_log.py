@@ -34,11 +34,9 @@ class ArrivalLog:
     may not, or cannot, be written.
     """
 
-    def __init__(
-        self, name: str, inputs: Iterable[Path], complain: Callable[[str], object]
-    ) -> None:
+    def __init__(self, name: str, inputs: Iterable[Path], warn: Callable[[str], object]) -> None:
         self._file: TextIO | None = None
-        self._complain = complain
+        self._warn = warn
         if not name:
             return
         path = Path(name).expanduser()
@@ -57,7 +55,7 @@ class ArrivalLog:
         try:
             self._file.write(f'{line}\n')
         except OSError as error:
-            self._complain(f'record_arrival: the log ends here ({error.strerror})')
+            self._warn(f'record_arrival: the log ends here ({error.strerror})')
             self.close()
 
     def close(self) -> None:

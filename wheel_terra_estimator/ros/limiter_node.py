@@ -66,7 +66,7 @@ class TractionLimiter(Node):
         self._refuse_unknown()
         self._file = Path(name).expanduser() if name else None
         self._unkept = ''  # why the state is not in its file
-        self._told: list[str] = []  # faults of the wiring that stand in the log
+        self._logged_faults: list[str] = []  # faults of the wiring that stand in the log
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._state = self._start()
         self._decision: limiter.Decision | None = None
@@ -194,9 +194,9 @@ class TractionLimiter(Node):
             level = ERROR
             words = words if state.reason in words else f'{state.reason}; {words}'
         faults = self._faults_of_wiring()
-        for fault in set(faults) - set(self._told):
+        for fault in set(faults) - set(self._logged_faults):
             self.get_logger().warning(fault)
-        self._told = faults
+        self._logged_faults = faults
         faults = [*faults, f'state_file: {self._unkept}'] if self._unkept else faults
         if faults:
             level, words = max(level, WARN), '; '.join([words, *faults])
