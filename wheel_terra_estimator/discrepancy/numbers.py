@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 
-# How quantities are shown: factor and unit.
+# Factor and unit in which quantities are printed.
 OF_BEDS = {'stiffness': 'stiffness', 'tan_friction': 'tan phi'}  # that differ between beds
 SHOWN = {
     'sinkage': (1e3, 'mm'),
@@ -20,7 +20,7 @@ SHOWN = {
 
 
 def plain(name: str) -> str:
-    """Return the name of a quantity, an input or an effect as it is said."""
+    """Return the name of a quantity, an input or an effect for a reader."""
     return name.replace('_', ' ')
 
 
@@ -30,7 +30,7 @@ def joined(keys: Iterable[str]) -> str:
 
 
 def axis_label(quantity: str) -> str:
-    """Return what stands at the axis of a quantity: its name, and the unit in which it is shown."""
+    """Return the axis label of a quantity: name and unit."""
     return f'{plain(quantity)} [{SHOWN[quantity][1]}]'
 
 
@@ -40,7 +40,7 @@ def with_unit(text: str, unit: str) -> str:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return significant digits, without an exponent but for what is tiny."""
+    """Return significant digits, with an exponent for tiny values alone."""
     if not math.isfinite(value):
         return '-'
     if value == 0.0:
@@ -53,12 +53,12 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def amount(quantity: str, value: float | None, digits: int = 3) -> str:
-    """Return a value of a quantity as it is shown, without its unit."""
+    """Return a value of a quantity as printed, without its unit."""
     return '-' if value is None else number(SHOWN[quantity][0] * value, digits)
 
 
 def percent(probability: float) -> str:
-    """Return a probability; one next to 0 or 1 is never said to be certain."""
+    """Return a probability; one next to 0 or 1 is not rounded to certainty."""
     if probability > 0.99:
         return 'over 99 %'
     return 'below 1 %' if probability < 0.01 else f'{100.0 * probability:.0f} %'

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a decision to the diagnosis that is reported; nothing is decided here."""
+"""Converts a decision into the reported diagnosis, without deciding anything."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
 
 _CANDIDATES_SHOWN = 12
-_NEAREST = 3  # effects named as nearest where nothing is named
+_NEAREST = 3  # effects listed as nearest where none is identified
 
 
 def render(
     table: SteadyTable, both: SteadyTable, configuration: Configuration, decision: Decision
 ) -> Diagnosis:
-    """Return what is reported of a decision.
+    """Return the diagnosis of a decision.
 
     ``table``, ``both``: the rows under diagnosis, and with those of a reference behind them.
     """
@@ -168,7 +168,7 @@ def _nearest(decision: Decision) -> tuple[str, ...]:
 
 
 def _candidates(decision: Decision) -> tuple[Candidate, ...]:
-    """Return the best explanations, nothing among them, each with why it was not the one."""
+    """Return the best explanations, the empty one included, each with the reason against it."""
     findings, verdict = decision.findings, decision.verdict
     selection = findings.selection
     nothing = selection.nothing

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a diagnosis says: typed, ready for pictures, and written as ``report.json``."""
+"""Result of a diagnosis: typed, for pictures, and written as ``report.json``."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class NamedEffect:
     parameters: Mapping[str, FittedParameter]  # parameter name -> fitted parameter
     confidence: float  # probability that the name is right, calibrated on synthetic campaigns
     confidence_of_set: float  # probability that the name or one of ``confounded_with`` is right
-    # Effects that the data cannot tell from it, most probable first
+    # Effects that the data cannot separate from it, most probable first
     confounded_with: tuple[str, ...] = ()
     remainder: bool = False  # True where something smooth is left that it does not explain
     claim: str = field(default='', metadata=_ASIDE)
@@ -62,7 +62,7 @@ class Candidate:
     json_also: ClassVar[Mapping[str, str]] = {'name': 'label', 'form': 'form'}
 
     names: tuple[str, ...] = field(metadata=_ASIDE)  # the effects in it
-    # Log marginal likelihood relative to ``nothing``: above 0 the data speak for it
+    # Log marginal likelihood relative to ``nothing``: above 0 the data favour it
     log_evidence: float
     probability: float  # posterior probability among all fitted sets
     parameters: Mapping[str, FittedParameter]  # ``effect.parameter`` -> fitted parameter
@@ -114,7 +114,7 @@ class LeftOut:
 class Proposal:
     """A law in the closures of the model for what no listed effect explains."""
 
-    words: str  # what it says
+    words: str  # statement of the law
     # Each term changes a target with a feature (``effects.learned_closure`` lists both)
     targets: tuple[str, ...]
     features: tuple[str, ...]
@@ -131,7 +131,7 @@ class Proposal:
     bed: tuple[SoilShift, ...] = field(default=(), metadata=_ASIDE)
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict, metadata=_ASIDE)
     fit: Fit | None = field(default=None, metadata=_ASIDE)  # the fitted model, law included
-    # Refit and law hold the soil where it can be believed: another soil alone would leave no gap,
+    # Refit and law hold the soil where it is plausible: another soil alone would leave no gap,
     # but is too far from the configured one
     soil_held: bool = False
     # Share of the refit's gap on left-out levels that the law closes
@@ -224,7 +224,7 @@ class Noise:
     origin: Mapping[str, str]
     # Quantity -> pooled deviation of rows that repeat one another, its degrees of freedom
     repeatability: Mapping[str, tuple[float, int]] = field(default_factory=dict)
-    # The same over the stated deviation of each row, of table and reference apart
+    # The same over the stated deviation of each row, of table and reference separately
     scatter: Mapping[str, tuple[float, int]] = field(default_factory=dict)
 
 
@@ -233,7 +233,7 @@ class Diagnosis:
     """Everything a diagnosis found."""
 
     verdict: str  # ``agrees``, ``named``, ``unexplained`` or ``undecided``
-    sentence: str  # the verdict for people, in one or two sentences
+    sentence: str  # the verdict in one or two sentences
     table: SteadyTable = field(metadata=_ASIDE)
     configuration: Configuration = field(metadata=_ASIDE)
     effects: tuple[NamedEffect, ...]  # strongest first; empty unless ``named``
@@ -264,7 +264,7 @@ class Diagnosis:
     base_effects: tuple[str, ...] = ()  # effects that the configuration had switched on already
     # ``effect.parameter`` -> fitted value, of parameters that were on already
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict)
-    nearest: tuple[str, ...] = ()  # where nothing was named: the effects that come nearest
+    nearest: tuple[str, ...] = ()  # where none was identified: the nearest effects
     # Quantities whose residuals change along the order of the rows
     along_rows: tuple[Change, ...] = ()
     proposal: Proposal | None = None  # A law for what no listed effect explains, where one helps
@@ -275,7 +275,7 @@ class Diagnosis:
     seconds: float = field(default=0.0, metadata=_ASIDE)  # time the diagnosis took
 
     def __repr__(self) -> str:
-        """Return the verdict in words, and the error of each quantity on unseen rows."""
+        """Return the verdict as text, and the error of each quantity on unseen rows."""
         errors = (
             f'{name} [{unit_of(name)}]: unseen rows off by {gap.before:.3g} as configured, '
             f'{gap.refit:.3g} soil refitted, {gap.after:.3g} in the end'

@@ -42,7 +42,7 @@ from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 _MOST_ODDS = 10.0  # nats
-_UNLIKELY = 0.05  # odds of beds that differ, below which nothing is said of them
+_UNLIKELY = 0.05  # odds of different beds below which they are not reported
 _BEDS_DIFFER = 0.2  # prior probability, where every sweep has a bed of its own; assumed
 
 
@@ -62,7 +62,7 @@ class Options:
 
 def diagnose(
     table: SteadyTable,  # checked rows (``tables.parsing.read_table``)
-    # The model believed in: soil, effects that are on, the wheel where the table has none
+    # The prior model: soil, effects that are on, the wheel where the table has none
     configuration: Configuration,
     # Rows in which the effect in question is absent; fitted first, so that the structural error
     # common to both tables cancels
@@ -89,7 +89,7 @@ def diagnose(
     )
     configured = _check_soil_carries(both, forward)
     check_pull_against_model(both, configured[:, 1])
-    # soil.relative_std is the estimator's doubt of a soil on its way, not that of a measured soil.
+    # soil.relative_std is for an unknown soil on the way of a rover, not for a measured one.
     stated_std, source = configuration.soil_std_stated, configuration.soil_source
     nuisance = (
         *soil_coordinates(configuration.soil, stated_std, source, chosen.soil_known_to),

@@ -44,7 +44,7 @@ class Stretch(NamedTuple):
 def changed_stretch(
     table: SteadyTable, setting: Setting, fitted: Fit, variance: FloatArray
 ) -> Stretch | None:
-    """Return the stretch that most wants a soil of its own, if the rows are sure of one.
+    """Return the stretch that most probably has a soil of its own, if that is certain enough.
 
     Around the fit everything is linear: for each stretch the evidence for two more soil parameters,
     which act on its rows only, follows from the inverse covariance of the cells.
@@ -100,7 +100,7 @@ _DRAWS = 2000
 _SEED = 11
 _CHANCE = 0.01  # chance, the number of tests paid for, below which a change is one
 _FEWEST_ROWS = 8
-_SAME_AS_INPUT = 0.8  # rank correlation with an input from which the two cannot be told apart
+_SAME_AS_INPUT = 0.8  # rank correlation with an input from which the two cannot be separated
 _SEQUENCES = ('row_order', 'date')
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What models say about rows that their fit did not see (groups of slip), and what is permitted."""
+"""Cross-validation: predictions of rows left out of a fit by groups of slip, and their limits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _REFITS = 7  # iterations of a fit without a group; it starts at the fit to all 
 
 
 def slip_groups(table: SteadyTable) -> IndexArray:
-    """Return (N,) group of each row: neighbouring slips together, equal ones never apart."""
+    """Return (N,) group of each row: neighbouring slips together, equal ones never separated."""
     return level_groups(table.columns['slip'], GROUPS, 3)
 
 
@@ -36,7 +36,7 @@ def hold_out(
     """Return the (N, 4) predictions of every fit, each row by parameters found without its group.
 
     Rows of a negative group (a reference) always stay in; what they show of a structural error is
-    part of a prediction. Parameters are fitted anew: where soil numbers lie in a bent valley or at
+    part of a prediction. Parameters are fitted again: where soil numbers lie in a bent valley or at
     a bound, one linear step ends far from the best.
     """
     problem = setting.problem
@@ -86,7 +86,7 @@ def gaps(
 ) -> dict[str, QuantityGap]:
     """Return the held-out errors of each quantity; cells rejected as outliers do not count.
 
-    ``allowed_error``: model error that is no reason for doubt [share of the range].
+    ``allowed_error``: tolerated model error [share of the range].
     """
     std, measured = _cell_noise(findings)[: len(table)], kept_cells(table, findings)
     found: dict[str, QuantityGap] = {}

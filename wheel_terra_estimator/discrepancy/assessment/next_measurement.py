@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which measurement would separate what is left: a menu of row blocks, ranked by expected d'."""
+"""Next measurement: row blocks, ranked by how well they separate open hypotheses (d')."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 _SLIPS = np.array([0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7, 0.8])
 _KEPT = 3
 _WORTH = 2.0  # d' that a measurement must promise, and ...
-_MORE = 1.5  # ... times the distance at hand: else it is not worth the trouble
+_MORE = 1.5  # ... least gain over the present distance of a proposed measurement
 _DEEPEST = 0.6  # of the radius: blocks in which a competitor sinks deeper are not proposed
 # A zero check costs minutes and settles an instrument's error for good.
 ZERO_CHECKS = {
     'sinkage_offset': 'read the sinkage sensor with the wheel on a hard, level floor (should be 0)',
     'drivetrain_friction': 'read the torque with the wheel turning in the air',
     'drivetrain_friction:viscous': 'read the torque with the wheel turning in the air',
-    # A lost share of no torque is nothing, and lifting reads more than lowering only by friction.
+    # A proportional loss vanishes at zero torque; lifting and lowering differ by friction alone.
     'drivetrain_friction:proportional': 'read the torque while the wheel lifts, then lowers, '
     'a known weight on a cord round it',
     'wheel_radius_bias': 'roll the wheel out on a hard floor: distance over 10 turns',

@@ -21,7 +21,7 @@ _LARGEST_SHARE = 0.7  # of the rows in a box; more is "everywhere"
 _DRAWS = 400
 _SEED = 7
 _SURE = 0.05
-_ONE_SIGN = 0.3  # below this share of the size a mean misfit says nothing
+_ONE_SIGN = 0.3  # below this share of the size a mean misfit is not significant
 
 
 def locate(
@@ -133,7 +133,7 @@ def _score(square: FloatArray, count: FloatArray) -> FloatArray:
 
 
 def _simulated(problem: Problem, nothing: Fit, variance: FloatArray | None) -> FloatArray:
-    """(m, draws) residuals of a refit where nothing is missing but what a reference shares."""
+    """(m, draws) residuals of a refit without any effect but the error shared with a reference."""
     rng = np.random.default_rng(_SEED)
     jacobian = nothing.sensitivity / problem.std[:, None]
     noise = rng.standard_normal((problem.size, _DRAWS))

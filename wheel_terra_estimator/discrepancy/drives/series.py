@@ -70,7 +70,7 @@ class DriveSeries:
     def speed_std(self, start: float, end: float) -> float:
         """Return the stated deviation of the mean speed of a stretch [m/s]; 0: none is stated.
 
-        Errors of references are apart, those of the smoother are one and the same all along.
+        Errors of references are independent, those of the smoother are common to all samples.
         """
         variances = self.speed.within(start, end)[:, 1]
         stated = variances[variances > 0]
@@ -131,11 +131,11 @@ def _channel(series: dict[int, FloatArray], origin: int, width: int) -> Channel:
 
 
 class SpeedSmoother:
-    """Listens to the measurements of a drive and tells its speed by the fixed-interval smoother.
+    """Takes the measurements of a drive and returns its speed by the fixed-interval smoother.
 
     A window holds a few references; the smoother also knows those before and behind it, and how the
-    wheels and the accelerometer carry the speed from one to the next. It hears neither torque nor
-    sinkage: rows that are to judge a soil model must not be made with what that model says of them.
+    wheels and the accelerometer carry the speed from one to the next. It uses neither torque nor
+    sinkage: rows that test a soil model must not depend on that model.
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -160,7 +160,7 @@ class SpeedSmoother:
             self._smoother.keep(estimates)
 
     def speed(self) -> Channel:
-        """Return forward velocity [m/s] and its variance [(m/s)^2], (k, 2), once all is heard."""
+        """Return forward velocity [m/s] and its variance [(m/s)^2], (k, 2)."""
         for estimates in self._core.flush():
             self._smoother.keep(estimates)
         found = {

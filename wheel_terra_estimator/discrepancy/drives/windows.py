@@ -1,8 +1,8 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Steady rows out of a drive: windows over whole lug periods, with honest deviations.
+"""Steady rows out of a drive: windows over whole lug periods, with their deviations.
 
-On a drive nobody sets the slip: it follows from the slope, and is known only as well as the
+The slip of a drive is not set: it follows from the slope, and is known only as well as the
 reference velocity. Nor is the pull of a wheel measured: the accelerometer gives the sum over the
 wheels. So each window yields
 
@@ -70,7 +70,7 @@ GOOD = 'steady'
 
 @dataclass(frozen=True)
 class Window:
-    """Means of a steady window and what their scatter says."""
+    """Means of a steady window and their deviations by scatter."""
 
     # [s] from the first wheel odometry
     start: float
@@ -355,7 +355,7 @@ def pooled_correlation(blocks: Iterable[FloatArray]) -> float:
     """Return the lag-one correlation within blocks (k, n) of any lengths, pooled.
 
     The correlation at which the expected sums over all blocks, each with its own length, stand in
-    the ratio of those found: nothing depends on the order of the blocks.
+    the ratio of those found: the order of the blocks has no effect.
     """
     above = below = 0.0
     columns: Counter[int] = Counter()
@@ -418,7 +418,7 @@ def _with_deviations(windows: list[Window], configuration: Configuration) -> lis
 
 
 def _variance(values: FloatArray, correlation: float) -> FloatArray:
-    """Variance of a correlated series of which only what is left of its mean is seen."""
+    """Variance of a correlated series from the deviations about its mean."""
     good = np.isfinite(values).all(0)
     squares = len(values) * np.var(np.where(good, values, 0.0), axis=0)
     return np.where(good, squares / block_moments(len(values), correlation)[1], np.nan)

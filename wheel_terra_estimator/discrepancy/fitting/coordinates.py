@@ -23,7 +23,7 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 
 
 class _Number(NamedTuple):
-    """A soil number that a diagnosis refits, and how well it is known where nobody states it.
+    """A soil number that a diagnosis refits, and its deviation where none is stated.
 
     Deviations are in the space of the coordinate: of logarithms, else absolute (of cohesion a share
     of its value, beside a part that does not vanish with it).

@@ -172,7 +172,7 @@ class Forward:
         # Coordinates of each hypothesis by which to differentiate (default: all)
         by: Sequence[Sequence[int]] | None = None,
     ) -> State:
-        """Solve the load balance of every hypothesis; with Jacobians by u unless told otherwise."""
+        """Solve the load balance of every hypothesis; with Jacobians by u by default."""
         if by is None:
             by = [range(len(h)) for h in hypotheses]
         if start is not None:

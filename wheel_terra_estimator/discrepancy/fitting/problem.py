@@ -62,7 +62,7 @@ class Problem:
 
     @property
     def moved(self) -> FloatArray:
-        """(N, 4) what ``wanted`` differs by from the readings; 0 where nothing was measured."""
+        """(N, 4) ``wanted`` less the readings; 0 where not measured."""
         shift = np.zeros((self.rows, len(self.scale)))
         shift[self.row, self.quantity] = self.wanted - self.observed
         return shift
@@ -101,7 +101,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class CommonError:
-    """Error of an input, felt by all quantities of the rows that share the reading."""
+    """Error of an input, common to all quantities of the rows that share the reading."""
 
     slope: FloatArray  # (N, 4) derivative of the quantities by the input
     std: FloatArray  # (N,) standard deviation of the input
@@ -113,7 +113,7 @@ def over_covariance(
 ) -> FloatArray:
     """Multiply (m, ...) vectors by the inverse of diag(variance) + J diag(1 / prior) J'.
 
-    J is (m, P) with few columns, ``prior`` the precision of what it stands for (Woodbury).
+    J is (m, P) with few columns, ``prior`` the precision of its parameters (Woodbury).
     """
     weighted = jacobian / variance[:, None]
     precision = weighted.T @ jacobian + np.eye(jacobian.shape[1]) * prior
@@ -157,7 +157,7 @@ def build_problem(
     outliers: Sequence[tuple[int, int]] = (),  # cells rejected
     # Errors of inputs (slip, leaving angle), common to the quantities of a row
     common: Sequence[CommonError] = (),
-    moved: FloatArray | None = None,  # (N, 4) by which readings and what is wanted differ
+    moved: FloatArray | None = None,  # (N, 4) of the differences of model and readings
     group: FloatArray | None = None,  # (N,) rows of other numbers share no structural error
 ) -> Problem:
     """Return the problem of an (N, 4) table."""

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Find a sparse law in the closures of the model, and judge it on what it was not fitted to.
+"""Find a sparse law in the closures of the model, and test it on rows that were left out.
 
 Terms (a target changed by a feature, see ``learned_closure``) are added one at a time, by evidence
 beyond the length of their description, soil and all terms refitted; then each is left out again.
@@ -51,17 +51,17 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import (
 
 MOST_TERMS = 4
 _TRIED = 6  # terms of the greatest expected gain that are fitted in each step
-_WORTH = 3.0  # nats by which a term must raise the evidence beyond those that say which it is
+_WORTH = 3.0  # nats by which a term must raise the evidence beyond its description length
 _LEVELS = 6  # levels of an input that are left out one at a time, at most
 _CLOSED = 0.15  # share of the gap on what was left out that a law must close
 _SMALL_FLOOR = 0.015  # structural error that stays beside a law [share of the range]
 _WORSE = 1.1  # times the soil refit: an error of one quantity that no law may reach ...
 _FINE = 1.35  # ... unless it is no more than so many times the noise, ...
 _PAYS = 5.0  # ... or so many times as much (in squared noise deviations) goes from the others
-_HOLDS = (2.5, 5.0, 10.0, 20.0, 40.0)  # times narrower: until the refitted soil can be believed
+_HOLDS = (2.5, 5.0, 10.0, 20.0, 40.0)  # times narrower: until the refitted soil is plausible
 _ALIKE = 0.8  # cosine of two signatures from which one resembles the other
 _RESEMBLING = 3
-# Terms that say what a named effect says, in one of its forms or in another one.
+# Terms equivalent to a named effect, in one of its forms or another.
 _SAME = {
     'exponent_by_slip': 'slip_sinkage_exponent',
     'exponent_by_slip_squared': 'slip_sinkage_exponent',
@@ -171,11 +171,11 @@ class Gap:
 def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
     """Return the law that the rows ask for; None where none predicts what was left out.
 
-    ``hold_soil`` where it can be believed, in the refit as well: where only another soil leaves no
+    ``hold_soil`` where it is plausible, in the refit as well: where only another soil leaves no
     gap, the law has to do without it, or is none.
     """
     findings, variance = gap.findings, gap.variance
-    # A large smooth error would take up what the law is to say.
+    # A large smooth error would absorb the law.
     floors = tuple(floor for floor in findings.setting.floors if floor.largest <= _SMALL_FLOOR)
     setting = replace(findings.setting, effects=_terms(gap.table), floors=floors)
     plain = setting.refit(findings.nothing)
@@ -202,7 +202,7 @@ def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
 
 
 def effects_said(law: Proposal) -> frozenset[str]:
-    """Return the effects that a law says, term by term; none where a term is none of them."""
+    """Return the effects equivalent to a law, term by term; none where a term has no equivalent."""
     terms = [f'{t}_by_{f}' for t, f in zip(law.targets, law.features, strict=True)]
     return frozenset(_SAME[term] for term in terms) if set(terms) <= set(_SAME) else frozenset()
 
@@ -259,7 +259,7 @@ def _search(setting: Setting, nothing: Explanation) -> list[Explanation]:
 
 
 def _description_lengths(terms: Iterable[str]) -> dict[str, float]:
-    """Return the nats that it takes to say each term; a product says a second feature."""
+    """Return the description length of each term [nats]; a product has a second feature."""
     single = [name for name in terms if pair_of(name)[1] not in PRODUCTS]
     plain = math.log(max(len(single), 1)) + _WORTH
     second = math.log(max(len({pair_of(name)[1] for name in single}), 1))

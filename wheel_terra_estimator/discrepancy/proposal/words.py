@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a proposed law says, and where it must not be trusted, in words."""
+"""Text on a proposed law and the limits of its validity."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES, TARGETS, pair_of
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
-_TWICE = math.log(2.0)  # from which a growth is said as a factor
+_TWICE = math.log(2.0)  # from which a growth is stated as a factor
 # Feature -> for which step of it a change is stated, and that step.
 _PER = {
     'one': ('everywhere alike', 1.0),

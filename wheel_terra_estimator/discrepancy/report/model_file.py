@@ -4,7 +4,7 @@
 
 A sensor reads ``gain * true + zero``: zeros and gains of readings that were found as effects are
 written as keys ``sensors.*``, from which estimator, drive rows, diagnosis and ``predict`` start,
-and the effect stays off, so that nothing corrects the same error twice.
+and the effect stays off, so that no error is corrected twice.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
 from wheel_terra_estimator.terramechanics.soil import Soil
 
-# Effects that are an error of a reading and nothing else: name -> its parameter.
+# Effects that are purely an error of a reading: name -> its parameter.
 _GAINS = {'torque': 'torque_gain', 'sinkage': 'sinkage_gain'}
 _SINKAGE_ZERO, _TORQUE_ZERO = 'sinkage_offset', 'drivetrain_friction'
 
@@ -87,7 +87,7 @@ def _stated(key: str, parameter: FittedParameter) -> dict[str, float]:
 def _sensor_keys(
     configuration: Configuration, turning: float
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the keys that say the same as the instrument effects of a model, and those effects.
+    """Return the keys equivalent to the instrument effects of a model, and those effects.
 
     ``turning`` is +1 or -1 where the wheel turned one way in all rows. 0: both ways; a constant
     friction, which turns with the wheel, is then no zero of the reading and stays an effect.
@@ -108,7 +108,7 @@ def _sensor_keys(
         found = effects.get(owner)
         if found is None or (owner == _TORQUE_ZERO and (not turning or 'torque' not in found)):
             continue
-        # The gain acts on the friction as well: what the motor gives is what is read.
+        # The gain acts on the friction as well: the reading is the motor's torque.
         parameter, scale = ('offset', 1.0)
         if owner == _TORQUE_ZERO:
             parameter, scale = 'torque', turning * factor
@@ -144,7 +144,7 @@ def _soil_keys(name: str, value: float, std: float, soil: Soil) -> dict[str, flo
 
 
 def provenance(diagnosis: Diagnosis, proposal: Proposal | None = None) -> str:
-    """Return one line: what was changed, from which table, how sure."""
+    """Return one line: the change, its table, its probability."""
     before = diagnosis.configuration.provenance
     if proposal is not None:
         done = 'a law proposed (learned_closure) and soil refitted'

@@ -93,7 +93,7 @@ def shown(value: Any) -> str:
 
 
 def _before(diagnosis: Diagnosis, key: str, value: Any) -> str:
-    """Return the configured value; a deviation or effect that nobody stated has none."""
+    """Return the configured value; a deviation or effect that is not stated has none."""
     optional = '_std' in key or (key.startswith('effects.') and not key.endswith('.enabled'))
     return '-' if optional and key not in diagnosis.configuration.stated else shown(value)
 

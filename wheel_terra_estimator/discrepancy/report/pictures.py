@@ -36,14 +36,14 @@ _LEGEND_LINE, _LEGEND_MARK, _LEGEND_LETTER = 0.28, 0.45, 0.072  # room they take
 
 
 def shown_input(name: str) -> tuple[float, str]:
-    """Return factor and unit in which an input is shown."""
+    """Return factor and unit of an input in pictures."""
     return SHOWN_INPUT.get(name, (1.0, unit_of(name)))
 
 
 def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
     """Draw measurement and model over slip, one curve for each setting of the other inputs.
 
-    None where the table has no sweeps of slip, or too many to be told apart.
+    None where the table has no sweeps of slip, or too many to be distinguished.
     """
     table, curves = diagnosis.table, diagnosis.curves
     groups = _sweeps(diagnosis)
@@ -108,7 +108,7 @@ def _sweeps(diagnosis: Diagnosis) -> list[tuple[str, IndexArray]]:
 def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     """Draw measured minus model against slip, coloured by an input, before and after.
 
-    Columns: as configured, soil refitted, effect added (the same again where nothing was named).
+    Columns: as configured, soil refitted, effect added (without one, the refit again).
     The grey band is two standard deviations of noise and floor.
     """
     curves, table = diagnosis.curves, diagnosis.table

@@ -1,8 +1,8 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How sure the name is: a map from posterior weights to frequencies, fitted on campaigns.
+"""Calibrated probability of a name: a map from posterior weights to frequencies, fitted on trials.
 
-The posterior of a model family that is never quite right is too sure of itself. A logistic map,
+The posterior of an imperfect model family is overconfident. A logistic map,
 fitted on campaigns with other formulas, structural error, outliers, unknown noise and unlisted
 effects, brings it to the frequency with which such names are right.
 """
@@ -27,7 +27,7 @@ FEATURES = (
     'one',
     'margin',  # log odds of the name against everything without it
     'margin_of_set',  # the same of the name and its competitors
-    'gain',  # log evidence over nothing, compressed
+    'gain',  # log evidence over the soil alone, compressed
     'remainder',  # something is left beyond the floor
     'floor',  # probability of a structural error
     'two',  # two effects or more are named
@@ -99,7 +99,7 @@ def confidence(values: Mapping[str, float], alike: int = 0, odds: float = 1.0) -
     weights = _weights()
     vector = np.array([values[name] for name in FEATURES])
     of_name = float(expit(vector @ np.array(weights['name']) + np.log(odds)))
-    # Never more than the rows themselves say: two names that fit alike share what there is.
+    # Never more than the posterior: two names that fit alike share it.
     margin = 8.0 * np.arctanh(np.clip(values['margin'] / 4.0, -0.999, 0.999))  # of the odds
     of_name = min(of_name, float(expit(margin / _TEMPERATURE)))
     of_set = float(expit(vector @ np.array(weights['set']) + np.log(odds)))

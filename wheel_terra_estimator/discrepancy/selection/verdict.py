@@ -1,8 +1,8 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""From posterior weights to a verdict, and to the names that stay open; absolute tests of a fit.
+"""From posterior weights to a verdict and its ambiguity groups; absolute tests of a fit.
 
-The thresholds were chosen on campaigns apart from those that score them (docs/diagnose.md).
+The thresholds were chosen on other trials than those that score them (docs/diagnose.md).
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ class Remainder:
 
     @property
     def accounted_for(self) -> bool:
-        """True where floor and noise, and numbers that can be believed, are enough."""
+        """True where model-error floor, noise and plausible numbers explain the rows."""
         return self.p_value > IMPROBABLE and self.z_score < LARGEST_Z_SCORE
 
     @property
     def only_far(self) -> bool:
-        """True where everything fits, but with a number that cannot be believed."""
+        """True where everything fits, but with an implausible number."""
         return self.significant and self.probability <= 0.5 and self.p_value > IMPROBABLE
 
     @property
@@ -124,7 +124,7 @@ class Verdict:
 
     status: str  # ``agrees``, ``named``, ``unexplained`` or ``undecided``
     index: int  # explanation that is reported as the fit: of the named set, else of nothing
-    # For each named effect, the others (in their best form) that the data cannot tell from it
+    # For each named effect, the others (in their best form) that the data cannot separate from it
     ambiguity_groups: tuple[tuple[str, ...], ...]
     left: Remainder  # what that explanation leaves
 
@@ -202,13 +202,13 @@ def _competitors(
         mine = set(explanation.names)
         if len(mine) == len(names) and others <= mine:
             (own,) = mine - others
-            # What is no better than leaving the place empty is no competitor.
+            # An explanation no better than without that effect is no competitor.
             if effect_of(own) == effect_of(name) and own != name:
                 continue  # another form of the same effect
             if own == name or explanation.log_evidence > without + BETTER_THAN_EMPTY:
                 places[own] = float(total[h])
     by_weight = sorted(places, key=lambda key: -places[key])
-    # Of a competitor's forms the best one stands for all.
+    # Of a competitor's forms the best one counts.
     best_form = {effect_of(key): key for key in reversed(by_weight)}
     order = [key for key in by_weight if best_form[effect_of(key)] == key]
     logs = np.array([places[key] for key in order]) / TEMPERATURE

@@ -95,7 +95,7 @@ class Setting:
         )
 
     def refit(self, fitted: Fit, variance: FloatArray | None = None, iterations: int = 10) -> Fit:
-        """Fit a set anew, from where it is."""
+        """Fit a set again, from its present values."""
         return self.fit([fitted.names], [fitted.u], fitted.angle, variance, iterations)[0]
 
     def predicted(self, outputs: Sequence[FloatArray], variance: FloatArray) -> FloatArray:
@@ -170,7 +170,7 @@ def _strength_responses(
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Return outputs (N, 4) and their derivative (N, 4, 1) by strength of each.
 
-    Terms of a sparse law have nothing but a strength: all stand in one model side by side.
+    Terms of a sparse law have only a strength: all are in one model.
     """
     fixed = len(base.u)
     if all(setting.effects[name].sparse for name, _, _ in trials):

@@ -30,7 +30,7 @@ def averaged(table: SteadyTable, most: int) -> SteadyTable:
     """Return the table averaged over cells of neighbouring inputs, at most ``most`` of them.
 
     The cells halve the widest input of the fullest cell over and over, between two of its values
-    (k-d tree): levels stay apart as long as there are cells. Rows that lack different columns are
+    (k-d tree): levels stay separate while there are cells. Rows that lack different columns are
     not mixed; readings further than `_FAR` from the median of their cell are left out.
     """
     names = list(table.columns)

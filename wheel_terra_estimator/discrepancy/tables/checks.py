@@ -185,7 +185,7 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray
         if quantity in arrays and f'{quantity}_std' in arrays:
             std, values = arrays[f'{quantity}_std'], np.abs(arrays[quantity])
             greatest = values[np.isfinite(values)].max(initial=0.0)
-            # A deviation beside which its whole column is nothing has another unit.
+            # A deviation far above its whole column has another unit.
             if np.nanmin(std, initial=np.inf) > 10.0 * greatest > 0.0:
                 far = f'is over ten times the largest {quantity}; give both in {unit_of(quantity)}'
                 refuse(np.isfinite(std), f'{quantity}_std', far)
@@ -201,7 +201,7 @@ def _check_signs(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray)
         why: str | Callable[[int], str],
         least: int = 1,
     ) -> None:
-        """Refuse what is wrong in most of the rows that are clear."""
+        """Refuse a column whose sign is wrong in most of the clear rows."""
         if wrong.sum() >= least and wrong.sum() > 0.8 * clear.sum():
             _refuse(name, lines, column, arrays[column], wrong, why)
 
@@ -338,7 +338,7 @@ def _without_copies(table: SteadyTable) -> tuple[SteadyTable, int]:
 
 
 def _check_range_of_design(table: SteadyTable, remarks: list[str]) -> None:
-    """Raise where the rows are too few or too alike to tell anything.
+    """Raise where the rows are too few or too alike for a diagnosis.
 
     A drive (its slip is uncertain) cannot choose its slips, and may still show a wrong radius.
     """

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Titles of columns: which quantity each is, in which unit, and what has to be asked."""
+"""Titles of columns: quantity and unit of each, and the questions they leave open."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ ALL = 'all'
 
 @dataclass(frozen=True)
 class Choice:
-    """What a user says of the columns."""
+    """Choices of the user for the columns."""
 
     # Name of a column of ours -> the table's
     entries: Mapping[str, Entry] = field(default_factory=dict)
@@ -87,7 +87,7 @@ def _entries(columns: Mapping[Any, Any], source: str) -> dict[str, Entry]:
 
 @dataclass(frozen=True)
 class Title:
-    """What a title says: the column, its unit as spelt, and whether it has to be asked for."""
+    """Meaning of a title: the column, its unit as spelt, and whether that is ambiguous."""
 
     name: str
     unit: str = ''
@@ -133,7 +133,7 @@ def meaning_of(title: str) -> Title | None:
 
 
 def with_unit(title: str, unit: str) -> str:
-    """Return a title with a unit that is known from elsewhere, unless it says so itself."""
+    """Return a title with a unit known from elsewhere, unless it has one itself."""
     meaning = meaning_of(title)
     si = unit_of(meaning.name) if meaning else '-'
     return title if unit in ('', si) or (meaning and meaning.unit) else f'{title} [{unit}]'
@@ -153,11 +153,11 @@ def _readings(title: str) -> Iterator[tuple[str, str]]:
 
 
 class Header:
-    """What the titles of a table say, and what is wrong with them.
+    """Meaning and faults of the titles of a table.
 
     ``source`` is what an error names, ``wanted`` are columns of ours. Then ``columns`` are those
     that are read, ``unused`` places and titles of the others (but for those that the user leaves
-    out), ``notes`` what is read otherwise than it stands there.
+    out), ``notes`` columns that are read otherwise than stated.
     """
 
     def __init__(
@@ -199,7 +199,7 @@ class Header:
 
     @property
     def units(self) -> dict[str, float]:
-        """Column -> factor to SI of the unit that its title says."""
+        """Column -> factor to SI of the unit in its title."""
         return {column.name: abs(column.factor) for column in self.columns}
 
     def _chosen(self, choice: Choice) -> Iterator[int]:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""CSV files and DataFrames as columns of numbers; what cannot be read is said with its remedy."""
+"""CSV files and DataFrames as columns of numbers; errors state the remedy."""
 
 from __future__ import annotations
 

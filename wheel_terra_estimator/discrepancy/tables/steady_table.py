@@ -48,7 +48,7 @@ class SteadyTable:
     # sensors (``sensors.*``) were taken off before, as of a drive's
     true_rows: BoolArray
     notes: tuple[str, ...] = ()  # what the reader found odd but usable
-    # Column -> factor to SI of the unit that its title says; 1 where it says none
+    # Column -> factor to SI of the unit in its title; 1 without one
     units: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -88,7 +88,7 @@ class SteadyTable:
         return _level(np.nan_to_num(self.columns.get('trial', np.zeros(len(self)))))
 
     def scaled_inputs(self) -> FloatArray:
-        """(N, d) varying inputs, each scaled to a range of 1; what is not stated at its mean."""
+        """(N, d) varying inputs, each scaled to a range of 1; missing values at their mean."""
         columns = []
         for name in self.varying():
             values = np.nan_to_num(self.columns[name], nan=float(np.nanmean(self.columns[name])))
@@ -105,7 +105,7 @@ class SteadyTable:
 
 
 def _level(values: FloatArray) -> FloatArray:
-    """Return the place of each value among those that lie apart."""
+    """Return the place of each value among the distinct ones."""
     order, place = np.argsort(values), np.zeros(len(values))
     place[order[1:]] = np.cumsum(np.diff(values[order]) > _APART)
     return place
