@@ -1,3 +1,3 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is wrong with a recording or a rover file, told from the recording itself."""
+"""Faults of a recording or a rover file, found from the recording itself."""

@@ -35,11 +35,11 @@ from wheel_terra_estimator.checks.statistics import (
 
 STEP = 0.05  # time between the values that are compared [s]
 LONGEST = {'turns': 2.0, 'starts': 2.0, 'speeds': 3.0}  # greatest lag that is looked for [s]
-IN_A_DRIVE = 15.0  # length of a drive over the greatest lag that it tells [-]
+IN_A_DRIVE = 15.0  # length of a drive over the greatest lag found from it [-]
 LEAST_OFFSET = 0.2  # lags below this [s] are those of chassis, soil, jitter and filters of encoders
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}  # correlation at the lag, at least
 BY_LOG = 'log time'
-SMOOTHED_BY = 'reference.smoothed_s'  # figure: such a velocity tells no scale
+SMOOTHED_BY = 'reference.smoothed_s'  # figure: such a velocity shows no scale
 SMOOTH = 0.02  # unlike part that a lag leaves of speeds that are made smooth, beside noise [-]
 FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part, at most
 LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
@@ -48,7 +48,7 @@ APART = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS, SHARP_SIGMAS = 4.0, 10.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]
 MANY = 60  # references from which it is averaged over starts and stops
-SLOWEST = 1.5  # period above which nothing is said of the stamps [s]
+SLOWEST = 1.5  # period above which stamps are not checked [s]
 SMOOTHED = 1.0  # speeds and turns are averaged over this to share a drive in halves [s]
 SMOOTHING = 0.4  # speeds and accelerations are averaged over this [s]
 
@@ -73,7 +73,7 @@ class Lag(NamedTuple):
 
     def counts(self, evidence: Evidence, name: str) -> bool:
         """Whether it is a lag of a channel and stood its trial."""
-        # Between the stamps of a reference nothing is known; over many of them it is averaged.
+        # Uncertainty between the stamps of a reference; it averages out over many of them.
         reference = _channel(evidence, name) if name == 'reference' else None
         between = BETWEEN * reference.period if reference is not None else 0.0
         between *= SIGMAS if reference is not None and reference.stamp.size < MANY else 2.0
@@ -92,7 +92,7 @@ STAMPED = ('joints', 'wheel_odometry', 'imu', 'reference', 'sinkage')
 
 
 def corrected(recording: Recording, facts: RoverFacts) -> Recording:
-    """Return the recording with the stamp offsets of the rover file taken off."""
+    """Return the recording with the stamp offsets of the rover file subtracted."""
     changes: dict[str, Any] = {}
     for name in STAMPED:
         channel, key = getattr(recording, name), 'wheel_odometry' if name == 'joints' else name
@@ -143,7 +143,7 @@ def _too_late(evidence: Evidence, off: dict[str, float]) -> list[Outcome]:
 
 
 def _moved(evidence: Evidence, name: str) -> float:
-    """Return what log time has taken off the stamps of a channel [s]."""
+    """Return the correction of the stamps of a channel by log time [s]."""
     return evidence.recording.moved.get(name, 0.0)
 
 
@@ -185,13 +185,13 @@ def _by_arrival(evidence: Evidence, name: str, lag: Lag) -> bool:
     # It would come before it was measured.
     if others > 0.0 and others + late < FUTURE - math.hypot(lag.std, LEAST_STD[lag.by]):
         return True
-    if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
+    if name == 'reference':  # its age is real; that of wheels is not, nor are future stamps
         return abs(own - late) < abs(own) - 0.5 * abs(late) or own < FUTURE < others
     return abs(others) + abs(own - late) < abs(own) + abs(others + late)
 
 
 def _whole_std(evidence: Evidence, name: str, lag: Lag) -> float:
-    """Return the deviation of a lag [s]; between two messages nothing is known of a change."""
+    """Return the deviation of a lag [s], with the time between two messages."""
     between = BETWEEN * max(evidence.period, _channel(evidence, name).period)
     return math.hypot(lag.std, between, LEAST_STD[lag.by])
 
@@ -297,7 +297,7 @@ def lag_of(
 ) -> Lag | None:
     """Return by how much the second series lags the first; None where they are not alike.
 
-    Lags are looked for around ``log`` [s], which log time tells where it is far from 0.
+    Lags are looked for around ``log`` [s], as given by log time where it is far from 0.
     The halves share the changes of the motion evenly, wherever in the drive they are.
     """
     limit = _longest(by, time)
@@ -325,11 +325,10 @@ def lag_of(
 def lags(
     time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, limit: float
 ) -> Callable[[slice], tuple[float, float] | None]:
-    """Return what tells the lag in some rows of a series at ``at`` after one on an even grid.
+    """Return a function of rows: lag of a series at ``at`` behind one on an even grid [s], and fit.
 
-    That is how much later it is [s], and their fit then. The first is read where the second was
-    measured, never the second in between. None: nothing to correlate, too short for lags up to
-    ``limit`` [s], or a lag beyond it.
+    The first is interpolated where the second was measured, never the second in between. None:
+    nothing to correlate, too short for lags up to ``limit`` [s], or a lag beyond it.
     """
     if time.size < 2 or not at.size or at[-1] - at[0] < 6.0 * limit:
         return lambda _: None
@@ -389,7 +388,7 @@ MOST_STEPS = 5  # of a clock that is set; more are of another kind and stay
 FUTURE = -0.1  # arrival less stamp that no message has [s]
 MOST_OFFSET = 1e4  # offset that a rover file may state, either way [s]
 ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
-MOST_LATE = 40.0  # beyond which a history is no cure [s]
+MOST_LATE = 40.0  # beyond which a longer history is no remedy [s]
 QUARTERS, UNEVEN = 4, 0.5  # parts of a drive; unlike gains of a drift over their mean, at most [-]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
 LONGEST_WAY = 10.0  # of a message into the log [s]
@@ -398,7 +397,7 @@ LONGEST_WAY = 10.0  # of a message into the log [s]
 def check_transport(
     recording: Recording, facts: RoverFacts, figures: dict[str, Any]
 ) -> tuple[list[Outcome], Recording]:
-    """Return what is wrong with the stamps, and the recording with that mended by log time."""
+    """Return faults of the stamps, and the recording with them corrected by log time."""
     outcomes = _silent(recording)
     late, shifts, steps = dict[str, float](), dict[str, float](), dict[str, float]()
     mended: dict[str, Any] = {}
@@ -431,7 +430,7 @@ def check_transport(
             quarters[name] = by_time
     for name, by_time in quarters.items():
         if name not in ('joints', 'imu') and min(by_time) > FUTURE:
-            continue  # its age is honest
+            continue  # its age is real
         others = [one for other, one in quarters.items() if other != name]
         if drift := _drift(by_time, others):
             channel = mended.get(name, getattr(recording, name))
@@ -469,7 +468,7 @@ def _clocks(
         # Stamps lie near their arrival: those that are farther off are wrong.
         by_wheels = abs(joints) > abs(late['imu'])
         off = {'joints': joints - late['imu']} if by_wheels else {'imu': late['imu'] - joints}
-    for name in ('sinkage', 'reference'):  # their age is honest
+    for name in ('sinkage', 'reference'):  # their age is real
         ahead = name == 'sinkage' and late.get(name, 0.0) < FUTURE < joints
         if ahead or abs(late.get(name, joints) - joints) > MOST_OFFSET:
             off[name] = late[name] - joints
@@ -480,7 +479,7 @@ def _clocks(
             outcomes.append(found('order', channel.topic, 0.99, how=how))
             continue
         mended[key] = shifted(channel, round(-value * 1e9))
-        if key != 'sinkage':  # the motions tell the rest
+        if key != 'sinkage':  # the rest follows from the motions
             moved[key] = -value
             continue
         std = math.hypot(robust_std(channel.late), ARRIVAL_STD)
@@ -578,7 +577,7 @@ def _silent(recording: Recording) -> list[Outcome]:
             late = float(np.median(channel.late)) if channel.late.size else 0.0
             way[name] = late if 0.0 < late < LONGEST_WAY else 0.0
     sent = {name: (first - way[name], last - way[name]) for name, (first, last) in heard.items()}
-    # As heard and as sent: a message may come late, or its stamp be off.
+    # By log time and by stamp: a message may come late, or its stamp be off.
     spans = [
         (one, min(first for first, _ in one.values()), max(last for _, last in one.values()))
         for one in (heard, sent)
@@ -609,7 +608,7 @@ def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Out
         off = np.abs(step / period - np.round(step / period))
         if np.mean(off < OFF_PERIOD) >= REGULAR:
             break
-    else:  # Stamps that jitter: their neighbours say nothing of the period.
+    else:  # Stamps that jitter: the differences of neighbours are not the period.
         period = float(np.median(stamps[SEVERAL:] - stamps[:-SEVERAL])) / SEVERAL
     figures[f'{name}.rate_hz'] = round(1.0 / period, 3) if period > 0.0 else None
     gaps = step[step > max(LONGEST_GAP, GAP_PERIODS * period)]

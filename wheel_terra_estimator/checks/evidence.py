@@ -41,11 +41,11 @@ Result = TypeVar('Result')
 
 REST_RATE = 0.02  # wheel rate below which a wheel stands, as a share of its working rate [-]
 SHORTEST_REST = 1.0  # A standstill counts as rest after this time [s]
-LEAST_REST = 0.4  # rest that tells the bias of a gyro [s]
+LEAST_REST = 0.4  # rest from which the bias of a gyro is taken [s]
 SETTLING = 0.5  # A speed counts as steady this long after it changed [s]
 STRAIGHT_SHARE = 0.25  # speed of the sides against the middle of a straight, at most [-]
-LEAST_MOVING_ROWS = 30  # fewer rows of driving than these tell nothing
-LEAST_DRIVING = 3.0  # less driving than this tells nothing, however many rows it has [s]
+LEAST_MOVING_ROWS = 30  # least rows of driving for a check
+LEAST_DRIVING = 3.0  # least driving for a check [s]
 EVEN_GROUND_STD = math.radians(0.8)  # deviation of a tilt by circles on a plane, at most [rad]
 NO_NOISE = 5e-4  # noise of rates that have none, over the working rate, at most [-]
 BEND_OF_NOISE = math.sqrt(70.0)  # deviation of fourth differences, in which no motion is left [-]
@@ -102,7 +102,7 @@ class Evidence:
         return max(round(duration / max(self.period, 1e-3)), 1)
 
     def enough(self, rows: Mask, times: float = 1.0) -> bool:
-        """Return whether rows tell something, or so many times that."""
+        """Return whether there is enough driving in rows, or so many times that."""
         least = max(LEAST_MOVING_ROWS, self.rows_in(LEAST_DRIVING))
         return bool(rows.sum() >= times * least)
 
@@ -176,7 +176,7 @@ class Evidence:
 
     @property
     def rested(self) -> bool:
-        """Whether a standstill tells the bias of the gyro."""
+        """Whether there is a standstill for the bias of the gyro."""
         return float(self.at_rest.sum()) * self.period > LEAST_REST
 
     @cached_property
@@ -352,15 +352,15 @@ def noise_of(values: FloatArray) -> float:
     return robust_std(np.diff(values, 4, axis=0).ravel()) / BEND_OF_NOISE
 
 
-def once(tells: Callable[[Evidence], Result]) -> Callable[[Evidence], Result]:
-    """Let what a function tells of an evidence stay with it, as a cached property does."""
+def once(function: Callable[[Evidence], Result]) -> Callable[[Evidence], Result]:
+    """Cache the result of a function of an evidence with it, as a cached property does."""
 
-    @wraps(tells)
+    @wraps(function)
     def kept_result(evidence: Evidence) -> Result:
         kept: dict[str, Any] = evidence.__dict__
-        if tells.__name__ not in kept:
-            kept[tells.__name__] = tells(evidence)
-        return kept[tells.__name__]
+        if function.__name__ not in kept:
+            kept[function.__name__] = function(evidence)
+        return kept[function.__name__]
 
     return kept_result
 
@@ -372,7 +372,7 @@ def _shared(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def row_medians(values: FloatArray) -> FloatArray:
-    """Return the median of each row of (k, n) without nan, 0 where nothing else is there."""
+    """Return the median of each row of (k, n) without nan, 0 where all are nan."""
     known = np.isfinite(values)
     whole, some = known.all(axis=1), known.any(axis=1)
     some &= ~whole
@@ -389,18 +389,18 @@ def _row_means(values: FloatArray) -> FloatArray:
     return np.where(known, values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
 
 
-# Motion as it is felt -----------------------------------------------------------------------------
+# Motion by the IMU --------------------------------------------------------------------------------
 
 Complex: TypeAlias = NDArray[np.complex128]
 
-LEAST_YAW = math.radians(12.0)  # yaw that starts and stops tell, at least [rad]
+LEAST_YAW = math.radians(12.0)  # least yaw of starts and stops in a comparison [rad]
 YAW_SIGMAS = 4.0
 FELT = (0.4, 2.5)  # felt along an axis over what wheels and gyro say; else it is another [-]
 FELT_BLOCKS = 10  # parts of a drive that a deviation comes from
 
 
 def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None:
-    """Return what wheels and gyro say that is felt, and what is (k,) [m/s^2]; None without an IMU.
+    """Return expected (by wheels and gyro) and measured specific force (k,) [m/s^2]; None: no IMU.
 
     Along x the acceleration of starts and stops, along y that of curves, as complex numbers; what
     changes more slowly than over ``drift`` [s] is the slope.
@@ -418,7 +418,7 @@ def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None
 
 
 def felt_senses(evidence: Evidence) -> list[int]:
-    """Return how starts and curves are felt along x and y: 1 as wheels and gyro say, -1 against.
+    """Return how starts and curves are measured along x and y: 1 as by wheels and gyro, -1 against.
 
     0 is not clear. An IMU that is turned feels both alike; no rotation reverses one of them.
     """
@@ -433,7 +433,7 @@ def felt_senses(evidence: Evidence) -> list[int]:
 
 
 def felt_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
-    """Return the angle by which a motion is felt turned [rad]; None where it is not clear."""
+    """Return the angle by which a measured motion is rotated [rad]; None where it is not clear."""
     both = _motions(evidence, drift)
     if both is None:
         return None

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a check says: a finding with its cure, or why it could not look."""
+"""Outcome of a check: a finding with its remedy, or the reason why it was not possible."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.configuration.parameters import plain_table
 
-SUREST = 0.99  # confidence that is said at most: nothing is certain
-INTERNAL_ERROR = 'internal error, see --debug'  # why a check that failed has nothing to say
+SUREST = 0.99  # greatest confidence that is reported
+INTERNAL_ERROR = 'internal error, see --debug'  # reason of a check that failed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class NotChecked:
-    """A kind of fault that this recording cannot tell, and why (with what to drive instead)."""
+    """A kind of fault that this recording cannot show, and why (with what to drive instead)."""
 
     kind: str
     reason: str
@@ -101,7 +101,7 @@ STANDARD_GRAVITY = 9.80665  # [m/s^2]
 
 @dataclass(frozen=True)
 class Fault:
-    """A kind of fault; `faults.yaml` says what its fields are."""
+    """A kind of fault; fields as in `faults.yaml`."""
 
     kind: str
     words: str
@@ -158,7 +158,7 @@ def not_checked(kind: str, why: str, **figures: Any) -> NotChecked:
 def of_offset(
     name: str, left: float, std: float, against: str, facts: RoverFacts
 ) -> dict[str, Any]:
-    """Return what a finding says of stamps that are ``left`` [s] off beyond what is stated."""
+    """Return the text of a finding on stamps that are ``left`` [s] off beyond the stated offset."""
     return {
         'value': round(left + float(getattr(facts.sensors, f'{name}_stamp_offset')), 3),
         'std': round(std, 3),

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the rover that a drive tells: rolling radius, track."""
+"""Figures of the rover found from a drive: rolling radius, track."""
 
 from __future__ import annotations
 
@@ -45,22 +45,22 @@ PRIOR_OF_RADIUS = 0.85  # probability that it is the radius, not the scale of th
 SURE = 0.97  # probability beside its rival from which a fault is named alone [-]
 TRACK_STD = 0.02  # deviation that slip leaves in a scale of speed by turns, at least [-]
 RESISTANCE = Estimate(0.08, 0.05)  # of firm ground over the weight [-]
-UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)  # where no torque tells it [-]
+UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)  # where no torque shows it [-]
 SOFT_DEPTH = 0.06  # sinkage over radius above which ground is not taken for firm [-]
 MOST_ROUNDING = 0.02  # error of the mean rate by rounding, over the working rate, at most [-]
 SLOPE_OF_SLIP = Estimate(0.2, 0.2)  # slip over traction of firm ground [-]
 NOT_SEEN = Estimate(0.0, 1e3)  # the same where there are no slopes
-LEAST_SEEN = 0.5  # weight of the drive from which it tells its slip [-]
+LEAST_SEEN = 0.5  # weight of the drive in its own slip [-]
 FIRM_DEPTH = Estimate(0.02, 0.015)  # sinkage over radius of firm ground [-]
-DEEPEST = 0.3  # the same, beyond which a sensor is not believed (another unit) [-]
+DEEPEST = 0.3  # the same, beyond which a sensor is rejected (another unit) [-]
 LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
 MOST_HIDDEN = 0.7  # speed over rim speed of slip that torques off zero may hide, at least [-]
-MOST_SOFT = 0.93  # the same on soft ground that no sinkage tells, at least [-]: slip is 7 % there
+MOST_SOFT = 0.93  # the same on soft ground without sinkage readings [-]: slip is 7 % there
 MOST_COST = 0.175
 """What loose soil costs over the weight where all may be slip [-]; half of that, a sixteenth."""
-UNSEEN_SLIP = 0.035  # slip that widens a track where no straight tells it, one deviation [-]
+UNSEEN_SLIP = 0.035  # slip that widens a track without straight driving, one deviation [-]
 STEERED_STD = 0.04  # slip of steered wheels in curves, as a share of the track, one deviation [-]
 MOST_UNLIKE = 0.1  # residual in turns of wheels that roll where they are steered, at most [-]
 CLEAR_TURN = 0.95  # correlation of gyro and difference of the sides that a turn has [-]
@@ -111,7 +111,7 @@ def radius_ratio(evidence: Evidence) -> TriedRatio | NotChecked:
 
     The reference's velocity is ``v = q (1 - k m) rim`` with the traction m = sum of T/r over the
     weight: q is the ratio of the radii, k the slope of slip over traction. Without torque a ratio
-    below 1 cannot be told from slip.
+    below 1 cannot be separated from slip.
     """
     reference, facts, figures = evidence.recording.reference, evidence.facts, evidence.figures
     if reference is None:
@@ -160,7 +160,7 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
             return estimate
         resistance = estimate
     elif plain.value > 1.0:
-        # Nothing but a larger radius makes a rover outrun its rolling wheels.
+        # Only a larger radius makes a rover faster than its rolling wheels.
         return Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD))
     else:
         return not_checked('radius', 'no_torque')
@@ -196,7 +196,7 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
 def _resistance(evidence: Evidence, seen: float) -> Estimate | NotChecked:
     """Return the rolling resistance over the weight by the torques, beside that of firm ground.
 
-    Zeros of the torques look like it; what no firm ground costs is not taken off as slip.
+    Zeros of the torques look like it; a torque above that of firm ground is not counted as slip.
     """
     facts, sensors = evidence.facts, evidence.facts.sensors
     arm = len(facts.names) / float(np.mean(facts.radius)) / (facts.mass * facts.gravity)
@@ -216,7 +216,7 @@ def _referred_to_slip_radius(evidence: Evidence, ratio: Estimate) -> Estimate:
     angle t1 on its speed is v cos t, not v: shear vanishes in the mean at a slip of
     (1 - lambda) h/(r + h) - t1^2/6, with t1^2/6 = z/(3 r). Where neither is known, lambda lies
     anywhere in 0 to 1 and z/r is that of firm ground. Depth counts for nothing to twice as much:
-    soil gives way along the contact as well.
+    soil yields along the contact as well.
     """
     configuration = evidence.facts.configuration
     lugs = float(np.mean(configuration.wheels.lug_height / evidence.facts.radius))
@@ -365,7 +365,7 @@ def measured_track(evidence: Evidence) -> TriedRatio | NotChecked:
         return Estimate(slope.value / track, slope.std / abs(track))
 
     ratio = fitted(slice(None))
-    if np.isfinite(evidence.steering).any():  # they slip aside and along in curves
+    if np.isfinite(evidence.steering).any():  # they slip in both directions in curves
         ratio = Estimate(ratio.value, math.hypot(ratio.std, STEERED_STD * ratio.value))
     trial = tried(lambda part: fitted(part).value, 1.0, yaw**2)
     if abs(ratio.value - 1.0) > LEAST_TRACK_ERROR and not trial.falls:

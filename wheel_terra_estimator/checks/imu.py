@@ -64,10 +64,10 @@ GRAVITIES = {'the Moon': 1.62, 'Mars': 3.71, 'the Earth': 9.81}  # [m/s^2]
 UPRIGHT_SHARE = 0.5  # share of the mean specific force along z that gravity has on a rover [-]
 UPSIDE_TILT = math.radians(35.0)  # mean tilt that no rover drives at [rad]
 STEEPEST_MEAN = math.radians(20.0)  # mean slope of a drive, at most [rad]
-LEAST_SHOWN = 0.01  # change of an angle [deg] below which a cure leaves it out
+LEAST_SHOWN = 0.01  # change of an angle that a remedy states, at least [deg]
 LEAST_MOUNTING = math.radians(1.5)  # mounting errors below this [rad] are left to calibration
 LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
-LEAST_TURN = 4.5  # heading that a drive has to cover for the mounting to be told from a slope [rad]
+LEAST_TURN = 4.5  # heading that a drive has to cover to separate the mounting from a slope [rad]
 FLAT_TURN_STD = math.radians(0.1)  # unevenness of the ground leaves open [rad]
 TURNED_ROUND = 0.75  # probability that an IMU is turned round, not its x axis reversed [-]
 LEAN_STD = math.radians(0.5)  # of a body in turns, which is no mounting where both ways are driven
@@ -90,7 +90,7 @@ LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by 
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_WILD = 3
 WILD_SIGMAS = 10.0  # of the usual change of a reading, which another unit makes large
-MOST_WILD = 0.2  # share of wild samples that are single ones, at most [-]
+MOST_WILD = 0.2  # greatest share of outliers that are single samples [-]
 LEAST_MESSAGES = 20
 UNIT_TOLERANCE = 0.12  # share by which the mean specific force may lie off gravity in another unit
 UP_APART = math.radians(25.0)  # that no acceleration makes [rad]
@@ -124,7 +124,7 @@ class ImuState:
         return replace(self, recording=replace(self.recording, imu=imu))
 
     def without(self, *names: str) -> ImuState:
-        """Return the state without the force or the rate, which mean nothing."""
+        """Return the state without the force or the rate, where they are faulty."""
         nothing = np.full_like(self.imu.force, np.nan)
         return self.with_values(**dict.fromkeys(names, nothing))
 
@@ -141,7 +141,7 @@ Judged = tuple[list[Outcome], ImuState]
 
 
 def check_imu(state: ImuState) -> Judged:
-    """Return what the IMU says against itself, and the recording with that mended."""
+    """Return contradictions within the IMU readings, and the recording with them corrected."""
     if state.recording.imu is None or state.imu.stamp.size < LEAST_MESSAGES:
         none: list[Outcome] = [not_checked(kind, 'no_imu') for kind in ('mounting', 'gravity')]
         return none, replace(state, recording=replace(state.recording, imu=None))
@@ -159,7 +159,7 @@ def check_imu(state: ImuState) -> Judged:
 
 
 def _up_apart(imu: ImuSeries) -> float:
-    """Return the angle between up by orientation and by specific force [rad]; nan: not told."""
+    """Return the angle between up by orientation and by specific force [rad]; nan: unknown."""
     norm = np.linalg.norm(imu.orientation, axis=1)
     known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
     if known.size < LEAST_MESSAGES:
@@ -290,7 +290,7 @@ def _scale_of_force(state: ImuState, size: float) -> Finding:
 
 @dataclass(frozen=True)
 class Mounting:
-    """What is left of the mounting: small tilt about x and y [rad], and the deviation of both."""
+    """Remaining tilt of the mounting: small angles about x and y and their deviation [rad]."""
 
     roll: float
     pitch: float
@@ -301,7 +301,7 @@ class Mounting:
 
     @property
     def sigmas(self) -> float:
-        """Deviations that the tilt is off nothing."""
+        """Tilt over its deviation."""
         return max(abs(self.roll), abs(self.pitch)) / self.std
 
     def taken_off(self, rotation: FloatArray) -> FloatArray:
@@ -313,7 +313,7 @@ class Mounting:
 def gross_tilt(evidence: Evidence) -> FloatArray | None:
     """Return the rotation that brings the mean specific force upright, if it is far from it.
 
-    By whole quarter turns where a slope explains what is left; else all of it is the mounting.
+    By whole quarter turns where a slope explains the rest; else all of it is the mounting.
     """
     if evidence.force is None:
         return None
@@ -410,7 +410,7 @@ def _is_mounting(tilt: FloatArray, floor: float, turns: FloatArray, gyro: FloatA
     """Return the probability that what circles show is the mounting, no zero [-].
 
     A body that turns on a plane turns about its own axis: of an IMU that is tilted (2,) [rad] the
-    gyro (k, 2) has as much of the turns (k, 1) on x and y, beside a zero nothing of them.
+    gyro (k, 2) has as much of the turns (k, 1) on x and y, apart from zeros none of them.
     """
     fits = [block_fit(turns, column)[0] for column in gyro.T]
     var = max(fit.std for fit in fits) ** 2 + CROSS_AXIS**2 + floor**2
@@ -471,7 +471,7 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if upright > CLEAR_AGREEMENT:
             reversed_force = replace(evidence, force=-evidence.force)
             starts = felt_yaw(reversed_force)
-            # Felt backward then it lies on its back, and the sides are swapped.
+            # Measured backward then it lies on its back, and the sides are swapped.
             if starts is None or abs(starts.value) <= 0.5 * math.pi:
                 return [evidence.found('force_reversed', 0.97, **words)], reversed_force
         if upright > -CLEAR_AGREEMENT:
@@ -535,7 +535,7 @@ def mounting_angles(rotation: FloatArray) -> list[float]:
 def mounting_finding(
     key: str, evidence: Evidence, mended: Evidence, std: float, sure: float, **figures: Any
 ) -> Finding:
-    """Return the finding that asks for a rotation; its parameter is the angle that changes most."""
+    """Return the finding that proposes a rotation; its parameter is the angle that changes most."""
     new, old = mounting_angles(mended.rotation), mounting_angles(evidence.rotation)
     change = [abs(math.remainder(a - b, 360.0)) for a, b in zip(new, old, strict=True)]
     most = int(np.argmax(change))

@@ -1,9 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The judge of the inputs: no slip class and no stuck warning from what is wrong.
+"""Monitor of the inputs: no slip class and no stuck warning from faulty inputs.
 
 A finding about single wheels silences these alone, and none a warning that a reference at rest, or
-a torque at its limit that nothing speaks against, has confirmed.
+a torque at its limit that no finding contradicts, has confirmed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from wheel_terra_estimator.estimation.measurements import StepInputs
 _LOGGER = logging.getLogger(__name__)
 SUBJECT = 'check of '  # begins the subject of a finding among the faults of a set
 _NOT_CHECKED = {SUBJECT + 'the inputs': f'not checked: {INTERNAL_ERROR}'}
-LONGEST_WAIT = 4_000_000_000  # of a stuck warning for the verdict on its inputs [ns of stamps]
+LONGEST_WAIT = 4_000_000_000  # of a stuck warning for the checks of its inputs [ns of stamps]
 FAR_NIS = 10.0
 """Mean normalised innovation squared of torque or balance that says that they do not fit. Usual
 0.03 to 1; up to 7 for seconds in turns without a reference and on snow; with the wrong sign 13."""
@@ -32,7 +32,7 @@ _MISFITS = {
 }
 """Figure of the filter -> subject and words of the fault."""
 _NOISE = 'noise_beyond_stated'
-"""What the filter says of sensors much noisier than a file or a message states."""
+"""Key of the filter's message on sensors much noisier than a file or a message states."""
 
 
 class InputJudge:
@@ -51,7 +51,7 @@ class InputJudge:
         if not self._failed:
             try:
                 self._checks.step(stamp, inputs)
-            except Exception:  # an onlooker: the estimate goes on without it
+            except Exception:  # an observer: the estimator works without it
                 _LOGGER.debug('checks while driving', exc_info=True)
                 self._checks.reset()
                 self._failed = True
@@ -59,7 +59,7 @@ class InputJudge:
     def judged(self, estimates: EstimateSet, health: Mapping[str, Any]) -> EstimateSet:
         """Return the estimates of the last step; slip is not judged while a finding stands.
 
-        ``health``: what the estimator says of itself.
+        ``health``: counters and texts of the estimator.
         """
         misfits = _misfits(health, dug_in=estimates.stuck and estimates.stuck_confirmed)
         faults = _reported({**estimates.faults, **misfits}, self._checks.remarks)
@@ -82,7 +82,7 @@ class InputJudge:
         return replace(estimates, stuck=False, stuck_direction=0, reasons=tuple(reasons))
 
     def _silenced(self, findings: tuple[Finding, ...]) -> dict[int, str]:
-        """Return the wheels whose slip means nothing, and why: all, where it is half of them."""
+        """Return the wheels whose slip is meaningless, and why: all, where it is half of them."""
         names, silenced = self._names, dict[int, str]()
         for finding in reversed(findings):
             named = finding.wheel.split(', ') if finding.wheel else names
@@ -95,7 +95,7 @@ class InputJudge:
     def _follow(self, estimates: EstimateSet, silenced: str) -> None:
         """Follow the stuck warning: what it waits for, if anything.
 
-        `silenced`: why no wheel is judged, if so.
+        `silenced`: reason why no wheel has a class, if so.
         """
         if not estimates.stuck:
             self._stuck_since, self._confirmed, self._waits_for = None, False, ''
@@ -123,19 +123,19 @@ class InputJudge:
         self._checks.restore(checks)
 
     def begin_run(self, stamp: int, keep_soil: bool) -> None:
-        """Start anew."""
+        """Start again."""
         self._checks.reset()
         self._failed = False
 
     def retune(self, configuration: Configuration) -> None:
-        """Go on with other tuning."""
+        """Continue with other tuning."""
         state = self._checks.snapshot()
         self._checks = OnlineChecks(configuration)
         self._checks.restore(state)
 
 
 def _misfits(health: Mapping[str, Any], *, dug_in: bool) -> dict[str, str]:
-    """Say where torque, balance or noise are far from what the filter expects of them.
+    """Return messages on torque, balance or noise that are far from what the filter expects.
 
     No model fits a rover that is `dug_in`.
     """

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Topics and joints: what is there under which name."""
+"""Topics and joints by name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 
 IMU = 'sensor_msgs/msg/Imu'
-LONGEST_SILENCE = 2.0  # of all wheels at the end, while other joints are told [s]
+LONGEST_SILENCE = 2.0  # of all wheels at the end, while other joints are reported [s]
 
 DEFAULT_TOPICS = {
     'joints': '/joint_states',
@@ -65,7 +65,7 @@ def check_topics(
         own = default.lstrip('/')
         if series is None or series.topic == default or own in remapped:
             continue
-        if 'truth' not in series.topic:  # kept apart on purpose, to compare with
+        if 'truth' not in series.topic:  # excluded on purpose, for comparison
             there = [series.topic]
             if name == 'imu':
                 there += [

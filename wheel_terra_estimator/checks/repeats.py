@@ -27,11 +27,11 @@ LEAST_NOISY = 4  # the same of a reading with noise
 LONGER = 10.0  # so many times longer than a reading usually stays [-]
 FINE = 50  # different readings of a sensor whose steps are not what makes it stay
 MOST_REPEATED = 0.5  # share of rates that repeat themselves: more are rounded, or noiseless
-LEAST_BESIDE = 30  # other readings that tell whether a sensor has noise
+LEAST_BESIDE = 30  # other readings from which a sensor is seen to have noise
 SELDOM = 0.1  # share of readings that repeat the one before of a sensor with noise [-]
 CHANGES = 0.5  # change of the rates over the working rate that all else then changes with [-]
 AT_ONCE = 0.9  # share of a stretch in which no rate without noise changes, at least [-]
-LEAST_CHANGES = 30  # changes of rates from which their rhythm is told
+LEAST_CHANGES = 30  # changes of rates from which their rhythm is found
 CLEAR_SINKAGE = 0.005  # of the other wheels, beside which none reads 0 all the time [m]
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of the rover before its recording is looked at: a rover file, or good guesses."""
+"""Facts of the rover before its recording is checked: a rover file, or typical values."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class RoverFacts:
 
     @property
     def sensors(self) -> Any:
-        """What is stated of the sensors."""
+        """Stated figures of the sensors."""
         return self.configuration.sensors
 
     @cached_property
@@ -73,7 +73,7 @@ class RoverFacts:
 
 
 def from_configuration(configuration: Configuration) -> RoverFacts:
-    """Return what a rover file says."""
+    """Return the facts of a rover file."""
     wheels = configuration.wheels
     return RoverFacts(
         configuration=configuration,
@@ -116,12 +116,12 @@ def wheel_names(joints: Sequence[str]) -> tuple[str, ...]:
 
 
 def in_words(name: str) -> str:
-    """Return the name of a joint in small letters, its words apart: ``frontLeft``: front_left."""
+    """Return the name of a joint in lower case, its words separated: ``frontLeft``: front_left."""
     return _CAMEL.sub('_', name).lower()
 
 
 def side_of(name: str) -> int:
-    """Return +1 for a name of the left side, -1 for the right, 0 where it does not say."""
+    """Return +1 for a name of the left side, -1 for the right, 0 where it has no side."""
     low = in_words(name)
     left, right = bool(_LEFT.search(low)), bool(_RIGHT.search(low))
     return int(left) - int(right)

@@ -99,8 +99,8 @@ class ImuSeries(Channel):
 
     force: FloatArray  # (k, 3)
     rate: FloatArray  # (k, 3)
-    orientation: FloatArray  # (k, 4) x, y, z, w; nan where the message says that there is none
-    absent: tuple[str, ...] = ()  # of force and rate, what every message says is not there
+    orientation: FloatArray  # (k, 4) x, y, z, w; nan where the message marks none
+    absent: tuple[str, ...] = ()  # force or rate that every message marks as missing
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class VelocitySeries(Channel):
 
 
 def of_one_wheel(series: Series, wheels: Sequence[str]) -> Series:
-    """Return the messages of the wheel that is told most often, where they hold one or few each."""
+    """Return the messages of the wheel that is reported most often, where each holds one or few."""
     if not isinstance(series, JointSeries | SinkageSeries):
         return series
     there = np.isfinite(series.rate if isinstance(series, JointSeries) else series.sinkage)

@@ -21,7 +21,7 @@ NO_DEPTH = 3.0  # the same over the other wheels, either way, that is no zero of
 LEAST_READINGS = 50
 ANOTHER_UNIT = 30.0  # noise over the stated one from which it may be another unit [-]
 USUAL_RADIUS = 0.15  # wheels below this [m] have smaller limits, as their radii are
-DEEP_SPELL = 0.004  # highest readings [m] from which what is below the ground is no sign
+DEEP_SPELL = 0.004  # highest readings [m] from which a reading below the ground is no sign error
 BELOW_ZERO = 0.006  # median above the ground that no sinkage has [m] (lugs carry less)
 ALIKE_SHARE = 0.4  # change of an offset over a drive that is still a zero, as a share [-]
 DEEP_STD = 0.02  # deviation of a zero of all wheels: their true sinkage [m]
@@ -29,7 +29,7 @@ ODD_ZERO = 0.01  # A wheel that reads this much less or more than every other of
 
 
 def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return what is wrong with the sinkage readings, and the evidence with their signs mended."""
+    """Return faults of the sinkage readings, and the evidence with their signs corrected."""
     sinkage = evidence.recording.sinkage
     if sinkage is None:
         return [not_checked('zero', 'no_sinkage')], evidence
@@ -129,7 +129,7 @@ def _sign_and_zero(
         spread = max(float(np.nanmax(others) - np.nanmin(others)), 0.1 * abs(far))
         how = f'reads {1000 * far:+.0f} mm against the other wheels all the time'
         least = max(ODD_ZERO * small, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
-        # What is far beyond that is none of a sinkage.
+        # A reading far beyond that is no sinkage.
         if least < abs(far) < NO_DEPTH * _radius(evidence) and _lasting(table, index, far):
             outcomes.append(_zero(evidence, [name], far, spread, how))
     return outcomes

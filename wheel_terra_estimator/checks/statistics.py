@@ -1,9 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Robust statistics that the checks share, and how a cure is tried before it is named.
+"""Robust statistics of the checks, and the cross-validation of a remedy.
 
-What is found on one half of a recording is applied to the other: the residual of the evidence has
-to fall there, and no rival's cure may do as well.
+A remedy found on one half of a recording is applied to the other: the residual of the evidence has
+to fall there, and no competing remedy may do as well.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ MOST_STEPS = 200  # different values of a reading beyond which steps do not matt
 SAME_VALUE = 1e-6  # share of the greatest value below which two values are one
 OFF_A_STEP = 0.05  # distance from a multiple of a step, as a share of it
 LEAST_HALF = 12  # rows of a half that something is found on, at least
-LEAST_FALL = 0.7  # residual with a cure over that without, on the other half, at most [-]
-LEAST_MARGIN = 0.8  # the same over that with a rival's cure [-]
+LEAST_FALL = 0.7  # greatest residual with a remedy over that without, on the other half [-]
+LEAST_MARGIN = 0.8  # the same over that with a competing remedy [-]
 
 
 class Estimate(NamedTuple):
@@ -123,7 +123,7 @@ def _huber(
 
 
 def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve normal equations (..., p, p) after scaling; a column of nothing gets coefficient 0."""
+    """Solve normal equations (..., p, p) after scaling; a column of zeros gets coefficient 0."""
     size = np.sqrt(np.maximum(np.abs(np.diagonal(normal, axis1=-2, axis2=-1)), 1e-300))
     scaled = normal / (size[..., :, None] * size[..., None, :]) + 1e-12 * np.eye(size.shape[-1])
     return np.asarray(np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size)
@@ -165,7 +165,7 @@ def runs(same: BoolArray) -> list[tuple[int, int]]:
 
 
 def correlation(first: FloatArray, second: FloatArray) -> float:
-    """Return the correlation of two series about zero, 0 where one of them is nothing."""
+    """Return the correlation of two series about zero, 0 where one of them is zero."""
     known = np.isfinite(first) & np.isfinite(second)
     first, second = first[known], second[known]
     size = float(np.sqrt((first @ first) * (second @ second)))
@@ -223,7 +223,7 @@ def step_of(values: FloatArray) -> float:
 
 
 class Trial(NamedTuple):
-    """Residuals without a cure, with it, and with the best rival's, each on the other half."""
+    """Residuals without a remedy, with it, and with the best competing one, on the other half."""
 
     before: float
     after: float
@@ -231,12 +231,12 @@ class Trial(NamedTuple):
 
     @property
     def falls(self) -> bool:
-        """Whether the cure mends something."""
+        """Whether the remedy helps."""
         return self.after < LEAST_FALL * self.before
 
     @property
     def passes(self) -> bool:
-        """Whether the cure mends something and no rival does as well."""
+        """Whether the remedy helps and no competing one does as well."""
         return self.falls and self.after < LEAST_MARGIN * self.rival
 
     def words(self, what: str, unit: str) -> str:
@@ -255,7 +255,7 @@ def halves(energy: FloatArray) -> tuple[slice, slice]:
 def tried(fit: Callable[[slice], float], nothing: float, energy: FloatArray) -> Trial:
     """Fit a number on each half of some rows and return what it leaves on the other, the worse one.
 
-    ``nothing`` is the number that changes nothing, ``energy`` (k,) what each row tells of it.
+    ``nothing`` is the number that changes nothing, ``energy`` (k,) the information of each row.
     """
     parts = halves(energy)
     if min(part.stop - part.start for part in parts) < LEAST_HALF:
@@ -266,5 +266,5 @@ def tried(fit: Callable[[slice], float], nothing: float, energy: FloatArray) -> 
 
 
 def worst(trials: Sequence[Trial]) -> Trial:
-    """Return the trial, of those on the halves, in which the cure did least."""
+    """Return the trial, of those on the halves, in which the remedy helped least."""
     return max(trials, key=lambda t: t.after / max(min(t.before, t.rival), 1e-12))

@@ -31,7 +31,7 @@ from wheel_terra_estimator.checks.statistics import (
 
 UPHILL_ENOUGH = -0.02  # specific force along the drive at which a wheel takes power [g]
 SIGN_SIGMAS = 4.0
-LEAST_ANSWER = 0.3  # answer of a torque to slopes over the others' that tells its sign [-]
+LEAST_ANSWER = 0.3  # response of a torque to slopes over the others' that shows its sign [-]
 ALIKE_LEVELS = 0.5  # least over greatest of torques that drive alike [-]
 LEAST_LOOSE = 0.03  # sum of T/r over the weight on loose level ground, at least [-]
 MOST_TRACTION = 0.85  # sum of T/r over the weight that no soil gives (tangent of 40 degrees)
@@ -43,7 +43,7 @@ UP_AND_DOWN = 0.3
 """The same of uphill and of downhill stretches: one way alone the soil may resist more the steeper
 the slope [m/s^2]."""
 GAIN_MODEL_STD = 0.05  # by resistance that is larger uphill (firm drives of the simulator)
-SLOPE_TIME = 2.0  # forces are averaged over this for a slope that a sign is told on [s]
+SLOPE_TIME = 2.0  # forces are averaged over this for the slope that shows a sign [s]
 SMOOTH_ROWS = 20  # rows over which slopes are averaged
 RUTS = 0.3  # half of the difference of resistance one way and back over its mean, one deviation [-]
 RUT_TILT = 0.5
@@ -57,7 +57,7 @@ ALIKE_ZEROS = 0.6  # scatter of zeros over their mean within which they are one 
 
 
 def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return what is wrong with the torques."""
+    """Return faults of the torques."""
     known = np.isfinite(evidence.torque).any(axis=0)
     if not known.any():
         return _not_checked('no_torque'), evidence
@@ -95,7 +95,7 @@ def _not_checked(why: str, **figures: float) -> list[Outcome]:
 def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return torques of the wrong sign: by what slopes, starts and stops change in them.
 
-    The mean alone does not tell: a wheel whose radius is a little smaller is dragged by the others.
+    The mean alone is not enough: a wheel with a slightly smaller radius is dragged by the others.
     """
     facts, answered = evidence.facts, answers(evidence)
     if answered is not None and _fight(evidence, answered):
@@ -126,9 +126,9 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 
 def _fight(evidence: Evidence, measured: list[tuple[Estimate, Estimate]]) -> bool:
-    """Return whether wheels may fight one another: torques of both signs leave next to nothing.
+    """Return whether wheels may fight one another: torques of both signs nearly cancel.
 
-    On firm ground they do so from the start on: without slopes nothing then tells the signs. Those
+    On firm ground they do so from the start on: without slopes the signs are then unknown. Those
     of wheels that are reversed are as large as the others.
     """
     facts, levels = evidence.facts, np.array([level.value for _, level in measured])
@@ -144,9 +144,9 @@ def _fight(evidence: Evidence, measured: list[tuple[Estimate, Estimate]]) -> boo
 
 
 def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
-    """Return how each torque answers to the force along the drive, and its level; None for nothing.
+    """Return the response of each torque to the force along the drive, and its level; or None.
 
-    Starts and stops of the wheels tell which way the IMU feels forward, else the mean torque does.
+    Starts and stops of the wheels show the forward direction of the IMU, else the mean torque does.
     """
     rows, sense = evidence.unturned, np.sign(evidence.common_rate)
     if evidence.force is None or not evidence.enough(rows):
@@ -180,7 +180,7 @@ def thrust(evidence: Evidence) -> FloatArray:
 
 
 def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Judge the level of the torques: units and currents."""
+    """Check the level of the torques: units and currents."""
     facts, rows = evidence.facts, evidence.straight
     assert evidence.force is not None
     if rows.sum() < LEAST_MOVING_ROWS:
@@ -316,7 +316,7 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
 
 
 def like_a_pitch(evidence: Evidence, zeros: list[Estimate]) -> bool:
-    """Return whether zeros are one in all torques, as a pitch of the IMU that no circle told is."""
+    """Return whether zeros are one in all torques, as by an IMU pitch that no circle showed."""
     known = evidence.figures.get('imu.tilt_std_deg', math.inf) < math.degrees(EVEN_GROUND_STD)
     seen = np.array([zero.value for zero in zeros]) / evidence.facts.radius
     return not known and float(np.ptp(seen)) < ALIKE_ZEROS * abs(float(np.mean(seen)))
@@ -336,7 +336,7 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     slopes = np.column_stack(calm)[rows]
     load = np.nan_to_num(facts.mass * slopes[:, :1] * facts.radius / len(facts.names))
     table = np.nan_to_num(evidence.torque[rows]) - load
-    # What is left of slopes along both axes: the IMU may be turned about z.
+    # Residual of slopes along both axes: the IMU may be turned about z.
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
     design = np.column_stack([np.ones(sense.size), sense, slopes])
     fits = [block_fit(design, column) for column in table.T]
