@@ -44,7 +44,7 @@ SMOOTH = 0.02  # unlike part that a lag leaves of speeds that are made smooth, b
 FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part, at most
 LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
 """Deviation of a lag by chassis and filters; log time leaves the age of a velocity open [s]."""
-APART = 0.2  # lags of two halves or motions that differ by less agree [s]
+AGREEING_LAGS = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS, SHARP_SIGMAS = 4.0, 10.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]
 MANY = 60  # references from which it is averaged over starts and stops
@@ -69,7 +69,7 @@ class Lag(NamedTuple):
     @property
     def steady(self) -> bool:
         """Whether both halves of the drive show the same."""
-        return 2.0 * self.std < APART
+        return 2.0 * self.std < AGREEING_LAGS
 
     def counts(self, evidence: Evidence, name: str) -> bool:
         """Whether it is a lag of a channel and stood its trial."""
@@ -104,17 +104,17 @@ def corrected(recording: Recording, facts: RoverFacts) -> Recording:
 
 def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return which sensor's stamps are off, and the evidence with the reference on the wheels'."""
-    answers = {'imu': _of_imu(evidence), 'reference': _of_reference(evidence)}
+    found = {'imu': _of_imu(evidence), 'reference': _of_reference(evidence)}
     by_log = _moved(evidence, 'imu') - _moved(evidence, 'joints')
-    if by_log and isinstance(answers['imu'], NotChecked):
-        answers['imu'] = _lag_by_log(by_log)
-    outcomes: list[Outcome] = [one for one in answers.values() if isinstance(one, NotChecked)]
-    lags = {name: one for name, one in answers.items() if not isinstance(one, NotChecked)}
-    blamed = _blamed(evidence, lags)
-    for name, off in blamed.items():
+    if by_log and isinstance(found['imu'], NotChecked):
+        found['imu'] = _lag_by_log(by_log)
+    outcomes: list[Outcome] = [one for one in found.values() if isinstance(one, NotChecked)]
+    lags = {name: one for name, one in found.items() if not isinstance(one, NotChecked)}
+    late = _late_channels(evidence, lags)
+    for name, off in late.items():
         if abs(off.value) <= MOST_OFFSET:  # else another clock
             outcomes.append(_outcome(evidence, name, off))
-    outcomes += _too_late(evidence, {name: off.value for name, off in blamed.items()})
+    outcomes += _too_late(evidence, {name: off.value for name, off in late.items()})
     reference, velocity = lags.get('reference'), evidence.recording.reference
     if reference and velocity is not None and reference.counts(evidence, 'reference'):
         left = reference.value + _moved(evidence, 'joints')
@@ -159,13 +159,13 @@ def _lag_by_log(late: float) -> Lag:
     return Lag(late, BY_LOG, (late, late), Trial(1.0, 0.0))
 
 
-def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
+def _late_channels(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
     """Return the sensor whose stamps are off: the one that is off against both others."""
     late = {name: lag for name, lag in lags.items() if lag.counts(evidence, name)}
     if len(late) == 2:
         imu, reference = late['imu'], late['reference']
         std = math.hypot(*(_whole_std(evidence, *lag) for lag in late.items()))
-        if abs(imu.value - reference.value) < max(APART, 3.0 * std):
+        if abs(imu.value - reference.value) < max(AGREEING_LAGS, 3.0 * std):
             return {'wheel_odometry': imu.of_the_first()}
         return late
     for name, lag in late.items():
@@ -250,7 +250,7 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
     if best is None:
         return not_checked('delay', 'no_turns', limit=round(_longest('turns', time), 1))
     apart = 0.0 if turned is None or started is None else abs(turned.value - started.value)
-    if started is not None and started.steady and apart > APART + 3.0 * best.std:
+    if started is not None and started.steady and apart > AGREEING_LAGS + 3.0 * best.std:
         return not_checked('delay', 'unlike', apart=apart)
     evidence.figures['imu.delay_s'] = round(best.value, 3)
     return best
@@ -530,9 +530,9 @@ def _drift(late: list[float], others: list[list[float]]) -> float:
     if len(late) < QUARTERS or not compared:
         return 0.0
     gain, beside = -np.diff(late), -np.diff(np.median(compared, axis=0))
-    drift, apart = (float(one.sum()) * QUARTERS / (QUARTERS - 1) for one in (gain, gain - beside))
+    drift, without = (float(one.sum()) * QUARTERS / (QUARTERS - 1) for one in (gain, gain - beside))
     even = np.ptp(gain) < UNEVEN * abs(float(gain.mean()))
-    return drift if even and min(abs(drift), abs(apart)) > LEAST_OFFSET else 0.0
+    return drift if even and min(abs(drift), abs(without)) > LEAST_OFFSET else 0.0
 
 
 def _steps(channel: Channel) -> FloatArray:

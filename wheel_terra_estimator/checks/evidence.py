@@ -395,8 +395,8 @@ Complex: TypeAlias = NDArray[np.complex128]
 
 LEAST_YAW = math.radians(12.0)  # least yaw of starts and stops in a comparison [rad]
 YAW_SIGMAS = 4.0
-FELT = (0.4, 2.5)  # felt along an axis over what wheels and gyro say; else it is another [-]
-FELT_BLOCKS = 10  # parts of a drive that a deviation comes from
+RATIOS = (0.4, 2.5)  # measured over expected motion along an axis; beyond, it is another [-]
+YAW_BLOCKS = 10  # parts of a drive that a deviation comes from
 
 
 def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None:
@@ -427,8 +427,8 @@ def felt_senses(evidence: Evidence) -> list[int]:
         return [0, 0]
     motion, seen = both
     pairs = (motion.real, seen.real), (motion.imag, seen.imag)
-    fits = [block_fit(wheels[:, None], felt)[0] for wheels, felt in pairs]
-    clear = [FELT[0] < abs(f.value) < FELT[1] and f.sigmas_from(0.0) > YAW_SIGMAS for f in fits]
+    fits = [block_fit(wheels[:, None], measured)[0] for wheels, measured in pairs]
+    clear = [RATIOS[0] < abs(f.value) < RATIOS[1] and f.sigmas_from(0.0) > YAW_SIGMAS for f in fits]
     return [int(np.sign(f.value)) * there for f, there in zip(fits, clear, strict=True)]
 
 
@@ -439,22 +439,22 @@ def felt_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
         return None
     motion, seen = both
     energy = np.cumsum(np.abs(motion) ** 2)
-    edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], FELT_BLOCKS + 1)[1:-1])
+    edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], YAW_BLOCKS + 1)[1:-1])
     blocks = zip(np.split(motion, edges), np.split(seen, edges), strict=True)
-    parts = np.array([np.vdot(wheels, felt) for wheels, felt in blocks])
+    parts = np.array([np.vdot(wheels, measured) for wheels, measured in blocks])
     total = parts.sum()
     spread = float(np.linalg.norm(parts - total / parts.size))
     chance = _by_chance(motion, seen, total)
-    felt = 0.5 * energy[-1] < abs(total) < 2.0 * energy[-1]
-    if not felt or abs(total) < 3.0 * max(spread, chance):
+    alike = 0.5 * energy[-1] < abs(total) < 2.0 * energy[-1]
+    if not alike or abs(total) < 3.0 * max(spread, chance):
         return None
-    aside = (parts * np.conj(total)).imag / abs(total) ** 2  # along it they differ without a turn
-    std = max(float(np.linalg.norm(aside)), chance / abs(total))
+    across = (parts * np.conj(total)).imag / abs(total) ** 2  # along it they differ without a turn
+    std = max(float(np.linalg.norm(across)), chance / abs(total))
     return Estimate(float(np.angle(total)), std)
 
 
 def _by_chance(motion: Complex, seen: Complex, total: complex) -> float:
-    """Return how alike a motion and what it leaves of what is felt are at other times, one way."""
+    """Return the chance correlation of a motion with the rest of the measured one at other lags."""
     left = seen - motion * total / np.vdot(motion, motion)
     at_lags = np.fft.ifft(np.fft.fft(left) * np.conj(np.fft.fft(motion)))
     return float(np.sqrt(0.5 * np.mean(np.abs(at_lags) ** 2)))

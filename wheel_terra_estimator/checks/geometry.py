@@ -312,10 +312,10 @@ def _unlike(evidence: Evidence) -> tuple[float, float]:
     if not left.size or not right.size:
         return 0.0, 0.0
     turned = stated_track(evidence) * evidence.yaw
-    apart = np.nanmedian((evidence.side_difference - turned)[rows] / evidence.rim[rows])
+    asymmetry = np.nanmedian((evidence.side_difference - turned)[rows] / evidence.rim[rows])
     threes = [sorted((left.mean(), right.mean(), one)) for one in middle]
     odd = [low - 2.0 * between + high for low, between, high in threes]
-    return abs(float(apart)), float(np.abs([np.ptp(left), np.ptp(right), *odd]).max())
+    return abs(float(asymmetry)), float(np.abs([np.ptp(left), np.ptp(right), *odd]).max())
 
 
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:

@@ -70,7 +70,7 @@ LONGEST_GAP = 1.0  # time without IMU in which a turn may pass unseen [s]
 LEAST_TURN = 4.5  # heading that a drive has to cover to separate the mounting from a slope [rad]
 FLAT_TURN_STD = math.radians(0.1)  # unevenness of the ground leaves open [rad]
 TURNED_ROUND = 0.75  # probability that an IMU is turned round, not its x axis reversed [-]
-LEAN_STD = math.radians(0.5)  # of a body in turns, which is no mounting where both ways are driven
+ROLL_STD = math.radians(0.5)  # of a body in turns, which is no mounting where both ways are driven
 YAW_MODEL_STD = math.radians(1.0)  # pitch and roll in starts and turns leave open [rad]
 LEAST_QUARTER = math.radians(45.0)  # least yaw of a quarter turn [rad]
 ALONG_AXIS = math.cos(math.radians(25.0))  # cosine within which an axis is meant [-]
@@ -88,12 +88,12 @@ CROSS_AXIS = 0.01  # gyro against accelerometer in one housing [rad]; data sheet
 UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
 LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
-LEAST_WILD = 3
-WILD_SIGMAS = 10.0  # of the usual change of a reading, which another unit makes large
-MOST_WILD = 0.2  # greatest share of outliers that are single samples [-]
+LEAST_OUTLIERS = 3
+OUTLIER_SIGMAS = 10.0  # of the usual change of a reading, which another unit makes large
+MOST_OUTLIERS = 0.2  # greatest share of samples that are single outliers [-]
 LEAST_MESSAGES = 20
 UNIT_TOLERANCE = 0.12  # share by which the mean specific force may lie off gravity in another unit
-UP_APART = math.radians(25.0)  # that no acceleration makes [rad]
+UP_DIFFERENCE = math.radians(25.0)  # that no acceleration makes [rad]
 MOST_COMPARED = 5000  # messages
 FROZEN_SHARE = 0.3  # share of messages that repeat the one before
 MOUNTING = tuple(f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw'))
@@ -149,7 +149,7 @@ def check_imu(state: ImuState) -> Judged:
     for check, *needed in (
         (_frozen, 'force', 'rate'),
         (_gravity, 'force'),
-        (_wild, 'force', 'rate'),
+        (_outliers, 'force', 'rate'),
         (_up_by_orientation, 'force'),
     ):
         if all(map(state.has, needed)):
@@ -158,7 +158,7 @@ def check_imu(state: ImuState) -> Judged:
     return outcomes, state
 
 
-def _up_apart(imu: ImuSeries) -> float:
+def _up_difference(imu: ImuSeries) -> float:
     """Return the angle between up by orientation and by specific force [rad]; nan: unknown."""
     norm = np.linalg.norm(imu.orientation, axis=1)
     known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
@@ -173,12 +173,12 @@ def _up_apart(imu: ImuSeries) -> float:
 def _up_by_orientation(state: ImuState) -> Judged:
     """Return an orientation that has up elsewhere than the specific force, both in its frame."""
     imu = state.imu
-    apart = _up_apart(imu)
+    difference = _up_difference(imu)
     upright = float((state.rotation @ np.median(imu.force, axis=0))[2]) > 0.0
-    turned_round = apart > math.pi - UP_APART and not upright  # see `check_upside`
-    if not apart >= UP_APART or turned_round:
+    turned_round = difference > math.pi - UP_DIFFERENCE and not upright  # see `check_upside`
+    if not difference >= UP_DIFFERENCE or turned_round:
         return [], state
-    how = f'its up and that of linear_acceleration lie {math.degrees(apart):.0f} degrees apart'
+    how = f'its up and that of linear_acceleration lie {math.degrees(difference):.0f} degrees apart'
     finding = state.found('orientation', 0.97, how=how)
     return [finding], state.with_values(orientation=np.full_like(imu.orientation, np.nan))
 
@@ -226,7 +226,7 @@ def _frozen(state: ImuState) -> Judged:
     return [state.found('sensor_frozen', 0.99, how=how)], state
 
 
-def _wild(state: ImuState) -> Judged:
+def _outliers(state: ImuState) -> Judged:
     """Leave out single samples that no body can make; the node does so by the same limits."""
     imu, outcomes, kept = state.imu, list[Outcome](), np.ones(state.imu.stamp.size, dtype=bool)
     for values, limit, unit in (
@@ -234,14 +234,14 @@ def _wild(state: ImuState) -> Judged:
         (imu.rate, OUTLIER_RATE, 'rad/s'),
     ):
         off = lonely(values)
-        if (off > limit).sum() < LEAST_WILD:
+        if (off > limit).sum() < LEAST_OUTLIERS:
             continue
         noise = np.array([robust_std(column) for column in np.diff(values, axis=0).T])
-        wild = (off > np.maximum(limit, WILD_SIGMAS * noise)).any(axis=1)  # or in another unit
-        if LEAST_WILD <= wild.sum() <= MOST_WILD * wild.size:
-            details = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'unit': unit}
+        single = (off > np.maximum(limit, OUTLIER_SIGMAS * noise)).any(axis=1)  # or in another unit
+        if LEAST_OUTLIERS <= single.sum() <= MOST_OUTLIERS * single.size:
+            details = {'count': int(single.sum()), 'share': 100.0 * np.mean(single), 'unit': unit}
             outcomes.append(state.found('imu_wild', 0.97, most=float(off.max()), **details))
-            kept &= ~wild
+            kept &= ~single
     return outcomes, state.with_imu(rows_of(imu, kept)) if outcomes else state
 
 
@@ -392,7 +392,7 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     facts = evidence.facts
     open_bias = facts.sensors.specific_force_bias_std if facts.known else 0.0
     one_way = abs(float(np.sign(yaw * evidence.rim)[turning].mean()))
-    floor = math.hypot(FLAT_TURN_STD, LEAN_STD * one_way, open_bias / facts.gravity)
+    floor = math.hypot(FLAT_TURN_STD, ROLL_STD * one_way, open_bias / facts.gravity)
     turns = np.column_stack([yaw, np.ones(yaw.size)])[turning, : 2 if seen is None else 1]
     along, across = tilt = value[:2]
     # A sensor whose x axis points up by p reads +g sin p on x; one rolled by q reads -g sin q on y.
@@ -429,8 +429,8 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [not_checked('mounting', 'no_starts')], evidence
     # Slopes at the places of starts and stops fall off faster than these: a rover that goes to and
     # fro feels the same ones each time.
-    apart = math.remainder(seen.value - quick.value, 2.0 * math.pi)
-    seen = Estimate(seen.value, math.hypot(seen.std, 0.5 * apart, YAW_MODEL_STD))
+    difference = math.remainder(seen.value - quick.value, 2.0 * math.pi)
+    seen = Estimate(seen.value, math.hypot(seen.std, 0.5 * difference, YAW_MODEL_STD))
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
         unclear = not_checked('mounting', 'yaw_open', least=math.degrees(YAW_SIGMAS * seen.std))
@@ -451,8 +451,8 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def without_yaw(seen: Estimate) -> FloatArray:
     """Return the rotation that takes a yaw off; right angles are meant where they fit."""
-    angle, apart = seen.value, math.remainder(seen.value, math.pi / 2.0)
-    if abs(apart) < 2.5 * max(seen.std, math.radians(4.0)) and abs(angle) > LEAST_QUARTER:
+    angle, difference = seen.value, math.remainder(seen.value, math.pi / 2.0)
+    if abs(difference) < 2.5 * max(seen.std, math.radians(4.0)) and abs(angle) > LEAST_QUARTER:
         angle = round(angle / (math.pi / 2.0)) * math.pi / 2.0
     return np.asarray(Rotation.from_rotvec([0.0, 0.0, -angle]).as_matrix())
 
@@ -541,8 +541,8 @@ def mounting_finding(
     most = int(np.argmax(change))
     angles = '  '.join(
         f'{name}: {angle:.2f}'
-        for name, angle, apart in zip(MOUNTING, new, change, strict=True)
-        if apart >= LEAST_SHOWN
+        for name, angle, difference in zip(MOUNTING, new, change, strict=True)
+        if difference >= LEAST_SHOWN
     )
     details = {'value': round(new[most], 3), 'std': std, 'parameter': MOUNTING[most]}
     return evidence.found(key, sure, angles=angles, **details, **figures)

@@ -140,11 +140,11 @@ def _lasting(table: FloatArray, index: int, far: float) -> bool:
 
     A zero shifts all readings; a wheel that digs itself in is deeper now and then.
     """
-    apart = []
+    differences = []
     for part in halves(np.ones(table.shape[0])):
         low, high = np.nanquantile(table[part], [0.1, 0.9], axis=0)
-        apart += [float(q[index] - np.nanmedian(np.delete(q, index))) for q in (low, high)]
-    return all(abs(one - far) < ALIKE_SHARE * abs(far) for one in apart)
+        differences += [float(q[index] - np.nanmedian(np.delete(q, index))) for q in (low, high)]
+    return all(abs(one - far) < ALIKE_SHARE * abs(far) for one in differences)
 
 
 def _zero(evidence: Evidence, names: list[str], left: float, std: float, how: str) -> Finding:

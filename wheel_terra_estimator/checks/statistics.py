@@ -261,8 +261,8 @@ def tried(fit: Callable[[slice], float], nothing: float, energy: FloatArray) -> 
     if min(part.stop - part.start for part in parts) < LEAST_HALF:
         return Trial(0.0, math.inf)
     first, second = (fit(part) for part in parts)
-    apart = abs(second - first)
-    return worst([Trial(abs(second - nothing), apart), Trial(abs(first - nothing), apart)])
+    distance = abs(second - first)
+    return worst([Trial(abs(second - nothing), distance), Trial(abs(first - nothing), distance)])
 
 
 def worst(trials: Sequence[Trial]) -> Trial:

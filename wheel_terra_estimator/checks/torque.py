@@ -31,7 +31,7 @@ from wheel_terra_estimator.checks.statistics import (
 
 UPHILL_ENOUGH = -0.02  # specific force along the drive at which a wheel takes power [g]
 SIGN_SIGMAS = 4.0
-LEAST_ANSWER = 0.3  # response of a torque to slopes over the others' that shows its sign [-]
+LEAST_RESPONSE = 0.3  # response of a torque to slopes over the others' that shows its sign [-]
 ALIKE_LEVELS = 0.5  # least over greatest of torques that drive alike [-]
 LEAST_LOOSE = 0.03  # sum of T/r over the weight on loose level ground, at least [-]
 MOST_TRACTION = 0.85  # sum of T/r over the weight that no soil gives (tangent of 40 degrees)
@@ -97,19 +97,19 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
     The mean alone is not enough: a wheel with a slightly smaller radius is dragged by the others.
     """
-    facts, answered = evidence.facts, answers(evidence)
-    if answered is not None and _fight(evidence, answered):
-        answered = None
-    if answered is None:
+    facts, by_wheel = evidence.facts, responses(evidence)
+    if by_wheel is not None and _fight(evidence, by_wheel):
+        by_wheel = None
+    if by_wheel is None:
         return [not_checked('sign', 'torque_no_change')], evidence
-    usual = float(np.median([abs(answer.value) for answer, _ in answered]))
-    agree = all(answer.value * level.value > 0.0 for answer, level in answered)
+    usual = float(np.median([abs(response.value) for response, _ in by_wheel]))
+    agree = all(response.value * level.value > 0.0 for response, level in by_wheel)
     wrong, unsure = [], []
-    for i, (answer, level) in enumerate(answered):
+    for i, (response, level) in enumerate(by_wheel):
         brakes = -level.value > SIGN_SIGMAS * level.std
-        clear = answer.sigmas_from(0.0) > SIGN_SIGMAS or (brakes and agree)
+        clear = response.sigmas_from(0.0) > SIGN_SIGMAS or (brakes and agree)
         drives = level.value > SIGN_SIGMAS * level.std
-        if answer.value < -LEAST_ANSWER * usual and clear and not drives:
+        if response.value < -LEAST_RESPONSE * usual and clear and not drives:
             wrong.append(i)
         elif brakes:
             unsure.append(facts.names[i])
@@ -119,7 +119,7 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return outcomes, evidence
     torque = evidence.torque.copy()
     torque[:, wrong] *= -1.0
-    sure = confidence(min(max(one.sigmas_from(0.0) for one in answered[i]) for i in wrong))
+    sure = confidence(min(max(one.sigmas_from(0.0) for one in by_wheel[i]) for i in wrong))
     names = ', '.join(facts.names[i] for i in wrong)
     outcomes.append(evidence.found('torque_sign', sure, wheel=names, value=-1.0))
     return outcomes, evidence.with_rate(evidence.rate, torque)
@@ -143,7 +143,7 @@ def _fight(evidence: Evidence, measured: list[tuple[Estimate, Estimate]]) -> boo
     return bool(firm and np.std(along) < LEAST_SLOPE_STD)
 
 
-def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
+def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     """Return the response of each torque to the force along the drive, and its level; or None.
 
     Starts and stops of the wheels show the forward direction of the IMU, else the mean torque does.
@@ -166,11 +166,11 @@ def answers(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     levels = [block_fit(way, column)[0] for column in table[rows].T]
     if yaw is not None:
         return list(zip(measured, levels, strict=True))
-    shares = [answer.value * level.value for answer, level in zip(measured, levels, strict=True)]
+    shares = [one.value * level.value for one, level in zip(measured, levels, strict=True)]
     if sum(shares) * np.median(shares) <= 0.0:
         return None
     forward = math.copysign(1.0, sum(shares))
-    measured = [Estimate(forward * answer.value, answer.std) for answer in measured]
+    measured = [Estimate(forward * response.value, response.std) for response in measured]
     return list(zip(measured, levels, strict=True))
 
 
@@ -271,10 +271,10 @@ def torque_gain(evidence: Evidence) -> Slopes | NotChecked:
         return not_checked('gain', 'soft', traction=traction)
     if abs(fit.gain.value - 1.0) > LEAST_GAIN_ERROR and not fit.trial.falls:
         return not_checked('gain', 'halves')
-    apart = min(0.5 * fit.trial.after, 1.0)
+    misfit = min(0.5 * fit.trial.after, 1.0)
     # A body that digs in reads uphill where thrust rises: slopes seem to cost less, never more.
     tilt = RUT_TILT * traction**2 * evidence.facts.gravity / fit.scatter
-    std = math.hypot(fit.gain.std, GAIN_MODEL_STD, apart, tilt if fit.gain.value < 1.0 else 0.0)
+    std = math.hypot(fit.gain.std, GAIN_MODEL_STD, misfit, tilt if fit.gain.value < 1.0 else 0.0)
     return fit._replace(gain=Estimate(fit.gain.value, std))
 
 
