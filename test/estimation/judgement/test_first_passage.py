@@ -25,9 +25,9 @@ from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonito
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     Memory,
     RoverMotion,
+    Situation,
     WheelMotion,
     driving_share,
-    observe,
 )
 
 RIM = 0.05  # [m/s]
@@ -43,7 +43,7 @@ def followed(motions):
     """Return the situation at the end of motions that are 0.1 s apart."""
     memory = Memory()
     for i, there in enumerate(motions):
-        found = observe(memory, 0.1 * i, there)
+        found = Situation(0.1 * i, there, memory)
         memory = found.memory
     return found
 

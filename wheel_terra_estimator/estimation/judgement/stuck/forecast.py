@@ -64,7 +64,7 @@ def passage_probability(
     known = TYPICAL_STD**2 / (TYPICAL_STD**2 + variance)
     mean = TYPICAL_SLIP + known * (np.asarray(slip) - TYPICAL_SLIP)
     below = ndtr((_EDGES - mean[:, None]) / np.sqrt(known * variance)[:, None])
-    weights = np.diff(below, axis=1)
+    weights = below[:, 1:] - below[:, :-1]
     weights[:, 0] += below[:, 0]
     level = DIGGING * max(deepening, 0.0) * clipped(median(mean.tolist()), 0.0, 1.0)
     place = min(level / _LEVELS[1], len(_LEVELS) - 1 - 1e-9)

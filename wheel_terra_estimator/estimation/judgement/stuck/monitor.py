@@ -27,7 +27,6 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     Memory,
     RoverMotion,
     Situation,
-    observe,
 )
 from wheel_terra_estimator.estimation.scalars import NAN
 
@@ -85,7 +84,7 @@ class StuckMonitor(Component[StuckState]):
     def update(self, time: float, motion: RoverMotion) -> StuckAssessment:
         """Judge the motion of the rover at a time [s]."""
         old, settings = self.state, self._settings
-        situation = observe(old.memory, time, motion)
+        situation = Situation(time, motion, old.memory)
         ahead = outlook(situation, settings)
         digs = situation.slip > _DIGGING_SLIP and situation.slip_std < TYPICAL_STD
         at_once = motion.slip_known and _stands(situation) and not motion.turning

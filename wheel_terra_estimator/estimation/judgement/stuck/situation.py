@@ -94,8 +94,50 @@ class Memory(NamedTuple):
 class Situation:
     """The rover at one update, as the warning sees it."""
 
+    time: float  # [s]
     motion: RoverMotion
-    memory: Memory
+    before: Memory
+
+    @cached_property
+    def memory(self) -> Memory:
+        """What is remembered after this update."""
+        before, wheels = self.before, self.motion.wheels
+        dt = 0.0 if isnan(before.time) else max(self.time - before.time, 0.0)
+        moves, turning = bool(self.moving), self.motion.turning
+        # Wheels settle into their ruts after a start; those that turn on the spot dig by command.
+        rolled = before.rolled + self.fastest * dt if moves and not turning else 0.0
+        fresh = rolled < _START_TRAVEL
+        usual = self.depth if isnan(before.depth) else before.depth
+        direction = before.direction
+        if moves and self.rim > _DIRECTION_SHARE * before.cruise:
+            forward = sum([1 if w.rim_speed > 0.0 else -1 for w in self.moving])
+            direction = (forward > 0) - (forward < 0)
+        stands = not moves and not any(isnan(w.rim_speed) for w in wheels)
+        shares = [w.torque_share for w in wheels if not isnan(w.torque_share)]
+        pulls = stands and max(shares, default=0.0) > _STALL_SHARE_AT_REST
+        pulls = pulls and sum(shares) / len(shares) - self.motion.holding_share > _BEYOND_SLOPE
+        since = self.time if isnan(before.pulls_since) else before.pulls_since
+        cruise = max(before.cruise * math.exp(-dt / _CRUISE_TIME), self.rim)
+        return Memory(
+            time=self.time,
+            rolled=rolled,
+            cruise=0.0 if turning else cruise,
+            ruts=tuple(
+                [
+                    w.sinkage
+                    if fresh or isnan(w.rim_speed)
+                    else rut + gain_of(abs(w.rim_speed) * dt, _RUT_LENGTH) * (w.sinkage - rut)
+                    for w, rut in zip(
+                        wheels, before.ruts or [w.sinkage for w in wheels], strict=True
+                    )
+                ]
+            ),
+            depth=usual
+            + gain_of(self.rim * dt, _DEEPENING_RADII * self.radius) * (self.depth - usual),
+            direction=direction,
+            direction_since=before.direction_since if direction == before.direction else self.time,
+            pulls_since=since if pulls else NAN,
+        )
 
     @cached_property
     def moving(self) -> tuple[WheelMotion, ...]:
@@ -230,47 +272,3 @@ class Situation:
     def slip_magnitude(self) -> float:
         """Median of |s|, braking included; nan where it is known of no wheel."""
         return median([abs(w.slip) for w in self.moving]) if self.moving else NAN
-
-
-def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
-    """Return the situation at a time [s], with the memory after it."""
-    dt = 0.0 if isnan(memory.time) else max(time - memory.time, 0.0)
-    now = Situation(motion, memory)
-    moves = bool(now.moving)
-    # Wheels settle into their ruts after a start; those that turn on the spot dig by command.
-    rolled = memory.rolled + now.fastest * dt if moves and not motion.turning else 0.0
-    fresh = rolled < _START_TRAVEL
-    ruts = memory.ruts or tuple([w.sinkage for w in motion.wheels])
-    usual = now.depth if isnan(memory.depth) else memory.depth
-    direction = memory.direction
-    if moves and now.rim > _DIRECTION_SHARE * memory.cruise:
-        forward = sum([1 if w.rim_speed > 0.0 else -1 for w in now.moving])
-        direction = (forward > 0) - (forward < 0)
-    stands = not moves and not any(isnan(w.rim_speed) for w in motion.wheels)
-    shares = [w.torque_share for w in motion.wheels if not isnan(w.torque_share)]
-    pulls = stands and max(shares, default=0.0) > _STALL_SHARE_AT_REST
-    pulls = pulls and sum(shares) / len(shares) - motion.holding_share > _BEYOND_SLOPE
-    since = time if isnan(memory.pulls_since) else memory.pulls_since
-    return Situation(
-        motion,
-        Memory(
-            time=time,
-            rolled=rolled,
-            cruise=0.0
-            if motion.turning
-            else max(memory.cruise * math.exp(-dt / _CRUISE_TIME), now.rim),
-            ruts=tuple(
-                [
-                    w.sinkage
-                    if fresh or isnan(w.rim_speed)
-                    else rut + gain_of(abs(w.rim_speed) * dt, _RUT_LENGTH) * (w.sinkage - rut)
-                    for w, rut in zip(motion.wheels, ruts, strict=True)
-                ]
-            ),
-            depth=usual
-            + gain_of(now.rim * dt, _DEEPENING_RADII * now.radius) * (now.depth - usual),
-            direction=direction,
-            direction_since=memory.direction_since if direction == memory.direction else time,
-            pulls_since=since if pulls else NAN,
-        ),
-    )
