@@ -239,18 +239,21 @@ def test_what_is_later_than_can_be_run_again_is_bounded_counted_and_told():
     assert health['late_inputs_dropped'] == 0
 
 
-def test_what_waits_longer_than_the_history_is_dropped_and_nothing_else():
-    """One step a second may be run again: after two seconds late inputs wait for their turn."""
-    slow = {**DEFAULT, 'max_lag': 0.0, 'filter__rerun_rate': 1.0, 'history': 2.0}
-    core, _ = make_core(**slow)
+def test_what_waits_is_fused_at_its_own_stamp_before_the_history_ends():
+    """One step a second may be run again; readings in the history count all the same."""
     stream = [odometry(0.1 * i) for i in range(61)]
-    play(core, stream[:40], flush=False)
-    for late in (2.5, 2.7):  # the state is at 3.9
-        core.add(sinkage(late))
-    assert core.health()['late_inputs_deferred'] == 2
-    play(core, stream[40:], flush=False)  # at 6.0 both are older than the history
-    core.add(sinkage(5.0))
-    core.flush()
-    health = core.health()
-    assert health['late_inputs_dropped'] == 2
-    assert health['late_inputs_deferred'] == 3
+    found = []
+    for rate in (1.0, 0.0):
+        bound = {**DEFAULT, 'max_lag': 0.0, 'filter__rerun_rate': rate, 'history': 2.0}
+        core, _ = make_core(**bound)
+        play(core, stream[:40], flush=False)
+        for late in (2.5, 2.7):  # the state is at 3.9
+            core.add(sinkage(late))
+        found.append(essence(play(core, stream[40:], flush=False)))  # at 4.6 the first would go
+        core.add(sinkage(4.5))
+        health = core.health()
+        assert health['late_inputs_deferred'] == (3 if rate else 0)
+        assert health['late_inputs_dropped'] == 0
+    bounded, unbounded = found
+    assert bounded[0] != unbounded[0], 'they wait'
+    assert bounded[7:] == unbounded[7:], 'they are fused'

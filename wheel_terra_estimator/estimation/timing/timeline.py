@@ -10,6 +10,7 @@ any number of late inputs between two sets costs one run.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
@@ -127,12 +128,12 @@ class Timeline:
             self._allowance = min(self._allowance + rate * elapsed, rate * ALLOWANCE)
             self._newest = newest
         if self._deferred:
-            yield from self._insert_deferred()
+            yield from self._insert_deferred(newest - hold)
         yield from self._release(newest - hold)
 
     def flush(self, end: int) -> Iterator[Due]:
         """Release everything up to a stamp [ns]."""
-        yield from self._insert_deferred(at_any_cost=True)
+        yield from self._insert_deferred(math.inf)
         yield from self._release(end)
 
     def begin_after(self, due: Due) -> None:
@@ -173,15 +174,18 @@ class Timeline:
                 return fate, self._due(index)
         return fate, None
 
-    def _insert_deferred(self, at_any_cost: bool = False) -> Iterator[Due]:
-        """Insert all deferred inputs, as soon as the allowance covers the oldest of them."""
+    def _insert_deferred(self, limit: float) -> Iterator[Due]:
+        """Insert all deferred inputs, as soon as the allowance covers the oldest of them.
+
+        At any cost before a release up to `limit` [ns] leaves the oldest behind the history.
+        """
         if not self._deferred:
             return
         oldest = min(measurement.stamp for _, measurement in self._deferred)
         cost = self._log.steps_after(oldest) - self._log.dirty
-        if cost > self._allowance and not at_any_cost:
+        if cost > self._allowance and oldest >= limit - self.settings.history:
             return
-        self._allowance -= max(cost, 0)
+        self._allowance = max(self._allowance - max(cost, 0), 0.0)
         deferred, self._deferred = self._deferred, []
         for channel, measurement in deferred:
             if self.is_too_old(measurement.stamp):
