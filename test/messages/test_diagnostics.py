@@ -86,6 +86,13 @@ def test_an_unknown_class_is_called_so_with_the_slip_that_is_in_doubt():
     assert (told.level, told.message) == (STALE, 'no wheel rate')
 
 
+def test_a_stalled_wheel_that_is_dragged_is_called_so():
+    reasons = ('stalled: torque near its limit, hardly turning', 'slip 0.10 +- 0.05')
+    dragged = at(0.0, slip_class=np.array([3, 0], dtype=np.uint8), reasons=reasons)
+    told = Diagnostics(NAMES).due(dragged)[1]
+    assert (told.level, told.message) == (ERROR, reasons[0])
+
+
 def test_one_wheel_without_a_rate_is_a_fault_of_the_node():
     lacking = {'slip_class': UNKNOWN, 'reasons': ('no wheel rate', 'slip 0.10 +- 0.05')}
     diagnostics = Diagnostics(NAMES)

@@ -24,7 +24,7 @@ COST = {
 }
 """Input that may be missing at a stamp -> that it is, and what that costs."""
 
-NO_RATE = 'no wheel rate'
+NO_RATE, STALLED = 'no wheel rate', 'stalled: torque near its limit, hardly turning'
 
 
 def reasons_in_words(
@@ -38,7 +38,7 @@ def reasons_in_words(
         if isnan(rim):
             text = NO_RATE
         elif stands:
-            text = 'stalled: torque near its limit, hardly turning'
+            text = STALLED
         elif wheel.resting:
             text = 'at rest'
         else:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.words import COST, NO_RATE
+from wheel_terra_estimator.estimation.words import COST, NO_RATE, STALLED
 
 SECOND = 1_000_000_000  # [ns]
 MEMORY = 10 * SECOND  # how long a fault stands in words after it was last seen [ns]
@@ -244,7 +244,7 @@ def _wheel_status(estimates: EstimateSet, i: int, name: str, node_name: str) -> 
     reason = e.reasons[i]
     slip_class = SlipClass(int(e.slip_class[i]))
     level, message = _wheel_level(e, i), reason
-    if slip_class in _CLASS_WORDS:
+    if slip_class in _CLASS_WORDS and not reason.startswith(STALLED):
         message = _CLASS_WORDS[slip_class][1]
     elif reason.startswith('slip'):
         message = NO_RATE if level == STALE else f'unknown: {reason}'
