@@ -293,7 +293,7 @@ def _longest(by: str, time: FloatArray) -> float:
 
 
 def lag_of(
-    time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, by: str, log: float = 0
+    time: FloatArray, first: FloatArray, at: FloatArray, second: FloatArray, by: str, log: float
 ) -> Lag | None:
     """Return by how much the second series lags the first; None where they are not alike.
 

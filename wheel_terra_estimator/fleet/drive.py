@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from wheel_terra_estimator.bags.replay import DEFAULT, Options, Replay, replay
+from wheel_terra_estimator.bags.replay import Options, Replay, replay
 from wheel_terra_estimator.bags.series_reader import read_series
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.bags.truth import Truth, read_truth
@@ -75,7 +75,7 @@ def replay_drive(
     configuration: Configuration,
     remaps: Mapping[str, str],
     output: Path | None,
-    options: Options = DEFAULT,
+    options: Options,
     on_checked: Callable[[CheckReport], None] = lambda checked: None,
 ) -> Drive:
     """Check a recording, run the estimator over it and sum it up.

@@ -64,9 +64,9 @@ def replay_bags(
     bags: Sequence[Path],
     settings: Settings,
     *,
-    overwrite: bool = False,
-    jobs: int = 1,
-    scheduler: str = '',
+    overwrite: bool,
+    jobs: int,
+    scheduler: str,
 ) -> list[DriveRow]:
     """Replay recordings into one folder each and write the summary over all.
 

@@ -105,7 +105,7 @@ def _figures(row: DriveRow) -> list[Any]:
     return [*figures, text(row.longest_stuck, 3), text(row.max_slip, 4), text(row.max_sinkage, 4)]
 
 
-def write_summary_page(rows: Sequence[DriveRow], path: Path, report: str = '') -> None:
+def write_summary_page(rows: Sequence[DriveRow], path: Path, report: str) -> None:
     """Write the page over all drives; ``report``: name of the report in the folder of each."""
     drives = [row for row in rows if not row.error]
     warned = sum(bool(row.stuck_warnings) for row in drives)

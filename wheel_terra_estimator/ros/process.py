@@ -43,7 +43,7 @@ class _Signals:
             end.start()
 
 
-def run_node(module: str, name: str, args: list[str] | None = None) -> int:
+def run_node(module: str, name: str, args: list[str] | None) -> int:
     """Make the node of a class in a module of `ros` and serve it until it is asked to stop."""
     gc.disable()  # until the node stands: what is made so far lives as long as it does
     signals = _Signals() if threading.current_thread() is threading.main_thread() else None

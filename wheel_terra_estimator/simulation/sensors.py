@@ -47,7 +47,7 @@ class SensorSuite:
     """All sensors of a rover, and how they fail; ``random`` is the source of all errors."""
 
     def __init__(
-        self, scenario: Scenario, random: np.random.Generator, faults: Sequence[Fault] = ()
+        self, scenario: Scenario, random: np.random.Generator, faults: Sequence[Fault]
     ) -> None:
         configuration = scenario.configuration
         self._configuration: Configuration = configuration

@@ -111,7 +111,7 @@ class DriveRows:
 def rows_from_bag(
     path: str | Path,  # folder, or a single ``.mcap`` or ``.db3``
     configuration: Configuration,  # wheels, mass and load model
-    remaps: Mapping[str, str] | None = None,  # estimator's topic -> the bag's
+    remaps: Mapping[str, str] | None,  # estimator's topic -> the bag's
     *,
     # Whether the slip comes from the fixed-interval smoother in place of the references alone; it
     # takes about 1.7 times as long as a replay

@@ -143,7 +143,7 @@ def _soil_keys(name: str, value: float, std: float, soil: Soil) -> dict[str, flo
     return {f'soil.{name}': value, f'soil.{name}_std': std}
 
 
-def provenance(diagnosis: Diagnosis, proposal: Proposal | None = None) -> str:
+def provenance(diagnosis: Diagnosis, proposal: Proposal | None) -> str:
     """Return one line: the change, its table, its probability."""
     before = diagnosis.configuration.provenance
     if proposal is not None:
