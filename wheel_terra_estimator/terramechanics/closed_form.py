@@ -84,13 +84,13 @@ class BranchForces:
         self._roll = contact.velocity_ratio / self._modulus
         self._turn = turn = R / self._modulus
         skid = contact.velocity_ratio / R - 1.0
-        self._turns_back = bool(np.any(skid > 0.0))
+        self._turns_back = np.count_nonzero(skid > 0.0) > 0
         # Weight of the nodes against the centroids.
         share = np.maximum((skid - _BLEND_FROM) / _BLEND, 0.0)
         if self._sideways:
             share = share + np.abs(contact.lateral_ratio / R) / _SIDEWAYS_BLEND
         share = np.minimum(share, 1.0)
-        self._skidding = bool(np.any(share > 0.0))
+        self._skidding = np.count_nonzero(share > 0.0) > 0
         self._skid = share * share * (3.0 - 2.0 * share)
         self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
         square_front, square_rear = front * front, rear * rear

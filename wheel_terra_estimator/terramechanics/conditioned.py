@@ -144,8 +144,8 @@ def _within_the_model(inputs: ConditionedInputs) -> ConditionedInputs:
     """Return inputs that the model takes: nan and values beyond the bounds as the nearest."""
     numbers = {name: getattr(inputs, name) for name in _LEAST}
     with np.errstate(invalid='ignore'):
-        total = sum(numbers.values())
-    if not np.isfinite(total).all():
+        total = np.add.reduce(sum(numbers.values()), axis=None)
+    if not math.isfinite(total):
         numbers = {
             name: np.where(np.isfinite(value), value, max(_LEAST[name], 0.0))
             for name, value in numbers.items()

@@ -138,8 +138,8 @@ class Pulls(Component[PullState]):
         if forces is not None:
             sums = self._known(cycle, total, sideways, tilt)
             if sums:
-                errors = joint + np.diag(np.array(own) + scrub)
-                pull = distributed(np.array(pull), errors, sums, loads.load)
+                joint.flat[:: n + 1] += np.array(own) + scrub
+                pull = distributed(np.array(pull), joint, sums, loads.load)
         self.state = PullState(tuple(pull), tuple(std), model_pull, tuple(torque), tuple(excess))
 
     def _known(

@@ -211,5 +211,5 @@ class WheelModels:
         log_depth = np.log(np.maximum(peak_depth, _LEAST_DEPTH) / c.reference_depth)
         normal = c.width * c.radius * a * sigma
         carried = normal + c.width * c.shear_radius * b * tau
-        exponent = np.broadcast_to(c.sinkage_exponent, np.shape(log_depth))
-        return Bearing(np.maximum(carried, _LEAST_BEARING * normal), exponent, log_depth)
+        carried = np.maximum(carried, _LEAST_BEARING * normal)
+        return Bearing(carried, c.sinkage_exponent, log_depth)

@@ -96,11 +96,12 @@ class SinkageProcess(Component[SinkageState]):
     def predict(self, prediction: Prediction, x: FloatArray, cycle: Cycle) -> float:
         """Add the sinkages to a prediction from a state `x` (size,); return the travel [m]."""
         layout, rims, loads, dt = self._layout, cycle.rims, cycle.loads.load, cycle.dt
-        turning = np.array([abs(rim) >= self._rover.rest_speed for rim in rims])  # known ones
+        turns = [abs(rim) >= self._rover.rest_speed for rim in rims]  # known ones
+        turning = np.array(turns)
         loaded = np.array(loads) > LEAST_LOAD
         walk = np.where(turning, _LIFTED_WALK, _RESTING_WALK)
         prediction.Q[self._entries, self._entries] = walk * dt
-        if not turning.any():
+        if not any(turns):
             return 0.0
         rim = np.where(turning, rims, 1.0)
         direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)

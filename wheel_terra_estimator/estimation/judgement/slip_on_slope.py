@@ -149,7 +149,7 @@ class SlopeCurve(Component[CurveState]):
         spread = float(gradient @ column)
         tail = (_FREEDOM + residual**2 / (spread + noise)) / (_FREEDOM + 1.0)
         gain = column / (spread + noise * max(tail, 1.0))
-        covariance -= np.outer(gain, column)
+        covariance -= gain[:, None] * column
         covariance = 0.5 * (covariance + covariance.T)
         least, greatest = state.driven
         return state._replace(
