@@ -200,11 +200,11 @@ def distributed(
     `errors` (n, n) is their covariance [N^2]. The deviations of single pulls stay: a sum says
     nothing of the differences between wheels.
     """
-    shares = np.array([each.shares for each in known])
-    residual = np.array([each.value for each in known]) - shares @ pull
-    covariance = errors @ shares.T
-    noise = np.diag([each.variance for each in known])
-    moved = pull + covariance @ np.linalg.solve(shares @ covariance + noise, residual)
+    for shares, value, variance in known:
+        column = errors @ shares
+        gain = column / (shares @ column + variance)
+        pull = pull + gain * (value - shares @ pull)
+        errors = errors - gain[:, None] * column
     return [
-        clipped(f, -_MOST_DRAG * load, load) for f, load in zip(moved.tolist(), loads, strict=True)
+        clipped(f, -_MOST_DRAG * load, load) for f, load in zip(pull.tolist(), loads, strict=True)
     ]
