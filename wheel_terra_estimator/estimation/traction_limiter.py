@@ -1,10 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Traction limiter: what passes of a velocity command, as a state machine without ROS.
+"""Traction limiter: the share of a velocity command that passes, as a state machine without ROS.
 
-``docs/limiter.md`` is its specification: `INTERLOCK` is the table of states and events there,
-`decide` the table of what passes. Each function takes a `LimiterState`, a time of a steady clock
-[s] and what came, and returns the state after it; nothing else is remembered.
+``docs/limiter.md`` is its specification: `INTERLOCK` is its table of states and events, `decide`
+its table of commands. Each function takes a `LimiterState`, a time of a steady clock [s] and an
+input, and returns the next state; there is no other memory.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ Velocity = tuple[float, float, float, float, float, float]
 ZERO: Velocity = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 RELEASE_TIME = 10.0  # [s] for which ``~/release`` opens a crawl
-OUT_TIME = 3.0  # [s] of motion out that ends a stop: that of ``filter.stuck_clear_time``
-TURN_BACK_TIME = 1.0  # [s] of standing between two ways out where the direction is unknown
-REST_TIME = 0.5  # [s] without motion that are rest: that of the estimator
-REST_SPEED = 0.002  # [m/s]: ``rest_speed`` of the estimator
-LONGEST_DELAY = 60.0  # [s] of a set behind its stamp: beyond it the two clocks disagree
+OUT_TIME = 3.0  # [s] of motion out that ends a stop, as ``filter.stuck_clear_time``
+TURN_BACK_TIME = 1.0  # [s] at standstill between two ways out where the direction is unknown
+REST_TIME = 0.5  # [s] without motion that count as rest, as in the estimator
+REST_SPEED = 0.002  # [m/s], as ``rest_speed`` of the estimator
+LONGEST_DELAY = 60.0  # [s] of a set behind its stamp; with more the two clocks disagree
 CLOCK_JITTER = 0.1  # [s] of a clock against the steady one
 COMMAND_TIMEOUT = 2.0  # [s] without a command after which the rover is taken to stand
 LONGEST_STEP = 0.2  # [s] between two commands that counts for the ramp
-SAME_WAY = 0.75  # share of the rim speeds that must agree for a direction
-LEAST_SLIP = 1e-3  # of which, and of its slip velocity, a speed follows
+SAME_WAY = 0.75  # share of the rim speeds that must agree for a direction [-]
+LEAST_SLIP = 1e-3  # slip below which slip velocity over slip gives no speed [-]
 
 
 class Interlock(Enum):
@@ -81,7 +81,7 @@ class Estimates(NamedTuple):
 
 
 class Wheel(NamedTuple):
-    """What was last known of a wheel; `at` is when by its stamp [s], minus infinity: never."""
+    """Last known estimates of a wheel, `at` a time [s] by their stamp, minus infinity: never."""
 
     slip: float = 0.0
     travel: float = NO_ENTRAPMENT_IN_SIGHT
@@ -89,7 +89,7 @@ class Wheel(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """What passes of a command, the state in one or two words, and why."""
+    """Share of a command that passes, the state in one or two words, and the reason."""
 
     scale: float
     state: str
@@ -101,7 +101,7 @@ NOTHING_KNOWN = Decision(1.0, 'no estimate', 'no estimate yet')
 
 @dataclass(frozen=True)
 class LimiterState:
-    """All that the limiter remembers; times are of a steady clock [s]."""
+    """Memory of the limiter; times are of a steady clock [s]."""
 
     interlock: Interlock = Interlock.FREE
     direction: int = 0  # that led in: 1 forward, -1 backward, 0 both or unknown
@@ -119,10 +119,10 @@ class LimiterState:
     sent: Velocity = ZERO  # what went out last
     sent_at: float = -math.inf
     still_since: float = 0.0  # nothing goes out
-    way: int = 0  # direction of what went out last, 0 = none yet
+    last_direction: int = 0  # of the last motion that went out, 0 = none yet
 
 
-# -- What is received -----------------------------------------------------------------------------
+# -- Inputs ---------------------------------------------------------------------------------------
 
 
 def after_event(
@@ -130,12 +130,12 @@ def after_event(
 ) -> LimiterState:
     """Return the state after an event of the interlock, as its table says.
 
-    `direction` and `reason` are of an event that closes it; a direction that was known is not
-    forgotten for one that is not.
+    `direction` and `reason` are of an event that closes it; a known direction is not replaced by an
+    unknown one.
     """
     following = INTERLOCK[event][state.interlock]
     if event is Event.STUCK and state.interlock is not Interlock.STUCK:
-        state = replace(state, released_until=-math.inf)  # what was released was less than this
+        state = replace(state, released_until=-math.inf)  # a release does not cover this
     if following is Interlock.FREE:
         return replace(state, interlock=following, direction=0, reason='', out=None)
     if event in (Event.STOP, Event.STUCK):
@@ -150,7 +150,7 @@ def after_stuck(state: LimiterState, stuck: bool, *, change: bool) -> LimiterSta
     """Return the state after ``~/stuck``.
 
     `change`: the same estimator had sent it before, so that False means cleared or reset; the first
-    one of an estimator that has just begun proves nothing.
+    one of a new estimator does not.
     """
     if stuck:
         return after_event(state, Event.STUCK, state.stuck_direction, 'stuck')
@@ -167,7 +167,7 @@ def after_direction(state: LimiterState, direction: int) -> LimiterState:
 
 
 def after_release(state: LimiterState, now: float) -> tuple[LimiterState, str]:
-    """Return the state after ``~/release``, and in words what it opens."""
+    """Return the state after ``~/release``, and a message on its effect."""
     if state.interlock is Interlock.FREE:
         return state, 'nothing to release'
     released = after_event(state, Event.RELEASE)
@@ -183,8 +183,8 @@ def after_estimates(
 ) -> LimiterState:
     """Return the state after a set of estimates.
 
-    One whose parts do not fit is not used. One that is too old only lowers the scale or stops, but
-    is remembered: the rim travel left of a wheel is what was received last.
+    A set whose arrays differ in length is not used. One that is too old can only lower the scale or
+    stop, but its slips and rim travels left are kept.
     """
     count = len(estimates.slip_class)
     if not count == len(estimates.slip) == len(estimates.rim_travel_left):
@@ -223,11 +223,11 @@ def after_estimates(
     return after_event(state, Event.STOP, direction, reason)
 
 
-# -- What passes ----------------------------------------------------------------------------------
+# -- Commands -------------------------------------------------------------------------------------
 
 
 def decide(state: LimiterState, now: float, command: Velocity, tuning: LimiterTuning) -> Decision:
-    """Return what is to pass of a command that comes now; the first line that applies."""
+    """Return the decision on a command that comes now, by the first line that applies."""
     if command == ZERO:
         return Decision(1.0, 'zero', 'zero command: passes')
     free = state.interlock is Interlock.FREE
@@ -245,10 +245,10 @@ def decide(state: LimiterState, now: float, command: Velocity, tuning: LimiterTu
 def after_command(
     state: LimiterState, now: float, command: Velocity, tuning: LimiterTuning
 ) -> tuple[LimiterState, Decision]:
-    """Return the state after a command, whose `sent` goes out, and what was decided.
+    """Return the state after a command, whose `sent` goes out, and the decision.
 
-    A reduction goes out at once, an increase with the greatest acceleration; what is not a number
-    stops.
+    A reduction goes out at once, an increase with the greatest acceleration; nan or infinity is a
+    stop.
     """
     if not all(map(math.isfinite, command)):
         command = ZERO
@@ -264,7 +264,7 @@ def after_command(
         sent=sent,
         sent_at=now,
         still_since=now if moves else now - still,
-        way=_sign(sent[0]) or state.way,
+        last_direction=_sign(sent[0]) or state.last_direction,
         started_at=now if starts else state.started_at,
         known_since_start=state.known_since_start and not starts,
     )
@@ -281,7 +281,7 @@ def estimate_age(state: LimiterState, now: float) -> float:
     return now - state.judged_at + _late(state)
 
 
-# -- Within ---------------------------------------------------------------------------------------
+# -- Helpers --------------------------------------------------------------------------------------
 
 
 def _clock_offset(
@@ -297,7 +297,7 @@ def _clock_offset(
     stepped = delay - state.delay > elapsed + CLOCK_JITTER
     agreed = state.clock_offset is None and math.isfinite(elapsed)
     if agreed and delay > 0.0 and not stepped:
-        return None  # a topic that ended, or lasts: no clock stepped
+        return None  # the topic ended or is late; no clock stepped
     return delay if state.clock_offset is None or stepped else min(state.clock_offset, delay)
 
 
@@ -309,9 +309,9 @@ def _late(state: LimiterState) -> float:
 def _counted_slips(
     state: LimiterState, known: Sequence[bool], now: float, tuning: LimiterTuning
 ) -> list[float]:
-    """Return the slip that counts of each wheel: what is or was last known, then the critical one.
+    """Return the slip that counts of each wheel: a fresh one, else at least the critical one.
 
-    A wheel of which nothing was known since it stood counts only after the start.
+    A wheel without a known slip since the last rest counts only after the start.
     """
     counted = []
     for wheel, is_known in zip(state.wheels, known, strict=True):
@@ -325,9 +325,9 @@ def _counted_slips(
 def _after_unknown(
     state: LimiterState, now: float, estimates: Estimates, tuning: LimiterTuning
 ) -> LimiterState:
-    """Return the state after a set without any known class: rest, a start, or doubt."""
+    """Return the state after a set without any known class: rest, a start, or unknown slip."""
     state = replace(state, out=None)
-    # The slip velocity of a wheel without rates is held: it does not move the others.
+    # Wheels whose rates are missing keep an old slip velocity and are left out.
     latest = max((wheel.at for wheel in state.wheels), default=-math.inf)
     slowly = all(
         abs(speed) <= REST_SPEED
@@ -358,7 +358,7 @@ def _after_motion(
     known: Sequence[bool],
     tuning: LimiterTuning,
 ) -> LimiterState:
-    """Return the state after a set in motion that is no reason to stop: the way out, or not."""
+    """Return the state after a set in motion that is no reason to stop: moving out, or not."""
     slips = [abs(s) for s, k in zip(estimates.slip, known, strict=True) if k]
     moving = _direction(estimates, known)
     if moving in (0, state.direction) or median(slips) >= tuning.critical_slip:
@@ -399,7 +399,7 @@ def _decide_closed(
 ) -> Decision:
     share = tuning.creep_scale
     if state.direction == 0:
-        turned = state.way * forward < 0 and _still_time(state, now) < TURN_BACK_TIME
+        turned = state.last_direction * forward < 0 and _still_time(state, now) < TURN_BACK_TIME
         if not turned:
             return Decision(share, 'backing out', f'direction unknown: crawl at {share:.2f}')
         words = (
@@ -425,9 +425,9 @@ def _still_time(state: LimiterState, now: float) -> float:
 def _ramped(
     before: Velocity, command: Velocity, scale: float, elapsed: float, tuning: LimiterTuning
 ) -> Velocity:
-    """Return what goes out [m/s, rad/s]: what is less at once, what is more by and by.
+    """Return what goes out [m/s, rad/s]: a reduction at once, an increase as a ramp.
 
-    All components take the same part of their way up, so that a curve stays the same curve.
+    All components rise by the same share of their increase, so that the curvature is kept.
     """
     limits = (tuning.max_acceleration,) * 3 + (tuning.max_angular_acceleration,) * 3
     target = [scale * component for component in command]
