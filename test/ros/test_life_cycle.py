@@ -202,6 +202,7 @@ def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener
         return any('before a restart: wheels dig in' in reason for reason in reasons)
 
     until(told)
+    assert said[-1].status[0].message.startswith('stuck: warned before a restart: wheels dig in')
     assert len(stuck) == 1, 'rest does not clear it'
     assert call('reset').success
     until(lambda: not stuck[-1].data and direction[-1].data == 0)
@@ -212,6 +213,8 @@ def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener
     assert written == pytest.approx(432.1, rel=0.2)
     status, words = process.stop(signal.SIGINT)
     assert status == 0 and 'Traceback' not in words, words
+    (error,) = [line for line in words.splitlines() if '[ERROR]' in line]
+    assert error.endswith('stuck before the restart: wheels dig in')
 
 
 def catches_signals(process):
