@@ -69,7 +69,7 @@ class PriorTuning:
     """Weight of the old covariance, against that of a start, where a new run keeps the soil [-]."""
     most_speed: float = 20.0  # [m/s]
     most_gravity_bias: float = 2.0  # [m/s^2]
-    most_strength: float = 1.0  # [ln]
+    most_strength: float = 2.0  # [ln]
     most_shear_modulus: float = 1.3  # [ln]
     most_slip_sinkage: float = 0.8
     most_centroid: float = 0.3
