@@ -17,6 +17,7 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision, workflow
 from wheel_terra_estimator.discrepancy.assessment import held_out
 from wheel_terra_estimator.discrepancy.report import words
+from wheel_terra_estimator.discrepancy.selection import readings
 from wheel_terra_estimator.discrepancy.selection.readings import Columns, units_apart
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
@@ -329,6 +330,15 @@ def test_a_gain_that_a_unit_explains_as_well_is_no_surer_than_that(
     assert ('so large a gain is rare' in found.sentence) == rare
     said = f'unless it is another unit of the column ({unit}), which would look alike'
     assert (said in found.sentence) == bool(unit)
+
+
+def test_effects_compete_in_another_unit_only_where_the_soil_is_likelier_in_it(monkeypatch):
+    """Half a decade off the size that a poorly known soil gives is no sign of another unit."""
+    table, values, *_ = make('sweep40')
+    values['soil.friction_angle_deg'] *= 0.45
+    few = Options(('cohesion', 'drivetrain_friction'), soil_known_to=1.0)
+    monkeypatch.setattr(readings, 'search', None)
+    assert run(table, values, options=few).verdict == 'agrees'
 
 
 def test_a_unit_is_alike_within_the_deviation_of_a_gain():

@@ -95,6 +95,18 @@ def run(table, values, **options):
                     **options)  # fmt: skip
 
 
+@pytest.mark.parametrize('hidden', [(), ('drivetrain_friction',)])
+def test_noise_that_is_a_third_larger_than_stated_is_no_misfit_and_hides_no_effect(hidden):
+    table, values, *_ = make('sweep40', hidden)
+    stated = {k: v / 1.5 if k.endswith('_std') else v for k, v in table.items()}
+    found = run(stated, values, options=FEW)
+    assert found.verdict == ('named' if hidden else 'agrees')
+    assert [effect.name for effect in found.effects] == list(hidden)
+    times = re.findall(r'scatter is (1\.\d) times the stated noise', ' '.join(found.notes))
+    assert len(times) == 3 and np.mean([float(n) for n in times]) == pytest.approx(1.5, abs=0.15)
+    assert 'the stated noise' not in ' '.join(run(table, values, options=FEW).notes)
+
+
 @pytest.mark.parametrize(('stated', 'verdict'), [(0.02, 'unexplained'), (0.1, 'agrees')])
 def test_an_effect_that_is_on_is_believed_as_far_as_its_deviation_goes(stated, verdict, unproposed):
     """True 0.2, configured 0.03: seven deviations off, or a good one."""

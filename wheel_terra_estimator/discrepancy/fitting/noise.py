@@ -37,6 +37,9 @@ SCATTER_CHANCE = 1e-3  # below which repeated rows do not have the stated noise
 _SMOOTH = (0.01, 0.03, 0.1, 0.3, 1.0)
 _FIRST_GUESS = 0.01  # of the range
 _USUAL, _SPREAD = 1.5, 1.2  # weak prior of the factor on the guess: centre, width of its log
+# Factors on a guess, and on what is stated: readings scatter by no less than that, and seldom by
+# twice as much. Width of the log of the latter.
+_FACTORS, _STATED, _TRUST = np.geomspace(0.01, 30.0, 90), np.geomspace(1.0, 2.0, 30), 0.3
 _LEAST = 1e-4  # of the range: noise below it is a matter of rounding
 # A few smooth rows, read off a figure or averaged, hide by how much they are off: an estimate is at
 # least what it would be if so many cells more were off by this share of the range.
@@ -123,27 +126,33 @@ def estimate_noise(
     shapes: Sequence[FloatArray],  # (N,) noise of each row over its mean: the usual one first
     build: Callable[[FloatArray], Problem],  # the problem with deviations (N, 4)
 ) -> Noise:
-    """Estimate what was neither stated nor repeated, beside soil and a smooth misfit.
+    """Estimate the noise of what was not repeated, beside soil and a smooth misfit.
 
     The marginal likelihood of a smooth process, the soil's tangent space and white noise is
-    maximised over the noise of each quantity, so that effects do not pass for noise.
+    maximised over the noise of each quantity, so that effects do not pass for noise. What was
+    stated is known but for a factor.
     """
-    unknown = [q for q in range(len(QUANTITIES)) if noise.origin.get(QUANTITIES[q]) == 'estimated']
+    unknown, stated = (
+        [q for q, name in enumerate(QUANTITIES) if noise.origin.get(name) == origin]
+        for origin in ('estimated', 'given')
+    )
     best, std = dict.fromkeys(unknown, -np.inf), noise.std.copy()
     usual = {q: math.sqrt(np.nanmean(std[:, q] ** 2)) for q in unknown}
-    for shape in shapes if unknown else ():
+    for shape in shapes if unknown else shapes[:1]:
         guess = noise.std.copy()
         for q in unknown:
             guess[:, q] = usual[q] * shape
         problem = build(guess)
         here = fitted.within(problem)
         target = here.residual + here.jacobian @ here.u
-        for q in unknown:
+        for q in (*unknown, *stated):
             cells = problem.quantity == q
             # Where slip errors mix the axes, those at the places of the cells stand for them.
-            value, count, score = _white_part(
-                target[cells], here.jacobian[cells], problem.roughness[cells], _LEAST / _FIRST_GUESS
-            )
+            part = target[cells], here.jacobian[cells], problem.roughness[cells]
+            if q in stated:  # whose own shape stays
+                std[:, q] = noise.std[:, q] * _white_part(*part, _STATED, 1.0, _TRUST)[0]
+                continue
+            value, count, score = _white_part(*part, _FACTORS, _USUAL, _SPREAD)
             score -= float(np.log(problem.std[cells]).sum())
             if score < best[q] + _CLEARLY:
                 continue
@@ -157,10 +166,14 @@ def estimate_noise(
 
 
 def _white_part(
-    target: FloatArray, jacobian: FloatArray, roughness: FloatArray, least: float
+    target: FloatArray,
+    jacobian: FloatArray,
+    roughness: FloatArray,
+    factors: FloatArray,
+    usual: float,  # centre of the prior; ``spread``: deviation of the logarithm
+    spread: float,
 ) -> tuple[float, float, float]:
     """Return the most probable noise factor, its degrees of freedom and its log likelihood."""
-    factors = np.geomspace(least, 30.0, 90)
     best, chosen = -np.inf, (1.0, 0.0)
     outer = jacobian @ jacobian.T
     for amplitude in _SMOOTH:
@@ -169,7 +182,7 @@ def _white_part(
         power = (vectors.T @ target) ** 2
         variance = np.maximum(values, 0.0)[None] + factors[:, None] ** 2
         score = -0.5 * (np.log(variance) + power / variance).sum(axis=1)
-        score -= 0.5 * (np.log(factors / _USUAL) / _SPREAD) ** 2
+        score -= 0.5 * (np.log(factors / usual) / spread) ** 2
         top = int(np.argmax(score))
         if score[top] > best:
             share = factors[top] ** 2 / variance[top]

@@ -67,6 +67,7 @@ REFERENCE_AGAIN = NextMeasurement(
     'the rows of the reference again on a fresh bed', ('another bed', 'an effect'), 0.0, math.inf
 )
 _SCATTERED = 0.2  # of the range: estimated noise beyond which agreement says little
+_NOISIER = 1.2  # times the stated noise: a scatter that is worth a note
 _COARSE = 0.05  # model-error floor above which agreement says little
 
 
@@ -235,6 +236,11 @@ def notes(
             '*_std columns'
         )
     found += _repeatability(findings.noise)
+    for q, name in enumerate(QUANTITIES):
+        times = findings.noise.std[: len(table), q] / table.stated_std[:, q]
+        if findings.noise.origin.get(name) == 'given' and np.nanmedian(times) > _NOISIER:
+            so = f'the scatter is {number(float(np.nanmedian(times)), 2)} times the stated noise'
+            found.append(f'{plain(name)}: {so}, and is used')
     if findings.outliers:
         count = len(findings.outliers)
         several = f'{count} cells were rejected as outliers'

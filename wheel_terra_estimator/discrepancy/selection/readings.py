@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,12 +94,12 @@ class Columns:
         if len(found) == len(self.table.quantities):
             return {}
         said: dict[str, float | str] = {}
-        for quantity, times in found.items():
-            reading = _scaled({quantity: times}, self.table, self.forward.points)
+        points, off = self.forward.points, found.items()
+        for reading in self._likeliest(_scaled({q: x}, self.table, points) for q, x in off):
             other = self._explained(reading, self.effects)
             gain = other.selection.best - self.findings.selection.best
             if gain + self._density(reading) > _CLEARLY:
-                said[quantity] = times
+                said.update(reading.said)
         return said
 
     def misread(self) -> Mapping[str, float | str]:
@@ -115,7 +115,7 @@ class Columns:
             or not (as_they_are.only_far or as_they_are.accounted_for)
         )
         count = len(selection.explanations[0].names)
-        for reading in self._likeliest():
+        for reading in self._likeliest(self._readings()):
             density, alone = self._density(reading), -math.inf
             for tried in ({}, self.effects)[: 2 if density or count > 1 else 1]:
                 if tried and alone + density < selection.best_single:
@@ -134,13 +134,13 @@ class Columns:
                     return reading.said
         return {}
 
-    def _likeliest(self) -> list[Reading]:
-        """Return the readings that soil alone fits best, by one fit each, likeliest first."""
+    def _likeliest(self, readings: Iterable[Reading]) -> list[Reading]:
+        """Return those that soil alone fits best, by one fit each, likeliest first."""
         setting, plain = self.findings.setting, self.findings.nothing
         variance = setting.problem.variance(_ROUGH)
         nothing = setting.refit(plain, variance)
         ranked = []
-        for reading in self._readings():
+        for reading in readings:
             cells = reading.scale[setting.problem.quantity]
             problem = replace(
                 setting.problem,

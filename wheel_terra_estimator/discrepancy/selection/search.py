@@ -88,20 +88,21 @@ def search(
 ) -> Findings:
     """Find noise, outliers and the weights of all explanations by effects that may be named."""
     builder = _Builder(table, forward, nuisance)
-    noise = noises.stated_noise(table, builder.scale, builder.trials, builder.reference)
+    stated = noises.stated_noise(table, builder.scale, builder.trials, builder.reference)
+    noise = stated
     problem, nothing = builder.fit_nothing(noise.std, (), None)
     if (table.slip_std > 0.0).any():
         builder.linearise(nothing, noise.std)
         problem, nothing = builder.fit_nothing(noise.std, (), nothing)
     if table.leaving_angle_std.any():
         builder.let_err('leaving_angle', table.leaving_angle_std, np.arange(len(table)), nothing)
-    noise = builder.estimate(noise, nothing, ())
+    noise = builder.estimate(stated, nothing, ())
     _, nothing = builder.fit_nothing(noise.std, (), nothing)
     # A smooth misfit of any size is allowed here, so that an effect does not look like outliers.
     free = builder.build(noise.std, (), free=True)
     outliers = find_outliers(free, nothing, _FLEXIBLE, builder.narrow)
     if outliers:
-        noise = builder.estimate(noise, nothing, outliers)
+        noise = builder.estimate(stated, nothing, outliers)
     lug_height = np.broadcast_to(forward.points.wheel.lug_height, (len(table),))
     reasons = {name: unavailable(effect, table, lug_height) for name, effect in effects.items()}
     possible = {name: effect for name, effect in effects.items() if not reasons[name]}
@@ -125,7 +126,7 @@ def search(
             break  # the same cells as before, or as once before: they would go round
         outliers = again
         apart.append({cell[:2] for cell in outliers})
-        noise = builder.estimate(noise, best, outliers)
+        noise = builder.estimate(stated, best, outliers)
     return Findings(
         setting,
         nothing,
