@@ -28,6 +28,25 @@ def test_a_reference_that_freezes_before_a_stop_and_a_way_back():
     assert finding.fault == 'reference_frozen'
 
 
+def test_a_wheel_without_rates_keeps_its_sign():
+    rate = WHOLE.joints.rate * [-1, math.nan, 1, 1]
+    told = {f.fault: f for f in found(joints=replace(WHOLE.joints, rate=rate))}
+    assert told['backwards'].wheel == 'front_left'
+    assert {*told} == {'backwards', 'missing_wheel', 'torque_sign'}
+
+
+def test_rates_and_reference_both_in_another_unit():
+    joints = replace(WHOLE.joints, rate=WHOLE.joints.rate * 30.0 / math.pi)
+    velocity, variance = 100.0 * WHOLE.reference.velocity, 1e4 * WHOLE.reference.variance
+    told = found(
+        joints=joints, reference=replace(WHOLE.reference, velocity=velocity, variance=variance)
+    )
+    assert {f.fault: f.value for f in told} == {
+        'rate_unit': pytest.approx(math.pi / 30.0),
+        'reference_unit': pytest.approx(0.01),
+    }
+
+
 def attitude(seconds):
     """Attitude (k, 4) of the drive: heading and slope."""
     motion = rolling.ten_minute_drive()

@@ -49,12 +49,18 @@ def in_steps(values):
     return step * np.round(values / step)
 
 
-def of_the_wheels(velocity):
+def of_the_wheels(velocity, rate=WHOLE.joints.rate):
     """Mean of the rates times a radius, as controllers of wheels publish it."""
     joints, reference = WHOLE.joints, WHOLE.reference
     near = np.abs(reference.stamp[:, None] - joints.stamp).argmin(axis=1)
-    speed = 1.03 * rolling.RADIUS * joints.rate[near].mean(axis=1)
+    speed = 1.03 * rolling.RADIUS * rate[near].mean(axis=1)
     return np.column_stack([speed, 0.0 * speed, 0.0 * speed])
+
+
+def between_stamps(velocity):
+    """The same, of rates half way between two messages."""
+    joints = WHOLE.joints
+    return of_the_wheels(velocity, 0.5 * (joints.rate + np.roll(joints.rate, -1, axis=0)))
 
 
 def one_number(*numbers):
@@ -70,6 +76,8 @@ ALL = ', '.join(rolling.NAMES)
 MOST = 0.8 * np.quantile(np.abs(WHOLE.joints.rate), 0.98)
 NOISE = np.random.default_rng(9970).normal(0.0, 0.02, WHOLE.joints.rate.shape)
 TENTH = (np.arange(WHOLE.joints.stamp.size) % 10 == 0)[:, None]
+HALF_PERIOD = round(0.5e9 / rolling.RATE)
+LOST = (WHOLE.reference.seconds % 10.0 < 2.0)[:, None]
 FAULTS = [  # channel, what its fields become, the only fault, its wheel, its true size, said
     (JOINTS, both(by([1, 1, -1, 1])), 'backwards', RL, None, 'direction: [1, 1, -1, 1]'),
     (JOINTS, both(by([-1, 1, -1, 1])), 'backwards', f'{FL}, {RL}', None, '[-1, 1, -1, 1]'),
@@ -79,6 +87,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, {'rate': by(COUNTS)}, 'rate_counts', None, approx(1.0 / COUNTS, rel=0.05), 'counts'),
     (JOINTS, {'rate': by(4.0)}, 'rate_unit', None, approx(0.25, rel=0.03), 'before a gear'),
     (JOINTS, {'rate': np.abs}, 'rates_unsigned', None, None, ''),
+    (JOINTS, {'rate': lambda v: np.maximum(v, 0.0)}, 'rates_unsigned', None, None, ''),
     (JOINTS, {'rate': in_steps}, 'rate_steps', None, None, 'steps of'),
     (JOINTS, {'rate': lambda v: np.clip(v, -MOST, MOST)}, 'rate_limit', ALL, None, f'{MOST:.4g}'),
     (JOINTS, {'rate': lambda v: v[:, [0, 1, 0, 3]]}, 'copied', f'{FL}, {RL}', None, 'a copy'),
@@ -130,6 +139,9 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (REFERENCE, {'velocity': np.abs}, 'reference_unsigned', None, None, ''),
     (REFERENCE, {'velocity': by(0.0)}, 'reference_zero', None, None, ''),
     (REFERENCE, {'velocity': of_the_wheels}, 'reference_wheels', None, None, 'slip is always 0'),
+    (REFERENCE, {'velocity': between_stamps, 'stamp': lambda s: s + HALF_PERIOD},
+     'reference_wheels', None, None, ''),
+    (REFERENCE, {'velocity': lambda v: np.where(LOST, 0.0, v)}, 'reference_zeros', None, None, ''),
     (REFERENCE, {'velocity': by(3.6)}, 'reference_unit', None, approx(1.0 / 3.6), ''),
     (REFERENCE, units(100.0), 'reference_unit', None, approx(0.01), ''),
     (REFERENCE, units(1000.0), 'reference_unit', None, approx(0.001), ''),

@@ -72,8 +72,9 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if both and not _sideways(reference) and _without_sign(rim, forward):
         calm = moving_mean(forward, LEAST_ROWS)
         sense = np.sign(np.interp(evidence.time, evidence.seconds(reference), calm))
-        turns = (evidence.moving & ~evidence.unturned)[:, None]  # in which the sides may be unlike
-        mended = evidence.with_rate(np.where(turns, np.nan, evidence.rate * sense[:, None]))
+        # In turns the sides may be unlike; what was cut off at 0 is not known.
+        unknown = (evidence.moving & ~evidence.unturned)[:, None] | (evidence.rate == 0.0)
+        mended = evidence.with_rate(np.where(unknown, np.nan, evidence.rate * sense[:, None]))
         finding = evidence.found('rates_unsigned', 0.95, other='reference goes')
         return [finding], mended
     return [], evidence
@@ -86,14 +87,18 @@ def _sideways(reference: VelocitySeries) -> bool:
 
 
 def _without_sign(speed: FloatArray, other: FloatArray) -> bool:
-    """Return whether one speed is positive and much the same whichever way the other goes."""
+    """Return whether one speed is never negative, whichever way the other goes.
+
+    It is much the same both ways, or 0 to the last digit on one.
+    """
     least = 0.4 * float(np.quantile(np.abs(other), 0.9))
     ways = [speed[other > least], speed[other < -least]]
     if min(way.size for way in ways) < LEAST_ROWS:
         return False
     usual = [float(np.median(way)) for way in ways]
     against = [float(np.mean(way < 0.0)) for way in ways]
-    return min(usual) > ALIKE_BOTH_WAYS * max(usual) and max(against) <= SELDOM_NEGATIVE
+    alike = min(usual) > ALIKE_BOTH_WAYS * max(usual) or 0.0 == min(usual) < max(usual)
+    return alike and max(against) <= SELDOM_NEGATIVE
 
 
 def check_source(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -108,11 +113,12 @@ def check_source(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     rows = np.abs(rim) > AHEAD * np.nanquantile(np.abs(rim), 0.9)
     if rows.sum() < LEAST_REFERENCES:
         return [], evidence
-    forward, rim = reference.velocity[rows, 0], rim[rows]
-    scale = float(np.median(forward / rim))
+    forward = reference.velocity[rows, 0]
+    between = np.interp(evidence.seconds(reference), evidence.time, evidence.rim)
+    scale = float(np.median(forward / rim[rows]))
+    left = min(robust_std(forward - scale * one[rows]) for one in (rim, between))
     noise = abs(scale) * noise_of(evidence.rim[evidence.moving])
-    noisy = noise > NO_NOISE * float(np.median(np.abs(forward)))
-    if not (noisy and robust_std(forward - scale * rim) < SHARES_NOISE * noise):
+    if not NO_NOISE * float(np.median(np.abs(forward))) < noise > left / SHARES_NOISE:
         return [], evidence
     return [evidence.found('reference_wheels', 0.95)], replace(
         evidence, recording=replace(recording, reference=None)
@@ -181,9 +187,7 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not evidence.facts.known or ASIDE in evidence.figures:
         return [], evidence
     rim, rows = ahead(evidence, reference, 0.4)
-    if rows.sum() < LEAST_ROWS:
-        return [], evidence
-    if hardly_moves(reference.velocity[:, 0], rows):
+    if rows.sum() < LEAST_ROWS or hardly_moves(reference.velocity[:, 0], rows):
         return [], evidence
     sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim))
     ratio = float(np.median(sense * reference.velocity[rows, 0] / rim[rows]))

@@ -353,6 +353,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if slides:
             trial = f'{chosen.trial}{SLIDE}'
             chosen = chosen._replace(sure=0.5 * chosen.sure, trial=trial)
+    signs = np.where(np.isfinite(evidence.rate).any(axis=0), signs, 1.0)
     if (signs < 0.0).any():
         finding, mended = _backwards(evidence, mended, signs, chosen)
         outcomes.append(finding)

@@ -16,6 +16,7 @@ from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
     NO_NOISE,
     Evidence,
+    Mask,
     noise_of,
     row_medians,
 )
@@ -26,6 +27,7 @@ from wheel_terra_estimator.checks.reference import (
     hardly_moves,
     units_of_reference,
 )
+from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import (
     correlation,
     lonely,
@@ -159,24 +161,41 @@ def _held(evidence: Evidence, index: int, rows: Any) -> bool:
 
 
 def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return zeros between rates at which no wheel stands for an instant, and what is left."""
-    zero, fast = evidence.rate == 0.0, np.abs(evidence.rate) > LIVELY * evidence.working_rate
+    """Return zeros between readings at speed, at which no wheel and no rover stands for an instant.
+
+    How long a rover may stand for the reference while its wheels drive is for these to say.
+    """
+    outcomes, zero = list[Outcome](), evidence.rate == 0.0
+    fast = np.abs(evidence.rate) > LIVELY * evidence.working_rate
     count = [np.unique(one).size > FINE for one in evidence.rate.T]  # else counts come and go
     for column, drives, fine in zip(zero.T, fast.T, count, strict=True):
-        short = np.zeros(column.size, dtype=bool)
-        spans = [(a, b) for a, b in runs(column) if a > 0 and b < column.size]
-        for first, last in spans:
-            brief = evidence.time[last] - evidence.time[first - 1] < SHORT_ZERO + evidence.period
-            short[first:last] = brief and drives[first - 1] and drives[last]
-        column &= short & (len(runs(short)) >= MANY_ZEROS and fine)
+        column &= fine & _sudden(column, drives, evidence.time, SHORT_ZERO + evidence.period)
+    reference = evidence.recording.reference
+    if reference is not None:
+        size, at = np.linalg.norm(reference.velocity, axis=1), evidence.seconds(reference)
+        drives = np.interp(at, evidence.time, evidence.moving) == 1.0
+        lost = _sudden((size == 0.0) & drives, size > LIVELY * np.quantile(size, 0.9), at)
+        if lost.any():
+            outcomes.append(evidence.found('reference_zeros', 0.95, count=int(lost.sum())))
+            left = replace(evidence.recording, reference=rows_of(reference, ~lost))
+            evidence = replace(evidence, recording=left)
     if not zero.any():
-        return [], evidence
+        return outcomes, evidence
     wheels = zero.any(axis=0)
     details = {'wheel': evidence.facts.named(wheels), 'count': int(zero.any(axis=1).sum())}
-    finding = evidence.found('rate_zeros', 0.95, **details)
+    outcomes.append(evidence.found('rate_zeros', 0.95, **details))
     if wheels.all():
-        return [finding], evidence.rows(~zero.all(axis=1))
-    return [finding], evidence.with_rate(np.where(zero, np.nan, evidence.rate))
+        return outcomes, evidence.rows(~zero.all(axis=1))
+    return outcomes, evidence.with_rate(np.where(zero, np.nan, evidence.rate))
+
+
+def _sudden(zero: Mask, fast: Mask, time: FloatArray, longest: float = math.inf) -> Mask:
+    """Return zeros (k,) between two readings at speed, for no longer [s]; none where few are."""
+    sudden = np.zeros(zero.size, dtype=bool)
+    for first, last in runs(zero):
+        between = first > 0 and last < zero.size and fast[first - 1] and fast[last]
+        sudden[first:last] = between and time[last] - time[first - 1] < longest
+    return sudden & (len(runs(sudden)) >= MANY_ZEROS)
 
 
 def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -328,8 +347,9 @@ def _fitting_units(
         fits = by_turn and not usual
         if ratio is not None:
             least = LEAST_BAND if factor < MOST_COUNT else UNIT_BAND[0]
+            both = fits and bool(units_of_reference(ratio / factor, UNIT_BAND))  # in other units
             fits = least < ratio / factor < UNIT_BAND[1]
-            fits &= track is None or by_turn or not usual
+            fits = both or (fits and (track is None or by_turn or not usual))
         if fits:
             units[unit] = factor
     if ratio is None or not units:
