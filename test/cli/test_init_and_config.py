@@ -37,7 +37,7 @@ RIGHT = '0.1 -0.3 0', '1.5707963 0 0', '0 0 1'  # the axis z of a joint rolled b
 LEFT = '0.1 0.3 0', '-1.5707963 0 0', '0 0 1'
 CART = (
     '<robot name="cart"><link name="base_link"/><link name="chassis"><inertial>'
-    '<origin xyz="0 0 0.1"/><mass value="40"/></inertial></link>'
+    '<origin xyz="0.1 0 0.1"/><mass value="40"/></inertial></link>'
     '<joint name="fixed" type="fixed"><parent link="base_link"/><child link="chassis"/>'
     '<origin xyz="0 0 0.2"/></joint>'
     f'{wheel("right", *RIGHT, "chassis")}{wheel("left", *LEFT, "chassis")}</robot>'
@@ -78,6 +78,15 @@ def test_from_a_urdf(init, capsys):
     assert 'wheels.direction is a guess' not in capsys.readouterr().out
     init('--overwrite', urdf=CART.replace('rpy="1.5707963 0 0"', 'rpy="0 0 0"'))  # not across
     assert 'wheels.direction is a guess' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('ahead', [0.0, 0.05])
+def test_a_mass_that_a_caster_carries_a_part_of_is_a_guess(init, capsys, ahead):
+    """Its centre lies on the only axle, or before it: then something else carries, too."""
+    chassis = f'<inertial><origin xyz="{ahead} 0 0.1"/><mass value="20.0"/></inertial>'
+    plain = '<inertial><mass value="20.0"/></inertial>'
+    assert init(urdf=EXPANDED.replace(plain, chassis)).rover.mass == 24.0
+    assert ('rover.mass is a guess' in capsys.readouterr().out) is bool(ahead)
 
 
 def test_a_tape_wins_over_the_places_of_a_urdf(init):

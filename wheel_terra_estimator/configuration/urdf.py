@@ -93,6 +93,8 @@ def read_urdf(
         guessed |= {'rover.mass', 'rover.centre_of_gravity'}
         ground = min(float(p[2, 3]) - r for p, r in zip(poses, radii, strict=True))
         centre = [0.0, 0.0, round(ground + CENTRE_HEIGHT * max(radii), 4)]
+    elif not round(poses[-1][0, 3], 3) <= round(centre[0], 3) <= round(poses[0][0, 3], 3):
+        guessed.add('rover.mass')  # a caster, or what else there is, carries a part of it
     return RoverSketch(
         name=robot.name,
         wheels=names,
