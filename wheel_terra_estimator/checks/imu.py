@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import MAD_TO_STD, FloatArray
 from wheel_terra_estimator.checks.evidence import (
     EVEN_GROUND_STD,
     LEAST_YAW,
@@ -36,7 +36,6 @@ from wheel_terra_estimator.checks.finding import (
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
     DRIFT,
-    MAD_TO_STD,
     UNIFORM_STD,
     Estimate,
     block_fit,

@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import MAD_TO_STD, BoolArray, FloatArray
 
-MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation of a normal distribution
 HUBER = 2.0  # residuals beyond this many deviations count less in a robust fit
 ROUNDS = 8  # reweighted fits
 BLOCKS = 12

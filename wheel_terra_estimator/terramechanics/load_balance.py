@@ -19,8 +19,13 @@ from wheel_terra_estimator.terramechanics.contact import Contact
 # Sinkage equal to the radius: the stress laws end here.
 LARGEST_ANGLE = np.pi / 2
 SMALLEST_ANGLE = 1e-5
-_STEP = 1e-6
-_TOLERANCE = _REST = 1e-10  # of the load: of Newton, and what interpolation may leave
+_FIRST_GUESSES = 1e-3, 1.4  # least and greatest first guess [rad]
+_START = 0.3  # first guess where there is no other [rad]
+_STEP = 1e-6  # relative step of the finite difference
+_TOLERANCE = 1e-10  # of the load
+_NEAR = 1e-5  # error over the load from which one Newton step reaches the tolerance
+_LEAST_EXPONENT = 0.2  # of the load over the angle, for a Newton step
+_NEWTON_STEPS, _BISECTIONS, _SCANNED = 40, 60, 80
 
 
 def explicit_entrance_angle(contact: Contact) -> FloatArray:
@@ -30,7 +35,7 @@ def explicit_entrance_angle(contact: Contact) -> FloatArray:
     area = 0.5 * contact.width * contact.radius * (1.0 - contact.leaving_ratio)
     modulus = contact.bearing_modulus * (rise / contact.reference_depth) ** n
     guess = (contact.normal_load / (area * modulus)) ** (1.0 / (2.0 * n + 1.0))
-    return np.clip(guess, 1e-3, 1.4)
+    return np.clip(guess, *_FIRST_GUESSES)
 
 
 def balance(
@@ -64,10 +69,10 @@ def balance(
         angle = np.exp(at_load(x0, x1, x2))
         pull, torque = at_load(f0, f1, f2), at_load(t0, t1, t2)
         # The next term of the series is some tenth of this.
-        settled = (np.abs(y0 * y1 * y2) < _REST) & (angle < LARGEST_ANGLE)
+        settled = (np.abs(y0 * y1 * y2) < _TOLERANCE) & (angle < LARGEST_ANGLE)
     if settled.all():
         return angle, pull, torque, settled
-    start = np.clip(np.where(np.isfinite(angle), angle, 0.3), 1e-3, 1.4)
+    start = np.clip(np.where(np.isfinite(angle), angle, _START), *_FIRST_GUESSES)
     found, carries = solve_entrance_angle(
         lambda angles: np.asarray(form.forces(angles)[0]), load, start
     )
@@ -99,7 +104,7 @@ def solve_entrance_angle(
     low, high = np.full_like(angle, SMALLEST_ANGLE), np.full_like(angle, LARGEST_ANGLE)
     pair = np.empty((2, *angle.shape))
     done = np.zeros(angle.shape, bool)
-    for _ in range(40):
+    for _ in range(_NEWTON_STEPS):
         pair[0], pair[1] = angle, angle * (1.0 + _STEP)
         force, next_force = carried(pair)
         error = np.abs(force - load)
@@ -111,11 +116,15 @@ def solve_entrance_angle(
         with np.errstate(divide='ignore', over='ignore', invalid='ignore'):
             exponent = (next_force / force - 1.0) / _STEP
             proposal = angle * (load / force) ** (1.0 / exponent)
-        good = np.isfinite(proposal) & (proposal > low) & (proposal < high) & (exponent > 0.2)
+        good = (
+            np.isfinite(proposal)
+            & (proposal > low)
+            & (proposal < high)
+            & (exponent > _LEAST_EXPONENT)
+        )
         step = np.where(good, proposal, np.sqrt(low * high))
         angle = np.where(done, angle, step)
-        # Newton squares the error: one step from here is below the tolerance.
-        if np.all(done | (good & (error < 1e-5 * load))):
+        if np.all(done | (good & (error < _NEAR * load))):
             return angle, np.ones_like(done)
         if np.all(done | (high - low < 1e-13)):
             break
@@ -129,7 +138,7 @@ def _first_crossing(
     done: BoolArray,
 ) -> tuple[FloatArray, BoolArray]:
     """Scan all points coarsely, then bisect those not done; the smallest crossing counts."""
-    grid = np.geomspace(1e-3, LARGEST_ANGLE, 80)
+    grid = np.geomspace(_FIRST_GUESSES[0], LARGEST_ANGLE, _SCANNED)
     force = np.concatenate(
         [carried(np.stack([np.full_like(load, a), np.full_like(load, b)]))
          for a, b in zip(grid[::2], grid[1::2], strict=True)]
@@ -139,7 +148,7 @@ def _first_crossing(
     first = np.argmax(above, axis=0)
     high = grid[first]
     low = np.where(first > 0, grid[np.maximum(first - 1, 0)], SMALLEST_ANGLE)
-    for _ in range(60):
+    for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         enough = carried(np.stack([middle, middle]))[0] >= load
         high, low = np.where(enough, middle, high), np.where(enough, low, middle)

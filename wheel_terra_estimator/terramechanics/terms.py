@@ -22,6 +22,7 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 SOIL_NUMBERS = tuple(f.name for f in fields(Soil) if f.name != 'pressure_law')
 # Share of the contact length that the peak of the stress keeps from either end.
 PEAK_MARGIN = 1e-3
+_MOST_LEAVING = 0.9  # measured leaving angle over the entrance angle, at most [-]
 
 
 class Terms:
@@ -126,7 +127,7 @@ def set_angles(
     contact.peak_angle = contact.peak_ratio * entrance_angle
     terms.apply('on_contact', contact)
     if measured_leaving is not None:
-        given = np.minimum(measured_leaving, 0.9 * entrance_angle)
+        given = np.minimum(measured_leaving, _MOST_LEAVING * entrance_angle)
         contact.leaving_angle = np.where(np.isnan(measured_leaving), contact.leaving_angle, given)
     margin = PEAK_MARGIN * (entrance_angle - contact.leaving_angle)
     contact.peak_angle = np.minimum(

@@ -23,6 +23,8 @@ _LONGEST_STEP = 2.0  # prior standard deviations
 _CLOSE_ENOUGH = 0.02  # in the objective
 _DECIMALS = 12  # what stands at a bound is off by rounding; no cohesion is below 0, nor -0
 _LEAST_DAMPING = 1e-6  # share of the precision that is added to its diagonal, at the start
+_EASE, _STIFFEN = 0.1, 30.0  # factors on the damping after a better and after a worse step
+_ANGLES = 2e-3, 1.5  # least and greatest first guess of an entrance angle [rad]
 
 
 class Number(NamedTuple):
@@ -97,7 +99,8 @@ class Descent:
         if better:
             self._u, self.objective = self.trial, objective
         damping = self._damping
-        self._damping = max(0.1 * damping, _LEAST_DAMPING) if better else max(30.0 * damping, 1.0)
+        eased, stiffened = max(_EASE * damping, _LEAST_DAMPING), max(_STIFFEN * damping, 1.0)
+        self._damping = eased if better else stiffened
         return better
 
     def step(self, precision: FloatArray, gradient: FloatArray) -> FloatArray:
@@ -178,7 +181,7 @@ def fit(
                 step = way.step(precision, here.sensitivity.T @ pulls[b])
             if better and way.going:
                 slope = state.angle_slope[index] @ step
-                angle[b] = np.clip(state.angle[index] + slope, 2e-3, 1.5)
+                angle[b] = np.clip(state.angle[index] + slope, *_ANGLES)
     return [best[b] for b in range(len(ways))]
 
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import bdtrc, chdtrc
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray
+from wheel_terra_estimator.arrays import MAD_TO_STD, BoolArray, FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import (
     OUTLIER_FACTOR,
@@ -104,7 +104,7 @@ def repeats(
         if len(mine) > 1:
             # The median resists an outlier among three or more repeats.
             centre = np.median(mine) if len(mine) > 2 else mine.mean()
-            spread = 1.4826 * float(np.median(np.abs(mine - np.median(mine))))
+            spread = MAD_TO_STD * float(np.median(np.abs(mine - np.median(mine))))
             clip = (5.0 * spread) ** 2 if spread else np.inf
             each = np.minimum((mine - centre) ** 2, clip)
             if stated is not None:

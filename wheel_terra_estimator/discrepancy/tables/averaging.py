@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray, IndexArray
+from wheel_terra_estimator.arrays import MAD_TO_STD, BoolArray, FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_COLUMNS,
     SteadyTable,
@@ -48,7 +48,7 @@ def averaged(table: SteadyTable, most: int) -> SteadyTable:
         off = np.zeros(len(values))
         for cell, middle in zip(cells, centre, strict=True):
             off[cell] = np.abs(values[cell] - middle)
-        spread = 1.4826 * np.median(off[off > 0.0]) if (off > 0.0).any() else 0.0
+        spread = MAD_TO_STD * np.median(off[off > 0.0]) if (off > 0.0).any() else 0.0
         kept = ~(off > _FAR * spread)
         picked = [cell[kept[cell]] if len(cell) > 2 else cell for cell in cells]
         return np.array([np.mean(values[cell]) if len(cell) else np.nan for cell in picked])
