@@ -46,6 +46,7 @@ LEAST_SUPPORT = 0.05
 """Floor of the support ratio: cohesion alone never carries the whole wheel."""
 LEAST_ANGLE = 0.01
 """Least entrance angle [rad]; the balance is singular at 0."""
+LEAST_SLIP = -0.999  # a locked wheel has -1, where v/(r w) is infinite [-]
 
 
 class SunkWheels(NamedTuple):
@@ -102,7 +103,7 @@ class ContactModel:
         """Return the forces, seen in the direction of travel."""
         soil, contact = self._soil, copy(self._as_built)
         factors, slip, depth = sunk.factors, sunk.slip, sunk.depth
-        ratio = speed_ratio(np.maximum(slip, -0.999))
+        ratio = speed_ratio(np.maximum(slip, LEAST_SLIP))
         contact.slip, contact.velocity_ratio = slip, ratio * self._slip_radius
         contact.normal_load = contact.stated_load = sunk.load
         contact.rim_speed, contact.slope, contact.direction = sunk.rim_speed, sunk.slope, 1.0
@@ -195,7 +196,7 @@ class ResistiveContact:
         """Return the forces; see `ContactModel.forces`."""
         slip, load = sunk.slip, sunk.load
         cosine = np.clip(1.0 - sunk.depth / self._radius, -0.5, np.cos(LEAST_ANGLE))
-        beyond = speed_ratio(np.maximum(slip, -0.999)) * self._lead - 1.0
+        beyond = speed_ratio(np.maximum(slip, LEAST_SLIP)) * self._lead - 1.0
         entrance = np.broadcast_to(np.arccos(cosine), np.shape(beyond))
         lift, back, rub_up, rub_ahead, turn = np.moveaxis(
             rim_integrals(np.arctan2(beyond, entrance), entrance), -1, 0

@@ -21,6 +21,7 @@ from wheel_terra_estimator.simulation.contact import SoilForces
 from wheel_terra_estimator.terramechanics.entrapment import digging_rate
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
+START_DEPTH, START_LENGTH = 0.05, 0.3  # of a contact before it settles, over the radius [-]
 SHEAR_TRAVEL = 0.25
 """Travel over which the shear follows the slip, as a share of the contact length."""
 SHEAR_DAMPING = 0.2
@@ -56,10 +57,10 @@ class ContactMemory:
         self._wheel, self._dig_efficiency = wheel, dig_efficiency
         self.shear = Shear(np.zeros(n), np.zeros(n))
         self.sense = np.zeros(n)
-        self.depth = 0.05 * self._radius
+        self.depth = START_DEPTH * self._radius
         self.lug_sinkage = np.zeros(n)
         self.sinkage_rate = np.zeros(n)
-        self._contact_length = 0.3 * self._radius
+        self._contact_length = START_LENGTH * self._radius
 
     @property
     def sinkage(self) -> FloatArray:

@@ -33,7 +33,15 @@ from wheel_terra_estimator.simulation.truth import Truth
 START = 1_000_000_000_000
 """Stamp of the start of a drive [ns]; not 0, which is no stamp."""
 LEAST_GAIN = 0.1
-"""Gain of a torque that is drawn at least [-]: another scale is no other sign."""
+"""Least gain of a torque that is drawn [-]: another scale is no other sign."""
+COMMON_GAIN, OWN_GAIN = 0.8, 0.6
+"""Gain error common to all torques (one type of sensor) and of each one, over its deviation [-]."""
+ATTITUDE_NOISE = 0.2  # noise of the orientation over its lasting error [-]
+# What the faults do: chance of a reading to be hit [-], and the error.
+SPIKE_CHANCE, SPIKE = 0.1, 50.0  # of a torque, in deviations of its noise
+NAN_CHANCE = 0.2  # of a wheel rate
+IMU_BIAS = np.array([0.3, 0.0, 0.0])  # [m/s^2]
+WILD_CHANCE, WILD_ERROR = 0.3, 10.0  # of a reference, in deviations of its noise
 
 
 class Arrival(NamedTuple):
@@ -60,8 +68,7 @@ class SensorSuite:
         self._scale = scale = scenario.sensors.noise
         # (n,) zeros of the torques, as drawn [N m]
         self.torque_zero = scale * figures.torque_zero_std * random.standard_normal(n)
-        # One current sensor type, one motor constant: most of the gain error is common.
-        gain = 0.8 * random.standard_normal() + 0.6 * random.standard_normal(n)
+        gain = COMMON_GAIN * random.standard_normal() + OWN_GAIN * random.standard_normal(n)
         self._torque_gain = np.maximum(1.0 + scale * figures.torque_gain_std * gain, LEAST_GAIN)
         self._sinkage_zero = scale * figures.sinkage_zero_std * random.standard_normal(n)
         self._force_bias = scale * figures.specific_force_bias_std * random.standard_normal(3)
@@ -131,14 +138,14 @@ class SensorSuite:
         torque = self._torque_gain * truth.torque + self.torque_zero
         torque += self._scale * self._figures.torque_std * noise[1]
         if (wheels := self._failed('torque_spikes', time)) is not None:
-            spikes = wheels & (self._random.uniform(size=n) < 0.1)
-            torque = np.where(spikes, torque + 50.0 * self._figures.torque_std, torque)
+            spikes = wheels & (self._random.uniform(size=n) < SPIKE_CHANCE)
+            torque = np.where(spikes, torque + SPIKE * self._figures.torque_std, torque)
         if not self._there.torque:
             torque = np.full(n, np.nan)
         elif (missing := self._failed('no_torque', time)) is not None:
             torque = np.where(missing, np.nan, torque)
         if (wheels := self._failed('nan_values', time)) is not None:
-            rate = np.where(wheels & (self._random.uniform(size=n) < 0.2), np.nan, rate)
+            rate = np.where(wheels & (self._random.uniform(size=n) < NAN_CHANCE), np.nan, rate)
         steering = None
         if self._steered.any():
             steering = np.where(self._steered, truth.steering, np.nan)
@@ -152,13 +159,13 @@ class SensorSuite:
         force = truth.specific_force + self._force_bias
         force = force + scale * figures.specific_force_std * noise[0]
         if self._failed('imu_bias', time) is not None:
-            force = force + np.array([0.3, 0.0, 0.0])
+            force = force + IMU_BIAS
         rate = truth.angular_rate + self._rate_bias
         rate = rate + scale * figures.angular_rate_std * noise[1]
         orientation = None
         if self._there.orientation and self._failed('no_orientation', time) is None:
-            small = 0.2 * scale * figures.orientation_std * self._random.standard_normal(2)
-            error = self._attitude_error + small
+            noise_std = ATTITUDE_NOISE * scale * figures.orientation_std
+            error = self._attitude_error + noise_std * self._random.standard_normal(2)
             roll, pitch = truth.roll + error[0], truth.pitch + error[1]
             heading = float(truth.position[2])
             orientation = Rotation.from_euler('xyz', [roll, -pitch, heading]).as_quat()
@@ -193,8 +200,8 @@ class SensorSuite:
         if chance[0] < self._there.reference_dropouts:
             return
         wild = chance[1] < self._there.reference_outliers
-        if wild or (self._failed('reference_wild', time) is not None and chance[1] < 0.3):
-            error += 10.0 * std * (1.0 if self._random.uniform() < 0.5 else -1.0)
+        if wild or (self._failed('reference_wild', time) is not None and chance[1] < WILD_CHANCE):
+            error += WILD_ERROR * std * (1.0 if self._random.uniform() < 0.5 else -1.0)
         yield ReferenceVelocity(self._stamp(time), truth.forward_velocity + error, std**2)
 
     # Faults and transport -----------------------------------------------------------------------
