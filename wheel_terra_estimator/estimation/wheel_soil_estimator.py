@@ -331,25 +331,29 @@ class WheelSoilEstimator:
         )
         self._sinkage_process.end_cycle(ekf, sinkage_before, unread, cycle.dt)
         self._speed.keep_least_variance(ekf, cycle.rims)
+        self._update_pulls(cycle, forces, total, stationary)
+
+    def _update_pulls(
+        self,
+        cycle: Cycle,
+        forces: ContactForces | None,
+        total: SumOfPulls | None,
+        stationary: Floats,
+    ) -> None:
+        """Compute the pulls after the update of a cycle; arguments as in `PullEvidence`."""
+        ekf, zeros = self._ekf, self._torque.zeros(self._ekf.mean)
+        torques = zip(self._wheels.state.torque, zeros, strict=True)
+        tilt_stds = self._sinkage_process.state.unmodelled_std * self._rover.rut_tilt
         evidence = PullEvidence(
             forces=forces,
             total=total,
             cycle=cycle,
-            readings=tuple(
-                [
-                    reading - zero
-                    for reading, zero in zip(
-                        self._wheels.state.torque, self._torque.zeros(ekf.mean), strict=True
-                    )
-                ]
-            ),
+            readings=tuple([reading - zero for reading, zero in torques]),
             stationary=stationary,
             sideways=self._lateral_forces(cycle),
-            tilt_std=math.hypot(
-                *(self._sinkage_process.state.unmodelled_std * self._rover.rut_tilt)
-            ),
+            tilt_std=math.hypot(*tilt_stds),
         )
-        tilt = rut_tilt(self._rover, layout, ekf.mean)
+        tilt = rut_tilt(self._rover, self._layout, ekf.mean)
         self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)
         if self._buffer is not None:
             present = Gaussian(ekf.mean, ekf.covariance)
