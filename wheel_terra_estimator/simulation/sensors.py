@@ -34,8 +34,7 @@ START = 1_000_000_000_000
 """Stamp of the start of a drive [ns]; not 0, which is no stamp."""
 LEAST_GAIN = 0.1
 """Least gain of a torque that is drawn [-]: another scale is no other sign."""
-COMMON_GAIN, OWN_GAIN = 0.8, 0.6
-"""Gain error common to all torques (one type of sensor) and of each one, over its deviation [-]."""
+COMMON_GAIN, OWN_GAIN = 0.8, 0.6  # gain error of all torques (one sensor type), of each one [-]
 ATTITUDE_NOISE = 0.2  # noise of the orientation over its lasting error [-]
 # What the faults do: chance of a reading to be hit [-], and the error.
 SPIKE_CHANCE, SPIKE = 0.1, 50.0  # of a torque, in deviations of its noise

@@ -116,12 +116,7 @@ def solve_entrance_angle(
         with np.errstate(divide='ignore', over='ignore', invalid='ignore'):
             exponent = (next_force / force - 1.0) / _STEP
             proposal = angle * (load / force) ** (1.0 / exponent)
-        good = (
-            np.isfinite(proposal)
-            & (proposal > low)
-            & (proposal < high)
-            & (exponent > _LEAST_EXPONENT)
-        )
+        good = (proposal > low) & (proposal < high) & (exponent > _LEAST_EXPONENT)
         step = np.where(good, proposal, np.sqrt(low * high))
         angle = np.where(done, angle, step)
         if np.all(done | (good & (error < _NEAR * load))):
