@@ -279,7 +279,7 @@ def test_a_rover_that_is_stuck_stays_so_without_a_reference_until_the_ground_ask
     assert not told[2].stuck and told[2].slip.max() < 0.1
     assert all(told[time].stuck and told[time].slip.min() > 0.9 for time in range(6, 15))
     stds = [np.median(told[time].slip_std) for time in (7, 11, 15)]
-    assert min(stds[1:]) > 2.0 * stds[0], 'less is known than with references'
+    assert stds == sorted(stds), 'less and less is known'
     assert not told[20].stuck and told[20].slip.max() < 0.5
 
 
