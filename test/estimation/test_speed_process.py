@@ -229,21 +229,6 @@ def test_the_slip_walks_farther_at_a_start_and_where_most_wheels_sink(
     assert made.state.ratio_walk == pytest.approx(walk)
 
 
-@pytest.mark.parametrize(
-    ('ratio', 'reference_known', 'follows_wheels'),
-    [(0.9, True, True), (0.1, True, False), (-0.3, True, False), (0.1, False, True)],
-)
-def test_wheels_that_spin_do_not_hold_the_speed_against_the_accelerometer(
-    ratio, reference_known, follows_wheels
-):
-    """Beyond the knee of the traction curve a rover slows down without its wheels changing."""
-    made = process([0.05] * 6, ratio=ratio)
-    made.follow_contacts(10.0, NAN, reference_known=reference_known)
-    slowing = InertialWindow(speed_change=-0.01, duration=0.1)
-    weight = made.step(0.1, speeds([0.05] * 6), slowing, inflated=True).wheel_weight
-    assert weight > 0.9 if follows_wheels else weight < 0.5
-
-
 def test_in_a_turn_on_the_spot_the_speed_does_not_follow_what_two_sides_leave():
     """They leave 5 mm/s, then 1 mm/s: no reason for the body to slow down to a fifth."""
     made = process([0.105, -0.095] * 3)

@@ -236,9 +236,7 @@ class SpeedProcess(Component[SpeedState]):
             steady = walk * (_WATCHED_SHARE if reference_known else 1.0)
             changing = min(_DIGGING_WALK * max(digging, 0.0), _MOST_WALK)
             walk = math.hypot(steady, changing)
-        # The traction curve flattens: where the ground varies, the slip varies the more.
-        flat = _MOST_WALK * min(abs(1.0 - self.state.ratio), 1.0) ** 2 if reference_known else 0.0
-        self.state = self.state._replace(ratio_walk=max(walk, start, flat))
+        self.state = self.state._replace(ratio_walk=max(walk, start))
 
     # -- Prediction ------------------------------------------------------------------------------
 
