@@ -656,3 +656,24 @@ def test_rates_of_a_simulator_without_noise_are_no_copies():
     rover = rolling.rover(**{f'wheels.{key}': value for key, value in (six | sizes).items()})
     joints = replace(WHOLE.joints, names=names, rate=rate, torque=np.full(rate.shape, np.nan))
     assert 'copied' not in {f.fault for f in checked(rover, joints=joints).findings}
+
+
+def test_one_late_message_beside_a_loss_is_no_step_of_a_clock():
+    reference = rows_of(
+        WHOLE.reference, ~np.isin(np.arange(WHOLE.reference.stamp.size), (200, 201))
+    )
+    arrival = reference.log_time.copy()
+    arrival[199] += 1_200_000_000  # before the two that are lost
+    late = replace(reference, log_time=arrival)
+    assert faults(rolling.checked(reference=late)) == []
+
+
+def test_torques_that_break_wheels_away_are_not_wild():
+    time = np.arange(0.0, 100.0, 0.05)
+    speed = np.where(time % 20.0 < 10.0, 0.0, 0.3)
+    whole = rolling.recording(rolling.Motion(time, speed, 0.0 * time, 0.0 * time))
+    starts = np.flatnonzero(np.diff(speed) > 0.0) + 1
+    torque = whole.joints.torque.copy()
+    torque[starts] += 100.0
+    joints = replace(whole.joints, torque=torque)
+    assert 'wild' not in faults(rolling.checked(whole=whole, joints=joints))

@@ -189,7 +189,7 @@ class Evidence:
             mean = np.convolve(rate, np.ones(width) / width, mode='valid')
             change[2 * width - 1 :] = np.abs(mean[width:] - mean[:-width])
         calm = change < 0.15 * max(self.working_rate, 1e-9)
-        return _shared(self.moving & self._after(calm, SETTLING))
+        return _shared(self._after(self.moving & calm, SETTLING))
 
     @cached_property
     def radius(self) -> FloatArray:

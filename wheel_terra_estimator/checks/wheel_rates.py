@@ -54,6 +54,7 @@ FINE = 50  # different rates of one that is not coarse, at least
 SAME_CHANGES = 0.95  # share of the changes of two rates that are the same of one sent twice [-]
 LEAST_CHANGES = 30
 SHORT_ZERO, MANY_ZEROS = 0.3, 10  # time of zeros between rates of driving [s], and their number
+FEW_ZEROS = 3  # the same of a reference, for which the wheels tell that the rover drives
 LIVELY = 0.3  # rate of the others beside which none stands, over the working rate [-]
 GOES_ON = 0.25  # turn times track over the speed of the other side of a rover that goes on [-]
 SAME_SPEED = 0.05  # speed of a side against the middle in which all roll alike, at most [-]
@@ -61,7 +62,7 @@ ONE_SIGN = 0.9  # share of rates of one sign that have none, less the rest [-]
 LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0  # speed over the others' of a radius; over scatter [ln]
 LEAST_COUNTS = 0.2  # speed of a wheel with fewer counts over the others', at least [-]
 WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0  # wild change over the greatest and usual value [-]
-LEAST_WILD, MOST_WILD = 3, 0.1  # number and share of single wild values that are told
+LEAST_WILD, MOST_WILD = 3, 0.1  # messages with, and share of, single wild values that are told
 LONG_FROZEN_TIME = 10.0  # time that a coarse encoder does not repeat itself [s]
 HELD_TORQUE = 1.5  # torque of a held wheel over that of the others, at least [-]
 DRAGGED_TORQUE = 0.5  # the same against theirs, of one that the others drag [-]
@@ -169,13 +170,14 @@ def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     fast = np.abs(evidence.rate) > LIVELY * evidence.working_rate
     count = [np.unique(one).size > FINE for one in evidence.rate.T]  # else counts come and go
     for column, drives, fine in zip(zero.T, fast.T, count, strict=True):
-        column &= fine & _sudden(column, drives, evidence.time, SHORT_ZERO + evidence.period)
+        short = _sudden(column, drives, evidence.time, SHORT_ZERO + evidence.period)
+        column &= short & (len(runs(short)) >= MANY_ZEROS and fine)
     reference = evidence.recording.reference
     if reference is not None:
         size, at = np.linalg.norm(reference.velocity, axis=1), evidence.seconds(reference)
         drives = np.interp(at, evidence.time, evidence.moving) == 1.0
         lost = _sudden((size == 0.0) & drives, size > LIVELY * np.quantile(size, 0.9), at)
-        if lost.any():
+        if len(runs(lost)) >= FEW_ZEROS:
             outcomes.append(evidence.found('reference_zeros', 0.95, count=int(lost.sum())))
             left = replace(evidence.recording, reference=rows_of(reference, ~lost))
             evidence = replace(evidence, recording=left)
@@ -190,12 +192,12 @@ def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 
 def _sudden(zero: Mask, fast: Mask, time: FloatArray, longest: float = math.inf) -> Mask:
-    """Return zeros (k,) between two readings at speed, for no longer [s]; none where few are."""
+    """Return the zeros (k,) between two readings at speed, for no longer [s]."""
     sudden = np.zeros(zero.size, dtype=bool)
     for first, last in runs(zero):
         between = first > 0 and last < zero.size and fast[first - 1] and fast[last]
         sudden[first:last] = between and time[last] - time[first - 1] < longest
-    return sudden & (len(runs(sudden)) >= MANY_ZEROS)
+    return sudden
 
 
 def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -240,7 +242,7 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
         # To break away or turn back takes a large torque for an instant.
         counted = wild if name == 'velocity' else wild & evidence.steady[:, None]
-        if counted.sum() >= LEAST_WILD and wild.sum() < MOST_WILD * wild.size:
+        if counted.any(axis=1).sum() >= LEAST_WILD and wild.sum() < MOST_WILD * wild.size:
             wheels = evidence.facts.named(wild.any(axis=0))
             details = {'field': name, 'count': int(wild.sum()), 'most': float(off[wild].max())}
             outcomes.append(evidence.found('wild', 0.97, wheel=wheels, **details))
