@@ -538,7 +538,7 @@ def _drift(late: list[float], others: list[list[float]]) -> float:
 def _steps(channel: Channel) -> FloatArray:
     """Return the steps (k,) before stamps that messages do not arrive by [s]; 0 for none.
 
-    Those behind a step stay as far off: one message may be late by itself.
+    Those behind a small step stay as far off: one message may be late by itself.
     """
     stamped = channel.stamp > 0
     step, arrival = (np.diff(at[stamped]) * 1e-9 for at in (channel.stamp, channel.log_time))
@@ -546,7 +546,8 @@ def _steps(channel: Channel) -> FloatArray:
     late = (channel.log_time - channel.stamp)[stamped] * 1e-9
     for row in np.flatnonzero(far) + 1:
         off = np.median(late[max(row - SEVERAL, 0) : row]) - np.median(late[row : row + SEVERAL])
-        far[row - 1] = off / (late[row - 1] - late[row]) > 0.5
+        by = late[row - 1] - late[row]
+        far[row - 1] = abs(by) > FAR_BACK or off / by > 0.5
     steps = np.zeros(stamped.size)
     steps[np.flatnonzero(stamped)[1:]] = np.where(far, step - arrival, 0.0)
     return steps
