@@ -156,7 +156,7 @@ def test_evidence_is_the_integral_over_parameters(setting):
     model = linear_fit(rng, problem)
     amplitude = 0.02
     floor = Floor((amplitude,) * 4, 0.0, False)
-    got = evidence(problem, model, (floor,)).log_joint[0]
+    got = evidence(problem, model, (floor,))[0]
 
     smooth = smooth_error(problem, inputs, scale, amplitude)
     density = scipy.stats.multivariate_normal(
@@ -553,8 +553,9 @@ def test_a_number_at_its_bound_is_the_bound():
     """0.3 * 3.3 - 0.99 is 0, but for a rounding below it."""
     own = Coordinate('soil', 'cohesion', -0.99, 0.3, 3.3), Coordinate('soil', 'cohesion', 2.0, 0.1)
     assert float(own[0].value(3.3)) < 0.0
-    fitted = Fit((), own, np.array([3.3, 5.0]), *[np.zeros(0)] * 6, 0.0, np.ones(2))
-    values = [number.value for number in fitted.numbers(np.eye(2))]
+    none = [np.zeros((0, 2))] * 5  # measured
+    fitted = Fit((), own, np.array([3.3, 5.0]), *none, np.zeros(0), 0.0, np.ones(2))
+    values = [number.value for number in fitted.numbers()]
     assert str(values) == '[0.0, 2.5]'
 
 

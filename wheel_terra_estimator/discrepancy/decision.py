@@ -150,9 +150,8 @@ class Decider:
     def _law(self, decision: Decision, hold_soil: bool = False) -> Proposal | None:
         """Return the law for what a decision's refit of the soil leaves."""
         on_top = LAW in self.findings.setting.forward.base_effects
-        alone = not self.findings.signatures  # the soil was asked for, and nothing else
-        if self.misread or self.beds_differ or on_top or alone:
-            return None  # not for a wrong unit, nor for what beds do, nor on top of another law
+        if self.misread or self.beds_differ or on_top or not self.findings.signatures:
+            return None  # not for a wrong unit, for what beds do, on a law, or where soil alone is asked
         key = decision.floor, hold_soil
         if key not in self.laws:
             self.laws[key] = propose(self._gap(decision), hold_soil=hold_soil)

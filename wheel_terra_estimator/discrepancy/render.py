@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch, changes_along_rows
@@ -134,13 +133,11 @@ def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffe
     return tuple(found)
 
 
-def _parameters(
-    fitted: Fit, covariance: FloatArray | None = None, *, base: bool = False
-) -> dict[str, FittedParameter]:
+def _parameters(fitted: Fit, *, base: bool = False) -> dict[str, FittedParameter]:
     """Return the parameters of the effects of a fit, or of those that were on before."""
     return {
         c.key: FittedParameter(value, std, c.unit, c.meaning)
-        for c, _, value, std, _ in fitted.numbers(covariance)
+        for c, _, value, std, _ in fitted.numbers()
         if c.owner not in ('soil', BED) and (c.owner in fitted.names) != base
     }
 
@@ -183,7 +180,7 @@ def _candidates(decision: Decision) -> tuple[Candidate, ...]:
             explanation.names,
             explanation.log_evidence - at_nothing,
             float(selection.probability[h].sum()),
-            _parameters(explanation.fitted, explanation.posterior.covariance[decision.floor_index]),
+            _parameters(explanation.fitted),
             '' if h == verdict.index else words.why_not(findings, verdict, h, totals, chosen),
         )
         for h in sorted((nothing, *shown), key=lambda h: -totals[h])

@@ -108,10 +108,8 @@ def diagnose(
         points = operating_points(part.columns, configuration, part.name)
         readings = Readings.of(configuration).true_on(part.true_rows)
         rows = replace(forward, points=points, active=None, readings=readings)
-        size, believed = (
-            _check_soil_carries(part, rows),
-            tuple(c for c in nuisance if c.owner != BED),
-        )
+        size = _check_soil_carries(part, rows)
+        believed = tuple(c for c in nuisance if c.owner != BED)
         for tried in ({}, effects):  # most are done with before any effect
             own = search(part, rows, believed, tried, default_floors())
             columns = Columns(part, rows, believed, tried, own, size, strictly=True)

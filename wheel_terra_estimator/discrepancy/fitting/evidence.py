@@ -41,14 +41,6 @@ class Floor:
         return max(self.amplitude)
 
 
-@dataclass(frozen=True)
-class Posterior:
-    """Linear posterior of one hypothesis for every floor."""
-
-    log_joint: FloatArray  # (F,) of evidence and prior of the floor
-    covariance: FloatArray  # (F, P, P)
-
-
 def log_sum(values: FloatArray, axis: int | None = None) -> FloatArray:
     """Return the logarithm of a sum of exponentials, minus infinity for none.
 
@@ -57,14 +49,10 @@ def log_sum(values: FloatArray, axis: int | None = None) -> FloatArray:
     return np.logaddexp.reduce(values, axis=axis)
 
 
-def evidence(
-    problem: Problem,
-    fitted: Fit,
-    floors: tuple[Floor, ...],
-) -> Posterior:
-    """Return the evidence of a fit for every floor.
+def evidence(problem: Problem, fitted: Fit, floors: tuple[Floor, ...]) -> FloatArray:
+    """Return the (F,) log of evidence and prior of every floor, for a fit.
 
-    It is the mean over soil as good as stated or worse, and effects small or large.
+    The evidence is the mean over soil as good as stated or worse, and effects small or large.
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u
@@ -89,12 +77,8 @@ def evidence(
     )
     value -= problem.log_std
     value += _truncation(fitted, mean, covariance, priors)
-    best = np.argmax(value, axis=0)
-    rows = np.arange(len(floors))
-    return Posterior(
-        log_sum(value + np.log(weights)[:, None], axis=0) + [f.log_prior for f in floors],
-        covariance[best, rows],
-    )
+    log_evidence = log_sum(value + np.log(weights)[:, None], axis=0)
+    return log_evidence + [f.log_prior for f in floors]
 
 
 def _prior_precisions(fitted: Fit) -> tuple[FloatArray, FloatArray]:

@@ -63,9 +63,9 @@ class Fit:
         """Posterior covariance of u."""
         return np.asarray(np.linalg.inv(self.precision()), dtype=float)
 
-    def numbers(self, covariance: FloatArray | None = None) -> list[Number]:
-        """Return the fitted numbers, by the posterior covariance of u (or another one)."""
-        std = np.sqrt(np.diag(self.covariance() if covariance is None else covariance))
+    def numbers(self) -> list[Number]:
+        """Return the fitted numbers."""
+        std = np.sqrt(np.diag(self.covariance()))
         return [
             Number(c, u, round(float(c.value(u)), _DECIMALS) + 0.0, c.deviation(u, s), s)
             for c, u, s in zip(self.coordinates, self.u.tolist(), std.tolist(), strict=True)

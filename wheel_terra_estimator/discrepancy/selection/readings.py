@@ -90,15 +90,14 @@ class Columns:
         Only those more than half a decade off the model's size. Where all are, it is no unit.
         """
         decades = {quantity: round(math.log10(due / size)) for quantity, size, due in self._sizes()}
-        found = {quantity: 10.0**power for quantity, power in decades.items() if power}
-        if len(found) == len(self.table.quantities):
-            return {}
+        off = [{quantity: 10.0**power} for quantity, power in decades.items() if power]
         said: dict[str, float | str] = {}
-        points, off = self.forward.points, found.items()
-        for reading in self._likeliest(_scaled({q: x}, self.table, points) for q, x in off):
-            other = self._explained(reading, self.effects)
-            gain = other.selection.best - self.findings.selection.best
-            if gain + self._density(reading) > _CLEARLY:
+        if len(off) == len(self.table.quantities):
+            return said
+        tens = (_scaled(lacked, self.table, self.forward.points) for lacked in off)
+        for reading in self._likeliest(tens):
+            gain = self._explained(reading, self.effects).selection.best + self._density(reading)
+            if gain > self.findings.selection.best + _CLEARLY:
                 said.update(reading.said)
         return said
 

@@ -89,11 +89,10 @@ def search(
     """Find noise, outliers and the weights of all explanations by effects that may be named."""
     builder = _Builder(table, forward, nuisance)
     stated = noises.stated_noise(table, builder.scale, builder.trials, builder.reference)
-    noise = stated
-    problem, nothing = builder.fit_nothing(noise.std, (), None)
+    problem, nothing = builder.fit_nothing(stated.std, (), None)
     if (table.slip_std > 0.0).any():
-        builder.linearise(nothing, noise.std)
-        problem, nothing = builder.fit_nothing(noise.std, (), nothing)
+        builder.linearise(nothing, stated.std)
+        problem, nothing = builder.fit_nothing(stated.std, (), nothing)
     if table.leaving_angle_std.any():
         builder.let_err('leaving_angle', table.leaving_angle_std, np.arange(len(table)), nothing)
     noise = builder.estimate(stated, nothing, ())

@@ -23,7 +23,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     effect_coordinates,
     loose_precision,
 )
-from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, Posterior, evidence, log_sum
+from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, evidence, log_sum
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
@@ -41,8 +41,12 @@ class Explanation:
     """A fitted set of effects with its evidence."""
 
     fitted: Fit
-    posterior: Posterior
-    log_evidence: float  # the floor integrated out
+    log_joint: FloatArray  # (F,) of evidence and prior of the floor
+
+    @property
+    def log_evidence(self) -> float:
+        """The floor integrated out."""
+        return float(log_sum(self.log_joint))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -110,8 +114,7 @@ class Setting:
 
     def explain(self, fitted: Fit) -> Explanation:
         """Weigh a fit."""
-        posterior = evidence(self.problem, fitted, self.floors)
-        return Explanation(fitted, posterior, float(log_sum(posterior.log_joint)))
+        return Explanation(fitted, evidence(self.problem, fitted, self.floors))
 
 
 Start: TypeAlias = tuple[tuple[str, ...], FloatArray, FloatArray]
@@ -304,7 +307,7 @@ def weigh(
 ) -> Selection:
     """Return posterior probabilities of all explanations and floors."""
     keys = tuple(visible)
-    joint = np.array([e.posterior.log_joint + log_prior(e.names, keys) for e in explanations])
+    joint = np.array([e.log_joint + log_prior(e.names, keys) for e in explanations])
     order = np.argsort(-log_sum(joint, axis=1))
     joint = joint[order]
     return Selection(
