@@ -151,7 +151,7 @@ class Decider:
         """Return the law for what a decision's refit of the soil leaves."""
         on_top = LAW in self.findings.setting.forward.base_effects
         if self.misread or self.beds_differ or on_top or not self.findings.signatures:
-            return None  # not for a wrong unit, what beds do, on a law, or where soil alone is asked
+            return None  # not for a wrong unit, what beds do, on a law, or for the soil alone
         key = decision.floor, hold_soil
         if key not in self.laws:
             self.laws[key] = propose(self._gap(decision), hold_soil=hold_soil)
