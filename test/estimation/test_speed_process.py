@@ -295,6 +295,19 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
     assert (gain**2 + 1.0) * twice.variance == pytest.approx(after(length).variance)
 
 
+def test_wheel_rates_without_any_slope_leave_the_slip_class_unknown():
+    """However far the rover rolls: on an unknown slope any slip may be the usual one."""
+    configuration, rim = reader.load(SAND), 0.05
+    cycle = Parts(configuration).cycle([rim] * 6, dt=1e4)
+    for slope_known in (True, False):
+        seen = cycle._replace(loads=cycle.loads._replace(force_known=slope_known))
+        step = process([rim] * 6).towards_equilibrium_slip(
+            SpeedStep(1.0, 0.0, 0.0, 0.0), seen, 1.0, EQUILIBRIUM_LENGTH, buried=False
+        )
+        slip_std = np.sqrt(step.variance) / rim
+        assert (slip_std < configuration.filter.class_std) == slope_known
+
+
 def test_wheels_alone_say_nothing_of_the_accelerometers_zero():
     for before in (0.0, 0.05):
         assert process([before] * 6).by_wheels(0.1, speeds([0.06] * 6), 0.0).bias_gain == 0.0

@@ -388,11 +388,13 @@ class SpeedProcess(Component[SpeedState]):
         slip = most if buried else self._equilibrium_slip.at(demand, beyond=most)
         ratio = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
         keep = math.exp(-abs(rim) * cycle.dt / length)
+        # On an unknown slope no more is known than before the drive.
+        std = _EQUILIBRIUM_SLIP_STD if cycle.loads.force_known else _FIRST_RATIO_STD
         return SpeedStep(
             keep * step.speed_gain,
             keep * step.bias_gain,
             keep * step.constant + (1.0 - keep) * ratio * rim,
-            keep * keep * step.variance + (1.0 - keep * keep) * (_EQUILIBRIUM_SLIP_STD * rim) ** 2,
+            keep * keep * step.variance + (1.0 - keep * keep) * (std * rim) ** 2,
         )
 
     def present(
