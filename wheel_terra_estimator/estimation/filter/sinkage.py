@@ -24,10 +24,6 @@ _FIRST_ACCEPTED_AFTER = 2
 """The same at the start, where the configured soil or the first reading may be far off. In between
 the rejected readings must outnumber those used before."""
 _AGE = 2.0  # up to which a reading counts as known [s]
-_LOAD_EXPONENT = 1.5
-"""Of sinkage in the load that a wheel bears: n + 1/2, with n = 1 of most soils (Bekker)."""
-_LEAST_SINKAGE = 1e-3
-"""Sinkage [m] below which readings are mostly noise."""
 FLOOR_VARIANCE = 1e-10  # of a reading [m^2]
 
 
@@ -88,11 +84,6 @@ class SinkageUpdate(Component[SinkageUpdateState]):
                 if in_a_row[i] < min(needed, _ACCEPTED_AFTER):
                     continue
                 ekf.inflate(index, residual * residual)
-            if not used[i]:
-                # By as much as the configured soil is off, the stiffness is uncertain.
-                seen, expected = np.maximum((total / count, ekf.mean[index]), _LEAST_SINKAGE)
-                off = _LOAD_EXPONENT * math.log(seen / expected)
-                ekf.inflate(self._layout.stiffness.start + i, off**2)
             in_a_row[i] = 0
             used[i] = min(used[i] + 1, _ACCEPTED_AFTER)
             mean_nis = smoothed_nis(mean_nis, min(nis, self._gate))
