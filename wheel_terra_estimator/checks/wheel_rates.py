@@ -23,6 +23,7 @@ from wheel_terra_estimator.checks.evidence import (
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, not_checked
 from wheel_terra_estimator.checks.reference import (
     LEAST_ROWS,
+    NO_SCALE,
     ahead,
     hardly_moves,
     units_of_reference,
@@ -349,7 +350,7 @@ def _fitting_units(
         fits = by_turn and not usual
         if ratio is not None:
             least = LEAST_BAND if factor < MOST_COUNT else UNIT_BAND[0]
-            both = fits and bool(units_of_reference(ratio / factor, UNIT_BAND))  # in other units
+            both = fits and ratio / factor > NO_SCALE  # the reference is in another unit as well
             fits = least < ratio / factor < UNIT_BAND[1]
             fits = both or (fits and (track is None or by_turn or not usual))
         if fits:
