@@ -29,7 +29,7 @@ def why_no_arrival_log(path: Path) -> str:
 class ArrivalLog:
     """Line after line, ``TOPIC STAMP``, `RESET` or `TUNE`, to a file.
 
-    ``inputs``: files that the node reads. ``complain``: called once with the reason why
+    ``inputs``: files that the node reads. ``warn``: called once with the reason why
     the log ends early: a disk that is full ends the log, not the node. Raises UserError where it
     may not, or cannot, be written.
     """
