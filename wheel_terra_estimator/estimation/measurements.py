@@ -55,7 +55,7 @@ class InertialReading:
 
 
 def heading_of(orientation: FloatArray) -> Any:
-    """Return the heading [rad] of quaternions x, y, z, w ((k,) 4), from x of the world to y."""
+    """Return the heading [rad] of quaternions x, y, z, w ((4,) or (k, 4)), from world x to y."""
     x, y, z, w = orientation.T
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 

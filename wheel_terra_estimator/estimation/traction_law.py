@@ -87,7 +87,7 @@ def traction_scale(
     """
     # The median: a single spinning wheel (on a stone, lifted off) is no entrapment, nor is braking.
     typical = median([max(s, 0.0) for s in slip])
-    # Two wheels that dig in are the begin of an entrapment, whatever the others do.
+    # Two wheels that dig in are the beginning of an entrapment, whatever the others do.
     nearest = sorted(rim_travel_left)
     travel = nearest[min(1, len(nearest) - 1)]
     if travel <= tuning.stop_rim_travel:

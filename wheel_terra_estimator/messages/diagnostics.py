@@ -50,8 +50,8 @@ class FaultLog:
             fault.words, fault.seen = words, now
 
     def standing(self, now: int) -> list[str]:
-        """Return the faults that stand, each with its subject in front; clear the others."""
-        told = []
+        """Return the faults that stand, with subject and age; clear the others."""
+        words = []
         for (subject, form), fault in list(self._faults.items()):
             fault.seen = min(fault.seen, now)
             age = now - fault.seen
@@ -59,8 +59,8 @@ class FaultLog:
                 del self._faults[subject, form]
                 continue
             ended = f' ({age // SECOND} s ago)' if age >= SECOND else ''
-            told.append(f'{subject}: {fault.words}{ended}')
-        return told
+            words.append(f'{subject}: {fault.words}{ended}')
+        return words
 
     def publish(self) -> list[str]:
         """Take note that all faults are reported; return those that were not before."""

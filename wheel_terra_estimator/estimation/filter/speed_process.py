@@ -181,7 +181,7 @@ class SpeedProcess(Component[SpeedState]):
     def follow_sides(self, rims: RimSpeeds, dt: float) -> None:
         """Inflate the process noise where rim speeds change relative to one another.
 
-        At the begin or end of a turn the two sides slip differently, so that the body speed is not
+        At the start or end of a turn the two sides slip differently, so that the body speed is not
         that of their mean.
         """
         slow = self.state.slow_rims

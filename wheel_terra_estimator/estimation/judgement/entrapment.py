@@ -34,7 +34,7 @@ class Entrapments(NamedTuple):
 
     begins: NDArray[np.int64]  # the slip exceeds 0.9
     entrapped: NDArray[np.int64]  # it has done so for a second
-    under_way: BoolArray  # from the begin until the slip falls below 0.9
+    under_way: BoolArray  # from the beginning until the slip falls below 0.9
 
 
 class Outcome(Enum):
