@@ -114,7 +114,7 @@ class Columns:
             or not (as_they_are.only_far or as_they_are.accounted_for)
         )
         count = len(selection.explanations[0].names)
-        for reading in self._likeliest(self._readings()):
+        for reading in self._likeliest(self._readings())[:_TRIED]:
             density, alone = self._density(reading), -math.inf
             for tried in ({}, self.effects)[: 2 if density or count > 1 else 1]:
                 if tried and alone + density < selection.best_single:
@@ -150,7 +150,7 @@ class Columns:
             fitted = other.fit([()], [np.zeros(len(self.nuisance))], None, variance)[0]
             if fitted.objective < nothing.objective - _LIKELIER:
                 ranked.append((fitted.objective, reading))
-        return [reading for _, reading in sorted(ranked, key=lambda r: r[0])[:_TRIED]]
+        return [reading for _, reading in sorted(ranked, key=lambda r: r[0])]
 
     def _explained(self, reading: Reading, effects: Mapping[str, Effect]) -> Findings:
         forward, floors = self.forward.at(reading.points), self.findings.setting.floors
