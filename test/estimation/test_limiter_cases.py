@@ -113,6 +113,13 @@ def test_a_wheel_that_lost_its_rate_in_motion_does_not_move_a_rover_at_rest():
     assert rover.scale(0.2) == 1.0
 
 
+def test_a_limiter_restarted_in_motion_takes_unknown_slips_for_no_start():
+    rover = Rover()
+    rover.now += 1.0
+    rover.drive(0.5, 0.1, slip=0.2, slip_class=UNKNOWN)
+    assert rover.scale(0.1) == rover.tuning.stale_scale
+
+
 def test_the_table_is_that_of_the_page():
     rows = [line.strip('|\n ').split(' | ') for line in PAGE.open() if line.startswith('| ')]
     states = [cell.strip('`') for cell in next(row for row in rows if row[0] == 'event')[1:]]

@@ -332,7 +332,7 @@ def _after_unknown(
     slowly = all(
         abs(speed) <= REST_SPEED
         for wheel, speed in zip(state.wheels, estimates.slip_velocity, strict=True)
-        if latest - wheel.at <= tuning.stale_after
+        if not latest - wheel.at > tuning.stale_after  # all of them while none was ever known
     )
     if slowly and _still_time(state, now) >= REST_TIME and state.known_since_start:
         start = Decision(1.0, 'starting', 'slip unknown at rest: command passes')
