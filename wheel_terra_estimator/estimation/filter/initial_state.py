@@ -77,7 +77,8 @@ class PriorTuning:
     most_rut_share: float = 0.9  # soil springs back
     most_shear_radius: float = 0.3
     most_slip_per_demand: float = 8.0  # near the top of the traction curve
-    most_stiffness: float = 8.0  # from fresh snow to rock [ln]
+    most_stiffness: float = 3.0  # [ln]; more, if the configured soil is softer than that:
+    hardest_sinkage: float = 2e-3  # of a wheel at rest on the hardest ground [m]
     most_shear_error: float = 1.5  # [ln]
     most_torque_zero: float = 1e4  # [N m]
     highest: float = 0.02  # of a wheel above the surface, over its radius [-]
@@ -140,6 +141,7 @@ def gravity_bias_std(rover: Rover, sensors: SensorFigures, orientation_std: floa
     return math.hypot(sensors.specific_force_bias_std, rover.gravity * orientation_std)
 
 
+_LOAD_EXPONENT = 0.5  # of the contact length, so of the load in the sinkage beside n (Bekker)
 _LEAST_SINE = 0.05  # of sin(phi) cos(phi): soil without friction
 
 
@@ -196,7 +198,11 @@ def initial_filter(
     P[zeros, zeros] = sensors.torque_zero_std**2
     if layout.reference_error is not None:
         P[layout.reference_error, layout.reference_error] = sensors.reference_wander_std**2
-    return GatedFilter(mean, P, *bounds(rover, layout, priors))
+    lower, upper = bounds(rover, layout, priors)
+    exponent = float(configuration.soil.sinkage_exponent) + _LOAD_EXPONENT
+    hardest = exponent * np.log(np.maximum(z, PRIORS.hardest_sinkage) / PRIORS.hardest_sinkage)
+    upper[layout.stiffness] = np.maximum(upper[layout.stiffness], hardest)
+    return GatedFilter(mean, P, lower, upper)
 
 
 def bounds(rover: Rover, layout: StateLayout, priors: SoilPriors) -> tuple[FloatArray, FloatArray]:
