@@ -141,7 +141,7 @@ def gravity_bias_std(rover: Rover, sensors: SensorFigures, orientation_std: floa
     return math.hypot(sensors.specific_force_bias_std, rover.gravity * orientation_std)
 
 
-_LOAD_EXPONENT = 0.5  # of the contact length, so of the load in the sinkage beside n (Bekker)
+_LOAD_EXPONENT = 0.5  # beside n: load = k z^(n + 1/2), since contacts grow with sqrt(z) (Bekker)
 _LEAST_SINE = 0.05  # of sin(phi) cos(phi): soil without friction
 
 
