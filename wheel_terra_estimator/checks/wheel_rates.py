@@ -55,7 +55,7 @@ FINE = 50  # different rates of one that is not coarse, at least
 SAME_CHANGES = 0.95  # share of the changes of two rates that are the same of one sent twice [-]
 LEAST_CHANGES = 30
 SHORT_ZERO, MANY_ZEROS = 0.3, 10  # time of zeros between rates of driving [s], and their number
-FEW_ZEROS = 3  # the same of a reference, for which the wheels tell that the rover drives
+FEW_ZEROS = 3  # the same of a reference while the wheels show that the rover drives
 LIVELY = 0.3  # rate of the others beside which none stands, over the working rate [-]
 GOES_ON = 0.25  # turn times track over the speed of the other side of a rover that goes on [-]
 SAME_SPEED = 0.05  # speed of a side against the middle in which all roll alike, at most [-]
@@ -63,7 +63,7 @@ ONE_SIGN = 0.9  # share of rates of one sign that have none, less the rest [-]
 LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0  # speed over the others' of a radius; over scatter [ln]
 LEAST_COUNTS = 0.2  # speed of a wheel with fewer counts over the others', at least [-]
 WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0  # wild change over the greatest and usual value [-]
-LEAST_WILD, MOST_WILD = 3, 0.1  # messages with, and share of, single wild values that are told
+LEAST_WILD, MOST_WILD = 3, 0.1  # messages with, and share of, single wild values that are reported
 LONG_FROZEN_TIME = 10.0  # time that a coarse encoder does not repeat itself [s]
 HELD_TORQUE = 1.5  # torque of a held wheel over that of the others, at least [-]
 DRAGGED_TORQUE = 0.5  # the same against theirs, of one that the others drag [-]
@@ -165,7 +165,7 @@ def _held(evidence: Evidence, index: int, rows: Any) -> bool:
 def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return zeros between readings at speed, at which no wheel and no rover stands for an instant.
 
-    How long a rover may stand for the reference while its wheels drive is for these to say.
+    Zeros of a reference may last for any time while the wheels drive.
     """
     outcomes, zero = list[Outcome](), evidence.rate == 0.0
     fast = np.abs(evidence.rate) > LIVELY * evidence.working_rate

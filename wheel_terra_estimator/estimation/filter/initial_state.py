@@ -199,6 +199,7 @@ def initial_filter(
     if layout.reference_error is not None:
         P[layout.reference_error, layout.reference_error] = sensors.reference_wander_std**2
     lower, upper = bounds(rover, layout, priors)
+    # However soft the configured soil is, the ground may be hard.
     exponent = float(configuration.soil.sinkage_exponent) + _LOAD_EXPONENT
     hardest = exponent * np.log(np.maximum(z, PRIORS.hardest_sinkage) / PRIORS.hardest_sinkage)
     upper[layout.stiffness] = np.maximum(upper[layout.stiffness], hardest)
