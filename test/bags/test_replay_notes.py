@@ -5,6 +5,7 @@
 import csv
 import json
 import tracemalloc
+from collections import Counter
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from recordings import beginning
 
 from wheel_terra_estimator.bags.history import HistoryRecorder, ThinnedRows, read_estimates
 from wheel_terra_estimator.bags.reader import MeasurementReader
-from wheel_terra_estimator.bags.replay import Options, replay
+from wheel_terra_estimator.bags.replay import Options, Replay, replay
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.cli.demo import DRIVES
@@ -245,7 +246,9 @@ def test_figures_of_a_thinned_drive_are_those_of_all_sets():
     assert long.stamp.size == 300
     assert short.stamp.size <= 50
     border = Border(0.25, np.inf)
-    summary, same = (summarise('', h, {}, {}, {}, (), border, ()) for h in (short, long))
+    summary, same = (
+        summarise('', Replay(h, {}, Counter(), Counter(), ()), border) for h in (short, long)
+    )
     assert summary == same
     assert summary.sets == 300
     classes = np.array([s.slip_class for s in everything])

@@ -9,6 +9,7 @@ import json
 import re
 import shutil
 import subprocess
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import pytest
 
 from wheel_terra_estimator import api
 from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, StuckWarning
+from wheel_terra_estimator.bags.replay import Replay
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.report.page import write_report
@@ -145,10 +147,11 @@ def an_hour() -> tuple[EstimateHistory, Truth]:
 @pytest.fixture(scope='module')
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     history, truth = an_hour()
-    topics, border = {'joint_states': '/joint_states'}, Border(0.25, np.inf)
-    summary = summarise('an hour', history, topics, {}, {}, ['a note'], border, ())
+    topics = {'joint_states': '/joint_states'}
+    result = Replay(history, topics, Counter(), Counter(), ('a note',))
+    summary = summarise('an hour', result, Border(0.25, np.inf))
     path = tmp_path_factory.mktemp('report') / 'report.html'
-    write_replay_report(path, summary, history, truth, reader.load(['generic_six_wheel']))
+    write_replay_report(path, summary, result, truth, reader.load(['generic_six_wheel']))
     return path
 
 

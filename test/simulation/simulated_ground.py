@@ -10,7 +10,7 @@ import numpy as np
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation.drives import Drives
-from wheel_terra_estimator.simulation.terrain import Terrain
+from wheel_terra_estimator.simulation.terrain import Ground, Terrain
 
 EFFECTS = [
     'effects.slip_sinkage_exponent.enabled:=true',
@@ -49,9 +49,8 @@ def ground(slope_deg: float = 0.0, side_deg: float = 0.0, **changes: Any) -> Ter
         'patchiness': 0.0,
         'patchiness_length': 0.5,
         'extent': (-10.0, 20.0),
-        'random': np.random.default_rng(0),
     }
-    return Terrain(**{**given, **changes})
+    return Terrain(Ground(**{**given, **changes}), np.random.default_rng(0))
 
 
 def drives(configuration: Configuration, speed: float = 0.05) -> Drives:

@@ -59,14 +59,12 @@ class Drive:
             write_replay_report(
                 files['report'],
                 self.summary,
-                history,
+                self.result,
                 self.truth,
                 self.configuration,
-                overwrite=overwrite,
                 findings=self.checked.findings,
                 errors=self.errors,
-                smoothed=self.result.smoothed,
-                track=track,
+                overwrite=overwrite,
             )
 
 
@@ -100,13 +98,8 @@ def summed_up(
 ) -> Drive:
     """Return the summary of a recording after its replay."""
     errors = truth_scores.judged(result.history, truth, result.topics, configuration)
-    notes = list(result.notes)
-    if not configuration.soil_stated:
-        notes.append(NO_SOIL)
-    summary = summarise(
-        title, result.history, result.topics, result.heard, result.rejected, notes,
-        Border.of(configuration), result.taught,
-    )  # fmt: skip
+    notes = () if configuration.soil_stated else (NO_SOIL,)
+    summary = summarise(title, result, Border.of(configuration), notes)
     return Drive(configuration, checked, result, truth, errors, summary)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.bags.replay import Replay
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.taught import LEARNED, Taught
 from wheel_terra_estimator.reporting import truth_scores
@@ -124,16 +125,10 @@ class DriveSummary:
 
 
 def summarise(
-    title: str,
-    history: EstimateHistory,
-    topics: Mapping[str, str],
-    counts: Mapping[str, int],
-    rejected: Mapping[tuple[str, str], int],
-    notes: Sequence[str],
-    border: Border,
-    taught: Sequence[Taught],
+    title: str, result: Replay, border: Border, notes: Sequence[str] = ()
 ) -> DriveSummary:
-    """Sum a drive up; ``topics`` and ``counts`` go by input topic, ``rejected`` by reason, too."""
+    """Sum a drive up; ``notes`` are said after those of the replay."""
+    history = result.history
     figures = history.figures()
     return DriveSummary(
         title=title,
@@ -150,11 +145,11 @@ def summarise(
             )
         ),
         messages=tuple(
-            MessageRow(name, topic, counts.get(name, 0), _rejections(name, rejected))
-            for name, topic in topics.items()
+            MessageRow(name, topic, result.heard[name], _rejections(name, result.rejected))
+            for name, topic in result.topics.items()
         ),
-        notes=tuple(notes),
-        taught=tuple(taught),
+        notes=(*result.notes, *notes),
+        taught=result.taught,
     )
 
 

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from wheel_terra_estimator.bags.history import EstimateHistory
-from wheel_terra_estimator.bags.track import Track
+from wheel_terra_estimator.bags.replay import Replay
 from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
@@ -37,14 +36,13 @@ from wheel_terra_estimator.reporting.truth_scores import QuantityError, TruthErr
 def write_replay_report(
     path: Path,
     summary: DriveSummary,
-    history: EstimateHistory,
+    result: Replay,
     truth: Truth | None,
     configuration: Configuration,
-    overwrite: bool = False,
+    *,
     findings: Sequence[Any] = (),
     errors: TruthErrors | None = None,
-    smoothed: bool = False,
-    track: Track | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Write the report of a drive.
 
@@ -54,6 +52,7 @@ def write_replay_report(
 
     effects = catalogue()
     values = configuration.flat()
+    history, track = result.history, result.track
     border = Border.of(configuration)
     page = render(
         'replay.html',
@@ -72,7 +71,7 @@ def write_replay_report(
         way=way_figure(track) if track else None,
         strengths=[(words, colour) for words, _, _, colour in STRENGTHS],
         position=track.source if track else '',
-        smoothed=smoothed,
+        smoothed=result.smoothed,
         truth_source=truth.source if truth else '',
         provenance=configuration.provenance,
         parameters=[(key, values[key]) for key in values if key in configuration.stated],

@@ -16,7 +16,7 @@ from wheel_terra_estimator.simulation.drives import Command, Drives
 from wheel_terra_estimator.simulation.plant import RoverPlant
 from wheel_terra_estimator.simulation.scenario import SENSOR_FAULTS, WHEEL_FAULTS, Fault, Scenario
 from wheel_terra_estimator.simulation.sensors import START, Arrival, SensorSuite
-from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Patch, Terrain
+from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Ground, Patch, Terrain
 from wheel_terra_estimator.simulation.truth import Truth, TruthTable
 
 LONGEST_STEP = 0.05
@@ -55,7 +55,7 @@ class Drive:
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
         # Separate, so that one more draw of one kind does not change the others.
-        variation, ground, noise = (
+        variation, unevenness, noise = (
             np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3)
         )
         self.scenario = scenario
@@ -95,20 +95,20 @@ class Drive:
         )
         reach = fastest * scenario.duration + 2.0 * float(np.abs(truth.wheels.x).max()) + 1.0
         slope = scenario.slope
-        terrain = Terrain(
-            slope.position,
-            slope.angle + np.where(slope.angle != 0.0, slope_shift, 0.0),
-            slope.side,
-            patches,
-            scenario.values['patches.border'],
-            soil,
-            slope.undulation,
-            slope.undulation_length,
-            scenario.values['patchiness'],
-            scenario.values['patchiness_length'],
-            (-reach, reach),
-            ground,
+        ground = Ground(
+            slope_position=slope.position,
+            slope_angle=slope.angle + np.where(slope.angle != 0.0, slope_shift, 0.0),
+            side_slope=slope.side,
+            patches=patches,
+            border=scenario.values['patches.border'],
+            base_factors=soil,
+            undulation=slope.undulation,
+            undulation_length=slope.undulation_length,
+            patchiness=scenario.values['patchiness'],
+            patchiness_length=scenario.values['patchiness_length'],
+            extent=(-reach, reach),
         )
+        terrain = Terrain(ground, unevenness)
         drives = self._drives(max(fastest, 0.01))
         efficiency = scenario.values['dig_efficiency']
         self.plant = RoverPlant(self.configuration, terrain, drives, efficiency)

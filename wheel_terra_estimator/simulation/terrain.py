@@ -43,45 +43,45 @@ def smooth_noise(random: np.random.Generator, count: int, correlation_length: fl
     return np.convolve(random.standard_normal(count + 2 * reach), kernel, mode='valid')
 
 
-class Terrain:
-    """Slope, height and soil factors at any point."""
+@dataclass(frozen=True)
+class Ground:
+    """What a terrain is made of."""
 
-    def __init__(
-        self,
-        # ``slope_position``, ``slope_angle``: (k,) knots of the slope along x [m], [rad], positive
-        # uphill; linear between
-        slope_position: FloatArray,
-        slope_angle: FloatArray,
-        side_slope: float,  # slope along y [rad], positive when the left side is higher
-        patches: list[Patch],  # later ones lie over earlier ones
-        border: float,  # length over which the soil changes at the border of a patch [m]
-        # Factors of the whole ground (the error of the nominal soil)
-        base_factors: dict[str, float],
-        # ``undulation``, ``undulation_length``: standard deviation [rad] and correlation length [m]
-        # of the slope's unevenness
-        undulation: float,
-        undulation_length: float,
-        # ``patchiness``, ``patchiness_length``: standard deviation of the logarithm and correlation
-        # length [m] of the stiffness, drawn for the left and the right half of the ground
-        patchiness: float,
-        patchiness_length: float,
-        # Least and greatest x [m]; beyond, the values of the ends hold
-        extent: tuple[float, float],
-        random: np.random.Generator,  # source of the unevenness
-    ) -> None:
-        self._x = np.arange(extent[0], extent[1] + GRID, GRID)
-        slope = np.interp(self._x, slope_position, slope_angle)
-        slope += undulation * smooth_noise(random, slope.size, undulation_length)
+    # ``slope_position``, ``slope_angle``: (k,) knots of the slope along x [m], [rad], positive
+    # uphill; linear between
+    slope_position: FloatArray
+    slope_angle: FloatArray
+    side_slope: float  # slope along y [rad], positive when the left side is higher
+    patches: list[Patch]  # later ones lie over earlier ones
+    border: float  # length over which the soil changes at the border of a patch [m]
+    base_factors: dict[str, float]  # of the whole ground (the error of the nominal soil)
+    # Standard deviation [rad] and correlation length [m] of the slope's unevenness
+    undulation: float
+    undulation_length: float
+    # Standard deviation of the logarithm and correlation length [m] of the stiffness, drawn for the
+    # left and the right half of the ground
+    patchiness: float
+    patchiness_length: float
+    extent: tuple[float, float]  # least and greatest x [m]; beyond, the values of the ends hold
+
+
+class Terrain:
+    """Slope, height and soil factors at any point; ``random`` draws the unevenness."""
+
+    def __init__(self, ground: Ground, random: np.random.Generator) -> None:
+        self._x = np.arange(ground.extent[0], ground.extent[1] + GRID, GRID)
+        slope = np.interp(self._x, ground.slope_position, ground.slope_angle)
+        slope += ground.undulation * smooth_noise(random, slope.size, ground.undulation_length)
         self._sin_slope = np.sin(slope)
         height = np.cumsum(self._sin_slope) * GRID
         self._height = height - np.interp(0.0, self._x, height)
-        self._patchiness = patchiness * np.stack(
-            [smooth_noise(random, slope.size, patchiness_length) for _ in range(2)]
+        self._patchiness = ground.patchiness * np.stack(
+            [smooth_noise(random, slope.size, ground.patchiness_length) for _ in range(2)]
         )
-        self.sine_of_side_slope = float(np.sin(side_slope))  # along y
-        self._patches = patches
-        self._border = border
-        self._base = np.array([base_factors.get(name, 1.0) for name in SOIL_QUANTITIES])
+        self.sine_of_side_slope = float(np.sin(ground.side_slope))  # along y
+        self._patches = ground.patches
+        self._border = ground.border
+        self._base = np.array([ground.base_factors.get(name, 1.0) for name in SOIL_QUANTITIES])
 
     def sine_of_slope(self, x: FloatArray) -> FloatArray:
         """Return the sine of the slope along x at ``x``."""
