@@ -110,6 +110,30 @@ def test_a_silence_is_put_down_to_what_is_refused_in_it():
     assert words.endswith('/joint_states: rejected: damaged (1 messages)')
 
 
+def test_estimates_that_come_back_to_a_stuck_rover_are_logged():
+    from wheel_terra_estimator.messages.diagnostics import ERROR, STALE
+    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
+
+    log = Mock()
+    node = SimpleNamespace(
+        _publisher=Mock(),
+        _pipeline=SimpleNamespace(diagnostics=SimpleNamespace(new_faults=['imu: lost'])),
+        _said=(-1, False),
+        get_logger=lambda: log,
+    )
+
+    def say(level, words):
+        EstimatorNode._say(node, 0, [SimpleNamespace(level=level, message=words)], 0.0)
+
+    say(ERROR, 'stuck: wheels dig in')  # was logged when the warning rose
+    log.error.assert_not_called()
+    log.warning.assert_called_once_with('imu: lost')
+    say(STALE, '/joint_states: silent')
+    say(ERROR, 'stuck: wheels dig in')
+    say(ERROR, 'stuck: wheels dig in')
+    log.error.assert_called_once_with('ERROR: stuck: wheels dig in')
+
+
 class TestOneNode:
     """One node for all, in this order: each has heard what the tests before it sent."""
 

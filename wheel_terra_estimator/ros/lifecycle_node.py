@@ -476,12 +476,16 @@ class EstimatorNode(LifecycleNode):
         new_faults = '; '.join(self._pipeline.diagnostics.new_faults)
         log = self.get_logger()
         if (level, expected) != self._said:
+            after_silence = self._said == (STALE, False)
             self._said = level, expected
             words = f'{LEVELS[level]}: {message}'
             if level == OK or expected:
                 log.info(words)
-            elif level != ERROR:  # the stuck warning was logged with its reason
+            elif level != ERROR:
                 log.warning(words)
+                return
+            elif after_silence:  # else the stuck warning was just logged, with its reason
+                log.error(words)
                 return
         if new_faults:
             log.warning(new_faults)
