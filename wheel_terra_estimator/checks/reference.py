@@ -71,10 +71,11 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     both = min(np.mean(forward > least), np.mean(forward < -least)) > SELDOM_NEGATIVE
     if both and not _sideways(reference) and _without_sign(rim, forward):
         calm = moving_mean(forward, LEAST_ROWS)
-        sense = np.sign(np.interp(evidence.time, evidence.seconds(reference), calm))
-        # In turns the sides may be unlike; what was cut off at 0 is not known.
-        unknown = (evidence.moving & ~evidence.unturned)[:, None] | (evidence.rate == 0.0)
-        mended = evidence.with_rate(np.where(unknown, np.nan, evidence.rate * sense[:, None]))
+        speed = np.interp(evidence.time, evidence.seconds(reference), calm)[:, None]
+        # In turns the sides may be unlike; rates that were cut off at 0 are unknown.
+        unknown = (evidence.moving & ~evidence.unturned)[:, None]
+        unknown = unknown | ((evidence.rate == 0.0) & (np.abs(speed) > least))
+        mended = evidence.with_rate(np.where(unknown, np.nan, evidence.rate * np.sign(speed)))
         finding = evidence.found('rates_unsigned', 0.95, other='reference goes')
         return [finding], mended
     return [], evidence
