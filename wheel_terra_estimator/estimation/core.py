@@ -44,8 +44,8 @@ from wheel_terra_estimator.estimation.timing.input_checks import (
 )
 from wheel_terra_estimator.estimation.timing.input_log import Estimator, InputLog, Stepped
 from wheel_terra_estimator.estimation.timing.lag import LONGEST_HOLD, LagLearner
-from wheel_terra_estimator.estimation.timing.step_grid import StepGrid
-from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline, TimeSettings
+from wheel_terra_estimator.estimation.timing.step_grid import TimeSettings
+from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline
 
 _FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
 """Numerical errors that a step may raise; they are caught and reported."""
@@ -87,19 +87,19 @@ class EstimatorCore:
     ) -> None:
         self._estimator = estimator or _estimator(configuration)
         self._judge = judged_by(configuration) if judged_by else None
-        self._settings = _time_settings(configuration)
-        self._lags = LagLearner(_max_lag(configuration))
-        self._clock_step = _nanoseconds(configuration.filter.clock_step)
+        settings = _time_settings(configuration)
+        self._lags = LagLearner(settings.max_lag)
+        self._watch = ClockWatch(
+            len(CHANNELS), settings.clock_step, self._lags.longest, settings.history
+        )
         self._errors = SensorErrors(configuration)
         self._checks = InputChecks(configuration)
         self._guard = OutputGuard(configuration)
         self._classes = PublishedClasses(configuration)
         self._slopes = OncePerSecond()
         self.warning = StuckMemory(configuration)
-        grid = StepGrid(self._settings.output_rate)
-        self._log = InputLog(self._runners(), grid, self._settings.reference_period)
-        self._timeline = Timeline(self._log, self._settings)
-        self._watch = self._new_watch()
+        self._log = InputLog(self._runners(), settings)
+        self._timeline = Timeline(self._log, settings)
         self._received = [0] * len(CHANNELS)
         self._late = [0] * len(CHANNELS)
         self._deferred = False  # since the last set
@@ -144,7 +144,7 @@ ReferenceVelocity
         self._resets += 1
         self._latest = None
         self.warning.clear()
-        self._watch = self._new_watch()
+        self._watch.reset()
         self._end_run(keep_soil=False)
 
     def retune(self, configuration: Configuration) -> None:
@@ -156,15 +156,13 @@ ReferenceVelocity
         self._estimator = _estimator(configuration)
         if self._judge is not None:
             self._judge.retune(configuration)
-        self._settings = _time_settings(configuration)
-        self._lags.fixed = _max_lag(configuration)
-        self._clock_step = _nanoseconds(configuration.filter.clock_step)
-        self._watch.retune(self._clock_step, self._lags.longest, self._settings.history)
+        settings = _time_settings(configuration)
+        self._lags.fixed = settings.max_lag
+        self._watch.retune(settings.clock_step, self._lags.longest, settings.history)
         self._classes.retune(configuration)
         self.warning.retune(configuration)
-        grid = StepGrid(self._settings.output_rate)
-        self._log.retune(self._runners(), grid, self._settings.reference_period)
-        self._timeline.retune(self._settings)
+        self._log.retune(self._runners(), settings)
+        self._timeline.retune(settings)
 
     def learned(self) -> dict[str, Any]:
         """Return identified soil and sensor parameters: key -> value; ``_std`` = deviation.
@@ -217,10 +215,6 @@ ReferenceVelocity
 
     def _runners(self) -> list[Stepped]:
         return [self._estimator] if self._judge is None else [self._judge, self._estimator]
-
-    def _new_watch(self) -> ClockWatch:
-        settings = self._settings
-        return ClockWatch(len(CHANNELS), self._clock_step, self._lags.longest, settings.history)
 
     def _follow(self, judgement: Judgement) -> list[EstimateSet]:
         sets: list[EstimateSet] = []
@@ -325,8 +319,9 @@ ReferenceVelocity
         faults, names = {}, self._checks.names
         if self._deferred:
             self._deferred = False
+            rate = self._timeline.settings.rerun_rate
             faults['late inputs'] = (
-                f'more than {self._settings.rerun_rate:.0f} steps a second would be repeated '
+                f'more than {rate:.0f} steps a second would be repeated '
                 '(filter.rerun_rate): fused late'
             )
         if self._clock_stepped:
@@ -360,6 +355,8 @@ def _time_settings(configuration: Configuration) -> TimeSettings:
     rate, tuning = configuration.reference_odom_max_rate, configuration.filter
     return TimeSettings(
         output_rate=configuration.output_rate,
+        max_lag=_nanoseconds(configuration.max_lag) if configuration.max_lag >= 0.0 else -1,
+        clock_step=_nanoseconds(tuning.clock_step),
         history=_nanoseconds(configuration.history),
         silence=_nanoseconds(tuning.silence),
         heartbeat=max(_nanoseconds(1.0 / tuning.heartbeat_rate), 1),
@@ -367,10 +364,6 @@ def _time_settings(configuration: Configuration) -> TimeSettings:
         # Where every stamp is a set, any number of steps may be run again.
         rerun_rate=float(tuning.rerun_rate) if configuration.output_rate > 0.0 else 0.0,
     )
-
-
-def _max_lag(configuration: Configuration) -> int:
-    return _nanoseconds(configuration.max_lag) if configuration.max_lag >= 0.0 else -1
 
 
 def _nanoseconds(seconds: float) -> int:

@@ -73,7 +73,12 @@ class ClockWatch:
 
     def __init__(self, channels: int, clock_step: int, max_lag: int, history: int) -> None:
         self.retune(clock_step, max_lag, history)
-        self._newest_of: list[int | None] = [None] * channels
+        self._channels = channels
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all messages."""
+        self._newest_of: list[int | None] = [None] * self._channels
         self._held: list[Arrival] = []
         self._suspicion = Suspicion.BEHIND
         self._odometry_held = 0

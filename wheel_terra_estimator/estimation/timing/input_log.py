@@ -27,7 +27,7 @@ from wheel_terra_estimator.estimation.timing.merging import (
     merge_wheels,
     same,
 )
-from wheel_terra_estimator.estimation.timing.step_grid import LONGEST_STEP, StepGrid
+from wheel_terra_estimator.estimation.timing.step_grid import LONGEST_STEP, StepGrid, TimeSettings
 
 KEPT_STATE_SPACING = 50_000_000
 """Least time between kept states [ns]: keeping one costs a twentieth of a step."""
@@ -75,13 +75,6 @@ class _Progress(NamedTuple):
     steps: int  # since the start of the run
 
 
-class _Kept(NamedTuple):
-    """A state to return to."""
-
-    state: Any
-    walk: _Progress
-
-
 class _LastRun(NamedTuple):
     """Where the last run ended: the cost of late inputs is counted from there."""
 
@@ -99,13 +92,13 @@ class Entry:
         self.stamp = stamp
         self.parts: list[Any] = [None] * len(CHANNELS)
         self.parts[channel] = measurement
-        self.kept: _Kept | None = None  # state after this entry
+        self.kept: tuple[tuple[Any, ...], _Progress] | None = None  # after this entry
 
 
 class InputLog:
     """Inputs of one run, and the `runners` that make the same steps through them.
 
-    Reference velocities are thinned to `reference_period`, by stamps [ns]; 0: all are used.
+    Reference velocities are thinned by stamps to the `reference_period` of the settings.
 
     Attributes
     ----------
@@ -121,17 +114,19 @@ class InputLog:
         Those of them that held other numbers than the first.
     dirty : int
         Steps that the next run will make again.
+    forgotten : int
+        Stamp [ns] up to which no state before an input is kept; 0: the start of the run is known.
     """
 
-    def __init__(self, runners: Sequence[Stepped], grid: StepGrid, reference_period: int) -> None:
+    def __init__(self, runners: Sequence[Stepped], settings: TimeSettings) -> None:
         self._runners = runners
-        self.grid = grid
+        self.grid = StepGrid(settings.output_rate)
         self.entries: list[Entry] = []
         self.stamps: list[int] = []
         self.counts = {'steps': 0, 'reruns': 0, 'steps_repeated': 0}
         self.repeated = [0] * len(CHANNELS)
         self.contradicted = [0] * len(CHANNELS)
-        self._reference_period = reference_period
+        self._reference_period = settings.reference_period
         self._pristine = self._snapshot()
         self._last_run: _LastRun
         self._caught_up: bool  # since the last run
@@ -139,10 +134,8 @@ class InputLog:
 
     def clear(self, *, keep_soil: bool) -> None:
         """Begin a new run; soil and biases kept with inflated covariance, or reset."""
-        self._origin: tuple[Any, bool] | None = (
-            self._snapshot() if keep_soil else self._pristine,
-            keep_soil,
-        )
+        self._origin = self._snapshot() if keep_soil else self._pristine, keep_soil
+        self.forgotten = 0
         self.entries.clear()
         self.stamps.clear()
         self.first: int | None = None
@@ -155,8 +148,8 @@ class InputLog:
         self._last_kept = 0  # stamp of the newest kept state
         self._dense_until = 0
 
-    def retune(self, runners: Sequence[Stepped], grid: StepGrid, reference_period: int) -> None:
-        """Go on from the state after the last step with other runners and another grid."""
+    def retune(self, runners: Sequence[Stepped], settings: TimeSettings) -> None:
+        """Continue from the state after the last step with other runners and times."""
         state = self._snapshot()
         self._runners = runners
         self._pristine = self._snapshot()
@@ -164,8 +157,8 @@ class InputLog:
             for entry in self.entries[self._ran :]:
                 entry.kept = None  # run again by the new one
         self._restore(state)
-        self._reference_period = reference_period
-        self.grid = grid
+        self._reference_period = settings.reference_period
+        self.grid = StepGrid(settings.output_rate)
         self._progress = self._progress._replace(step_index=-1)
 
     def insert(self, channel: int, measurement: Measurement) -> tuple[int, bool]:
@@ -205,10 +198,6 @@ class InputLog:
             return max(position - bisect_left(self.stamps, stamp), 0)
         before = self.grid.step_index(stamp - self.first)
         return self.grid.step_index(end - self.first) - before + 1
-
-    def reaches(self, stamp: int) -> bool:
-        """Return whether a state before `stamp` [ns] is still kept."""
-        return self._origin is not None or stamp > self.stamps[0]
 
     def run_to(self, last: int) -> None:
         """Run up to and with the entry `last`."""
@@ -266,6 +255,7 @@ class InputLog:
         del self.entries[: index + 1], self.stamps[: index + 1]
         self._ran, self._position, self._provisional = 0, -1, False
         self._origin = self._pristine, False
+        self.forgotten = 0
         self._account()
 
     def forget(self, horizon: int) -> int:
@@ -280,7 +270,7 @@ class InputLog:
         if index <= 0:
             return 0
         del self.entries[:index], stamps[:index]
-        self._origin = None
+        self.forgotten = stamps[0]
         self._ran -= index
         self._position -= index
         position, end, unchanged = self._last_run
@@ -344,7 +334,7 @@ class InputLog:
             return  # the start of the run is known anyway
         entry = self.entries[self._position - 1]
         if entry.kept is None and (always or entry.stamp - self._last_kept >= KEPT_STATE_SPACING):
-            entry.kept = _Kept(self._snapshot(), self._progress)
+            entry.kept = self._snapshot(), self._progress
             self._last_kept = entry.stamp
 
     def _go_back(self) -> None:
@@ -356,10 +346,10 @@ class InputLog:
         if index >= 0:
             kept = self.entries[index].kept
             assert kept is not None
-            self._progress = kept.walk
-            self._restore(kept.state)
+            state, self._progress = kept
+            self._restore(state)
         else:
-            assert self._origin is not None
+            assert not self.forgotten
             state, keep_soil = self._origin
             self._restore(state)
             for runner in self._runners:

@@ -81,17 +81,18 @@ class LagLearner:
         """Take the stamp [ns] of an accepted message; not `whole`: it holds some wheels only."""
         if self._first is None:
             self._first = stamp
-        lags = self._lags.get(channel)
+        lags, present = self._lags.get(channel), stamp
         if lags is None:
             leads = self._leads[channel]
             if self._newest is not None and channel not in self._led:
                 self._led.add(channel)
                 leads.append(stamp - self._newest)
             # With a stated lag a second message is needed before a clock counts as ahead.
-            known = len(leads) > (self.fixed >= 0) and min(leads) > _CLOCKS_AGREE
-            self._advance(stamp - min(leads) if known else stamp)
+            if len(leads) > (self.fixed >= 0) and min(leads) > _CLOCKS_AGREE:
+                present = stamp - min(leads)
+        self.present = present if self.present is None else max(self.present, present)
+        if lags is None:
             return
-        self._advance(stamp)
         self._led.clear()
         if channel == WHEEL_ODOMETRY:
             self._odometry_received = True
@@ -107,9 +108,6 @@ class LagLearner:
         if len(lags) < _MEMORY // 2 or self._counts[channel] % _LEARN_EVERY == 0:
             usual = sorted(lags)[int(_SHARE * (len(lags) - 1) + 0.5)]
             self.learned[channel] = 0 if usual < SHORTEST_HOLD else round(_MARGIN * usual)
-
-    def _advance(self, stamp: int) -> None:
-        self.present = stamp if self.present is None else max(self.present, stamp)
 
     def hold(self) -> int:
         """Return how long inputs are held back now [ns]."""

@@ -74,13 +74,16 @@ def merge_step(
         for channel in zip(*parts, strict=True)
     )
     rates, measured = _odometry(stamp, odometry, measured)
-    merged: list[Any] = [
-        rates,
-        inertial[0] if len(inertial) == 1 else _inertial(stamp, inertial),
-        *[some[0] if len(some) == 1 else _mean_reading(stamp, some) for some in wheels],
-        references[-1] if references else None,
-    ]
-    return StepInputs(*merged), measured
+    merged: list[Any] = [rates]
+    for readings in (inertial, *wheels):
+        if len(readings) < 2:
+            merged.append(readings[0] if readings else None)
+        elif readings is inertial:
+            merged.append(_inertial(stamp, inertial))
+        else:
+            mean = _mean([_values(reading) for reading in readings])
+            merged.append(type(readings[0])(stamp, mean))
+    return StepInputs(*merged, references[-1] if references else None), measured
 
 
 def _odometry(
@@ -122,16 +125,8 @@ def _newest(rows: list[FloatArray | None]) -> FloatArray | None:
     return newest
 
 
-def _mean_reading(stamp: int, readings: list[Any]) -> Any:
-    if not readings:
-        return None
-    return type(readings[0])(stamp, _mean([_values(reading) for reading in readings]))
-
-
-def _inertial(stamp: int, readings: list[InertialReading]) -> InertialReading | None:
+def _inertial(stamp: int, readings: list[InertialReading]) -> InertialReading:
     """Return mean specific force and rate, the newest attitude, and the first variances stated."""
-    if not readings:
-        return None
     orientations = [r.orientation for r in readings if r.orientation is not None]
     stated = [next(filter(None, c), 0.0) for c in zip(*(r.variance for r in readings), strict=True)]
     return InertialReading(

@@ -11,12 +11,27 @@ at a stamp do not depend on how often they are asked for, and what came between 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from wheel_terra_estimator.estimation.scalars import SECOND
 
 LEAST_STEP_RATE = 20.0  # [Hz] at which a rover's speed and slip are followed
 LONGEST_STEP = 120_000_000
 """Without wheel odometry to end it, a step ends after this time [ns]."""
+
+
+@dataclass(frozen=True)
+class TimeSettings:
+    """Durations [ns] and rates of the timeline: the parameters of the same names."""
+
+    output_rate: float  # [Hz], 0 = a set at every stamp of the wheel odometry
+    max_lag: int  # below 0 = as learned
+    clock_step: int
+    history: int
+    silence: int
+    heartbeat: int  # period
+    reference_period: int  # 0 = every reference velocity is used
+    rerun_rate: float  # repeated steps per second of stamps [Hz], 0 = any number
 
 
 class StepGrid:

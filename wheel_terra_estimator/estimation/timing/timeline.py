@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
@@ -20,6 +19,7 @@ from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.scalars import SECOND
 from wheel_terra_estimator.estimation.timing.input_checks import WHEEL_ODOMETRY
 from wheel_terra_estimator.estimation.timing.input_log import InputLog
+from wheel_terra_estimator.estimation.timing.step_grid import TimeSettings
 
 GREATEST_LENGTH = 100_000
 """Inputs that the log holds at most, so that no publisher can fill the memory."""
@@ -34,18 +34,6 @@ class Fate(Enum):
     DEFERRED = 'deferred'  # late, waits until the rate of repeated steps allows it
     TOO_OLD = 'too old'
     FULL = 'no room'
-
-
-@dataclass(frozen=True)
-class TimeSettings:
-    """Durations of the timeline [ns] and rates: the parameters of the same names."""
-
-    output_rate: float  # [Hz], 0 = a set at every stamp of the wheel odometry
-    history: int
-    silence: int
-    heartbeat: int  # period
-    reference_period: int  # 0 = every reference velocity is used
-    rerun_rate: float = 0.0  # repeated steps per second of stamps [Hz], 0 = any number
 
 
 class Due(NamedTuple):
@@ -147,7 +135,7 @@ class Timeline:
         state = self._state
         if state is None:
             return False
-        return stamp < state - self.settings.history or not self._log.reaches(stamp)
+        return stamp < state - self.settings.history or stamp <= self._log.forgotten
 
     @property
     def slow_odometry(self) -> float:
@@ -168,10 +156,8 @@ class Timeline:
         if new and index < self.released:
             self.released += 1
         fate = Fate.LATE if state is not None and stamp < state else Fate.IN_ORDER
-        if channel == WHEEL_ODOMETRY and index < self.released:
-            self._note_odometry(stamp)
-            if self._set_is_due(stamp):
-                return fate, self._due(index)
+        if channel == WHEEL_ODOMETRY and index < self.released and self._ends_period(stamp):
+            return fate, self._due(index)
         return fate, None
 
     def _insert_deferred(self, limit: float) -> Iterator[Due]:
@@ -205,18 +191,19 @@ class Timeline:
             self.released = index + 1
             self._state = entry.stamp
             if self._odometry is None:
-                self._note_odometry(entry.stamp)  # silence counts from the start of the run
-            if entry.parts[WHEEL_ODOMETRY] is not None:
-                self._note_odometry(entry.stamp)
-                if self._set_is_due(entry.stamp):
-                    yield self._due(index)
-            elif self._heartbeat_is_due(entry.stamp):
+                self._odometry = entry.stamp  # silence counts from the start of the run
+            rolled = entry.parts[WHEEL_ODOMETRY] is not None
+            if (self._ends_period if rolled else self._heartbeat_is_due)(entry.stamp):
                 yield self._due(index)
         if self._state is not None:
             self.released -= log.forget(self._state - self.settings.history)
 
-    def _set_is_due(self, stamp: int) -> bool:
-        """Return whether wheel odometry of this stamp is the first in a period of the sets."""
+    def _ends_period(self, stamp: int) -> bool:
+        """Take note of wheel odometry; return whether it is the first in a period of the sets."""
+        assert self._odometry is not None
+        if stamp > self._odometry:
+            self._intervals = self._intervals[1], stamp - self._odometry
+            self._odometry, self._heartbeats = stamp, 0
         last = self._last_set
         if last is None:
             return True
@@ -227,13 +214,6 @@ class Timeline:
         first = self._log.first
         assert first is not None
         return self._log.grid.set_index(stamp - first) > self._log.grid.set_index(last - first)
-
-    def _note_odometry(self, stamp: int) -> None:
-        if self._odometry is None or stamp > self._odometry:
-            if self._odometry is not None:
-                self._intervals = self._intervals[1], stamp - self._odometry
-            self._odometry = stamp
-            self._heartbeats = 0
 
     def _heartbeat_is_due(self, stamp: int) -> bool:
         """Return whether, in a silence of wheel odometry, a set is due at this stamp."""
