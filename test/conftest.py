@@ -316,7 +316,7 @@ def filter_failures() -> Iterator[list[str]]:
 @pytest.fixture(scope='session')
 def check_failures() -> Iterator[list[str]]:
     """Errors of checks anywhere in this process: a recording is judged by the others."""
-    from wheel_terra_estimator.checks import input_judge, run
+    from wheel_terra_estimator.checks import online, run
 
     found: list[str] = []
 
@@ -328,7 +328,7 @@ def check_failures() -> Iterator[list[str]]:
         return SimpleNamespace(debug=debug)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (run, input_judge):
+        for module in (online, run):
             patch.setattr(module, '_LOGGER', watched(module._LOGGER))
         yield found
 

@@ -39,7 +39,7 @@ def test_a_wheel_without_rates_keeps_its_sign():
 def test_rates_of_0_at_rest_are_a_standstill_also_of_rates_without_a_sign(unsigned):
     moves = np.abs(WHOLE.joints.rate).max(axis=1, keepdims=True) > 0.05  # [rad/s]
     joints = replace(WHOLE.joints, rate=unsigned(WHOLE.joints.rate) * moves)
-    imu = replace(WHOLE.imu, rate=WHOLE.imu.rate + [0.0, 0.0, 0.02])
+    imu = replace(WHOLE.imu, rate=WHOLE.imu.rate + np.array([0.0, 0.0, 0.02]))
     told = {f.fault: f.value for f in found(joints=joints, imu=imu)}
     assert told == {'rates_unsigned': None, 'gyro_bias': pytest.approx(0.02, abs=0.001)}
 

@@ -210,7 +210,7 @@ def test_a_warning_that_was_confirmed_once_stays_and_wrong_torques_confirm_none(
     def out(fault, confirmations):
         words = {'kind': 'gain', 'topic': 'joint_states', 'words': 'wrong', 'cure': 'mend it'}
         finding = Finding(**words, confidence=0.97, fault=fault)
-        monkeypatch.setattr(OnlineChecks, 'findings', (finding,))
+        monkeypatch.setattr(judge, 'standing', lambda driving: (finding,) * (driving == 'slip'))
         return [
             judge.judged(some_estimates(6, stuck=True, stuck_confirmed=confirmed), {}).stuck
             for confirmed in confirmations
@@ -255,9 +255,9 @@ class Wheels:
 
 def test_sinkage_counted_upwards_is_told_and_a_small_one_is_not():
     wheels = Wheels()
-    assert not wheels.checks_after(12, depth=0.02).findings
-    assert not wheels.checks_after(12, depth=-0.002).findings, 'within the zero error'
-    (finding,) = wheels.checks_after(12, depth=-0.02).findings
+    assert not wheels.checks_after(12, depth=0.02).standing('slip')
+    assert not wheels.checks_after(12, depth=-0.002).standing('slip'), 'within the zero error'
+    (finding,) = wheels.checks_after(12, depth=-0.02).standing('slip')
     assert (finding.kind, finding.topic) == ('sign', 'sinkage')
     assert '-20 mm' in finding.words and 'negate position' in finding.cure
 
@@ -282,9 +282,9 @@ def test_sinkage_in_millimetres_and_a_variance_of_a_million_are_told_with_their_
 
 def test_a_frozen_rate_is_told_and_noisy_ones_are_not():
     wheels = Wheels()
-    assert not wheels.checks_after(10).findings
-    assert not wheels.checks_after(8, frozen=True).findings  # nor is a coarse encoder's
-    (finding,) = wheels.checks_after(18, frozen=True).findings
+    assert not wheels.checks_after(10).standing('slip')
+    assert not wheels.checks_after(8, frozen=True).standing('slip')  # nor is a coarse encoder's
+    (finding,) = wheels.checks_after(18, frozen=True).standing('slip')
     assert (finding.kind, finding.wheel) == ('frozen', wheels.configuration.wheels.names[2])
 
 
@@ -297,7 +297,7 @@ def test_a_dead_imu_whose_means_are_rounded_is_told():
         mean = reading + random.integers(-2, 3, 6) * np.spacing(reading)
         dead = InertialReading(stamp, mean[:3], mean[3:], None)
         checks.step(stamp, replace(inputs, inertial=dead))
-    assert 'sensor_frozen' in {finding.fault for finding in checks.remarks}
+    assert 'sensor_frozen' in {finding.fault for finding in checks.standing('beside')}
 
 
 def raised(wheels, begin, end=np.inf, seconds=20, flip_from=None):
@@ -378,16 +378,16 @@ def test_a_kept_state_gives_the_same_verdict():
     fault = on_imu(1.0 / 9.80665)
     drive = drive_of(SIX)
     checks = checks_over(drive, fault, 3.0)
-    assert not checks.findings
+    assert not checks.standing('slip')
     kept = checks.snapshot()
     first = next(a.measurement for a in drive.arrivals)
     stamp = first.stamp + 5_000_000_000
     reading = InertialReading(stamp, np.array([0.0, 0.0, 1.0]), np.zeros(3), None)
     for _ in range(2):
         checks.step(stamp, StepInputs(inertial=reading))
-        assert checks.findings, 'the second judgement'
+        assert checks.standing('slip'), 'the second judgement'
         checks.restore(kept)
-        assert not checks.findings
+        assert not checks.standing('slip')
     assert checks.window().imu.stamp.size == checks_over(drive, fault, 3.0).window().imu.stamp.size
 
 

@@ -60,11 +60,11 @@ def after(**what):
 @pytest.mark.parametrize('late', [pytest.param(0.6, marks=pytest.mark.slow), 1.6])
 def test_late_stamps_are_told_with_the_delay(late):
     checks = after(late=late)
-    (remark,) = checks.remarks
+    (remark,) = checks.standing('beside')
     assert (remark.kind, remark.topic) == ('delay', 'reference_odom')
     assert remark.value == pytest.approx(late, abs=0.15)
     assert remark.cure.startswith(f'sensors.reference_stamp_offset: {remark.value:.3f}')
-    assert not checks.findings and not checks.undecided
+    assert not checks.standing('slip') and not checks.undecided
 
 
 @pytest.mark.parametrize(
@@ -78,11 +78,11 @@ def test_late_stamps_are_told_with_the_delay(late):
 )
 def test_honest_stamps_are_not(what):
     """Nor what may lie between a few slow references: wheels that follow these do so late."""
-    assert not after(**{'late': 0.0, **what}).remarks
+    assert not after(**{'late': 0.0, **what}).standing('beside')
 
 
 def test_without_starts_and_stops_nothing_is_told():
-    assert not after(late=1.0, changes=False).remarks
+    assert not after(late=1.0, changes=False).standing('beside')
 
 
 def test_slip_is_judged_beside_it():
@@ -105,7 +105,7 @@ def test_a_kept_state_gives_the_same_verdict():
                 checks.step(later, StepInputs(reference=wrong.reference))
             checks.restore(kept)
         checks.step(stamp, inputs)
-    assert plain.remarks and checks.remarks == plain.remarks
+    assert plain.standing('beside') and checks.standing('beside') == plain.standing('beside')
 
 
 def test_a_pause_begins_anew():

@@ -38,7 +38,7 @@ def told(recording, since=0.0, until=70.0):
         if stamp > rolling.START + until * 1e9:
             break
         checks.step(stamp, StepInputs(**what))
-        for finding in (*checks.findings, *checks.remarks):
+        for finding in (*checks.standing('slip'), *checks.standing('beside')):
             seconds = (stamp - rolling.START) * 1e-9 - since
             first.setdefault(finding.fault, (seconds, finding))
     return first

@@ -8,7 +8,6 @@ a torque at its limit that no finding contradicts, has confirmed.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -17,9 +16,7 @@ from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, Finding
 from wheel_terra_estimator.checks.online import OnlineChecks
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.measurements import StepInputs
 
-_LOGGER = logging.getLogger(__name__)
 SUBJECT = 'check of '  # begins the subject of a finding among the faults of a set
 _NOT_CHECKED = {SUBJECT + 'the inputs': f'not checked: {INTERNAL_ERROR}'}
 LONGEST_WAIT = 4_000_000_000  # of a stuck warning for the checks of its inputs [ns of stamps]
@@ -35,26 +32,15 @@ _NOISE = 'noise_beyond_stated'
 """Key of the filter's message on sensors much noisier than a file or a message states."""
 
 
-class InputJudge:
-    """The checks while driving as what runs beside an estimator, kept states included."""
+class InputJudge(OnlineChecks):
+    """The checks while driving, and what their findings change in the estimates."""
 
     def __init__(self, configuration: Configuration) -> None:
+        super().__init__(configuration)
         self._names = tuple(configuration.wheels.names)
-        self._checks = OnlineChecks(configuration)
-        self._failed = False  # the checks of this run
         self._stuck_since: int | None = None  # [ns] of the warning; None = there is none
         self._confirmed = False  # the warning, since it began
         self._waits_for = ''  # why a warning is not out; empty: it is, or there is none
-
-    def step(self, stamp: int, inputs: StepInputs) -> None:
-        """Look at the inputs of a step; stamps [ns] increase."""
-        if not self._failed:
-            try:
-                self._checks.step(stamp, inputs)
-            except Exception:  # an observer: the estimator works without it
-                _LOGGER.debug('checks while driving', exc_info=True)
-                self._checks.reset()
-                self._failed = True
 
     def judged(self, estimates: EstimateSet, health: Mapping[str, Any]) -> EstimateSet:
         """Return the estimates of the last step; slip is not judged while a finding stands.
@@ -62,10 +48,9 @@ class InputJudge:
         ``health``: counters and texts of the estimator.
         """
         misfits = _misfits(health, dug_in=estimates.stuck and estimates.stuck_confirmed)
-        faults = _reported({**estimates.faults, **misfits}, self._checks.remarks)
-        if self._failed:
-            faults |= _NOT_CHECKED
-        silenced = self._silenced(self._checks.findings)
+        failed = _NOT_CHECKED if self._failed else {}
+        findings = self.standing('slip')
+        silenced = self._silenced(findings)
         classes, reasons = estimates.slip_class.copy(), list(estimates.reasons)
         for i, why in silenced.items():
             classes[i], reasons[i] = SlipClass.UNKNOWN, why
@@ -73,9 +58,13 @@ class InputJudge:
             estimates,
             slip_class=classes,
             reasons=tuple(reasons),
-            faults=_reported(faults, self._checks.findings),
+            faults=_reported(
+                estimates.faults | misfits | failed, (*self.standing('beside'), *findings)
+            ),
         )
-        self._follow(estimates, reasons[0] if len(silenced) == len(self._names) else '')
+        doubted = any(finding.fault.startswith('torque') for finding in findings)
+        unknown = reasons[0] if len(silenced) == len(self._names) else ''
+        self._follow(estimates, unknown, doubted)
         if not self._waits_for:
             return estimates
         reasons = [self._waits_for] * len(reasons)
@@ -92,10 +81,10 @@ class InputJudge:
             return silenced
         return dict.fromkeys(range(len(names)), f'not judged: {findings[0].words}')
 
-    def _follow(self, estimates: EstimateSet, silenced: str) -> None:
+    def _follow(self, estimates: EstimateSet, silenced: str, doubted: bool) -> None:
         """Follow the stuck warning: what it waits for, if anything.
 
-        `silenced`: reason why no wheel has a class, if so.
+        `silenced`: reason why no wheel has a class, if so; `doubted`: torques may be wrong.
         """
         if not estimates.stuck:
             self._stuck_since, self._confirmed, self._waits_for = None, False, ''
@@ -104,34 +93,13 @@ class InputJudge:
         begun = estimates.stamp if self._stuck_since is None else self._stuck_since
         held_up = (rises or bool(self._waits_for)) and estimates.stamp - begun < LONGEST_WAIT
         self._stuck_since, self._waits_for = begun, ''
-        doubted = any(f.fault.startswith('torque') for f in self._checks.findings)
         self._confirmed |= estimates.stuck_confirmed and not doubted
         if self._confirmed:
             return
         if silenced:
             self._waits_for = silenced
-        elif held_up and not self._failed and self._checks.undecided:
-            self._waits_for = f'stuck warning waits: {self._checks.undecided}'
-
-    def snapshot(self) -> Any:
-        """Return the state of the checks."""
-        return self._checks.snapshot(), self._failed
-
-    def restore(self, snapshot: Any) -> None:
-        """Return to a kept state."""
-        checks, self._failed = snapshot
-        self._checks.restore(checks)
-
-    def begin_run(self, stamp: int, keep_soil: bool) -> None:
-        """Start again."""
-        self._checks.reset()
-        self._failed = False
-
-    def retune(self, configuration: Configuration) -> None:
-        """Continue with other tuning."""
-        state = self._checks.snapshot()
-        self._checks = OnlineChecks(configuration)
-        self._checks.restore(state)
+        elif held_up and not self._failed and self.undecided:
+            self._waits_for = f'stuck warning waits: {self.undecided}'
 
 
 def _misfits(health: Mapping[str, Any], *, dug_in: bool) -> dict[str, str]:

@@ -8,6 +8,7 @@ fault decides: one that was not seen before takes as long to be believed as the 
 
 from __future__ import annotations
 
+import logging
 import math
 import warnings
 from dataclasses import dataclass, field, replace
@@ -34,6 +35,7 @@ from wheel_terra_estimator.checks.series import (
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import StepInputs
 
+_LOGGER = logging.getLogger(__name__)
 BIN = 100_000_000  # means are over this [ns of stamps]
 KEPT = 300  # bins that are kept: 30 s
 OFTEN, SELDOM = 20, 60  # bins between judgements: 2 s in the first half minute of motion, 6 s later
@@ -42,28 +44,12 @@ NEEDED = 2  # judgements that agree before a fault is told
 MEMORY = 6  # judgements without a fault that are remembered when one is seen
 CAP = 4  # agreeing judgements beyond this many count no more
 LEAST_SURE = 0.5  # confidence from which a finding counts
-_OTHERS = 8  # numbers of IMU and reference in a `Row`
 DIGITS = 12  # decimals of means: those of one number, summed up elsewhere, differ behind them
 
 
-class Row(NamedTuple):
-    """Means over a bin that ends at ``stamp`` [ns]; nan where nothing came."""
-
-    stamp: int
-    rate: Floats  # (n,) [rad/s]
-    torque: Floats  # (n,) [N m]
-    sinkage: Floats  # (n,) [m]
-    inertial: Floats  # (6,) specific force [m/s^2], angular rate [rad/s]
-    reference: Floats  # velocity [m/s], its variance
-
-
-def _mean(samples: tuple[list[float], ...]) -> Floats:
-    """Return the means of (k, count) numbers without nan; the same where all are one number."""
-    table = np.array(samples)
-    known = np.isfinite(table)
-    number = np.where(known.any(axis=0), known.sum(axis=0), math.nan)
-    mean: list[float] = (np.where(known, table, 0.0).sum(axis=0) / number).round(DIGITS).tolist()
-    return tuple(mean)
+_OTHERS = 8
+"""Numbers of a step beside rate [rad/s], torque [N m] and sinkage [m] of each wheel: specific force
+[m/s^2], angular rate [rad/s], reference velocity [m/s], its variance; nan where nothing came."""
 
 
 class Tally(NamedTuple):
@@ -106,22 +92,21 @@ class OnlineChecks:
     """Judge of a stream of steps; deterministic, driven by stamps alone."""
 
     def __init__(self, configuration: Configuration) -> None:
+        self.retune(configuration)
+        self.reset()
+
+    def retune(self, configuration: Configuration) -> None:
+        """Continue with other tuning."""
         self._configuration = configuration
         self._facts = rover_facts.from_configuration(configuration)
         self._radius: list[float] = self._facts.radius.tolist()
-        self.reset()
 
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """What stands now and makes slip meaningless; empty: nothing."""
-        return self._standing('slip')
+    def standing(self, driving: str) -> tuple[Finding, ...]:
+        """Return the findings that stand now.
 
-    @property
-    def remarks(self) -> tuple[Finding, ...]:
-        """What stands now beside which slip is judged all the same."""
-        return self._standing('beside')
-
-    def _standing(self, driving: str) -> tuple[Finding, ...]:
+        ``driving``: as in `faults.yaml`, 'slip': those that make slip meaningless; 'beside': those
+        beside which slip is judged all the same.
+        """
         tallies = self._verdicts.tallies
         standing = [n for n, t in tallies.items() if t.stands and FAULTS[n].driving == driving]
         return tuple(tallies[name].finding for name in sorted(standing, key=RANK.__getitem__))
@@ -139,48 +124,62 @@ class OnlineChecks:
     def reset(self) -> None:
         """Forget everything."""
         self._begin: int | None = None  # of the bin [ns]
-        self._rows: tuple[Row, ...] = ()
+        # End of each bin [ns], and the means over it of the numbers of a step
+        self._rows: tuple[tuple[int, Floats], ...] = ()
         self._verdicts = _Verdicts()
-        self._samples: tuple[list[float], ...] = ()  # of the bin: numbers of a `Row`, by step
+        self._samples: tuple[list[float], ...] = ()  # of the bin, by step
+        self._failed = False  # by an error of the program, until the next run
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return the state in a form that later steps leave alone."""
-        return self._begin, self._rows, self._verdicts, self._samples
+        return self._begin, self._rows, self._verdicts, self._samples, self._failed
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Return to a kept state."""
-        self._begin, self._rows, self._verdicts, self._samples = snapshot
+        self._begin, self._rows, self._verdicts, self._samples, self._failed = snapshot
+
+    def begin_run(self, stamp: int, keep_soil: bool) -> None:
+        """Start again."""
+        self.reset()
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Take all inputs of a stamp [ns], later than the one before."""
-        if self._begin is None or stamp - self._begin > KEPT * BIN:  # the first one, or a pause
-            self._begin, self._rows, self._samples = stamp, (), ()
-        if stamp - self._begin >= BIN:
-            self._close(stamp)
-        n = len(self._radius)
-        sample = [math.nan] * (3 * n + _OTHERS)
-        if (rolled := inputs.wheel_odometry) is not None:
-            sample[: 2 * n] = rolled.rate.tolist() + rolled.torque.tolist()
-        if inputs.sinkage is not None:
-            sample[2 * n : 3 * n] = inputs.sinkage.sinkage.tolist()
-        if (felt := inputs.inertial) is not None:
-            sample[3 * n : -2] = felt.specific_force.tolist() + felt.angular_rate.tolist()
-        if inputs.reference is not None:
-            sample[-2:] = inputs.reference.forward, inputs.reference.variance
-        self._samples += (sample,)
+        if self._failed:
+            return
+        try:
+            if self._begin is None or stamp - self._begin > KEPT * BIN:  # the first one, or a pause
+                self._begin, self._rows, self._samples = stamp, (), ()
+            if stamp - self._begin >= BIN:
+                self._close(stamp)
+            n = len(self._radius)
+            sample = [math.nan] * (3 * n + _OTHERS)
+            if (rolled := inputs.wheel_odometry) is not None:
+                sample[: 2 * n] = rolled.rate.tolist() + rolled.torque.tolist()
+            if inputs.sinkage is not None:
+                sample[2 * n : 3 * n] = inputs.sinkage.sinkage.tolist()
+            if (imu := inputs.inertial) is not None:
+                sample[3 * n : -2] = imu.specific_force.tolist() + imu.angular_rate.tolist()
+            if inputs.reference is not None:
+                sample[-2:] = inputs.reference.forward, inputs.reference.variance
+            self._samples += (sample,)
+        except Exception:  # an observer: the estimator works without it
+            _LOGGER.debug('checks while driving', exc_info=True)
+            self.reset()
+            self._failed = True
 
     def _close(self, stamp: int) -> None:
         """Close the bin before a stamp, and judge if it is time to."""
         assert self._begin is not None
         bins = (stamp - self._begin) // BIN
         self._begin += bins * BIN
-        mean, n = _mean(self._samples), len(self._radius)
-        wheels = mean[:n], mean[n : 2 * n], mean[2 * n : 3 * n]
-        row = Row(self._begin - (bins - 1) * BIN, *wheels, mean[3 * n : -2], mean[-2:])
-        self._samples = ()
-        old = next((i for i, r in enumerate(self._rows) if row.stamp - r.stamp < KEPT * BIN), 0)
-        self._rows = (*self._rows[old:], row)
-        rims = [abs(w * r) for w, r in zip(row.rate, self._radius, strict=True)]
+        table = np.array(self._samples)
+        known = np.isfinite(table)
+        number = np.where(known.any(axis=0), known.sum(axis=0), math.nan)
+        means = (np.where(known, table, 0.0).sum(axis=0) / number).round(DIGITS).tolist()
+        end, self._samples = self._begin - (bins - 1) * BIN, ()
+        old = next((i for i, (at, _) in enumerate(self._rows) if end - at < KEPT * BIN), 0)
+        self._rows = (*self._rows[old:], (end, tuple(means)))
+        rims = [abs(w * r) for w, r in zip(means, self._radius, strict=False)]
         moves = max((rim for rim in rims if rim == rim), default=0.0) > LEAST_RIM_SPEED
         verdicts = self._verdicts = replace(
             self._verdicts,
@@ -226,10 +225,9 @@ class OnlineChecks:
     def window(self) -> Recording:
         """Return what is kept as a recording: as the sensors read, on the right stamps."""
         facts, errors = self._facts, self._facts.errors
-        stamp = np.array([row.stamp for row in self._rows], dtype=np.int64)
-        rate, torques, depth, inertial, velocity = (
-            np.array([row[i] for row in self._rows]) for i in range(1, 6)
-        )
+        stamp = np.array([end for end, _ in self._rows], dtype=np.int64)
+        n, means = len(self._radius), np.array([means for _, means in self._rows])
+        rate, torques, depth, inertial, velocity = np.split(means, [n, 2 * n, 3 * n, -2], axis=1)
 
         def there(values: FloatArray) -> Any:
             return np.isfinite(values).any(axis=1)

@@ -83,7 +83,8 @@ def merge_step(
         else:
             mean = _mean([_values(reading) for reading in readings])
             merged.append(type(readings[0])(stamp, mean))
-    return StepInputs(*merged, references[-1] if references else None), measured
+    merged.append(references[-1] if references else None)
+    return StepInputs(*merged), measured
 
 
 def _odometry(
