@@ -63,13 +63,13 @@ def page() -> str:
     for section, title in _SECTIONS.items():
         lines += [f'## {title}', '']
         of_section = [p for p in table if p.key.rpartition('.')[0] == section]
-        lines += [_row([*alike]) for _, alike in itertools.groupby(of_section, key=_said)]
+        lines += [_row([*alike]) for _, alike in itertools.groupby(of_section, key=_row_key)]
         lines.append('')
     return '\n'.join(lines) + f'\n{_EFFECTS}'
 
 
-def _said(parameter: Parameter) -> tuple[object, ...]:
-    """Return what one row says for all parameters that have it in common."""
+def _row_key(parameter: Parameter) -> tuple[object, ...]:
+    """Return the content that parameters of one row have in common."""
     return parameter.meaning, parameter.allowed, str(parameter.default), parameter.required
 
 

@@ -469,7 +469,7 @@ def test_no_yaw_seems_better_known_than_it_scatters(monkeypatch):
         real, imaginary = scipy.ndimage.gaussian_filter1d(random.standard_normal((2, 2, 3000)), 8.0)
         motion, hills = real + 1j * imaginary
         monkeypatch.setattr(evidence, '_motions', lambda *_, m=motion, h=hills: (m, m + 3.0 * h))
-        told.append(evidence.felt_yaw(None))
+        told.append(evidence.mounting_yaw(None))
     value, std = np.array([yaw for yaw in told if yaw is not None]).T
     assert value.size > 90 and std.min() > 0.7 * value.std()
     assert np.median(std) < 1.3 * value.std()

@@ -238,11 +238,11 @@ def test_a_law_says_effects_only_where_all_of_its_terms_are_some():
         targets, features = zip(*(term.split('_by_') for term in terms), strict=True)
         return SimpleNamespace(targets=targets, features=features)
 
-    assert find.effects_said(law('torque_by_one', 'drawbar_pull_by_one')) == {
+    assert find.equivalent_effects(law('torque_by_one', 'drawbar_pull_by_one')) == {
         'drivetrain_friction',
         'pull_zero',
     }
-    assert find.effects_said(law('torque_by_one', 'exponent_by_slope')) == frozenset()
+    assert find.equivalent_effects(law('torque_by_one', 'exponent_by_slope')) == frozenset()
 
 
 def test_a_change_is_said_in_the_units_of_the_rows():

@@ -118,12 +118,14 @@ def test_estimates_that_come_back_to_a_stuck_rover_are_logged():
     node = SimpleNamespace(
         _publisher=Mock(),
         _pipeline=SimpleNamespace(diagnostics=SimpleNamespace(new_faults=['imu: lost'])),
-        _said=(-1, False),
+        _logged_level=(-1, False),
         get_logger=lambda: log,
     )
 
     def say(level, words):
-        EstimatorNode._say(node, 0, [SimpleNamespace(level=level, message=words)], 0.0)
+        EstimatorNode._publish_diagnostics(
+            node, 0, [SimpleNamespace(level=level, message=words)], 0.0
+        )
 
     say(ERROR, 'stuck: wheels dig in')  # was logged when the warning rose
     log.error.assert_not_called()

@@ -50,14 +50,14 @@ def test_the_soil_is_saved_though_messages_keep_the_timers_waiting(estimator, mo
 def test_who_cannot_keep_up_takes_what_came_last(estimator, speed, first, left_out):
     """Three batches of 2 s: all of the first, of the others the last half second, or all."""
     node, _ = estimator
-    usual, clock = node._hear, [node._started]
+    usual, clock = node._process, [node._started]
     node._seconds = lambda: clock[0]
 
     def hear(*message):
         clock[0] += 0.05 / speed
         usual(*message)
 
-    node._hear = hear
+    node._process = hear
     for batch in range(3):
         node._catch_up(
             *[

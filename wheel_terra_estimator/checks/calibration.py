@@ -69,8 +69,8 @@ def calibrate(
     _track(changes, evidence)
     report.not_checked.append(not_checked('mass', 'centre'))
     mended = {change.key for change in changes.made}
-    rivals = ('mass', 'reference_scale' if 'wheels.radius' in mended else '')
-    left = [f for f in report.findings if f.parameter not in mended and f.fault not in rivals]
+    alternatives = ('mass', 'reference_scale' if 'wheels.radius' in mended else '')
+    left = [f for f in report.findings if f.parameter not in mended and f.fault not in alternatives]
     return Calibration(tuple(changes.made), tuple(report.not_checked), tuple(left), report.figures)
 
 
@@ -91,7 +91,7 @@ class _Changes:
 
 
 def _sure(report: CheckReport) -> list[Finding]:
-    """Return the findings whose cure stood its trial and has no rival."""
+    """Return the findings whose cure stood its trial and has no alternative."""
     return [finding for finding in report.findings if finding.confidence > LEAST_SURE]
 
 
@@ -110,7 +110,7 @@ def _directions(changes: _Changes, report: CheckReport, configuration: Configura
 def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
     """Note the mounting; return the evidence in the frame of the file that is written."""
     findings = [f for f in report.findings if f.parameter in imu.MOUNTING]
-    if any(f.confidence <= imu.UNTURNED for f in findings):  # a rival may be it
+    if any(f.confidence <= imu.UNTURNED for f in findings):  # an alternative may be it
         evidence, findings = evidence.turned(evidence.facts.mounting), []
     finding = findings[0] if findings else None
     rotation, std = evidence.rotation, finding.std if finding is not None else None

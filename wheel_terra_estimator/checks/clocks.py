@@ -210,8 +210,8 @@ def _outcome(evidence: Evidence, name: str, lag: Lag) -> Outcome:
     against, sure = lag.by + lag.trial.words('unlike part', ''), 0.97
     if lag.by == BY_LOG:
         on_the_way = -LONGEST_WAY < lag.value < 0.0
-        rival, sure = (', or its messages come late', 0.5) if on_the_way else ('', 0.97)
-        against = f'log time: two clocks{rival}'
+        alternative, sure = (', or its messages come late', 0.5) if on_the_way else ('', 0.97)
+        against = f'log time: two clocks{alternative}'
     details = of_offset(name, lag.value, std, against, evidence.facts)
     return evidence.found(f'{name}_offset', sure, **details)
 

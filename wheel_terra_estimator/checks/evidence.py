@@ -70,7 +70,7 @@ class Evidence:
     rotation: FloatArray  # (3, 3) from the IMU's frame into base_link
     figures: dict[str, Any]  # what the report shows beside findings; the checks write into it
     steering: FloatArray  # (k, n) angles, positive left [rad]; nan of a wheel that has none
-    likelier_radius: float = 1.0  # over those of ``facts``, of a finding that has a rival [-]
+    likelier_radius: float = 1.0  # over those of ``facts``, of a finding with an alternative [-]
 
     def found(self, key: str, confidence: float, **details: Any) -> Finding:
         """Return a finding on the topic of its fault's channel; see `finding.found`."""
@@ -417,10 +417,10 @@ def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None
     return motion, seen
 
 
-def felt_senses(evidence: Evidence) -> list[int]:
-    """Return how starts and curves are measured along x and y: 1 as by wheels and gyro, -1 against.
+def accelerometer_signs(evidence: Evidence) -> list[int]:
+    """Return the signs of accelerations along x and y: 1 as by wheels and gyro, -1 opposite.
 
-    0 is not clear. An IMU that is turned feels both alike; no rotation reverses one of them.
+    0 is not clear. A rotated IMU measures both alike; no rotation reverses one of them.
     """
     both = _motions(evidence, DRIFT)
     if both is None:
@@ -432,7 +432,7 @@ def felt_senses(evidence: Evidence) -> list[int]:
     return [int(np.sign(f.value)) * there for f, there in zip(fits, clear, strict=True)]
 
 
-def felt_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
+def mounting_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
     """Return the angle by which a measured motion is rotated [rad]; None where it is not clear."""
     both = _motions(evidence, drift)
     if both is None:

@@ -133,7 +133,8 @@ def found(
 ) -> Finding:
     """Return a finding in the words of its fault, which name further figures; see `Finding`."""
     fault = FAULTS[key]
-    figures = {'trial': '', 'rival': '', 'separate': '', 'wheels': wheel, 'topic': topic} | figures
+    none = dict.fromkeys(('trial', 'alternative', 'separate'), '')
+    figures = none | {'wheels': wheel, 'topic': topic} | figures
     figures.setdefault('value', value)
     figures.setdefault('std', std)
     return Finding(

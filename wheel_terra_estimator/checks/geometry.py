@@ -42,7 +42,7 @@ RADIUS_SIGMAS, UNCLEAR_SIGMAS = 4.0, 2.0  # from which it is a finding, or left 
 LEAST_UNLIKE = 0.05  # difference of wheels that slip makes none, on one side [-]
 OUTRUN_STD = 0.01  # slip that is left open where a rover outruns its wheels [-]
 PRIOR_OF_RADIUS = 0.85  # probability that it is the radius, not the scale of the reference [-]
-SURE = 0.97  # probability beside its rival from which a fault is named alone [-]
+SURE = 0.97  # probability beside its alternative from which a fault is named alone [-]
 TRACK_STD = 0.02  # deviation that slip leaves in a scale of speed by turns, at least [-]
 RESISTANCE = Estimate(0.08, 0.05)  # of firm ground over the weight [-]
 UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)  # where no torque shows it [-]
@@ -282,9 +282,9 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words['trial'] = trial.words('error', 'of the speed')
     alone = max(share, 1.0 - share) > SURE
     if not alone:
-        words['rival'] = ': wrong wheel radius, or wrong scale of the reference'
+        words['alternative'] = ': wrong wheel radius, or wrong scale of the reference'
         hides = 'soft ground causes' if soft else 'torque zeros hide'
-        words['rival'] += f', or {hides} slip' if slips else ''
+        words['alternative'] += f', or {hides} slip' if slips else ''
         words['separate'] = '; drive ten metres along a tape: which of the two shows ten?'
     off = radius * ratio.std
     of_rims = {'value': round(float(np.mean(rims)), 5), 'std': round(off, 5), 'radii': listed(rims)}
@@ -416,11 +416,16 @@ def check_track(evidence: Evidence) -> list[Outcome]:
         return []
     sure = confidence(ratio.sigmas_from(1.0))
     words: dict[str, Any] = {'stated': stated, 'trial': trial.words('error', 'of the track')}
-    rival, separate = ', or the gyro has a scale error', '; measure it with a tape'
+    alternative, separate = ', or the gyro has a scale error', '; measure it with a tape'
     if not alone:
-        rival = ', or the radius is wrong, or the wheels slip'
+        alternative = ', or the radius is wrong, or the wheels slip'
         separate += ', or drive straight with a reference'
-    words |= {'rival': rival, 'separate': separate, 'ratio': ratio.value, 'off': ratio.std}
+    words |= {
+        'alternative': alternative,
+        'separate': separate,
+        'ratio': ratio.value,
+        'off': ratio.std,
+    }
     value, std = round(stated * ratio.value, 4), round(stated * ratio.std, 4)
     lateral = listed(evidence.facts.configuration.wheels.y * ratio.value, '.3f')
     sure = 0.9 * sure if alone else 0.5

@@ -22,8 +22,8 @@ from wheel_terra_estimator.checks.evidence import (
     LEAST_YAW,
     YAW_SIGMAS,
     Evidence,
-    felt_senses,
-    felt_yaw,
+    accelerometer_signs,
+    mounting_yaw,
 )
 from wheel_terra_estimator.checks.finding import (
     STANDARD_GRAVITY,
@@ -42,11 +42,11 @@ from wheel_terra_estimator.checks.statistics import (
     confidence,
     correlation,
     in_parts,
-    lonely,
     moving_mean,
     probability,
     robust_std,
     runs,
+    spike_height,
     step_of,
 )
 from wheel_terra_estimator.checks.turning import (
@@ -232,7 +232,7 @@ def _outliers(state: ImuState) -> Judged:
         (imu.force, OUTLIER_FORCE, 'm/s^2'),
         (imu.rate, OUTLIER_RATE, 'rad/s'),
     ):
-        off = lonely(values)
+        off = spike_height(values)
         if (off > limit).sum() < LEAST_OUTLIERS:
             continue
         noise = np.array([robust_std(column) for column in np.diff(values, axis=0).T])
@@ -420,10 +420,10 @@ def _is_mounting(tilt: FloatArray, floor: float, turns: FloatArray, gyro: FloatA
 
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return an IMU whose x axis does not point forward, and the evidence with that mended."""
-    starts, curves = felt_senses(evidence)
+    starts, curves = accelerometer_signs(evidence)
     if starts * curves < 0 and _turns_upright(evidence) > CLEAR_AGREEMENT:
         return [evidence.found('force_axes', 0.95)], replace(evidence, force=None)
-    seen, quick = felt_yaw(evidence), felt_yaw(evidence, 0.5 * DRIFT)
+    seen, quick = mounting_yaw(evidence), mounting_yaw(evidence, 0.5 * DRIFT)
     if seen is None or quick is None:
         return [not_checked('mounting', 'no_starts')], evidence
     # Slopes at the places of starts and stops fall off faster than these: a rover that goes to and
@@ -437,13 +437,13 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     mended = evidence.turned(without_yaw(seen) @ evidence.rotation)
     words: dict[str, Any] = {'angle': -math.degrees(seen.value), 'off': math.degrees(seen.std)}
     sure, aside = 0.97, math.sin(seen.value)
-    curves = felt_senses(mended)[1]  # turned round or exchanged, starts feel the same
+    curves = accelerometer_signs(mended)[1]  # turned round or exchanged, starts feel the same
     exchanged = abs(aside) > ALONG_AXIS and curves < 0
     if exchanged and _turns_upright(evidence) > CLEAR_AGREEMENT:
         return [evidence.found('force_axes', 0.95)], replace(evidence, force=None)
     if (curves == 0 or exchanged) and max(abs(aside), -math.cos(seen.value)) > ALONG_AXIS:
-        rival = ' and y are exchanged' if abs(aside) > ALONG_AXIS else ' has the wrong sign'
-        words['rival'] = f', or linear_acceleration.x{rival}: drive circles'
+        alternative = ' and y are exchanged' if abs(aside) > ALONG_AXIS else ' has the wrong sign'
+        words['alternative'] = f', or linear_acceleration.x{alternative}: drive circles'
         sure = TURNED_ROUND
     return [mounting_finding('imu_yaw', evidence, mended, words['off'], sure, **words)], mended
 
@@ -469,13 +469,13 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         upright = _turns_upright(evidence)
         if upright > CLEAR_AGREEMENT:
             reversed_force = replace(evidence, force=-evidence.force)
-            starts = felt_yaw(reversed_force)
+            starts = mounting_yaw(reversed_force)
             # Measured backward then it lies on its back, and the sides are swapped.
             if starts is None or abs(starts.value) <= 0.5 * math.pi:
                 return [evidence.found('force_reversed', 0.97, **words)], reversed_force
         if upright > -CLEAR_AGREEMENT:
             sure = UNTURNED
-            words['rival'] = ', or linear_acceleration has the wrong sign: drive circles'
+            words['alternative'] = ', or linear_acceleration has the wrong sign: drive circles'
     std = math.degrees(STEEPEST_MEAN) / 3.0
     return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended
 
@@ -512,13 +512,13 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words = {'size': math.degrees(size), 'zero': math.sin(size) * gravity, 'biases': zero}
     sure = confidence(tilt.sigmas) * max(tilt.sure, 1.0 - tilt.sure)
     if tilt.sure < 0.5:
-        words['rival'] = ', or its axes are tilted'
+        words['alternative'] = ', or its axes are tilted'
         worst = int(np.argmax(np.abs(off)))
         evidence.figures['imu.specific_force_bias'] = (biases + off).round(3).tolist()
         words |= {'value': round(float((biases + off)[worst]), 3), 'std': gravity * tilt.std}
         bias = evidence.found('force_bias', sure, **words)
         return [bias], replace(evidence, force=evidence.force - off)
-    words['rival'] = f' (or its accelerometer is off by {words["zero"]:.2g} m/s^2)'
+    words['alternative'] = f' (or its accelerometer is off by {words["zero"]:.2g} m/s^2)'
     mended = evidence.turned(tilt.taken_off(evidence.rotation))
     return [mounting_finding('imu_tilt', evidence, mended, std, sure, **words)], mended
 
@@ -581,7 +581,7 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         details = {'axis': 'xyz'[worst], 'bias': float(bias[worst]), 'biases': listed(whole, '.5f')}
         details |= {'value': float(f'{whole[worst]:.4g}'), 'std': float(std[worst])}
         known = gyro_unit_known(evidence)
-        details['rival'] = '' if known else ', or it is in degrees per second: drive a circle'
+        details['alternative'] = '' if known else ', or it is in degrees per second: drive a circle'
         outcomes.append(evidence.found('gyro_bias', 0.99 if known else 0.5, **details))
     return outcomes
 

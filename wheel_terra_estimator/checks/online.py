@@ -56,7 +56,7 @@ class Tally(NamedTuple):
     """Judgements that spoke for a fault less those against it; what the first one said."""
 
     score: int
-    said_by: str
+    check: str
     finding: Finding
     stands: bool = False
 
@@ -211,7 +211,7 @@ class OnlineChecks:
                 tally = tallies.get(name) or Tally(-min(right, MEMORY), check, finding)
                 tallies[name] = tally.after(finding)
             for name, tally in list(tallies.items()):
-                if tally.said_by == check and name not in found and FAULTS[name].kind not in silent:
+                if tally.check == check and name not in found and FAULTS[name].kind not in silent:
                     tallies[name] = tally.after(None)
                     if tallies[name].score <= 0:
                         del tallies[name]

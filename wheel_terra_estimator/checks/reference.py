@@ -17,9 +17,9 @@ from wheel_terra_estimator.checks.series import VelocitySeries, nearest
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,
     integrated,
-    lonely,
     moving_mean,
     robust_std,
+    spike_height,
 )
 
 LEAST_REFERENCES = 10
@@ -231,7 +231,7 @@ def check_jumps(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if reference is None or reference.stamp.size < LEAST_REFERENCES:
         return [not_checked('jumps', 'few')], evidence
     forward, at = reference.velocity[:, 0], evidence.seconds(reference)
-    off, speed = lonely(forward[:, None])[:, 0], float(np.quantile(np.abs(forward), 0.8))
+    off, speed = spike_height(forward[:, None])[:, 0], float(np.quantile(np.abs(forward), 0.8))
     usual = max(robust_std(np.diff(forward)), 1e-6)
     wild = off > max(JUMP_FACTOR * usual, LEAST_JUMP * speed)
     if not wild.any():

@@ -94,7 +94,7 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
     if off:
         (unit, factor), *others = sorted(off, key=lambda entry: off[entry])
         details = {'level': level, 'noise': noise, 'radius': radius, 'unit': unit}
-        details['rival'] = ''.join(f', or in {other}' for other, _ in others)
+        details['alternative'] = ''.join(f', or in {other}' for other, _ in others)
         finding = evidence.found('sinkage_unit', 0.97 / len(off), value=factor, **details)
         return [finding], table * factor
     return [], table

@@ -150,8 +150,8 @@ def bend_noise(values: FloatArray) -> float:
     return robust_std(np.diff(values, 2, axis=0).ravel()) / math.sqrt(6.0)
 
 
-def lonely(values: FloatArray) -> FloatArray:
-    """Return by how much values (k, n) leave both the one before and after to the same side."""
+def spike_height(values: FloatArray) -> FloatArray:
+    """Return how far values (k, n) lie above, or below, both their neighbours; 0 for others."""
     steps = np.diff(np.pad(values, ((1, 1), (0, 0)), constant_values=np.nan), axis=0)
     off = np.minimum(np.abs(steps[:-1]), np.abs(steps[1:]))
     return np.nan_to_num(off * (steps[:-1] * steps[1:] < 0.0))
@@ -226,7 +226,7 @@ class Trial(NamedTuple):
 
     before: float
     after: float
-    rival: float = math.inf
+    competing: float = math.inf
 
     @property
     def falls(self) -> bool:
@@ -236,7 +236,7 @@ class Trial(NamedTuple):
     @property
     def passes(self) -> bool:
         """Whether the remedy helps and no competing one does as well."""
-        return self.falls and self.after < LEAST_MARGIN * self.rival
+        return self.falls and self.after < LEAST_MARGIN * self.competing
 
     def words(self, what: str, unit: str) -> str:
         """Return what the trial showed, to be put behind a finding."""
@@ -266,4 +266,4 @@ def tried(fit: Callable[[slice], float], nothing: float, energy: FloatArray) -> 
 
 def worst(trials: Sequence[Trial]) -> Trial:
     """Return the trial, of those on the halves, in which the remedy helped least."""
-    return max(trials, key=lambda t: t.after / max(min(t.before, t.rival), 1e-12))
+    return max(trials, key=lambda t: t.after / max(min(t.before, t.competing), 1e-12))

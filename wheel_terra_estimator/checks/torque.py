@@ -16,7 +16,7 @@ from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
     SETTLING,
     Evidence,
-    felt_yaw,
+    mounting_yaw,
     once,
 )
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome, listed, not_checked
@@ -151,7 +151,7 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     rows, sense = evidence.unturned, np.sign(evidence.common_rate)
     if evidence.force is None or not evidence.enough(rows):
         return None
-    yaw = felt_yaw(evidence)
+    yaw = mounting_yaw(evidence)
     width = evidence.rows_in(SETTLING)
     along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
     if yaw is not None:
@@ -372,7 +372,9 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     whole = whole_zeros(evidence, zeros)
     pitch = like_a_pitch(evidence, zeros)  # a slope that is none is in all of them
     sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong)) * (0.5 if pitch else 1.0)
-    details: dict[str, Any] = {'rival': ', or the IMU is pitched: drive a level circle' * pitch}
+    details: dict[str, Any] = {
+        'alternative': ', or the IMU is pitched: drive a level circle' * pitch
+    }
     details['left'] = listed((zeros[i].value for i in wrong), '.2f')
     details['zeros'] = listed((zero.value for zero in whole), '.2f')
     details['wheel'] = ', '.join(facts.names[i] for i in wrong)

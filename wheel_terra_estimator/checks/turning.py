@@ -24,8 +24,8 @@ from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
     Evidence,
-    felt_senses,
-    felt_yaw,
+    accelerometer_signs,
+    mounting_yaw,
     once,
     row_medians,
 )
@@ -196,12 +196,12 @@ def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
         and not fixes[i].mirrors(fixes[best])
         and whole[i].track * whole[best].track >= 0.0
     ]
-    rival = min(others, key=lambda i: whole[i].cost, default=None)
+    alternative = min(others, key=lambda i: whole[i].cost, default=None)
     trials = [
         Trial(
             part[0] - NOISE_FLOOR,
             part[best],
-            np.inf if rival is None else part[rival] - NOISE_FLOOR,
+            np.inf if alternative is None else part[alternative] - NOISE_FLOOR,
         )
         for part in parts
     ]
@@ -362,10 +362,11 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         outcomes += swaps
     if blame == 'reference' and evidence.recording.reference is not None:
         alone = bool(turn) or agreement[1] is not None
-        sure, rival = (confidence(3.0), '') if alone else (0.5, ', or all wheels read negative')
+        sure, others = (confidence(3.0), '') if alone else (0.5, ', or all wheels read negative')
         if slides:
-            sure, rival = 0.5 * sure, f'{rival}{SLIDE}'
-        outcomes.append(evidence.found('reference_reversed', sure, value=-1.0, rival=rival))
+            sure, others = 0.5 * sure, f'{others}{SLIDE}'
+        finding = evidence.found('reference_reversed', sure, value=-1.0, alternative=others)
+        outcomes.append(finding)
         velocity = -evidence.recording.reference.velocity
         mended = mended.with_channel('reference', velocity=velocity)
     return outcomes, mended
@@ -432,7 +433,7 @@ def _direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
         fit = float(sense @ forward) / max(float(np.abs(forward).sum()), 1e-12)
         by_reference = fit if abs(fit) > SAME_SENSE else None
     signed = evidence.with_rate(evidence.rate * signs, evidence.torque * signs)
-    yaw = felt_yaw(signed)
+    yaw = mounting_yaw(signed)
     if yaw is not None and abs(math.cos(yaw.value)) > CLEAR_DIRECTION:
         by_force = math.cos(yaw.value)
     if by_force is None and evidence.facts.known and np.nansum(signed.torque * signed.rate) > 0.0:
@@ -479,7 +480,7 @@ def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sides = evidence.found(
         'swapped_sides',
         0.97 if sense else 0.5,
-        rival='' if sense else ', or the gyro is positive to the right',
+        alternative='' if sense else ', or the gyro is positive to the right',
         names=', '.join(facts.names[i] for i in order),
     )
     if sense:
@@ -493,7 +494,7 @@ def _sense_of_gyro(evidence: Evidence) -> tuple[str, int]:
     """Return what beside the wheels tells the sense of the gyro; 1 as it has it, -1 not, 0 ''."""
     imu = evidence.recording.imu
     assert imu is not None
-    starts, curves = felt_senses(evidence)
+    starts, curves = accelerometer_signs(evidence)
     curves = max(curves, 0) if starts < 1 else curves  # else the IMU may be turned round
     if curves:
         return 'curves', curves

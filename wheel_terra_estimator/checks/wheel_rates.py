@@ -31,10 +31,10 @@ from wheel_terra_estimator.checks.reference import (
 from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import (
     correlation,
-    lonely,
     moving_mean,
     robust_std,
     runs,
+    spike_height,
     step_of,
 )
 
@@ -238,7 +238,7 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return single rates and torques that leave the ones before and after; left out from here."""
     outcomes, mended = list[Outcome](), []
     for name, table in (('velocity', evidence.rate), ('effort', evidence.torque)):
-        off, usual = lonely(table), np.nanquantile(np.abs(table), 0.98, axis=0)
+        off, usual = spike_height(table), np.nanquantile(np.abs(table), 0.98, axis=0)
         noise = np.array([robust_std(column) for column in np.diff(table, axis=0).T])
         wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
         # To break away or turn back takes a large torque for an instant.

@@ -22,7 +22,7 @@ from wheel_terra_estimator.discrepancy.assessment.held_out import (
     slip_groups,
 )
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.proposal.find import Gap, effects_said, propose
+from wheel_terra_estimator.discrepancy.proposal.find import Gap, equivalent_effects, propose
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
@@ -176,7 +176,7 @@ class Decider:
             return names, True
         law = self._law(decision)
         ahead = gap.closed(unseen) - (law.closed if law else 0.0)
-        same = law is not None and effects_said(law) == {effect_of(n.key) for n in names}
+        same = law is not None and equivalent_effects(law) == {effect_of(n.key) for n in names}
         if law is not None and ahead < -_CLEARLY and not same:
             return names, False
         ahead_of_all = same or (ahead >= _CLEARLY and len(names) > 1)

@@ -123,7 +123,10 @@ class EstimatorNode(LifecycleNode):
         self._kept: KeptSoil | None = None
         self._active = self._declaring = False
         self._enabled = True
-        self._said = (-1, False)  # level of the node that was logged last, and whether quietly
+        self._logged_level = (
+            -1,
+            False,
+        )  # level of the node that was logged last, and whether quietly
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_service(Trigger, '~/save_soil', self._save_soil)
         self.create_service(SetBool, '~/set_enabled', self._set_enabled)
@@ -168,7 +171,7 @@ class EstimatorNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to publish estimates."""
         self._active = True
-        self._say_stuck()
+        self._publish_stuck()
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -230,7 +233,7 @@ class EstimatorNode(LifecycleNode):
         self._incompatible: dict[str, str] = {}
         self._numbered: set[str] = set()
         self._shared: set[str] = set()  # topics of several publishers
-        self._same_name = self._said_ready = False
+        self._same_name = self._ready_logged = False
         self._pipeline.transport_values = self._transport_values
         self._pipeline.transport_faults = self._transport_faults
         self._pipeline.diagnostics.clock = lambda stamp: time.monotonic_ns()
@@ -246,11 +249,11 @@ class EstimatorNode(LifecycleNode):
             )
         ]
 
-    def _say_ready(self) -> None:
+    def _log_ready(self) -> None:
         """Log what is listened to; not before the first sets, since rclpy's first line is slow."""
-        if self._said_ready or self._pipeline is None:
+        if self._ready_logged or self._pipeline is None:
             return
-        self._said_ready = True
+        self._ready_logged = True
         topics = (self.resolve_topic_name(topic) for topic in self._subscriptions_made)
         self.get_logger().info(
             f'ready: {len(self._pipeline.names)} wheels, listening to {", ".join(topics)}'
@@ -297,7 +300,7 @@ class EstimatorNode(LifecycleNode):
         if came and time.time_ns() - came > BEHIND and self._pipeline is not None:
             self._watch((topic, data, info))
         else:
-            self._hear(topic, data, info)
+            self._process(topic, data, info)
 
     def _catch_up(self, *taken_before: _Message) -> None:
         """Take all that waits in the queues in the order in which it came: no topic runs ahead.
@@ -316,7 +319,7 @@ class EstimatorNode(LifecycleNode):
         begun, first, last = self._seconds(), taken[0][0], taken[-1][0]
         for came, topic, data, info in taken:
             left_out = self._overloaded and topic in FREQUENT and came < last - BEHIND
-            self._hear(topic, data, info, OVERLOADED if left_out else '')
+            self._process(topic, data, info, OVERLOADED if left_out else '')
         span = last - first
         limit = min(span, BEHIND) if self._overloaded else span
         self._overloaded = span > BEHIND and (self._seconds() - begun) * _SECOND > limit
@@ -326,7 +329,7 @@ class EstimatorNode(LifecycleNode):
         """Return when a message came here [ns], or where that is unknown when it was sent."""
         return int(info['received_timestamp'] or info['source_timestamp'])
 
-    def _hear(self, topic: str, data: bytes, info: dict[str, Any], refused: str = '') -> None:
+    def _process(self, topic: str, data: bytes, info: dict[str, Any], refused: str = '') -> None:
         pipeline = self._pipeline
         if pipeline is None:
             return  # was in the queue when the node was cleaned up
@@ -375,7 +378,7 @@ class EstimatorNode(LifecycleNode):
         if self._views is not None:
             self._views.publish(estimates)
         if statuses := self._pipeline.diagnostics.due(estimates):
-            self._say(estimates.stamp, statuses, now)
+            self._publish_diagnostics(estimates.stamp, statuses, now)
 
     def _on_message_lost(self, topic: str, event: Any) -> None:
         if topic in self._numbered:
@@ -428,7 +431,7 @@ class EstimatorNode(LifecycleNode):
         if not self._active:
             response.message += ' once the node is active'
         self.get_logger().info(response.message)
-        self._say_stuck()
+        self._publish_stuck()
         return response
 
     # -- What is kept over a restart ------------------------------------------------------------
@@ -458,11 +461,11 @@ class EstimatorNode(LifecycleNode):
 
     # -- What the operator sees -----------------------------------------------------------------
 
-    def _say_stuck(self) -> None:
+    def _publish_stuck(self) -> None:
         if self._publisher is not None and self._active and self._enabled:
             self._publisher.publish_stuck(self._warned.stuck, self._warned.direction)
 
-    def _say(
+    def _publish_diagnostics(
         self, stamp: int, statuses: list[Status], now: float, *, expected: bool = False
     ) -> None:
         """Publish diagnostics; log a change of the node's level, and each fault when it is new.
@@ -475,9 +478,9 @@ class EstimatorNode(LifecycleNode):
         level, message = statuses[0].level, statuses[0].message
         new_faults = '; '.join(self._pipeline.diagnostics.new_faults)
         log = self.get_logger()
-        if (level, expected) != self._said:
-            after_silence = self._said == (STALE, False)
-            self._said = level, expected
+        if (level, expected) != self._logged_level:
+            after_silence = self._logged_level == (STALE, False)
+            self._logged_level = level, expected
             words = f'{LEVELS[level]}: {message}'
             if level == OK or expected:
                 log.info(words)
@@ -497,7 +500,7 @@ class EstimatorNode(LifecycleNode):
         """
         if self._pipeline is None:
             return  # was due when the node was cleaned up
-        self._say_ready()
+        self._log_ready()
         self._catch_up(*taken)  # what waits to be taken is not silent
         now = self._seconds()
         if self._latest is not None and now - self._saved_at >= SAVE_PERIOD:
@@ -512,17 +515,19 @@ class EstimatorNode(LifecycleNode):
         stopped = self._stopped_in_words()
         # While sets flow they bring their own diagnostics; leave them the first word.
         flowing = not (silent or stopped)
-        level_changes = (silent or bool(stopped)) and self._said[0] != STALE
+        level_changes = (silent or bool(stopped)) and self._logged_level[0] != STALE
         wait = DIAGNOSTICS_PERIOD + (WATCH_PERIOD if flowing else 0.0)
         if now - self._diagnostics_at < wait and not level_changes:
             return
         stamp = self.get_clock().now().nanoseconds
         if not (silent or stopped) and self._latest is not None:
-            self._say(stamp, diagnostics.now(self._latest), now)
+            self._publish_diagnostics(stamp, diagnostics.now(self._latest), now)
             return
         words = stopped or self._silence_in_words(now)
         expected = bool(stopped) or (self._latest is None and now - self._started < DISCOVERY)
-        self._say(stamp, diagnostics.stale(words, self._latest), now, expected=expected)
+        self._publish_diagnostics(
+            stamp, diagnostics.stale(words, self._latest), now, expected=expected
+        )
 
     def _stopped_in_words(self) -> str:
         if not self._active:

@@ -94,7 +94,7 @@ class TractionLimiter(Node):
         for message_kind, topic, callback, profile in topics:
             self.create_subscription(message_kind, f'{NODE}/{topic}', callback, profile)
         self.create_service(Trigger, '~/release', self._release)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._say, clock=self._steady)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=self._steady)
 
     # -- What is received -----------------------------------------------------------------------
 
@@ -158,7 +158,7 @@ class TractionLimiter(Node):
             self._keep()
             why = f': {state.reason}' if state.reason else ''
             self.get_logger().info(f'interlock {state.interlock.value}{why}')
-            self._say()
+            self._publish_diagnostics()
         if (state.clock_offset is None) != (before.clock_offset is None):
             self.get_logger().warning(
                 f'stamps of the estimates and the local clock differ by {state.delay:.1f} s: their '
@@ -179,9 +179,9 @@ class TractionLimiter(Node):
         if before is None or before.state != decision.state:
             if before is None or {before.state, decision.state} != AS_THE_SOIL_GIVES:
                 self.get_logger().info(decision.reason)
-            self._say()
+            self._publish_diagnostics()
 
-    def _say(self) -> None:
+    def _publish_diagnostics(self) -> None:
         """Publish diagnostics."""
         if self._unkept:
             self._keep()

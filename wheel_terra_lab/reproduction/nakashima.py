@@ -268,7 +268,7 @@ def _figures(runs: Runs) -> list[Statement]:
         answer = figure.holds(figure, rows)
         holds = None if answer is None else bool(answer)
         why = 'not run' if holds is None else ''
-        place, told = f'figure {figure.name}', _told(figure, rows)
+        place, told = f'figure {figure.name}', _in_words(figure, rows)
         found.append(Statement(place, figure.statement, '', told or '-', holds, why))
     steepest = reproduced_figures.STEEPEST
     path = reproduced_figures.paths(rows, runs.folder).get(steepest)
@@ -286,7 +286,7 @@ def _figures(runs: Runs) -> list[Statement]:
     return found
 
 
-def _told(figure: reproduced_figures.Figure, rows: Sequence[Row]) -> str:
+def _in_words(figure: reproduced_figures.Figure, rows: Sequence[Row]) -> str:
     """Return what the curves of a figure have on 25 degrees, or slips under the largest pull."""
     if figure.quantity == reproduced_figures.PULL:
         ends = [(c.label, c.points(rows, figure.quantity)) for c in figure.curves]

@@ -201,7 +201,7 @@ def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
     return replace(found, closed=most, soil_held=hold_soil)
 
 
-def effects_said(law: Proposal) -> frozenset[str]:
+def equivalent_effects(law: Proposal) -> frozenset[str]:
     """Return the effects equivalent to a law, term by term; none where a term has no equivalent."""
     terms = [f'{t}_by_{f}' for t, f in zip(law.targets, law.features, strict=True)]
     return frozenset(_SAME[term] for term in terms) if set(terms) <= set(_SAME) else frozenset()
