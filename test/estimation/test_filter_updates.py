@@ -495,7 +495,7 @@ def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ek
         ekf.set(i, float(ekf.mean[i]), 1e-12)
     strong = ekf.mean.copy()
     strong[SHEAR_STRENGTH] = 0.1  # the soil is stronger than the file says
-    for _ in range(200):
+    for _ in range(120):
         loads = tuple((level * (0.3 + 1.4 * rng.random(6))).tolist())
         found, true = (linearised(parts, x, loads) for x in (ekf.mean, strong))
         torque = true.torque + np.array([zero, -zero, 0.0, 0.0, 0.0, 0.0])

@@ -30,8 +30,6 @@ from wheel_terra_estimator.estimation.taught import (
     with_model_errors,
 )
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
-from wheel_terra_estimator.simulation.drive import simulate
-from wheel_terra_estimator.simulation.scenario import load
 
 START = 100 * SECOND
 SOIL = ('friction_angle_deg', 'cohesion', 'shear_modulus', 'frictional_modulus', 'cohesive_modulus')
@@ -50,14 +48,13 @@ def deviation(key):
 
 
 @pytest.fixture(scope='module')
-def drive():
-    scenario = {'configuration': ['generic_six_wheel', 'dry_sand_ding2015'], 'duration': 6.0}
-    return simulate(load(scenario | {'slope.angle_deg': [8.0]}), 3)
+def driven(climb):
+    begun = climb.arrivals[: len(climb.arrivals) // 2]
+    return run(climb.configuration, (a.measurement for a in begun))
 
 
-@pytest.fixture(scope='module')
-def driven(drive):
-    return run(drive.configuration, (a.measurement for a in drive.arrivals))
+def first_odometry(drive):
+    return next(a.measurement for a in drive.arrivals if isinstance(a.measurement, WheelOdometry))
 
 
 def standing(duration, rate, force=(0.0, 0.0, GRAVITY)):
@@ -69,7 +66,7 @@ def standing(duration, rate, force=(0.0, 0.0, GRAVITY)):
             yield WheelOdometry(stamp, np.zeros(4), np.zeros(4))
 
 
-def test_soil_is_that_of_the_topic_and_its_deviations_hold_elsewhere(drive, driven):
+def test_soil_is_that_of_the_topic_and_its_deviations_hold_elsewhere(climb, driven):
     core, sets = driven
     learned = core.learned()
     last = dict(zip(sets[-1].soil_names, sets[-1].soil.tolist(), strict=True))
@@ -82,7 +79,7 @@ def test_soil_is_that_of_the_topic_and_its_deviations_hold_elsewhere(drive, driv
     assert learned[deviation(key)] >= 0.999 * std[key]  # the moduli: no more than stated before
     assert std[key] < 0.95 * start[key]  # something was learned
     phi = np.radians(last[key])
-    configured = drive.configuration.soil  # cohesion and tangent are scaled by one factor
+    configured = climb.configuration.soil  # cohesion and tangent are scaled by one factor
     scale = np.tan(phi) / np.tan(float(configured.friction_angle))
     assert last['soil.cohesion'] == pytest.approx(scale * float(configured.cohesion))
     assert abs(scale - 1.0) > 0.01
@@ -90,26 +87,25 @@ def test_soil_is_that_of_the_topic_and_its_deviations_hold_elsewhere(drive, driv
     assert 0.1 <= of_tangent <= 0.2  # sand from place to place: 12 %
 
 
-def test_where_nothing_was_learned_restarts_do_not_add_up(drive):
-    configuration = drive.configuration
-    first = next(a.measurement for a in drive.arrivals if isinstance(a.measurement, WheelOdometry))
+def test_where_nothing_was_learned_restarts_do_not_add_up(climb):
+    configuration = climb.configuration
     found = []
     for _ in range(3):
-        core, _ = run(configuration, [first])
+        core, _ = run(configuration, [first_odometry(climb)])
         found.append(core.learned())
         configuration = configuration.replace(found[-1])
     for key, value in found[0].items():
         assert found[2][key] == pytest.approx(value, rel=1e-6), key
 
 
-def test_the_second_drive_begins_where_the_first_one_ended(driven, drive, tmp_path):
+def test_the_second_drive_begins_where_the_first_one_ended(driven, climb, tmp_path):
     core, sets = driven
     learned = core.learned()
     path = tmp_path / 'learned.yaml'
     write_values(path, learned)
     assert read_values(path) == learned  # to the last bit
-    again = drive.configuration.replace(read_values(path))
-    _, second = run(again, (a.measurement for a in drive.arrivals[:200]))
+    again = climb.configuration.replace(read_values(path))
+    _, second = run(again, [first_odometry(climb)])
     np.testing.assert_allclose(second[0].soil, sets[-1].soil, rtol=1e-6)
     away = [abs(sets_[0].soil[0] - sets[-1].soil[0]) for sets_ in (second, sets)]
     assert away[0] < 1e-4 < away[1]  # friction angle [deg]

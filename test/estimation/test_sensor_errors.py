@@ -62,7 +62,7 @@ def estimates(configuration, stream):
 
 
 def test_a_drive_with_stated_errors_gives_the_estimates_of_the_clean_one(rover):
-    clean = drive(1, duration=2.5)
+    clean = drive(1, duration=2.0)
     wrong = [misread(measurement) for measurement in clean]
     expected = estimates(rover, clean)
     corrected = estimates(rover.replace(STATED), wrong)
@@ -96,7 +96,7 @@ def test_what_the_checks_are_to_refuse_is_left_to_them(rover):
 
 
 def test_simulated_sensors_have_the_stated_errors():
-    level = {'configuration': ['generic_six_wheel', 'test_sand'], 'duration': 3.0}
+    level = {'configuration': ['generic_six_wheel', 'test_sand'], 'duration': 1.5}
     stated = {
         'torque_gain': [1.2] * 6,
         'torque_zero': [2.0] * 6,

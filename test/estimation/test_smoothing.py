@@ -81,11 +81,6 @@ def test_a_linear_drive_smoothed_is_its_least_squares_solution():
 # -- A simulated drive ----------------------------------------------------------------------------
 
 
-@pytest.fixture(scope='module')
-def drive():
-    return simulate(load('climb_soft_patch'), seed=1025, duration=11.0)
-
-
 def run(drive, measurements):
     smoother = DriveSmoother(drive.configuration)
     core = EstimatorCore(drive.configuration, smoother.estimator)
@@ -98,14 +93,14 @@ def run(drive, measurements):
 
 
 @pytest.fixture(scope='module')
-def pairs(drive):
+def pairs(climb):
     """(smoothed, of the filter) set by set."""
-    return run(drive, [a.measurement for a in drive.arrivals])
+    return run(climb, [a.measurement for a in climb.arrivals])
 
 
-def test_the_tape_changes_nothing_of_the_filter(drive, pairs):
-    core = EstimatorCore(drive.configuration)
-    part = drive.arrivals[: len(drive.arrivals) // 3]
+def test_the_tape_changes_nothing_of_the_filter(climb, pairs):
+    core = EstimatorCore(climb.configuration)
+    part = climb.arrivals[: len(climb.arrivals) // 3]
     sets = [e for a in part for e in core.add(a.measurement)]
     assert len(sets) > 0.25 * len(pairs)
     for plain, (_, live) in zip(sets, pairs, strict=False):
@@ -113,8 +108,8 @@ def test_the_tape_changes_nothing_of_the_filter(drive, pairs):
         np.testing.assert_array_equal(plain.drawbar_pull, live.drawbar_pull)
 
 
-def test_the_smoother_is_nearer_to_the_truth_and_says_how_near(drive, pairs):
-    truth = drive.truth
+def test_the_smoother_is_nearer_to_the_truth_and_says_how_near(climb, pairs):
+    truth = climb.truth
     rows = {stamp: i for i, stamp in enumerate(truth.stamp.tolist())}
     found = [(s, f, rows[f.stamp]) for s, f in pairs if f.stamp in rows]
     late = found[len(found) // 3 :]  # the first seconds stand
@@ -139,9 +134,9 @@ def test_what_was_not_judged_live_is_not_judged_later(pairs):
         assert (smoothed.slip_class[unjudged] == SlipClass.UNKNOWN).all()
 
 
-def test_a_late_reference_is_smoothed_at_its_own_stamp(drive):
+def test_a_late_reference_is_smoothed_at_its_own_stamp(climb):
     """However late references come, within the history, the smoothed drive is nearly the same."""
-    early = [a for a in drive.arrivals if a.measurement.stamp < drive.truth.stamp[0] + 4e9]
+    early = [a for a in climb.arrivals if a.measurement.stamp < climb.truth.stamp[0] + 4e9]
 
     def delayed(seconds):
         def arrival(a):
@@ -150,7 +145,7 @@ def test_a_late_reference_is_smoothed_at_its_own_stamp(drive):
 
         return [a.measurement for a in sorted(early, key=arrival)]
 
-    one, other = run(drive, delayed(0.0)), run(drive, delayed(1.5))
+    one, other = run(climb, delayed(0.0)), run(climb, delayed(1.5))
     assert len(one) == len(other)
     assert any((a[1].slip != b[1].slip).any() for a, b in zip(one, other, strict=True))
     settled = [i for i, (s, _) in enumerate(one) if s.stamp < one[-1][0].stamp - 2e9]

@@ -100,7 +100,9 @@ def written_anew(sinkage, slip):
 def test_forces_are_those_of_scipy_quad():
     contacts, slips = Contacts(wheels(3), EARTH), np.array([0.1, 0.3, 0.7])
     rate, load = np.full(3, 0.6), np.full(3, 80.0)
-    forces = settled(contacts, each(PLAIN, 3), load, rate, (1 - slips) * 0.15 * rate, 0.0 * rate)
+    forces = settled(
+        contacts, each(PLAIN, 3), load, rate, (1 - slips) * 0.15 * rate, 0.0 * rate, 5.0
+    )
     assert forces.normal == pytest.approx(load, rel=1e-3)
     for i, slip in enumerate(slips):
         normal, pull, torque = written_anew(contacts.sinkage[i], slip)

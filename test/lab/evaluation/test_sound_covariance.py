@@ -10,7 +10,7 @@ from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_lab.evaluation.runner import inputs_of_mode, run_estimator
 from wheel_terra_lab.evaluation.simulators import SIMULATORS
 
-LENGTH = 10.0  # [s]
+LENGTH = 7.0  # [s]
 RATE = 10.0  # sets a second
 
 

@@ -98,10 +98,10 @@ def test_other_formulas_are_other_formulas():
 
 def test_same_seed_same_campaign_and_noise_as_asked():
     plan = Plan(hide='one', noise='t', outliers=0.05, missing=0.1)
-    first, again = (make_campaign(7, 'sweep40', plan) for _ in range(2))
+    first, again = (make_campaign(7, 'basic16', plan) for _ in range(2))
     for key, values in first.table.items():
         np.testing.assert_array_equal(values, again.table[key])
-    other = make_campaign(8, 'sweep40', plan)
+    other = make_campaign(8, 'basic16', plan)
     assert not np.array_equal(first.rows['normal_load'], other.rows['normal_load'])
     cells = np.concatenate([first.table[key] for key in OUTPUTS])
     assert 0.02 < np.mean(np.isnan(cells)) < 0.25
@@ -109,7 +109,7 @@ def test_same_seed_same_campaign_and_noise_as_asked():
 
 def test_noise_has_the_stated_size():
     deviations = []
-    for seed in range(8):
+    for seed in range(5):
         campaign = make_campaign(seed, 'sweep40', Plan(hide='none', noise='mixed'))
         for key in OUTPUTS:
             error = campaign.table[key] - campaign.noise_free[key]
@@ -123,7 +123,7 @@ def test_a_structural_error_is_smooth_and_of_the_stated_share():
     rows, rng = campaign.rows, np.random.default_rng(3)
     clean = solve(rows, campaign.soil)
     draws = []
-    for _ in range(2000):
+    for _ in range(1000):
         out = {key: np.zeros(len(rows['slip'])) for key in OUTPUTS}
         SmoothError(0.02, rows, clean, rng).finish(out, None, rows)
         draws.append(out['torque'] / np.ptp(clean['torque']))
