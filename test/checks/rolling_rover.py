@@ -93,9 +93,27 @@ def recording(motion=None, seed=0):
     return _usual_recording(seed) if motion is None else _recorded(motion, seed)
 
 
-def checked(configuration=None, whole=None, **changes):
-    """The report on a drive, by default the usual one, with some of its channels changed."""
-    return check_recording(replace(whole or recording(), **changes), configuration or rover())
+def changed(whole=None, **channels):
+    """A drive, by default the usual one, with other channels, or with other fields of them."""
+    whole = whole or recording()
+    others = {
+        name: replace(getattr(whole, name), **given) if isinstance(given, dict) else given
+        for name, given in channels.items()
+    }
+    return replace(whole, **others)
+
+
+def checked(configuration=None, whole=None, **channels):
+    """The report on such a drive."""
+    return check_recording(changed(whole, **channels), configuration or rover())
+
+
+def faults(report):
+    return [finding.fault for finding in report.findings]
+
+
+def found(**channels):
+    return checked(**channels).findings
 
 
 def _recorded(m, seed):

@@ -70,8 +70,7 @@ def test_swapped_sides_are_told_from_a_straight_drive():
 
 @pytest.mark.parametrize('reference', [WHOLE.reference, None])
 def test_rim_speed_and_revolutions_that_are_near_are_told_together(reference):
-    slow = replace(WHOLE.joints, rate=WHOLE.joints.rate * rolling.RADIUS)
-    report = checked(joints=slow, reference=reference)
+    report = checked(joints={'rate': WHOLE.joints.rate * rolling.RADIUS}, reference=reference)
     units = [finding for finding in report.findings if finding.kind == 'unit']
     assert {round(finding.value, 3) for finding in units} == {
         round(2 * math.pi, 3),
@@ -101,7 +100,7 @@ def test_a_small_tilt_is_told_by_full_turns(degrees, gravity):
 def test_a_clock_that_is_set_on_the_way_is_no_offset():
     late = np.arange(WHOLE.joints.stamp.size) > 0.4 * WHOLE.joints.stamp.size
     stamp = WHOLE.joints.stamp + np.where(late, 2_500_000_000, 0)
-    report = checked(joints=replace(WHOLE.joints, stamp=stamp))
+    report = checked(joints={'stamp': stamp})
     assert 'order' in {f.kind for f in report.findings}
     assert not any(f.parameter for f in report.findings), [str(f) for f in report.findings]
 
@@ -110,13 +109,12 @@ def test_stamps_that_jitter_are_no_missing_messages():
     jitter = np.random.default_rng(4).normal(0.0, 1.5, WHOLE.imu.stamp.size)
     period = float(np.median(np.diff(WHOLE.imu.stamp)))
     stamp = np.sort(WHOLE.imu.stamp + (period * jitter).astype(np.int64))
-    report = checked(imu=replace(WHOLE.imu, stamp=stamp))
+    report = checked(imu={'stamp': stamp})
     assert 'drop_outs' not in {f.kind for f in report.findings}, report.findings
 
 
 def test_torque_scale_is_a_gain_or_a_mass():
-    joints = replace(WHOLE.joints, torque=1.5 * WHOLE.joints.torque)
-    report = checked(joints=joints)
+    report = checked(joints={'torque': 1.5 * WHOLE.joints.torque})
     assert kinds(report) == {('gain', None), ('mass', None)}
     gain = next(f for f in report.findings if f.kind == 'gain')
     assert gain.value == pytest.approx(1.5, abs=3.0 * gain.std)
@@ -124,12 +122,12 @@ def test_torque_scale_is_a_gain_or_a_mass():
 
 def test_a_wheel_without_torque_leaves_the_scale_open():
     torque = WHOLE.joints.torque * [1.0, np.nan, 1.0, 1.0]  # without it nobody knows the sum
-    report = checked(joints=replace(WHOLE.joints, torque=1.5 * torque))
+    report = checked(joints={'torque': 1.5 * torque})
     assert not report.findings
     untold = {o.kind for o in report.not_checked if 'a wheel without torque' in o.reason}
     assert untold == {'gain', 'mass'}
     ends = np.where(WHOLE.joints.seconds[:, np.newaxis] < 80.0, WHOLE.joints.torque, np.nan)
-    whole = checked(joints=replace(WHOLE.joints, torque=ends))  # what is left tells it
+    whole = checked(joints={'torque': ends})  # what is left tells it
     assert whole.figures['torque.gain'] == pytest.approx(1.0, abs=0.02)
 
 
@@ -205,11 +203,11 @@ def test_stamps_of_the_sinkage_ahead_of_their_arrival():
 
 
 def test_pauses_of_a_recording_are_no_bursts():
-    """A quarter of an hour behind every 15 s of the same drive, in all its channels."""
+    """Two minutes behind every 15 s of the same drive, in all its channels."""
 
     def paused(channel):
         since = channel.stamp - WHOLE.joints.stamp[0]
-        wait = since // 15_000_000_000 * 900_000_000_000
+        wait = since // 15_000_000_000 * 120_000_000_000
         return replace(channel, stamp=channel.stamp + wait, log_time=channel.log_time + wait)
 
     names = ('joints', 'imu', 'sinkage', 'reference')

@@ -8,13 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rolling_rover as rolling
+from rolling_rover import found
 
 from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.wheel_rates import rate_step
-
-
-def found(**changes):
-    return rolling.checked(**changes).findings
 
 
 def held(channel, field, since, until, column=...):
@@ -35,16 +32,14 @@ def test_nothing_is_frozen_while_the_rover_stands(name, field):
 
 
 def test_a_coarse_gyro_on_a_straight_and_a_simulation_without_noise():
-    coarse = replace(WHOLE.imu, rate=np.round(WHOLE.imu.rate, 1))
-    assert 'frozen' not in {f.kind for f in found(imu=coarse)}
+    assert 'frozen' not in {f.kind for f in found(imu={'rate': np.round(WHOLE.imu.rate, 1)})}
     motion = rolling.ten_minute_drive()
     exact = replace(
         WHOLE.reference,
         velocity=np.column_stack([motion.speed[::5], 0 * motion.time[::5], 0 * motion.time[::5]]),
     )
     rates = (motion.speed[:, None] - motion.yaw_rate[:, None] * rover_y()) / rolling.RADIUS
-    joints = replace(WHOLE.joints, rate=rates)
-    assert 'frozen' not in {f.kind for f in found(reference=exact, joints=joints)}
+    assert 'frozen' not in {f.kind for f in found(reference=exact, joints={'rate': rates})}
 
 
 @pytest.mark.parametrize('dead', [None, 2])
@@ -59,8 +54,7 @@ def test_rates_without_noise_that_stay_together_are_alive_and_one_alone_is_not(d
     whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
     if dead is not None:
         rate[50:300, dead] = rate[50, dead]
-    joints = replace(whole.joints, rate=rate)
-    told = rolling.checked(whole=whole, joints=joints).findings
+    told = rolling.checked(whole=whole, joints={'rate': rate}).findings
     frozen = [f.wheel for f in told if f.kind == 'frozen']
     assert frozen == ([] if dead is None else [rolling.NAMES[dead]])
 
@@ -71,11 +65,10 @@ def rover_y():
 
 
 def test_no_sinkage_is_read_on_firm_ground():
-    firm = replace(WHOLE.sinkage, sinkage=0.0 * WHOLE.sinkage.sinkage)
-    assert found(sinkage=firm) == []
+    assert found(sinkage={'sinkage': 0.0 * WHOLE.sinkage.sinkage}) == []
     dead = WHOLE.sinkage.sinkage.copy()
     dead[:, 3] = 0.0
-    names = {(f.fault, f.wheel) for f in found(sinkage=replace(WHOLE.sinkage, sinkage=dead))}
+    names = {(f.fault, f.wheel) for f in found(sinkage={'sinkage': dead})}
     assert ('sinkage_frozen', 'rear_right') in names
 
 
@@ -85,8 +78,7 @@ def test_torques_that_brake_down_a_slope_have_a_sign():
     force = WHOLE.imu.force.copy()
     force[:, 0] -= np.sign(np.interp(WHOLE.imu.seconds, seconds, rate))
     joints = replace(WHOLE.joints, torque=np.abs(WHOLE.joints.torque))
-    downhill = replace(WHOLE.imu, force=force)
-    assert 'torque_unsigned' not in {f.fault for f in found(joints=joints, imu=downhill)}
+    assert 'torque_unsigned' not in {f.fault for f in found(joints=joints, imu={'force': force})}
 
 
 def test_a_seldom_reference_that_stays_for_six_readings():

@@ -230,8 +230,7 @@ def test_what_looks_like_a_fault_is_none(channel, changes, allowed, untold):
 
 
 def test_inches_of_sinkage_are_not_surely_centimetres():
-    depth = replace(WHOLE.sinkage, sinkage=WHOLE.sinkage.sinkage / 0.0254)
-    (told,) = rolling.checked(sinkage=depth).findings
+    (told,) = rolling.checked(sinkage={'sinkage': WHOLE.sinkage.sinkage / 0.0254}).findings
     assert told.fault == 'sinkage_unit' and told.confidence < 0.8
     assert 'inches' in told.words and 'centimetres' in told.words
 
@@ -239,6 +238,6 @@ def test_inches_of_sinkage_are_not_surely_centimetres():
 def test_wild_samples_of_a_gyro_are_told_in_any_unit():
     rate = np.degrees(WHOLE.imu.rate)
     rate[500::900] += math.degrees(20.0)
-    told = rolling.checked(imu=replace(WHOLE.imu, rate=rate)).findings
+    told = rolling.checked(imu={'rate': rate}).findings
     (finding,) = (f for f in told if f.fault == 'imu_wild')
     assert finding.words.startswith('6 samples') and 'rad/s' in finding.words
