@@ -415,6 +415,13 @@ def test_an_input_beyond_the_history_silences_no_other(name):
     assert told[0].topic == getattr(WHOLE, name).topic
 
 
+@pytest.mark.parametrize(('tardy', 'told'), [(0.05, []), (0.3, [5.0])])  # 1.5 (2.4 + 0.3) s
+def test_an_input_of_which_a_part_comes_after_the_history(tardy, told):
+    late = np.where(np.arange(WHOLE.reference.stamp.size) % 20 < 20 * tardy, 2.4, 1.4)  # [s]
+    report = checked(**later('reference', late))
+    assert [f.value for f in report.findings if f.parameter == 'history'] == told
+
+
 def test_a_logger_whose_clock_is_off_blames_no_input():
     """Its clock gains on all stamps alike, or is ahead; or a reference grows older evenly."""
 

@@ -134,7 +134,7 @@ def _too_late(evidence: Evidence, off: dict[str, float]) -> list[Outcome]:
     for name in ('imu', 'sinkage', 'reference'):
         if name in off:
             continue
-        late = _late(evidence, name) - own
+        late = _late(evidence, name, NEARLY_ALL) - own
         if history < late < MOST_LATE:
             topic, value = _channel(evidence, name).topic, float(math.ceil(1.5 * late))
             finding = found('too_late', topic, 0.9, value=value, late=late, history=history)
@@ -147,12 +147,15 @@ def _moved(evidence: Evidence, name: str) -> float:
     return evidence.recording.moved.get(name, 0.0)
 
 
-def _late(evidence: Evidence, name: str) -> float:
-    """Return the usual log time less stamp of a channel as it was sent [s]; nan: not known."""
+def _late(evidence: Evidence, name: str, share: float = 0.5) -> float:
+    """Return the log time less stamp of a channel as it was sent [s]; nan: not known.
+
+    That of a ``share`` of its messages is smaller.
+    """
     channel: Channel | None = getattr(evidence.recording, name)
     if channel is None or not channel.late.size:
         return math.nan
-    return float(np.median(channel.late)) - _moved(evidence, name)
+    return float(np.quantile(channel.late, share)) - _moved(evidence, name)
 
 
 def _lag_by_log(late: float) -> Lag:
@@ -388,6 +391,7 @@ MOST_STEPS = 5  # of a clock that is set; more are of another kind and stay
 FUTURE = -0.1  # arrival less stamp that no message has [s]
 MOST_OFFSET = 1e4  # offset that a rover file may state, either way [s]
 ARRIVAL_STD = 0.05  # difference of arrivals of two sensors, one deviation [s]
+NEARLY_ALL = 0.9  # share of the messages of an input that must not be too late [-]
 MOST_LATE = 40.0  # beyond which a longer history is no remedy [s]
 QUARTERS, UNEVEN = 4, 0.5  # parts of a drive; unlike gains of a drift over their mean, at most [-]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]

@@ -47,6 +47,9 @@ from wheel_terra_estimator.estimation.timing.lag import LONGEST_HOLD, LagLearner
 from wheel_terra_estimator.estimation.timing.step_grid import TimeSettings
 from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline
 
+_TOO_OLD = 'stamp older than `history` (raise it, or set its clock)'
+_MOST_TOO_OLD = 0.1  # share of the messages of an input that may be dropped for that without a word
+_FEW_MESSAGES = 3
 _FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
 """Numerical errors that a step may raise; they are caught and reported."""
 
@@ -275,7 +278,7 @@ ReferenceVelocity
             self._late[channel] += 1
             self._deferred |= fate is Fate.DEFERRED
         elif fate is Fate.TOO_OLD:
-            self._checks.refuse(channel, 'stamp older than `history` (raise it, or set its clock)')
+            self._checks.refuse(channel, _TOO_OLD)
         elif fate is Fate.FULL:
             self._checks.refuse(channel, 'more inputs than can be held for sorting')
         return [] if due is None else [self._published(due)]
@@ -336,6 +339,11 @@ ReferenceVelocity
                 f'stamps {abs(by) / SECOND:.1f} s {where}: late, or a clock is off -> set the '
                 'clocks, or sensors.*_stamp_offset of the one that is off'
             )
+        for name, count, reasons in zip(names, self._received, self._checks.rejected, strict=True):
+            if reasons[_TOO_OLD] > max(_MOST_TOO_OLD * count, _FEW_MESSAGES):
+                history = self._timeline.settings.history / SECOND
+                late = f'many messages are more than {history:g} s late and dropped'
+                faults.setdefault(name, f'{late} -> raise history, or set its clock')
         if silent:
             name, every = names[WHEEL_ODOMETRY], self._timeline.slow_odometry
             words = f'no usable message on {name}: wheel rates unknown'
