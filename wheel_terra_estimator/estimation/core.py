@@ -23,7 +23,6 @@ import numpy as np
 from wheel_terra_estimator.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.judgement.classes import PublishedClasses
-from wheel_terra_estimator.estimation.judgement.slip_on_slope import OncePerSecond
 from wheel_terra_estimator.estimation.judgement.stuck.memory import StuckMemory
 from wheel_terra_estimator.estimation.measurements import Measurement, WheelOdometry
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
@@ -99,7 +98,6 @@ class EstimatorCore:
         self._checks = InputChecks(configuration)
         self._guard = OutputGuard(configuration)
         self._classes = PublishedClasses(configuration)
-        self._slopes = OncePerSecond()
         self.warning = StuckMemory(configuration)
         self._log = InputLog(self._runners(), settings)
         self._timeline = Timeline(self._log, settings)
@@ -108,6 +106,8 @@ class EstimatorCore:
         self._deferred = False  # since the last set
         self._reruns = 0  # until the last set
         self._latest: EstimateSet | None = None
+        self._first_set: int | None = None  # stamp of that of the run [ns]
+        self._second = -1  # of the last set, from then on
         self._clock_steps = 0
         self._clock_stepped = False  # since the last set
         self._resets = 0
@@ -223,7 +223,7 @@ ReferenceVelocity
         sets: list[EstimateSet] = []
         for suspicion, arrival in judgement.strays:
             if suspicion is Suspicion.BEHIND:
-                sets += self._insert(arrival)
+                sets += self._insert(arrival, stray=True)
             else:
                 self._checks.refuse(
                     arrival.channel, 'stamp far ahead of all others (set its clock)'
@@ -235,10 +235,6 @@ ReferenceVelocity
             self._end_run(keep_soil=self._ran_on())
             self._clock_stepped = True
         for arrival in judgement.accepted:
-            measured = arrival.measurement
-            whole = not (isinstance(measured, WheelOdometry) and isnan(sum(measured.rate.tolist())))
-            if not self._timeline.is_too_old(measured.stamp):
-                self._lags.note(arrival.channel, measured.stamp, whole=whole)
             sets += self._insert(arrival)
         present = self._lags.present
         if judgement.accepted and present is not None:
@@ -265,13 +261,17 @@ ReferenceVelocity
     def _end_run(self, keep_soil: bool) -> None:
         self._timeline.end_run(keep_soil=keep_soil)
         self._classes.reset()
-        self._slopes.reset()
+        self._first_set, self._second = None, -1
         self._lags.begin_run()
 
-    def _insert(self, arrival: Arrival) -> list[EstimateSet]:
+    def _insert(self, arrival: Arrival, *, stray: bool = False) -> list[EstimateSet]:
+        """Put an input into the log; the stamp of a `stray` says nothing of the lags."""
         channel, measurement = arrival
         contradicted = self._log.contradicted[channel]
         fate, due = self._timeline.insert(channel, measurement)
+        if not (stray or fate is Fate.TOO_OLD):
+            rates = measurement.rate.tolist() if isinstance(measurement, WheelOdometry) else ()
+            self._lags.note(channel, measurement.stamp, whole=not isnan(sum(rates)))
         if self._log.contradicted[channel] != contradicted:
             self._checks.reject(channel, 'stamp repeated with other numbers (the newer ones count)')
         if fate in (Fate.LATE, Fate.DEFERRED):
@@ -309,8 +309,10 @@ ReferenceVelocity
         estimates = self.warning.follow(
             self._classes.follow(estimates), run_again=self._reruns != reruns
         )
-        if not self._slopes.due(stamp):
-            estimates = replace(estimates, slip_on_slope=None)
+        self._first_set = stamp if self._first_set is None else self._first_set
+        before, self._second = self._second, (stamp - self._first_set) // SECOND
+        if self._second == before:
+            estimates = replace(estimates, slip_on_slope=None)  # at 1 Hz
         if failed:
             self.warning.begin_anew()
             self._timeline.begin_after(due)

@@ -32,7 +32,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.estimates import SLOPES, SlipOnSlope
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
-from wheel_terra_estimator.estimation.scalars import SECOND, TINY, gain_of
+from wheel_terra_estimator.estimation.scalars import TINY, gain_of
 
 _DEMANDS = np.tan(np.radians(SLOPES))
 _DRAWS = 64
@@ -201,25 +201,3 @@ def slips_at(
     return SlipOnSlope(
         slip.mean(axis=0), np.hypot(slip.std(axis=0), scatter), ndtr(beyond).mean(axis=0)
     )
-
-
-class OncePerSecond:
-    """Selects the first set at or after each second of a run, which carries the slips on slopes."""
-
-    def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Begin a new run."""
-        self._first: int | None = None
-        self._second = -1
-
-    def due(self, stamp: int) -> bool:
-        """Return whether the set of a stamp [ns] carries them."""
-        if self._first is None:
-            self._first = stamp
-        second = (stamp - self._first) // SECOND
-        if second == self._second:
-            return False
-        self._second = second
-        return True

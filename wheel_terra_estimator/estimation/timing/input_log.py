@@ -112,8 +112,6 @@ class InputLog:
         Per channel: inputs whose stamp the channel had given before.
     contradicted : list of int
         Those of them that held other numbers than the first.
-    dirty : int
-        Steps that the next run will make again.
     forgotten : int
         Stamp [ns] up to which no state before an input is kept; 0: the start of the run is known.
     """
@@ -139,7 +137,6 @@ class InputLog:
         self.entries.clear()
         self.stamps.clear()
         self.first: int | None = None
-        self.dirty = 0
         self._ran = 0  # entries[:_ran] have been run, and not changed since
         self._position = -1  # entries[:_position] made the state of the last step; -1: none did
         self._provisional = False  # the runners have made a part of the next step
@@ -181,7 +178,7 @@ class InputLog:
             changed = self._merge(entries[index], channel, measurement)
         last_run = self._last_run
         if changed and index < last_run.unchanged:
-            self.dirty = max(self.dirty, self.steps_after(stamp))
+            self._dirty += self.added_steps(stamp)
             self._last_run = last_run._replace(unchanged=index)
         if changed and index < self._ran:
             if stamp > stamps[self._ran - 1] - DENSE_SPAN:
@@ -189,15 +186,17 @@ class InputLog:
             self._ran = index
         return index, new
 
-    def steps_after(self, stamp: int) -> int:
-        """Return how many steps would be made again for an input of this stamp [ns]."""
+    def added_steps(self, stamp: int) -> int:
+        """Return how many more steps would be made again for an input of this stamp [ns]."""
         position, end, _ = self._last_run
         if position <= 0 or self.first is None or stamp > end:
             return 0
         if self.grid.every_stamp:
-            return max(position - bisect_left(self.stamps, stamp), 0)
-        before = self.grid.step_index(stamp - self.first)
-        return self.grid.step_index(end - self.first) - before + 1
+            steps = position - bisect_left(self.stamps, stamp)
+        else:
+            before = self.grid.step_index(stamp - self.first)
+            steps = self.grid.step_index(end - self.first) - before + 1
+        return max(steps - self._dirty, 0)
 
     def run_to(self, last: int) -> None:
         """Run up to and with the entry `last`."""
@@ -246,7 +245,7 @@ class InputLog:
 
     def _account(self) -> None:
         """Count the cost of late inputs from here on."""
-        self.dirty = 0
+        self._dirty = 0  # steps that the next run will make again
         self._caught_up = False
         self._last_run = _LastRun(self._position, self._progress.end, self._ran)
 

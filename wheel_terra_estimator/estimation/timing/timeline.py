@@ -91,12 +91,12 @@ class Timeline:
         set.
         """
         stamp = measurement.stamp
-        if self.is_too_old(stamp):
+        if self._is_too_old(stamp):
             return Fate.TOO_OLD, None
         if len(self._log.entries) >= GREATEST_LENGTH:
             return Fate.FULL, None
-        cost = self._log.steps_after(stamp) - self._log.dirty
-        if cost > 0 and self.settings.rerun_rate > 0.0:
+        cost = self._log.added_steps(stamp)
+        if cost and self.settings.rerun_rate > 0.0:
             if self._deferred or cost > self._allowance:
                 self.counts['late_inputs_deferred'] += 1
                 self._deferred.append((channel, measurement))
@@ -130,7 +130,7 @@ class Timeline:
         self._log.begin_after(due.entry)
         self.released -= due.entry + 1
 
-    def is_too_old(self, stamp: int) -> bool:
+    def _is_too_old(self, stamp: int) -> bool:
         """Return whether an input of this stamp [ns] comes too late to be used."""
         state = self._state
         if state is None:
@@ -168,13 +168,13 @@ class Timeline:
         if not self._deferred:
             return
         oldest = min(measurement.stamp for _, measurement in self._deferred)
-        cost = self._log.steps_after(oldest) - self._log.dirty
+        cost = self._log.added_steps(oldest)
         if cost > self._allowance and oldest >= limit - self.settings.history:
             return
-        self._allowance = max(self._allowance - max(cost, 0), 0.0)
+        self._allowance = max(self._allowance - cost, 0.0)
         deferred, self._deferred = self._deferred, []
         for channel, measurement in deferred:
-            if self.is_too_old(measurement.stamp):
+            if self._is_too_old(measurement.stamp):
                 self.counts['late_inputs_dropped'] += 1
             else:
                 _, due = self._insert(channel, measurement)
