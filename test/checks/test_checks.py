@@ -383,10 +383,7 @@ def test_even_times_over_stamps_that_jump():
     drive = np.arange(0.0, 60.0, 0.1)
     paused = np.concatenate([drive, drive + 900.0])
     assert even_times(paused, 0.05)[-1] == pytest.approx(paused[-1], abs=0.051)
-    for jumped in (
-        np.concatenate([drive, [4e8]]),
-        np.concatenate([[0.0, 1.0], drive + 4e8]),
-    ):
+    for jumped in (np.concatenate([drive, [4e8]]), np.concatenate([[0.0, 1.0], drive + 4e8])):
         found = even_times(jumped, 0.05)
         assert found[-1] - found[0] == pytest.approx(59.9, abs=0.051)
     assert even_times(np.arange(0.0, 4e9, 3500.0), 0.05).size <= MOST_TIMES + 1

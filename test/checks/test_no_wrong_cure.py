@@ -181,8 +181,7 @@ def test_a_second_between_turns_tells_no_sign_of_a_torque():
 
 
 @pytest.mark.parametrize(
-    ('order', 'signs'),
-    [([0, 1, 2], [-1, 1, 1]), ([0, 1, 2], [1, -1, 1]), ([1, 0, 2], [1, 1, 1])],
+    ('order', 'signs'), [([0, 1, 2], [-1, 1, 1]), ([0, 1, 2], [1, -1, 1]), ([1, 0, 2], [1, 1, 1])]
 )
 def test_axes_of_the_accelerometer_that_no_rotation_gives_are_no_turned_imu(order, signs):
     """Starts are felt along x, curves along y: one of them reversed, or both exchanged."""
@@ -549,10 +548,7 @@ def test_a_simulation_without_noise_and_slip_has_no_reference_of_its_wheels(nois
     rate += noise * np.random.default_rng(1).standard_normal(rate.shape)
     speed = rolling.rolling_radius() * rate[::5].mean(axis=1)
     velocity = np.column_stack([speed, 0.0 * speed, 0.0 * speed])
-    report = checked(
-        joints={'rate': rate},
-        reference={'velocity': velocity},
-    )
+    report = checked(joints={'rate': rate}, reference={'velocity': velocity})
     assert ('reference_wheels' in faults(report)) == told
 
 

@@ -63,8 +63,7 @@ def test_an_odd_wheel_hides_no_radius_that_all_wheels_have_wrong():
 
 
 @pytest.mark.parametrize(
-    ('percent', 'told'),
-    [((0, 0, 4, 4), False), ((0, 0, 7, 7), True), ((7, 0, 0, 0), True)],
+    ('percent', 'told'), [((0, 0, 4, 4), False), ((0, 0, 7, 7), True), ((7, 0, 0, 0), True)]
 )
 def test_one_wheel_of_a_tricycle_is_as_odd_as_it_is(percent, told):
     """One wheel on each side and one, in two joints, on the centre line."""

@@ -16,10 +16,7 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
 
 HEADER = 'time,rpm_fl,rpm_fr,torque_fl,torque_fr,ax,ay,az,gx,gy,gz,sinkage_fl,gps_speed'
-ROWS = [
-    '100.0,60,-60,1.5,-1.5,0,0,1,0,0,90,12,0.5',
-    '100.1,30,,1.0,,0,0,1,0,0,0,,',
-]
+ROWS = ['100.0,60,-60,1.5,-1.5,0,0,1,0,0,90,12,0.5', '100.1,30,,1.0,,0,0,1,0,0,0,,']
 LOG = '\n'.join([HEADER, *ROWS])
 
 

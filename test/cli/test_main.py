@@ -230,8 +230,7 @@ def test_exit_status_with_closed_streams(words, status):
 
 
 @pytest.mark.parametrize(
-    ('number', 'cure'),
-    [(errno.EACCES, 'change its permissions'), (errno.ENOSPC, 'make room')],
+    ('number', 'cure'), [(errno.EACCES, 'change its permissions'), (errno.ENOSPC, 'make room')]
 )
 def test_what_the_machine_refuses_is_told_with_its_cure(number, cure):
     said = outside_cause(OSError(number, 'no', 'rows.csv'))

@@ -390,9 +390,7 @@ def test_an_effect_of_ones_own(tmp_path):
         "    validity='', source='', on_outputs=term)\n"
     )
     file = parameter_file(
-        tmp_path,
-        'm.yaml',
-        'effect_file: mine.py\neffects.my_effect: {enabled: true, extra: 2.0}',
+        tmp_path, 'm.yaml', 'effect_file: mine.py\neffects.my_effect: {enabled: true, extra: 2.0}'
     )
     try:
         with pytest.raises(UserError, match='--allow-effect-files'):

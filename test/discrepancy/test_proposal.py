@@ -103,8 +103,7 @@ def test_the_file_of_the_law_gives_the_reported_gap(speedy, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ('seed', 'design', 'name'),
-    [(500, 'sweep40', 'hump'), (504, 'slope48', 'friction_softening')],
+    ('seed', 'design', 'name'), [(500, 'sweep40', 'hump'), (504, 'slope48', 'friction_softening')]
 )
 def test_strangers_of_another_hand_shrink_on_loads_and_lugs_left_out(seed, design, name):
     plan = Plan(hide='outside', names=(name,), noise='mixed')
@@ -125,8 +124,7 @@ def test_strangers_of_another_hand_shrink_on_loads_and_lugs_left_out(seed, desig
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ('seed', 'design', 'name'),
-    [(507, 'full56', 'side_drag'), (509, 'slope48', 'crosstalk')],
+    ('seed', 'design', 'name'), [(507, 'full56', 'side_drag'), (509, 'slope48', 'crosstalk')]
 )
 def test_strangers_that_listed_effects_imitate_are_not_named_with_confidence(seed, design, name):
     """A drag as a bulldozing with another radius, a crosstalk as a gain: said, but as a guess."""

@@ -199,12 +199,7 @@ def fleet_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-KINDS = {
-    'report': 20,
-    'diagnosis_report': 0,
-    'soilbin_report': 6,
-    'fleet_report': 0,
-}
+KINDS = {'report': 20, 'diagnosis_report': 0, 'soilbin_report': 6, 'fleet_report': 0}
 """Page -> lines that its figure has at least."""
 
 

@@ -14,11 +14,7 @@ from wheel_terra_estimator.terramechanics.kinematics import (
     slip_ratio,
     speed_ratio,
 )
-from wheel_terra_estimator.terramechanics.model import (
-    OUTSIDE_VALIDITY,
-    OVERLOADED,
-    WheelSoilModel,
-)
+from wheel_terra_estimator.terramechanics.model import OUTSIDE_VALIDITY, OVERLOADED, WheelSoilModel
 
 
 def test_frictionless_soil_gives_minus_the_compaction_resistance():
