@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Lets the tests of this folder import its helpers; the drive that several of them look at."""
+"""Lets the tests of this folder import its helpers; a drive at which several of them look."""
 
 import sys
 from pathlib import Path
@@ -16,3 +16,16 @@ def climb():
     from parts import drive
 
     return drive(12.0, **{'slope.angle_deg': [8.0]})
+
+
+@pytest.fixture(scope='session')
+def climbed(climb):
+    """Core and estimator after the climb, and the sets; nobody changes them."""
+    from fake_estimator import play
+
+    from wheel_terra_estimator.estimation.core import EstimatorCore
+    from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+
+    estimator = WheelSoilEstimator(climb.configuration)
+    core = EstimatorCore(climb.configuration, estimator)
+    return core, play(core, (arrival.measurement for arrival in climb.arrivals)), estimator

@@ -47,12 +47,6 @@ def deviation(key):
     return key.replace('_deg', '') + ('_std_deg' if key.endswith('_deg') else '_std')
 
 
-@pytest.fixture(scope='module')
-def driven(climb):
-    begun = climb.arrivals[: len(climb.arrivals) // 2]
-    return run(climb.configuration, (a.measurement for a in begun))
-
-
 def first_odometry(drive):
     return next(a.measurement for a in drive.arrivals if isinstance(a.measurement, WheelOdometry))
 
@@ -66,8 +60,8 @@ def standing(duration, rate, force=(0.0, 0.0, GRAVITY)):
             yield WheelOdometry(stamp, np.zeros(4), np.zeros(4))
 
 
-def test_soil_is_that_of_the_topic_and_its_deviations_hold_elsewhere(climb, driven):
-    core, sets = driven
+def test_soil_is_that_of_the_topic_and_its_deviations_hold_elsewhere(climb, climbed):
+    core, sets, _ = climbed
     learned = core.learned()
     last = dict(zip(sets[-1].soil_names, sets[-1].soil.tolist(), strict=True))
     std = dict(zip(sets[-1].soil_names, sets[-1].soil_std.tolist(), strict=True))
@@ -98,8 +92,8 @@ def test_where_nothing_was_learned_restarts_do_not_add_up(climb):
         assert found[2][key] == pytest.approx(value, rel=1e-6), key
 
 
-def test_the_second_drive_begins_where_the_first_one_ended(driven, climb, tmp_path):
-    core, sets = driven
+def test_the_second_drive_begins_where_the_first_one_ended(climbed, climb, tmp_path):
+    core, sets, _ = climbed
     learned = core.learned()
     path = tmp_path / 'learned.yaml'
     write_values(path, learned)

@@ -199,11 +199,11 @@ def drive(variances, backwards=False):
     """A start, an arc and a stop; `variances` go to the messages of the IMU in turn."""
     rng = np.random.default_rng(4)
     stream = []
-    for i in range(260):
-        stamp, moving = 100 * SECOND + i * SECOND // 100, 40 < i < 220
-        if backwards and i >= 130:
+    for i in range(180):
+        stamp, moving = 100 * SECOND + i * SECOND // 100, 30 < i < 150
+        if backwards and i >= 90:
             stamp -= 30 * SECOND
-        turn = 0.1 * (100 < i < 180)
+        turn = 0.1 * (70 < i < 120)
         variance = variances[min(i // 2, len(variances) - 1)]
         force = np.array([0.3, 0.0, 9.8]) + 0.3 * rng.normal(size=3)
         rate = np.array([0.0, 0.0, turn]) + 0.02 * rng.normal(size=3)

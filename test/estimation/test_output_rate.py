@@ -186,12 +186,12 @@ def late(stream, kind, delay, jitter=0.2, seed=0):
     ('who', 'delay', 'jitter'), [(odometry, 0.41, 0.2), (odometry, 0.5, 0.0), (imu, 0.41, 0.2)]
 )
 def test_what_lags_for_good_is_waited_for_and_no_set_is_lost(who, delay, jitter):
-    stream = drive(8.0)
+    stream = drive(6.0)
     punctual_core, punctual = make_core(**DEFAULT)
     expected = play(punctual_core, stream)
     core, fake = make_core(**DEFAULT)
     sets = play(core, late(stream, type(who(0.0)), delay, jitter))
-    assert len(sets) == len(expected) == 160
+    assert len(sets) == len(expected) == 120
     assert fake.steps < 1.5 * punctual.steps
     assert not any('silent' in str(s.faults) for s in sets)
 

@@ -98,12 +98,8 @@ def pairs(climb):
     return run(climb, [a.measurement for a in climb.arrivals])
 
 
-def test_the_tape_changes_nothing_of_the_filter(climb, pairs):
-    core = EstimatorCore(climb.configuration)
-    part = climb.arrivals[: len(climb.arrivals) // 3]
-    sets = [e for a in part for e in core.add(a.measurement)]
-    assert len(sets) > 0.25 * len(pairs)
-    for plain, (_, live) in zip(sets, pairs, strict=False):
+def test_the_tape_changes_nothing_of_the_filter(climbed, pairs):
+    for plain, (_, live) in zip(climbed[1], pairs, strict=True):
         np.testing.assert_array_equal(plain.slip, live.slip)
         np.testing.assert_array_equal(plain.drawbar_pull, live.drawbar_pull)
 
@@ -160,7 +156,7 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
     scenario = load(
         {
             'configuration': ['generic_six_wheel', 'hit_lss1'],
-            'duration': 6.0,
+            'duration': 5.0,
             'slope.angle_deg': [6.0],
             'drive.time': [0.0, 3.5, 4.5],
             'drive.forward': [0.05, 0.05, -0.05],
