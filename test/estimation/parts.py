@@ -27,7 +27,7 @@ from wheel_terra_estimator.simulation.scenario import load
 SAND = ['generic_six_wheel', 'dry_sand_ding2015']
 
 
-def drive(duration=5.5, seed=3, **keys):
+def drive(duration=4.5, seed=3, **keys):
     """Return a simulated drive on sand without jitter and spikes, by default on the level."""
     base = {'configuration': SAND, 'sensors.jitter': 0.0, 'sensors.sinkage_outliers': 0.0}
     return simulate(load({**base, 'duration': duration, **keys}), seed)

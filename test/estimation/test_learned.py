@@ -128,7 +128,7 @@ def test_the_bias_of_the_accelerometer_has_the_sign_of_the_sensor():
     rim_rate = 0.1 / float(rover.wheels.slip_radius[0])
 
     def driving():
-        for i in range(50 * 4):
+        for i in range(50 * 3):
             stamp = START + i * SECOND // 50
             yield InertialReading(stamp, np.array([0.08, 0.0, GRAVITY]), np.zeros(3), LEVEL)
             if i % 5 == 0:

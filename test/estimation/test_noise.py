@@ -7,8 +7,10 @@ from math import nan, radians
 
 import numpy as np
 import pytest
-from fake_estimator import play
+from fake_estimator import SECOND, play
 from parts import SAND, Parts
+from test_core_with_filter import START
+from test_core_with_filter import drive as noisy_drive
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -16,7 +18,6 @@ from wheel_terra_estimator.estimation.inputs.noise import ObservedNoise, StatedN
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     InertialVariance,
-    ReferenceVelocity,
     StepInputs,
     WheelOdometry,
 )
@@ -177,7 +178,7 @@ def test_a_factor_that_tells_nothing_is_not_written_out(noise):
 # Noise of the IMU as its messages state it: the same as in a file, and no placeholder.
 
 
-SECOND = 1_000_000_000
+MIDDLE = START + SECOND
 FIGURES = {
     'sensors.specific_force_std': 0.4,
     'sensors.angular_rate_std': 0.02,
@@ -196,26 +197,15 @@ ROVER = reader.from_parameters(SILENT)
 
 
 def drive(variances, backwards=False):
-    """A start, an arc and a stop; `variances` go to the messages of the IMU in turn."""
-    rng = np.random.default_rng(4)
-    stream = []
-    for i in range(180):
-        stamp, moving = 100 * SECOND + i * SECOND // 100, 30 < i < 150
-        if backwards and i >= 90:
-            stamp -= 30 * SECOND
-        turn = 0.1 * (70 < i < 120)
-        variance = variances[min(i // 2, len(variances) - 1)]
-        force = np.array([0.3, 0.0, 9.8]) + 0.3 * rng.normal(size=3)
-        rate = np.array([0.0, 0.0, turn]) + 0.02 * rng.normal(size=3)
-        if not i % 2:
-            upright = np.array([0.0, -0.015, 0.0, 1.0])
-            stream.append(InertialReading(stamp, force, rate, upright, variance))
-        if not i % 10:
-            sides = np.array([-turn, turn, -turn, turn]) * 1.8 + 3.0 * moving
-            stream.append(WheelOdometry(stamp, sides, np.full(4, 6.0 * moving)))
-        if i % 100 == 99:
-            speed = 0.45 * moving + 0.02 * rng.normal()
-            stream.append(ReferenceVelocity(stamp, speed, 4e-4))
+    """A start, a drive and a stop; `variances` go to the messages of the IMU in turn."""
+    stream, left = [], iter(variances)
+    variance = None
+    for m in noisy_drive(4, duration=2.0):
+        if isinstance(m, InertialReading):
+            variance = next(left, variance)
+            m = replace(m, orientation=np.array([0.0, -0.015, 0.0, 1.0]), variance=variance)
+        back = 30 * SECOND if backwards and m.stamp > MIDDLE else 0
+        stream.append(replace(m, stamp=m.stamp - back))
     return stream
 
 

@@ -95,7 +95,7 @@ def test_each_quadrant_has_the_right_signs(slope, speed, climb, climbed):
     if slope == 8.0:
         sets, truth = climbed[1], climb.truth
     else:
-        run = drive(**{'slope.angle_deg': [slope], 'drive.forward': [speed]})
+        run = drive(5.5, **{'slope.angle_deg': [slope], 'drive.forward': [speed]})
         sets, truth = estimate(run), run.truth
     assert_followed(sets, truth)
     assert np.sign(last([s.drawbar_pull for s in sets]).sum()) == np.sign(slope)
@@ -133,7 +133,7 @@ def test_each_contact_law_follows_a_climb_with_a_reference(climb, climbed, law):
 
 
 def test_a_soil_configured_by_mistake_does_not_bias_slip_and_sinkage():
-    d = simulate(load({**kinds.KINDS['climb'], 'duration': 9.0, 'sensors.jitter': 0.0}), 1000)
+    d = simulate(load({**kinds.KINDS['climb'], 'duration': 8.0, 'sensors.jitter': 0.0}), 1000)
     snow = reader.load(['generic_six_wheel', 'snow_us'])  # 60 times softer, 3 cm deep
     sets = estimate(d, estimator=WheelSoilEstimator(snow))
     slip, sinkage = (last([getattr(s, name) for s in sets]) for name in ('slip', 'sinkage'))
@@ -175,7 +175,7 @@ def test_new_run_keeps_the_soil_only_when_asked(climb, climbed):
 
 
 def test_rest_holds_slip_and_says_unknown():
-    run = drive(**{'drive.time': [0.0, 2.0, 2.1], 'drive.forward': [0.05, 0.05, 0.0]})
+    run = drive(5.5, **{'drive.time': [0.0, 2.0, 2.1], 'drive.forward': [0.05, 0.05, 0.0]})
     sets = estimate(run)
     at_rest = sets[-20:]
     assert all((s.slip_class == SlipClass.UNKNOWN).all() for s in at_rest)
@@ -352,7 +352,7 @@ def test_a_steered_rover_is_judged_along_its_wheels():
         'drive__forward': [0.05, 0.05, 0.05],
         'drive__turn_rate': [0.0, 0.0, 0.05],
     }
-    drive = simulate(load('steered_turns', **arcs), 4, duration=4.5)
+    drive = simulate(load('steered_turns', **arcs), 4, duration=4.0)
     truth, configuration = drive.truth, drive.configuration
     turning = np.abs(truth.yaw_rate) > 0.03
     assert turning.sum() > 25
