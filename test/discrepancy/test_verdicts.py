@@ -137,6 +137,21 @@ def test_beds_that_differ_from_sweep_to_sweep_are_no_effect(unproposed, options)
     assert again.what.startswith('the sweeps of least and greatest normal load again')
 
 
+def test_soil_that_differs_from_day_to_day_is_no_effect(unproposed):
+    table, values, soil, rows = make('sweep40')
+    cohesive = soil.cohesion + 700.0
+    wet = replace(soil, frictional_modulus=1.4 * soil.frictional_modulus, cohesion=cohesive)
+    second = np.arange(40) % 2 == 1  # each sweep was taken on both days
+    plain, change = solve(rows, soil), solve(rows, wet)
+    for key in ('sinkage', 'drawbar_pull', 'torque'):
+        table[key] = table[key] + np.where(second, change[key] - plain[key], 0.0)
+    assert run(table, values, options=TWO).verdict != 'agrees'
+    found = run({**table, 'date': 20573.3 + second}, values, options=TWO)
+    assert (found.verdict, found.effects) == ('agrees', ())
+    assert any('differs from day to day' in note for note in found.notes)
+    assert found.next_measurement[0].what.endswith('all on one day')
+
+
 def test_a_name_that_shrinks_no_gap_is_not_given(monkeypatch, unproposed):
     table, values, *_ = make('lugs48', ('lug_support',), 1.5)
     few = Options(effects=('lug_support',))

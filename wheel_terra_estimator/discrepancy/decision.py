@@ -93,9 +93,10 @@ class Decision:
     # Column -> factor that it lacks, or what it is, where it looks misread; nothing is named then
     misread: Mapping[str, float | str] = field(default_factory=dict)
     proposal: Proposal | None = None  # A law, where something is missing and no name is given
-    beds_differ: float = 0.0  # probability that only the beds of the sweeps differ, where notable
+    beds_differ: float = 0.0  # probability that only the beds differ, where notable
+    by_day: bool = False  # those of the days, not of the sweeps
 
-    def unless(self, apart: Decision, probability: float) -> Decision:
+    def unless(self, apart: Decision, probability: float, *, by_day: bool) -> Decision:
         """Return ``apart``, the decision where beds differ, if that is the more probable one.
 
         Else the names are less sure, and no law is proposed unless beds are improbable.
@@ -103,10 +104,10 @@ class Decision:
         if not apart.verdict.left.accounted_for:
             return self  # nor do beds
         if probability > _LIKELY:
-            return replace(apart, beds_differ=probability)
+            return replace(apart, beds_differ=probability, by_day=by_day)
         names = _as_sure(self.names, 1.0 - probability)
         law = self.proposal if probability < _OPEN_TO_BEDS else None
-        return replace(self, names=names, proposal=law, beds_differ=probability)
+        return replace(self, names=names, proposal=law, beds_differ=probability, by_day=by_day)
 
     @property
     def floor(self) -> float:
@@ -123,7 +124,7 @@ class Decider:
     findings: Findings
     allowed_error: float  # model error that is no reason for doubt [share of the range]
     misread: Mapping[str, float | str] = field(default_factory=dict)  # as in the decision
-    beds_differ: bool = False  # from sweep to sweep: unseen rows may be off by more than noise
+    beds_differ: bool = False  # unseen rows may be off by more than noise
     # Best law beside each floor, soil held or not: it competes with names, or is proposed
     laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
 

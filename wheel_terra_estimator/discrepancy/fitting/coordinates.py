@@ -76,6 +76,9 @@ LOOSE = 6.0
 # By which prepared beds differ, shares of the soil numbers: forces of repeated plates and wheels on
 # CMU's bed (measured/cmu_single_wheel) scatter by 2 to 17 %, 8 % pooled; of the friction assumed.
 BED_SCATTER = {'stiffness': 0.10, 'tan_friction': 0.03}
+# By which a soil differs from day to day, with moisture and density: shares, cohesion in Pa;
+# assumed, published loams of two moistures differ by more.
+DAY_SCATTER = {'stiffness': 0.30, 'tan_friction': 0.10, 'cohesion': 500.0}
 BED = 'bed'  # owner of what the bed of the rows under diagnosis has in excess of a reference's
 _FARTHEST_BED = 8.0  # deviations by which it may differ
 

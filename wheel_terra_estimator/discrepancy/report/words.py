@@ -14,7 +14,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
-from wheel_terra_estimator.discrepancy.fitting.coordinates import BED, BED_SCATTER
+from wheel_terra_estimator.discrepancy.fitting.coordinates import BED, BED_SCATTER, DAY_SCATTER
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.noise import ENOUGH_REPEATS, SCATTER_CHANCE
 from wheel_terra_estimator.discrepancy.numbers import (
@@ -272,20 +272,29 @@ def _repeatability(noise: Noise) -> list[str]:
     return found
 
 
-def own_beds(probability: float, table: SteadyTable) -> tuple[str, ...]:
-    """Return a remark where every sweep has a bed of its own, and the beds may differ."""
+def own_beds(probability: float, table: SteadyTable, *, by_day: bool = False) -> tuple[str, ...]:
+    """Return a remark where sweeps or days have beds of their own, and these may differ."""
     if not probability:
         return ()
+    if by_day:
+        usual = percent(DAY_SCATTER['stiffness'])
+        so = f'that the soil differs from day to day ({usual} of the stiffness are usual)'
+        return (f'{so} is {percent(probability)} likely',)
     return (
         f'{_swept(table)} and bed changed together, from sweep to sweep: that the beds differ '
         f'(a tenth of the stiffness is usual) is {percent(probability)} likely',
     )
 
 
-def fresh_bed(probability: float, table: SteadyTable) -> tuple[NextMeasurement, ...]:
+def fresh_bed(
+    probability: float, table: SteadyTable, *, by_day: bool = False
+) -> tuple[NextMeasurement, ...]:
     """Return the measurement that tells beds that differ from an effect."""
     if not probability:
         return ()
+    if by_day:
+        what = 'a sweep of each day again, all on one day'
+        return (NextMeasurement(what, ('the soil of another day', 'an effect'), 0.0, math.inf),)
     competitors = 'another bed', f'an effect of {_swept(table)}'
     what = 'one sweep again on a fresh bed, with a column trial'
     if 'trial' in table.columns:
@@ -387,7 +396,8 @@ def _agreement(decision: Decision, gap_p_value: float) -> str:
     within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'
     if not floor:
         within = ' (model-error floor needed: none)'
-    beds = ' and the bed of each sweep may be another' if decision.beds_differ else ''
+    bed = 'soil of each day' if decision.by_day else 'bed of each sweep'
+    beds = f' and the {bed} may be another' if decision.beds_differ else ''
     return f'Model and measurement agree once the soil is refitted{beds}{within}.'
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.fitting import noise as noises
-from wheel_terra_estimator.discrepancy.fitting.coordinates import BED_SCATTER, Coordinate
+from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
@@ -139,15 +139,16 @@ def search(
     )
 
 
-def apart(findings: Findings, beds: IndexArray) -> Findings:
+def apart(findings: Findings, beds: IndexArray, scatter: Mapping[str, float]) -> Findings:
     """Weigh the best explanations once more, where beds differ as they usually do.
 
-    ``beds``: (N,) bed of each row, an error that its rows share.
+    ``beds``: (N,) bed of each row, an error that its rows share; ``scatter``: soil coordinate ->
+    deviation between beds.
     """
     builder, setting = copy(findings.builder), findings.setting
     nothing, std = findings.nothing, findings.noise.std
     for _ in range(2):  # one bed may end far from where several do
-        builder.part_beds(beds, setting.problem, nothing)
+        builder.part_beds(beds, scatter, setting.problem, nothing)
         setting = replace(setting, problem=builder.build(std, findings.outliers))
         nothing = setting.refit(nothing)
     ranked = enumerate(e.fitted for e in findings.selection.explanations)
@@ -309,15 +310,17 @@ class _Builder:
         # The reading lies off the point of linearisation: the tangent takes the cells along.
         self._moved = slope * moved[:, None]
 
-    def part_beds(self, beds: IndexArray, problem: Problem, nothing: Fit) -> None:
-        """Let stiffness and strength of the beds differ, linearly around a fit."""
+    def part_beds(
+        self, beds: IndexArray, scatter: Mapping[str, float], problem: Problem, nothing: Fit
+    ) -> None:
+        """Let the soil of the beds differ, linearly around a fit."""
         self.by_bed = []
         for c, column in zip(nothing.coordinates, nothing.sensitivity.T, strict=True):
-            if c.owner == 'soil' and c.name in BED_SCATTER:
+            if c.owner == 'soil' and c.name in scatter:
                 slope = np.zeros(self.table.measured.shape)
                 slope[problem.row, problem.quantity] = column / c.scale
-                scatter = np.full(len(self.table), BED_SCATTER[c.name])
-                self.by_bed.append(CommonError(slope, scatter, beds))
+                std = np.full(len(self.table), scatter[c.name])
+                self.by_bed.append(CommonError(slope, std, beds))
 
     def build(self, std: FloatArray, outliers: Outliers, *, free: bool = False) -> Problem:
         """Return the problem without some cells; ``free``: trials share no structural error."""

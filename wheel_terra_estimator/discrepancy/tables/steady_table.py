@@ -83,6 +83,12 @@ class SteadyTable:
         sweep = np.ravel(np.unique(levels, axis=0, return_inverse=True)[1])
         return sweep if 0 < sweep.max() < len(self) / _LEAST_ROWS else None
 
+    def days(self) -> IndexArray | None:
+        """(N,) number of the day of each row, on which the soil may be another; None of one day."""
+        dates = np.nan_to_num(self.columns.get('date', np.zeros(len(self))))
+        day = np.ravel(np.unique(np.floor(dates), return_inverse=True)[1])
+        return day if 0 < day.max() < len(self) / _LEAST_ROWS else None
+
     def trials(self) -> FloatArray:
         """(N,) number of the trial of each row: each has a bed of its own; all 0 if not stated."""
         return _level(np.nan_to_num(self.columns.get('trial', np.zeros(len(self)))))
