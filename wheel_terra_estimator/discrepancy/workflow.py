@@ -131,12 +131,12 @@ def diagnose(
     possible = [(beds, scatter) for beds, scatter in grounds if beds is not None]
     alone = reference is None and not misread
     if possible and alone and decision.verdict.status != 'agrees':
-        each = [(apart(findings, *ground), ground[1] is DAY_SCATTER) for ground in possible]
-        parted, by_day = max(each, key=lambda found: found[0].selection.best)
+        place, parted = apart(findings, possible)
         odds = math.exp(min(parted.selection.best - findings.selection.best, _MOST_ODDS))
         odds *= _BEDS_DIFFER / (1.0 - _BEDS_DIFFER)
         if odds > _UNLIKELY:
             other = Decider(table, both, parted, chosen.allowed_error, beds_differ=True).decision()
+            by_day = possible[place][1] is DAY_SCATTER
             decision = decision.unless(other, odds / (1.0 + odds), by_day=by_day)
     notes: tuple[str, ...] = ()
     if decision.verdict.status in OPEN and reference is None and not misread:

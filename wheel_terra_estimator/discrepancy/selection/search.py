@@ -139,18 +139,24 @@ def search(
     )
 
 
-def apart(findings: Findings, beds: IndexArray, scatter: Mapping[str, float]) -> Findings:
+def apart(
+    findings: Findings, grounds: Sequence[tuple[IndexArray, Mapping[str, float]]]
+) -> tuple[int, Findings]:
     """Weigh the best explanations once more, where beds differ as they usually do.
 
-    ``beds``: (N,) bed of each row, an error that its rows share; ``scatter``: soil coordinate ->
-    deviation between beds.
+    ``grounds``: (N,) bed of each row, an error that its rows share, with the deviations of soil
+    coordinates between beds. Returns which of them the soil alone needs most, and the findings.
     """
-    builder, setting = copy(findings.builder), findings.setting
-    nothing, std = findings.nothing, findings.noise.std
-    for _ in range(2):  # one bed may end far from where several do
-        builder.part_beds(beds, scatter, setting.problem, nothing)
-        setting = replace(setting, problem=builder.build(std, findings.outliers))
-        nothing = setting.refit(nothing)
+    alone, builder = list[tuple[float, int, Setting, Fit]](), copy(findings.builder)
+    for place, ground in enumerate(grounds):
+        setting, nothing = findings.setting, findings.nothing
+        for _ in range(2):  # one bed may end far from where several do
+            builder.part_beds(*ground, setting.problem, nothing)
+            problem = builder.build(findings.noise.std, findings.outliers)
+            setting = replace(setting, problem=problem)
+            nothing = setting.refit(nothing)
+        alone.append((setting.explain(nothing).log_evidence, place, setting, nothing))
+    _, place, setting, nothing = max(alone, key=lambda one: one[0])
     ranked = enumerate(e.fitted for e in findings.selection.explanations)
     best = [f for place, f in ranked if len(f.names) == 1 or (f.names and place < _KEPT)]
     fits = setting.fit(
@@ -158,7 +164,7 @@ def apart(findings: Findings, beds: IndexArray, scatter: Mapping[str, float]) ->
     )
     explanations = [setting.explain(f) for f in (nothing, *fits)]
     selection = weigh(explanations, setting.floors, setting.effects)
-    return replace(findings, setting=setting, nothing=nothing, selection=selection)
+    return place, replace(findings, setting=setting, nothing=nothing, selection=selection)
 
 
 def _not_visible(
