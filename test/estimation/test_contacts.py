@@ -36,7 +36,6 @@ from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     RUT_SHARE,
     SHEAR_MODULUS,
-    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SPEED,
 )
@@ -353,7 +352,6 @@ ENTRIES = {
     'modulus': lambda layout: SHEAR_MODULUS,
     'centroid': lambda layout: CENTROID,
     'rut_share': lambda layout: RUT_SHARE,
-    'shear_radius': lambda layout: SHEAR_RADIUS,
     'sinkage': lambda layout: range(layout.size)[layout.sinkage],
 }
 

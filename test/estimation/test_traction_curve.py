@@ -146,7 +146,7 @@ LOADS = (250.0,) * 5 + (0.0,)
 def margin(parts, slope, direction=1.0):
     found = PullMargin(len(LOADS), parts.models)
     sinkages = parts.filter().mean[parts.layout.sinkage]
-    wheels = WheelStates(1.0, sinkages, np.array(LOADS), mound=0.05)
+    wheels = WheelStates(1.0, sinkages, np.array(LOADS))
     found.update(0.0, wheels, direction * math.tan(slope))
     return found.state.margin
 
@@ -154,7 +154,7 @@ def margin(parts, slope, direction=1.0):
 def test_the_margin_is_the_greatest_pull_less_what_the_slope_asks(parts):
     sinkage = parts.filter().mean[parts.layout.sinkage]
     ratio = 1.0 - np.linspace(0.2, 0.95, 40)[:, None]
-    _, pulls = parts.models.torque_and_pull(WheelStates(ratio, sinkage, 250.0, mound=0.05))
+    _, pulls = parts.models.torque_and_pull(WheelStates(ratio, sinkage, 250.0))
     level = margin(parts, 0.0)
     assert level[0] == pytest.approx(pulls[:, 0].max(), abs=0.02 * 250.0)
     assert level[5] == 0.0  # in the air

@@ -20,10 +20,8 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     GRAVITY_BIAS,
-    MOUND,
     RUT_SHARE,
     SHEAR_MODULUS,
-    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SLIP_PER_DEMAND,
     SLIP_SINKAGE,
@@ -48,10 +46,8 @@ _COMMON = (
     ('soil.shear_modulus', RELATIVE, SHEAR_MODULUS),
     ('effects.slip_sinkage_exponent.n1', '-', SLIP_SINKAGE),
     ('stress centroid', 'of the entrance angle', CENTROID),
-    ('stress centroid at high slip', 'of the entrance angle', MOUND),
     ('slip per traction coefficient', '-', SLIP_PER_DEMAND),
     ('share of a rut that stays', '-', RUT_SHARE),
-    ('shear radius', 'of the slip radius', SHEAR_RADIUS),
     ('accelerometer bias', 'm/s^2', GRAVITY_BIAS),
 )
 """Name, unit of the deviations, entry of the state; the friction angle by its tangent."""

@@ -130,7 +130,7 @@ class ResistiveForceModels(WheelModels):
         return rim.torque * states.load * self._radius, rim.pull * states.load
 
     def bearing(self, states: WheelStates) -> Bearing:  # noqa: D102
-        rim = self._rim_forces(states._replace(centroid=0.0, mound=0.0))
+        rim = self._rim_forces(states._replace(centroid=0.0))
         depth = np.minimum(np.maximum(states.sinkage, LEAST_SINKAGE), self._radius)
         softer = states.slip_sinkage * np.abs(slip_of_speed_ratio(states.speed_ratio))
         # As in a law with the exponent 1, to which slip adds.

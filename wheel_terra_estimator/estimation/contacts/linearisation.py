@@ -21,10 +21,8 @@ from wheel_terra_estimator.estimation.contacts.wheel_models import (
 )
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
-    MOUND,
     RUT_SHARE,
     SHEAR_MODULUS,
-    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SPEED,
     StateLayout,
@@ -61,7 +59,7 @@ class ContactForces(NamedTuple):
 class Linearisation(Component[FloatArray]):
     """Evaluates the wheel models once per cycle, with smoothed derivatives.
 
-    Its memory: smoothed derivatives of torque and pull as in `WheelForces`, (2, 6, n); nan = none.
+    Its memory: smoothed derivatives of torque and pull as in `WheelForces`, (2, 5, n); nan = none.
     `leaving_angle_std` is the deviation of a measured leaving angle after smoothing [rad].
 
     Notes
@@ -93,24 +91,23 @@ class Linearisation(Component[FloatArray]):
         turning = np.array(turns)
         rim, load, rut = np.where(turning, cycle.rims, 1.0), np.array(loads), np.array(ruts)
         direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
-        rut_share, sheared = float(x[RUT_SHARE]), 1.0 - float(x[SHEAR_RADIUS])
+        rut_share = float(x[RUT_SHARE])
         met = _met(x, layout, rut)
         speed = direction * headings.speeds(float(x[SPEED]), cycle.yaw_rate)
         states = contact_states(x, layout, load, rut)._replace(
-            speed_ratio=sheared * speed / rim,
+            speed_ratio=speed / rim,
             rim_speed=rim,
             leaving_angle=cycle.leaving_angles,
         )
         forces = self._models.forces(states)
         torque_noise, pull_noise = self._noise_of_angle(states, forces, turning)
         self.state = self.smoothed(forces, load * np.array(self._rover.shear_radius), turning)
-        by_ratio, by_depth, by_strength, by_modulus, by_centroid, by_mound = self.state[
-            ::-1
-        ].transpose(1, 0, 2)
+        by_ratio, by_depth, by_strength, by_modulus, by_centroid = self.state[::-1].transpose(
+            1, 0, 2
+        )
         wheels = np.arange(n)
         # The ratio is that of the direction of rolling: the two signs cancel.
-        rows[:, :, SPEED] = by_ratio * (sheared * np.array(headings.by_speed) / rim)
-        rows[:, :, SHEAR_RADIUS] = by_ratio * (direction * -states.speed_ratio / sheared)
+        rows[:, :, SPEED] = by_ratio * (np.array(headings.by_speed) / rim)
         by_sinkage = np.where(met < rut, 1.0 - rut_share, 1.0)
         rows[:, wheels, layout.sinkage.start + wheels] = by_depth * (direction * by_sinkage)
         rows[:, :, RUT_SHARE] = by_depth * (direction * -met)
@@ -118,7 +115,6 @@ class Linearisation(Component[FloatArray]):
         rows[:, wheels, layout.shear_error.start + wheels] = by_strength * direction
         rows[:, :, SHEAR_MODULUS] = by_modulus * direction
         rows[:, :, CENTROID] = by_centroid * direction
-        rows[:, :, MOUND] = by_mound * direction
         rows[:, ~turning] = 0.0
         pull, torque = np.where(turning, direction * [forces.pull, forces.torque], 0.0)
         return ContactForces(x, pull, torque, rows[0], rows[1], pull_noise, torque_noise)
@@ -160,7 +156,6 @@ def contact_states(
         strength=x[SHEAR_STRENGTH] + x[layout.shear_error],
         shear_modulus=float(x[SHEAR_MODULUS]),
         centroid=float(x[CENTROID]),
-        mound=float(x[MOUND]),
     )
 
 

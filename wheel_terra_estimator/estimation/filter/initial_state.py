@@ -17,10 +17,8 @@ from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, GatedFilte
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     GRAVITY_BIAS,
-    MOUND,
     RUT_SHARE,
     SHEAR_MODULUS,
-    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SLIP_PER_DEMAND,
     SLIP_SINKAGE,
@@ -43,15 +41,12 @@ class PriorTuning:
     speed_std: float = 1.0  # [m/s]
     slip_sinkage_std: float = 0.1  # of n1 [-]
     centroid_std: float = 0.06  # [-]
-    mound_mean: float = 0.05  # where the configured soil knows no mound [-]
-    mound_std: float = 0.1
     slip_per_demand_mean: float = 1.0
     """Slip per required traction coefficient: the inverse slope of a traction curve [-], 0.5 on
     firm ground to 3 near the greatest pull (docs/models/validation.md)."""
     slip_per_demand_std: float = 1.0
     rut_share_mean: float = 0.3
     rut_share_std: float = 0.4
-    shear_radius_std: float = 0.03  # over the slip radius [-]: a third of a lug's height
     sinkage_share: float = 0.5  # of the sinkage at rest
     sinkage_floor: float = 0.005  # [m]
     own_stiffness_share: float = 0.5
@@ -73,9 +68,7 @@ class PriorTuning:
     most_shear_modulus: float = 1.3  # [ln]
     most_slip_sinkage: float = 0.8
     most_centroid: float = 0.3
-    most_mound: float = 0.6
     most_rut_share: float = 0.9  # soil springs back
-    most_shear_radius: float = 0.3
     most_slip_per_demand: float = 8.0  # near the top of the traction curve
     most_stiffness: float = 3.0  # [ln]; more, if the configured soil is softer than that:
     hardest_sinkage: float = 2e-3  # of a wheel at rest on the hardest ground [m]
@@ -174,15 +167,12 @@ def initial_filter(
         SHEAR_MODULUS: priors.shear_modulus_std,
         SLIP_SINKAGE: PRIORS.slip_sinkage_std,
         CENTROID: PRIORS.centroid_std,
-        MOUND: PRIORS.mound_std,
         SLIP_PER_DEMAND: PRIORS.slip_per_demand_std,
         RUT_SHARE: PRIORS.rut_share_std,
-        SHEAR_RADIUS: PRIORS.shear_radius_std,
     }
     P = np.zeros((layout.size, layout.size))
     for index, std in deviations.items():
         P[index, index] = std**2
-    mean[MOUND] = 0.0 if 'soil_mound' in configuration.effects else PRIORS.mound_mean
     mean[RUT_SHARE] = PRIORS.rut_share_mean
     mean[SLIP_PER_DEMAND] = PRIORS.slip_per_demand_mean
     level = WheelStates(1.0, 0.0, np.array(loads))
@@ -214,8 +204,8 @@ def bounds(rover: Rover, layout: StateLayout, priors: SoilPriors) -> tuple[Float
     upper[SHEAR_STRENGTH] = max(PRIORS.most_strength, most * priors.strength_std)
     upper[SHEAR_MODULUS] = PRIORS.most_shear_modulus
     upper[SLIP_SINKAGE] = PRIORS.most_slip_sinkage
-    upper[[CENTROID, MOUND]] = PRIORS.most_centroid, PRIORS.most_mound
-    upper[[RUT_SHARE, SHEAR_RADIUS]] = PRIORS.most_rut_share, PRIORS.most_shear_radius
+    upper[CENTROID] = PRIORS.most_centroid
+    upper[RUT_SHARE] = PRIORS.most_rut_share
     upper[SLIP_PER_DEMAND] = PRIORS.most_slip_per_demand
     upper[layout.stiffness] = max(PRIORS.most_stiffness, most * priors.stiffness_std)
     upper[layout.shear_error] = PRIORS.most_shear_error
@@ -235,8 +225,8 @@ def bounds(rover: Rover, layout: StateLayout, priors: SoilPriors) -> tuple[Float
 
 def with_soil_of(old: FilterMemory, start: FilterMemory, layout: StateLayout) -> FilterMemory:
     """Return the start of a run that keeps soil and biases of an old one, inflated."""
-    kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND]
-    kept += [SLIP_PER_DEMAND, RUT_SHARE, SHEAR_RADIUS]
+    kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID]
+    kept += [SLIP_PER_DEMAND, RUT_SHARE]
     kept += range(layout.size)[layout.stiffness]
     kept += range(layout.size)[layout.torque_zero]
     block = np.ix_(kept, kept)

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.estimation.filter.initial_state import PRIORS, SoilPriors
+from wheel_terra_estimator.estimation.filter.initial_state import SoilPriors
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
-    MOUND,
     RUT_SHARE,
     SHEAR_MODULUS,
-    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
     Prediction,
@@ -36,9 +34,7 @@ class SoilTuning:
     shear_modulus_walk: float = 0.1  # [ln]
     slip_sinkage_walk: float = 0.05
     centroid_walk: float = 0.05
-    mound_walk: float = 0.05
     rut_share_walk: float = 0.02
-    shear_radius_length: float = 20.0  # correlation length of the shear radius [m]
     stiffness_walk: float = 0.15  # of all wheels together [ln]
     own_stiffness_walk: float = 0.3  # of each wheel [ln]
     soft_is_weak: float = 0.7  # correlation of a wheel's own stiffness and strength [-]
@@ -64,7 +60,6 @@ class SoilProcess:
         self._walk = float(configuration.filter.soil_walk) ** 2
         self._error_length = float(configuration.filter.shear_error_length)
         self._error_variance = priors.shear_error_std**2
-        self._shear_radius_variance = PRIORS.shear_radius_std**2
         self._each = np.eye(n)
         self._mean = np.full((n, n), 1.0 / n)
         self._mean_variance = self._error_variance + n * priors.shear_error_common_std**2
@@ -85,12 +80,7 @@ class SoilProcess:
             mean[index] *= forget
             F[index, index] = forget
             Q[index, index] = std**2 * walk
-        Q[MOUND, MOUND] = _TUNING.mound_walk**2 * walk
         Q[RUT_SHARE, RUT_SHARE] = _TUNING.rut_share_walk**2 * walk
-        keep = math.exp(-travel / _TUNING.shear_radius_length)
-        mean[SHEAR_RADIUS] *= keep
-        F[SHEAR_RADIUS, SHEAR_RADIUS] = keep
-        Q[SHEAR_RADIUS, SHEAR_RADIUS] = self._shear_radius_variance * (1.0 - keep * keep)
         k, e = layout.stiffness, layout.shear_error
         Q[k, k] = self._stiffness * walk
         hold = math.exp(-travel / self._error_length)

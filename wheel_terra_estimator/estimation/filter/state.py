@@ -17,9 +17,6 @@ slip_sinkage     -      Added to n1 in N = n0 + n1 |s|.
 centroid         -      Common shift of the centroid of the contact stress, as a share of the
                         entrance angle: takes up errors of c1, c2, c3 and of resistances that the
                         torque does not see (bulldozing). Seen by torque against the balance.
-mound            -      The part of that shift that comes with slip, (s - onset)+^2: soil piles up
-                        behind the wheel and pushes it (the effect ``soil_mound``). Seen where slip
-                        changes.
 slip_per_demand  -      Change of slip by that of the required traction coefficient: the inverse
                         slope of the traction curve. It predicts the slip on a change of slope
                         before the next reference velocity shows it, and is learned from these.
@@ -34,9 +31,6 @@ torque_zero (n)  N m    Zero of each torque sensor, constant. Seen where loads a
 rut_share        -      Share of the rut of the wheel before that stays pressed: a wheel which
                         follows begins there (multi-pass), so that its contact is shorter than its
                         sinkage below the undisturbed surface says. Seen as axles differ.
-shear_radius     -      Relative difference of shear radius and slip radius: the soil is sheared at
-                        another radius than that of the slip, and a measured traction curve seldom
-                        begins at the origin. Gauss-Markov over travel.
 reference_error  m/s    Only with ``sensors.reference_wander_std``: correlated part of the error of
                         the reference velocity, first-order Gauss-Markov over time, as of a
                         satellite receiver whose error lasts over many readings.
@@ -63,12 +57,10 @@ from wheel_terra_estimator.arrays import FloatArray
     SHEAR_MODULUS,
     SLIP_SINKAGE,
     CENTROID,
-    MOUND,
     SLIP_PER_DEMAND,
     RUT_SHARE,
-    SHEAR_RADIUS,
-) = range(10)
-_COMMON = 10
+) = range(8)
+_COMMON = 8
 
 
 @dataclass(frozen=True)
