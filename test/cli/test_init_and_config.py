@@ -17,6 +17,7 @@ from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.rover_template import passes
 from wheel_terra_estimator.configuration.urdf import _origin, read_urdf
+from wheel_terra_estimator.estimation.rover import Rover
 
 PATHFINDER = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
 STAMP = 1_700_000_000_000_000_000  # [ns]
@@ -186,6 +187,98 @@ def test_what_steers_is_found_in_a_urdf(init, capsys, axis, told):
     }
     # An axis that points down counts to the right.
     assert ('wheels.steering_joints' in capsys.readouterr().out) == told
+
+
+def arm(name, xyz, parent='base_link', axis='0 1 0', kind='revolute'):
+    """A link that turns on its parent, and its joint."""
+    return (
+        f'<link name="{name}"/><joint name="{name}_joint" type="{kind}"><parent link="{parent}"/>'
+        f'<child link="{name}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/></joint>'
+    )
+
+
+ROCKER, BOGIE, HUBS = (0.07, 0.10), (-0.11, 0.05), (0.28, 0.0, -0.26)  # x, z; x of hubs [m]
+
+
+def side_of_six(y, name, rocker='revolute', last='rocker'):
+    """Three wheels of a side: the first on the rocker (or on `last`), the others on the bogie."""
+    (rx, rz), (bx, bz) = ROCKER, BOGIE
+    links = arm(f'{name}_rocker', f'{rx} {y} {rz}', kind=rocker)
+    links += arm(f'{name}_bogie', f'{bx - rx} 0 {bz - rz}', f'{name}_rocker')
+    parents = last.replace('rocker', f'{name}_rocker'), f'{name}_bogie', f'{name}_bogie'
+    origins = {f'{name}_rocker': (rx, y, rz), f'{name}_bogie': (bx, y, bz), 'across': (0.28, 0, 0)}
+    for i, parent in enumerate(parents):
+        at = np.subtract((HUBS[i], y, -0.1), origins[parent])
+        links += wheel(f'{name}_{i}', ' '.join(map(str, at)), parent=parent)
+    return links
+
+
+def six(*, across='', **keys):
+    body = '<link name="base_link"><inertial><mass value="28"/></inertial></link>'
+    sides = side_of_six(0.2, 'left', **keys) + side_of_six(-0.2, 'right', **keys)
+    return f'<robot name="six">{body}{across}{sides}</robot>'
+
+
+def test_rocker_and_bogie_carry_the_wheels_of_a_urdf(init, capsys):
+    """The loads are those of the levers: the differential holds both rockers' sides alike."""
+    rover = init(urdf=six())
+    assert rover.rover.suspension == 'rocker_bogie' and rover.rover.bogie_wheels == 'rear'
+    assert rover.rover.rocker_pivot == pytest.approx(ROCKER)
+    assert rover.rover.bogie_pivot == pytest.approx(BOGIE)
+    assert 'a guess' not in capsys.readouterr().out
+    loads = Rover.from_configuration(rover).load.loads((0.0, 0.0, 9.81), moment=np.zeros(6))
+    centre = rover.rover.centre_of_gravity[0]
+    front = (centre - BOGIE[0]) / (HUBS[0] - BOGIE[0])  # of a side; the bogie pivot has the rest
+    middle = (1.0 - front) * (BOGIE[0] - HUBS[2]) / (HUBS[1] - HUBS[2])
+    shares = np.repeat([front, middle, 1.0 - front - middle], 2) / 2.0
+    assert loads == pytest.approx(40.0 * 9.81 * shares, rel=1e-3)
+
+
+def test_pivots_that_a_urdf_does_not_show(init, capsys):
+    """Rockers fixed to the chassis (as of JPL's open rover); wheels on arms of their own."""
+    assert init(urdf=six(rocker='fixed')).rover.bogie_pivot == pytest.approx(BOGIE)
+    assert 'rover.rocker_pivot is a guess' in capsys.readouterr().out
+    alone = six().replace('bogie_joint" type="revolute"', 'bogie_joint" type="fixed"')
+    assert init('--overwrite', urdf=alone).rover.suspension == 'rigid'
+    assert 'rover.suspension is a guess' in capsys.readouterr().out
+    init('--overwrite', '--wheels', 'a,b,c,d,e,f', *MEASURES)
+    assert 'rover.suspension is a guess' in capsys.readouterr().out
+
+
+def test_a_triple_bogie_loads_both_wheels_across_alike(init, capsys):
+    """As of ExoMy: whatever leans the rover to the side, the beam across shares evenly."""
+    beam = arm('across', f'{HUBS[0]} 0 0', axis='1 0 0')
+    rover = init(urdf=six(across=beam, rocker='fixed', last='across'))
+    assert 'a guess' not in capsys.readouterr().out
+    loads = Rover.from_configuration(rover).load.loads((0.0, 2.0, 9.0), moment=np.zeros(6))
+    assert loads[0] == pytest.approx(loads[1])
+    assert loads[3] > 1.1 * loads[2]  # the force to the left acts on the right side's bogie
+
+
+def test_the_wheel_of_a_fork_is_a_caster(init):
+    """As of AgileX's Tracer: only the link of the fork is named so."""
+    fork = arm('castor_fork', '0.4 0 0.2', axis='0 0 1', kind='continuous')
+    idle = wheel('idle', '-0.02 0 -0.1', parent='castor_fork')
+    assert init(urdf=CART.replace('</robot>', f'{fork}{idle}</robot>')).wheels.count == 2
+
+
+def test_wheels_that_roll_along_y_have_guessed_places(init, capsys):
+    """As of AgileX's Scout Mini, whose base_link points to the left."""
+    sideways = CART.replace('axis xyz="0 0 1"', 'axis xyz="1 0 0"')
+    init(urdf=sideways)
+    said = capsys.readouterr().out
+    assert 'wheels.x is a guess' in said and 'wheels.y is a guess' in said
+
+
+def test_joints_to_choose_the_wheels_from_turn_about_y(init, capsys):
+    """As of ExoMy, where knuckles and eyes turn, too; wheels of tracked vehicles are revolute."""
+    rims = CART.replace('_wheel_joint', '_rim')
+    eye = arm('eye', '0 0 1', axis='1 0 0', kind='continuous')
+    assert init(urdf=rims.replace('</robot>', f'{eye}{arm("boom", "0 0 1")}</robot>')) == 2
+    said = capsys.readouterr().err
+    assert said.endswith('--wheels right_rim,left_rim\n') and 'tracks' in said
+    assert init(urdf=CART.replace('"continuous"', '"revolute"')) == 2
+    assert 'no continuous joint named as a wheel' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,7 @@ _MEASURES = (
     ('mass', 'KG', 'mass on these wheels [kg]'),
 )
 DESCRIPTION = '/robot_description'
+_FEW_WHEELS = 4  # number up to which the suspension hardly matters
 TEXT_AT = 8
 """Bytes of a std_msgs/String before its text: encapsulation and length."""
 _NEEDED = ('radius', 'track', 'wheelbase', 'mass')
@@ -76,6 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_file(arguments.output, arguments.overwrite)
     sketch = _sketch(arguments)
+    if len(sketch.wheels) > _FEW_WHEELS and not sketch.suspension:
+        sketch = replace(sketch, guessed=sketch.guessed | {'rover.suspension'})
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(rover_file(sketch), encoding='utf-8')
     reader.load([arguments.output])

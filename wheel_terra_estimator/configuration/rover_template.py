@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from wheel_terra_estimator.configuration.parameters import declared
@@ -39,6 +39,7 @@ class RoverSketch:
     direction: Sequence[int] = ()
     wheel_odometry: str = ''  # topic that carries the rates; '': joint_states
     steering_joints: Sequence[str] = ()  # that steer each wheel, '' = not steered
+    suspension: Mapping[str, Value] = field(default_factory=dict)  # its keys; none: not known
     left_out: Sequence[str] = ()  # joints that may be wheels, by their height
     guessed: frozenset[str] = field(default_factory=frozenset)
     source: str = ''
@@ -51,6 +52,7 @@ def rover_file(sketch: RoverSketch) -> str:
         'rover.name': sketch.name,
         'rover.mass': float(sketch.mass),
         'rover.centre_of_gravity': [float(v) for v in sketch.centre_of_gravity],
+        **sketch.suspension,
         'wheels.names': list(sketch.wheels),
         'wheels.radius': [float(v) for v in sketch.radius],
         'wheels.width': [float(v) for v in sketch.width],
@@ -76,11 +78,14 @@ def rover_file(sketch: RoverSketch) -> str:
     lines = [as_text(values, comment, notes)]
     lines += ['    # Worth stating if known (values shown are the defaults):']
     for key in _WORTH_STATING:
+        if key in values:
+            continue
         parameter = table[key]
         default = parameter.default
         shown = [default] * count if parameter.size == 'wheels' else default
         unit = f' [{parameter.unit}]' if parameter.unit not in ('', '-') else ''
-        lines.append(f'    # {key}: {format_value(shown)}  # {parameter.meaning}{unit}')
+        mark = f'{A_GUESS}: ' if key in sketch.guessed else ''
+        lines.append(f'    # {key}: {format_value(shown)}  # {mark}{parameter.meaning}{unit}')
     return '\n'.join(lines) + '\n'
 
 

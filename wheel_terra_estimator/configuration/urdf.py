@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Wheels, what steers them and mass of a rover from its URDF.
+"""Wheels, what steers and carries them, and mass of a rover from its URDF.
 
 A URDF may come from anywhere: documents with a DTD or entities are refused (they could blow up or
 read files), and the size is bounded.
@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.configuration.rover_template import (
     CENTRE_HEIGHT,
     DEFAULT_WIDTH_SHARE,
@@ -29,9 +30,10 @@ DEEPEST_CHAIN = 1000
 BASE_LINKS = ('base_link', 'base_footprint')
 
 _ROUND = ('cylinder', 'sphere')
-_ACROSS = 0.1  # y of an axis below which its sign is unknown
+_ACROSS = 0.1  # y of a wheel's axis (leftward if a positive rate drives forward): known from here
 _NEAR = 0.01  # axles that differ less in height may be of wheels alike [m]
-_UPRIGHT = 0.8  # cosine between the axis of a joint that steers and the vertical, at least
+_ALONG = 0.8  # cosine between an axis and a direction that it points along, at least
+_ROCKER_BOGIE = 3  # wheels on each side of a rover with rockers and bogies
 
 Pose = FloatArray  # (4, 4)
 
@@ -55,10 +57,10 @@ def read_urdf(
     names = list(wheels) or [name for name, joint in joints.items() if _is_wheel(name, joint)]
     missing = [name for name in names if name not in joints]
     if missing or not names:
-        turning = [n for n, j in joints.items() if j.get('type') in ('continuous', 'revolute')]
+        named = 'no joint ' + missing[0] if missing else 'no continuous joint named as a wheel'
         raise UserError(
-            f'{path}: {"no joint " + missing[0] if missing else "no joint named as a wheel"}; give '
-            f'the wheels, of its turning joints: --wheels {",".join(turning) or "(none)"}'
+            f'{path}: {named}; give the wheels (tracks are not modelled), of its turning joints: '
+            f'--wheels {",".join(robot.turning_across()) or "(none)"}'
         )
     placed = [(name, robot.pose(joints[name])) for name in names]
     placed.sort(key=lambda item: (-round(item[1][0, 3], 3), -item[1][1, 3]))
@@ -82,9 +84,11 @@ def read_urdf(
         )
     guessed = set() if all(w for _, w in shapes) else {'wheels.width'}
     radii = [r for r, _ in shapes]
-    leftward = [_leftward(joints[n], p, path) for n, p in zip(names, poses, strict=True)]
-    if any(abs(left) < _ACROSS for left in leftward):
+    axes = [p[:3, :3] @ _axis(joints[n], path) for n, p in zip(names, poses, strict=True)]
+    if any(abs(axis[1]) < _ACROSS for axis in axes):
         guessed.add('wheels.direction')
+    if all(abs(axis[0]) > _ALONG for axis in axes):
+        guessed |= {'wheels.x', 'wheels.y'}  # they roll along y, so that x may not be forward
     steering = [robot.steering_joint(joints[name]) for name in names]
     if any(axis < 0.0 for _, axis in steering):
         guessed.add('wheels.steering_joints')
@@ -95,6 +99,9 @@ def read_urdf(
         centre = [0.0, 0.0, round(ground + CENTRE_HEIGHT * max(radii), 4)]
     elif not round(poses[-1][0, 3], 3) <= round(centre[0], 3) <= round(poses[0][0, 3], 3):
         guessed.add('rover.mass')  # a caster, or what else there is, carries a part of it
+    suspension, rockers_known = robot.suspension(names, poses, centre[0])
+    if suspension and not rockers_known:
+        guessed.add('rover.rocker_pivot')
     return RoverSketch(
         name=robot.name,
         wheels=names,
@@ -105,8 +112,9 @@ def read_urdf(
         z=[round(float(p[2, 3]), 5) for p in poses],
         mass=round(mass, 3) or 50.0,
         centre_of_gravity=centre,
-        direction=[-1 if left < -_ACROSS else 1 for left in leftward],
+        direction=[-1 if axis[1] < -_ACROSS else 1 for axis in axes],
         steering_joints=[joint for joint, _ in steering],
+        suspension=suspension,
         left_out=[n for n, z in height.items() if z < max(p[2, 3] for p in poses) + _NEAR],
         guessed=frozenset(guessed),
         source=f'{path.name}, relative to {robot.base}',
@@ -140,8 +148,9 @@ def _parse(path: Path, data: bytes | None) -> ElementTree.Element:
 
 def _is_wheel(name: str, joint: ElementTree.Element) -> bool:
     words = f'{name} {_link(joint, "child")}'.lower()
-    caster = re.search(r'caster|steer', words)
-    return joint.get('type') == 'continuous' and 'wheel' in words and not caster
+    caster = re.search('cast[eo]r', f'{words} {_link(joint, "parent")}'.lower())
+    other = caster or 'steer' in words
+    return joint.get('type') == 'continuous' and 'wheel' in words and not other
 
 
 def _link(joint: ElementTree.Element, side: str) -> str:
@@ -181,9 +190,8 @@ def _axis(joint: ElementTree.Element, path: Path) -> FloatArray:
     return np.array(_numbers(axis.get('xyz') if axis is not None else None, (1.0, 0, 0), path))
 
 
-def _leftward(joint: ElementTree.Element, pose: Pose, path: Path) -> float:
-    """Return y of a joint's axis: a positive rate drives forward where it points left."""
-    return float((pose[:3, :3] @ _axis(joint, path))[1])
+def _mean_x_z(poses: Sequence[Pose]) -> list[float]:
+    return [round(float(np.mean([pose[k, 3] for pose in poses])), 5) for k in (0, 2)]
 
 
 class _Robot:
@@ -242,21 +250,81 @@ class _Robot:
                 return radius, length
         return 0.0, 0.0
 
+    def turning_across(self) -> list[str]:
+        """Return the joints that may turn wheels: of those about y if there are any, else all."""
+        turning = [n for n, j in self.joints.items() if j.get('type') in ('continuous', 'revolute')]
+        axes = {
+            n: self.pose(self.joints[n])[:3, :3] @ _axis(self.joints[n], self.path) for n in turning
+        }
+        free = [n for n in turning if self.joints[n].get('type') == 'continuous'] or turning
+        return [n for n in free if abs(axes[n][1]) > _ALONG] or turning
+
+    def _turning_above(self, wheel: ElementTree.Element) -> Iterator[tuple[str, Pose, FloatArray]]:
+        """Give name, pose and axis in the base of what turns above a wheel, nearest first."""
+        joint = self._above.get(_link(wheel, 'parent'))
+        for _ in range(DEEPEST_CHAIN):
+            if joint is None or _link(joint, 'child') == self.base:
+                return
+            if joint.get('type') in ('revolute', 'continuous'):
+                pose = self.pose(joint)
+                yield joint.get('name', ''), pose, pose[:3, :3] @ _axis(joint, self.path)
+            joint = self._above.get(_link(joint, 'parent'))
+
     def steering_joint(self, wheel: ElementTree.Element) -> tuple[str, float]:
         """Return the joint that steers a wheel, and the z of its axis in the base: -1 counts right.
 
         It is the nearest turning joint above the wheel whose axis is upright; '' and 0 for none.
         """
-        joint = self._above.get(_link(wheel, 'parent'))
-        for _ in range(DEEPEST_CHAIN):
-            if joint is None or _link(joint, 'child') == self.base:
-                break
-            if joint.get('type') in ('revolute', 'continuous'):
-                up = float((self.pose(joint)[:3, :3] @ _axis(joint, self.path))[2])
-                if abs(up) > _UPRIGHT:
-                    return joint.get('name', ''), up
-            joint = self._above.get(_link(joint, 'parent'))
-        return '', 0.0
+        above = self._turning_above(wheel)
+        steering = ((name, float(axis[2])) for name, _, axis in above if abs(axis[2]) > _ALONG)
+        return next(steering, ('', 0.0))
+
+    def suspension(
+        self, wheels: Sequence[str], poses: Sequence[Pose], centre: float
+    ) -> tuple[dict[str, Value], bool]:
+        """Return the keys of a rocker-bogie suspension, and whether the rockers' pivots are known.
+
+        A bogie is a joint about y that carries two wheels of a side, a rocker one that carries all
+        three. Where another bogie joins the remaining wheels of both sides (a triple bogie), the
+        loads are those of rockers about the same pivots as the bogies. Rockers fixed to the
+        chassis are taken to turn below the ``centre`` of gravity, x [m]. Nothing for other rovers.
+        """
+        pivots: dict[str, Pose] = {}
+        carried: dict[str, set[int]] = {}
+        for i, wheel in enumerate(wheels):
+            for name, pose, axis in self._turning_above(self.joints[wheel]):
+                if abs(axis[2]) < _ALONG:
+                    pivots[name] = pose
+                    carried.setdefault(name, set()).add(i)
+        bogies, rockers, fronts = [], [], set()
+        x = [float(pose[0, 3]) for pose in poses]
+        left = {i for i, pose in enumerate(poses) if pose[1, 3] > 0.0}
+        for side in (left, set(range(len(wheels))) - left):
+            bogie = [n for n, held in carried.items() if len(held) == 2 and held < side]
+            if len(side) != _ROCKER_BOGIE or len(bogie) != 1:
+                return {}, False
+            pair = [x[i] for i in carried[bogie[0]]]
+            pivot = pivots[bogie[0]]
+            if not min(pair) < pivot[0, 3] < max(pair):
+                return {}, False
+            bogies.append(pivot)
+            rockers += [pivots[n] for n, held in carried.items() if held == side][:1]
+            (alone,) = side - carried[bogie[0]]
+            fronts.add(min(pair) > x[alone])
+            joined = any(alone in h and h - side and len(h) == 2 for h in carried.values())
+        if len(fronts) != 1:
+            return {}, False
+        bogie_x, bogie_z = _mean_x_z(bogies)
+        if len(rockers) == len(bogies):
+            rocker = _mean_x_z(rockers)
+        else:
+            rocker = [bogie_x if joined else centre, bogie_z]
+        return {
+            'rover.suspension': 'rocker_bogie',
+            'rover.rocker_pivot': rocker,
+            'rover.bogie_pivot': [bogie_x, bogie_z],
+            'rover.bogie_wheels': 'front' if fronts.pop() else 'rear',
+        }, joined or len(rockers) == len(bogies)
 
     def mass(self) -> tuple[float, list[float]]:
         """Return the mass of all links and their centre of gravity in the base."""
