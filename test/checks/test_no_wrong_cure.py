@@ -658,6 +658,19 @@ def test_one_late_message_beside_a_loss_is_no_step_of_a_clock():
     assert faults(rolling.checked(reference=late)) == []
 
 
+def test_two_damaged_messages_are_no_habit_of_a_driver():
+    rate = WHOLE.joints.rate.copy()
+    rate[[300, 400]] = 40.0  # of all wheels
+    assert faults(rolling.checked(joints=replace(WHOLE.joints, rate=rate))) == []
+
+
+def test_a_reference_that_is_lost_twice_has_no_second_publisher():
+    seconds, velocity = WHOLE.reference.seconds, WHOLE.reference.velocity.copy()
+    velocity[(abs(seconds - 30.0) < 1.0) | (abs(seconds - 80.0) < 1.0)] = 0.0
+    reference = replace(WHOLE.reference, velocity=velocity)
+    assert 'reference_zeros' not in faults(rolling.checked(reference=reference))
+
+
 def test_torques_that_break_wheels_away_are_not_wild():
     time = np.arange(0.0, 100.0, 0.05)
     speed = np.where(time % 20.0 < 10.0, 0.0, 0.3)

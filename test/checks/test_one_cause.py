@@ -99,7 +99,9 @@ def test_a_pitch_of_the_imu_that_no_circle_shows_is_named_beside_zeros_of_all_to
 JOINTS = ('front_left_steer', 'front_right_steer', 'rear_left_steer', 'rear_right_steer')
 
 
-def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES, motion=None, **other):
+def steered(
+    change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES, motion=None, sent=lambda v: v, **other
+):
     """A rover with four steered wheels, long beside its track, in circles; angles changed."""
     rover, whole = rolling.rover(**{
         'wheels.x': list(x), 'wheels.steering_joints': list(JOINTS), 'wheels.names': list(names),
@@ -114,7 +116,7 @@ def steered(change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES, motion=None, 
     joints = replace(
         whole.joints,
         names=whole.joints.names + JOINTS,
-        rate=np.hstack([rate, none]),
+        rate=np.hstack([sent(rate), none]),
         torque=np.hstack([whole.joints.torque, none]),
         position=np.hstack([none, change(angle)]),
     )
@@ -159,6 +161,16 @@ def test_joints_across_that_are_exchanged():
     assert [f.wheel for f in report.findings if f.fault == 'steering_angle'] == [
         'front_left, front_right'
     ]
+
+
+def test_angles_of_curves_driven_backward_are_right_where_rates_have_no_sign():
+    time = np.arange(0.0, 160.0, 0.1)
+    yaw = np.interp(time, [5.0, 6.0, 30.0, 31.0, 85.0, 86.0, 110.0, 111.0], [0, 0.2, 0.2, 0] * 2)
+    speed = np.interp(time, [1.0, 2.0, 79.0, 80.0, 81.0, 159.0], [0.0, 0.3, 0.3, 0.0, -0.3, -0.3])
+    report = steered(
+        lambda angle: angle, motion=rolling.Motion(time, speed, yaw, 0.0 * time), sent=np.abs
+    )
+    assert {f.fault for f in report.findings} == {'rates_unsigned'}
 
 
 def test_steering_angles_in_degrees():
