@@ -142,7 +142,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (REFERENCE, {'velocity': between_stamps, 'stamp': lambda s: s + HALF_PERIOD},
      'reference_wheels', None, None, ''),
     (REFERENCE, {'velocity': lambda v: np.where(LOST, 0.0, v)}, 'reference_zeros', None, None, ''),
-    (REFERENCE, {'velocity': by(3.6)}, 'reference_unit', None, approx(1.0 / 3.6), ''),
+    (REFERENCE, {'velocity': by(3.6)}, 'reference_unit', None, approx(1.0 / 3.6), 'kilometres'),
     (REFERENCE, units(100.0), 'reference_unit', None, approx(0.01), ''),
     (REFERENCE, units(1000.0), 'reference_unit', None, approx(0.001), ''),
     (REFERENCE, {'variance': lambda v: 0.0 * v + 1e6}, 'covariance', None, None, ''),

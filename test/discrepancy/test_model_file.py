@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_workflow import FEW, make, noisy
+from test_workflow import FEW, make, noisy, run
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
@@ -43,6 +43,15 @@ def assert_errors(rows, table, gaps, which='fitted', near=2e-3):
         assert error == pytest.approx(getattr(gaps[quantity], which), rel=near)
 
 
+def written(table, values, folder, **options):
+    """Return the diagnosis of a table; its model file gives the errors that it states."""
+    found = run(table, values, **options)
+    write_model(found, folder / 'model.yaml')
+    rows = predicted(table, found.configuration, folder, 'model.yaml')
+    assert_errors(rows, table, found.gap)
+    return found
+
+
 @pytest.mark.parametrize(
     ('hidden', 'known', 'design'),
     [
@@ -63,12 +72,8 @@ def test_predict_with_the_written_model_gives_the_reported_error(hidden, known, 
             'effects.slip_sinkage_exponent.n1': 1.0,
             'effects.slip_sinkage_exponent.n1_std': 0.5,
         }
-    configuration = reader.from_parameters(values, complete=False)
     few = Options(effects=('slip_sinkage_exponent', 'drivetrain_friction', 'lug_digging'))
-    found = diagnose(check_table('t.csv', table), configuration, options=few)
-    write_model(found, tmp_path / 'model.yaml')
-    rows = predicted(table, configuration, tmp_path, 'model.yaml')
-    assert_errors(rows, table, found.gap)
+    found = written(table, values, tmp_path, options=few)
     for gap in found.gap.values():
         assert gap.fitted == pytest.approx(gap.after, rel=0.3)
     both = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
@@ -91,17 +96,14 @@ def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
     table = noisy(rows, exact, exact, np.random.default_rng(9))
     prefix = 'effects.slip_sinkage_exponent'
     values |= {f'{prefix}.enabled': True, f'{prefix}.n1': 0.3}
-    configuration = reader.from_parameters(values, complete=False)
     few = Options(effects=('slip_sinkage_exponent', 'bulldozing', 'cohesion'))
-    found = diagnose(check_table('t.csv', table), configuration, options=few)
+    found = written(table, values, tmp_path, options=few)
     assert [(e.name, e.form) for e in found.effects] == [('slip_sinkage_exponent', 'lyasko')]
     gain = found.effects[0].parameters['gain']
     assert abs(gain.value - 1.5) < 4.0 * gain.std
     assert 'the form named here takes its place' in found.notes[0]
     assert 'other forms, in its place, were tried' in found.not_tried['slip_sinkage_exponent']
-    write_model(found, tmp_path / 'model.yaml')
-    assert_errors(predicted(table, configuration, tmp_path), table, found.gap, 'before')
-    assert_errors(predicted(table, configuration, tmp_path, 'model.yaml'), table, found.gap)
+    assert_errors(predicted(table, found.configuration, tmp_path), table, found.gap, 'before')
 
 
 def test_the_written_soil_is_that_of_the_table_where_a_reference_has_another_bed(tmp_path):
@@ -113,12 +115,8 @@ def test_the_written_soil_is_that_of_the_table_where_a_reference_has_another_bed
         friction_angle=np.arctan(0.96 * np.tan(soil.friction_angle)),
     )
     again = noisy(rows, solve(rows, soil), solve(rows, softer), np.random.default_rng(3))
-    configuration = reader.from_parameters(values, complete=False)
-    few = FEW
-    reference = check_table('a.csv', table)
-    found = diagnose(check_table('t.csv', again), configuration, reference, few)
-    write_model(found, tmp_path / 'model.yaml')
-    assert_errors(predicted(again, configuration, tmp_path, 'model.yaml'), again, found.gap)
+    both = {'reference': check_table('a.csv', table), 'options': FEW}
+    found = written(again, values, tmp_path, **both)
     assert (found.verdict, found.effects) == ('agrees', ())
     assert any('0.87' in note and 'of that of the reference' in note for note in found.notes)
     assert any('beds differ so' in note for note in found.notes)
@@ -127,7 +125,7 @@ def test_the_written_soil_is_that_of_the_table_where_a_reference_has_another_bed
     assert stiffness.after / stiffness.before == pytest.approx(0.87, abs=0.02)
     assert friction.after / friction.before == pytest.approx(0.96, abs=0.01)
     # The table alone tells its bed about as well as both tables do.
-    alone = diagnose(check_table('t.csv', again), configuration, options=few).soil[0]
+    alone = run(again, values, options=FEW).soil[0]
     assert stiffness.after_std == pytest.approx(alone.after_std, rel=0.5)
     assert 'the soil is that of the bed of these rows' in corrected(found)[0].provenance
     assert not any('is in no file' in note for note in found.notes)
@@ -143,13 +141,9 @@ def test_the_error_that_a_reference_shares_is_not_in_the_errors_of_the_written_m
     clean = solve(rows, soil)
     both = solve(rows, soil, (SmoothError(0.08, rows, clean, rng),))
     reference, table = (noisy(rows, clean, both, rng) for _ in range(2))
-    configuration = reader.from_parameters(values, complete=False)
     few = Options(effects=('bulldozing', 'cohesion'))
-    found = diagnose(
-        check_table('t.csv', table), configuration, check_table('a.csv', reference), few
-    )
-    write_model(found, tmp_path / 'model.yaml')
-    assert_errors(predicted(table, configuration, tmp_path, 'model.yaml'), table, found.gap)
+    given = {'reference': check_table('a.csv', reference), 'options': few}
+    found = written(table, values, tmp_path, **given)
     assert max(gap.fitted / gap.after for gap in found.gap.values()) > 2.0
     assert sum('is in no file: model.yaml alone errs' in note for note in found.notes) == 1
 
@@ -185,16 +179,12 @@ def test_errors_of_readings_are_written_once_where_the_node_takes_them_off(
     table = with_errors(table, factors, zeros)
     # One of two wheels states errors already: what is found comes on top.
     before = {'sensors.torque_gain': [1.0], 'sensors.sinkage_zero': [0.0]}
-    configuration = reader.from_parameters({**values, **before}, complete=False)
-    found = diagnose(check_table('t.csv', table), configuration, options=SENSORS)
-    write_model(found, tmp_path / 'model.yaml')
+    found = written(table, {**values, **before}, tmp_path, options=SENSORS)
     model = reader.load([tmp_path / 'model.yaml'], complete=False)
     for key, value in keys.items():
         std = {'torque_gain': 0.06, 'sinkage_gain': 0.06, 'torque_zero': 0.15, 'sinkage_zero': 1e-3}
         assert getattr(model.sensors, key)[0] == pytest.approx(value, abs=std[key])
     assert not set(model.effects) & set(OF_SENSORS)
-    rows = predicted(table, configuration, tmp_path, 'model.yaml')
-    assert_errors(rows, table, found.gap)
     again = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
     second = diagnose(check_table('t.csv', table), again, options=SENSORS)
     assert second.verdict == 'agrees'
@@ -213,15 +203,10 @@ def test_an_error_of_a_reading_that_was_an_effect_moves_to_the_sensors(tmp_path)
         'effects.torque_gain.gain': 0.15,
         'effects.torque_gain.gain_std': 0.1,
     }
-    configuration = reader.from_parameters(values, complete=False)
-    found = diagnose(check_table('t.csv', table), configuration, options=SENSORS)
-    write_model(found, tmp_path / 'model.yaml')
-    rows = predicted(table, configuration, tmp_path, 'model.yaml')
+    written(table, values, tmp_path, options=SENSORS)
     both = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
     assert 'torque_gain' not in both.effects
     assert both.sensors.torque_gain[0] == pytest.approx(1.1 * 1.2, rel=0.05)
-    error = np.sqrt(np.mean((rows[:, 2] - table['torque']) ** 2))
-    assert error == pytest.approx(found.gap['torque'].fitted, rel=2e-3)
 
 
 @pytest.mark.slow
@@ -231,8 +216,7 @@ def test_a_friction_of_rows_that_turn_both_ways_stays_a_friction():
     sign = np.where(back, -1.0, 1.0)
     for key in ('angular_velocity', 'drawbar_pull', 'torque'):
         table[key] = sign * table[key]
-    configuration = reader.from_parameters(values, complete=False)
-    model, _ = corrected(diagnose(check_table('t.csv', table), configuration))
+    model, _ = corrected(run(table, values))
     assert model.effects['drivetrain_friction']['torque'] > 0.0
     assert not model.sensors.torque_zero.any()
 
@@ -240,21 +224,20 @@ def test_a_friction_of_rows_that_turn_both_ways_stays_a_friction():
 def test_curves_of_uncertain_slips_stand_where_the_slip_was_read(tmp_path, monkeypatch):
     """The fit stands at more probable slips, which are nearer to the truth than those read."""
     table, values, *_ = make('sweep40')
-    configuration = reader.from_parameters(values, complete=False)
     true, rng = table['slip'], np.random.default_rng(3)
     read = np.clip(true + 0.03 * rng.standard_normal(true.size), -0.9, 0.9)
     search, kept = workflow.search, []
     monkeypatch.setattr(workflow, 'search', lambda *given: kept.append(search(*given)) or kept[0])
     uncertain = {**table, 'slip': read, 'slip_std': np.full(true.size, 0.03)}
     few = Options(effects=('bulldozing', 'cohesion'))
-    found = diagnose(check_table('t.csv', uncertain), configuration, options=few)
+    found = run(uncertain, values, options=few)
     assert found.verdict == 'agrees'
     np.testing.assert_allclose(found.curves.refit, found.curves.after)
     probable = kept[0].setting.forward.points.slip
     assert np.std(probable - true) < 0.8 * np.std(read - true)
     write_model(found, tmp_path / 'model.yaml')
     there, here = (
-        predicted({**table, 'slip': slip}, configuration, tmp_path, 'model.yaml')
+        predicted({**table, 'slip': slip}, found.configuration, tmp_path, 'model.yaml')
         for slip in (read, probable)
     )
     for q in range(1, len(QUANTITIES)):  # pull and torque, which bend little over an error
