@@ -469,14 +469,23 @@ def test_no_yaw_seems_better_known_than_it_scatters(monkeypatch):
     assert np.median(std) < 1.3 * value.std()
 
 
-@pytest.mark.parametrize(('costs', 'told'), [(0.08, True), (0.17, False)])
-def test_slip_that_loose_soil_makes_is_no_radius(costs, told):
-    """The rover makes 0.6 of its way; what that costs is that of firm ground, or of loose."""
+@pytest.mark.parametrize(
+    ('costs', 'told', 'gravity'), [(0.08, True, 9.81), (0.17, False, 9.81), (0.17, False, 3.71)]
+)
+def test_slip_that_loose_soil_makes_is_no_radius(costs, told, gravity):
+    """The rover makes 0.6 of its way; what that costs is that of firm ground, or of loose.
+
+    The weight is that of the IMU's gravity where the rover file states that of another planet.
+    """
     sense = np.sign(np.round(WHOLE.joints.rate, 1))
     weight = rolling.MASS * rolling.GRAVITY
     more = (costs - rolling.RESISTANCE) * weight * rolling.RADIUS / 4 * sense
-    slower = replace(WHOLE.reference, velocity=0.6 * WHOLE.reference.velocity)
-    report = checked(joints={'torque': WHOLE.joints.torque + more}, reference=slower, sinkage=None)
+    slower = {'velocity': 0.6 * WHOLE.reference.velocity}
+    joints, rover = (
+        {'torque': WHOLE.joints.torque + more},
+        rolling.rover(**{'rover.gravity': gravity}),
+    )
+    report = checked(rover, joints=joints, reference=slower, sinkage=None)
     assert bool({*faults(report)} & {'radius', 'reference_scale'}) == told
     if not told:
         assert any('torques are 0.17' in e.reason for e in report.not_checked)
