@@ -289,21 +289,10 @@ class World(RuleBasedStateMachine):
             assert set(self.scales()) <= {0.0, crawl}
 
 
-def run(sequences, **more):
-    run_state_machine_as_test(
-        World,
-        settings=settings(
-            max_examples=sequences,
-            stateful_step_count=10,
-            suppress_health_check=list(HealthCheck),
-            **more,
-        ),
-    )
-
-
 @pytest.mark.hypothesis
 @pytest.mark.parametrize(
     'sequences', [SEQUENCES, pytest.param(50 * SEQUENCES, marks=pytest.mark.slow)]
 )
 def test_no_sequence_of_events_breaks_an_invariant(sequences):
-    run(sequences)
+    calm = {'stateful_step_count': 10, 'suppress_health_check': list(HealthCheck)}
+    run_state_machine_as_test(World, settings=settings(max_examples=sequences, **calm))

@@ -224,12 +224,6 @@ def catches_signals(process):
     return bool(mask >> (signal.SIGTERM - 1) & 1)
 
 
-def assert_two_signals_end(process, number):
-    status, words = process.stop(number, number)
-    assert status == 0, words
-    assert 'Traceback' not in words
-
-
 @pytest.mark.skipif(not Path('/proc/self/status').exists(), reason='asks the kernel of Linux')
 @pytest.mark.parametrize('delay', [0.0, 0.7])
 def test_signals_end_it_while_it_starts_also_twice(start_interpreter, parameters, delay):
@@ -242,7 +236,8 @@ def test_signals_end_it_while_it_starts_also_twice(start_interpreter, parameters
             time.sleep(0.01)
     time.sleep(delay)
     for number, process in processes.items():
-        assert_two_signals_end(process, number)
+        status, words = process.stop(number, number)
+        assert status == 0 and 'Traceback' not in words, words
 
 
 def test_a_closing_that_hangs_is_cut_short(monkeypatch):

@@ -185,16 +185,12 @@ def test_a_side_that_turns_round_behind_a_spin_is_no_stall(spinning):
     assert found[-1].stuck is not spinning
 
 
-def held_from_the_start(ahead):
-    """Half of the wheels turn half as fast, near their limit; return the travel at the warning."""
-    rows = [[wheel(0.1, rim=0.05, torque=0.95)] * 2 + [wheel(0.1, rim=0.1, torque=0.95)] * 2] * 60
-    rows[:1] = [[wheel(0.0, rim=0.0, known=False)] * 4] * ahead
-    return 0.1 * (first(course(rows)) - 0.1 * ahead)
-
-
 @pytest.mark.parametrize('rest', [1, 20])
 def test_pulling_away_is_no_stall_until_the_wheels_have_rolled(rest):
-    assert 0.25 < held_from_the_start(rest) < 0.3
+    """Half of the wheels turn half as fast, near their limit: warned after 0.25 m of rim travel."""
+    rows = [[wheel(0.1, rim=0.05, torque=0.95)] * 2 + [wheel(0.1, rim=0.1, torque=0.95)] * 2] * 60
+    rows[:1] = [[wheel(0.0, rim=0.0, known=False)] * 4] * rest
+    assert 0.25 < 0.1 * (first(course(rows)) - 0.1 * rest) < 0.3
 
 
 @pytest.mark.parametrize('ahead', [1, -1])
@@ -246,27 +242,27 @@ def test_the_direction_is_unknown_where_the_rims_went_both_ways():
     assert rocking == stalling(lambda t: (0.05, -0.05), 8.0) == 0
 
 
-def test_wheels_that_are_being_stopped_raise_nothing_by_an_early_reference():
-    monitor = StuckMonitor(SETTINGS)
-    # The reference stands 0.9 s before the wheels do, as in a recorded stop on firm ground.
-    found = []
-    for i in range(120):
-        t = 0.1 * i
-        speed = min(max(0.7 - 0.9 * max(t - 8.0, 0.0), 0.0), 0.7)
-        rim = min(max(0.7 - 1.2 * max(t - 9.3, 0.0), 0.0), 0.7)
-        slip = 1.0 - speed / rim if rim > 0.01 else 0.0
-        rows = [wheel(slip, rim=rim, known=rim > 0.01, torque=0.1)] * 4
-        found.append(judge(monitor, t, speed, True, rows))
-    assert first(found) is None
+def slowing(speed, deceleration, start):
+    """Return a speed as a function of time that falls to zero from a time on."""
+    return lambda time: max(speed - deceleration * max(time - start, 0.0), 0.0)
 
 
-def test_a_stop_on_a_slope_is_no_want_of_power():
-    """Wheels that are stopped hold the slope: their torque is what it was, half of the limit."""
+@pytest.mark.parametrize(
+    ('rims', 'speeds', 'known', 'torque', 'least'),
+    [
+        # The reference stands 0.9 s before the wheels do, as in a recorded stop on firm ground.
+        (slowing(0.7, 1.2, 9.3), slowing(0.7, 0.9, 8.0), True, 0.1, 0.01),
+        # Wheels that are stopped hold the slope: their torque is what it was, half of the limit.
+        (slowing(0.05, 0.02, 8.0), slowing(0.04, 0.016, 8.0), False, 0.5, 0.002),
+    ],
+)
+def test_wheels_that_are_being_stopped_raise_nothing(rims, speeds, known, torque, least):
     monitor, found = StuckMonitor(SETTINGS), []
-    for i in range(120):
-        rim = min(max(0.05 - 0.02 * max(0.1 * i - 8.0, 0.0), 0.0), 0.05)
-        rows = [wheel(0.2, rim=rim, known=rim > 0.002, torque=0.5)] * 4
-        found.append(judge(monitor, 0.1 * i, 0.8 * rim, False, rows))
+    for time in (0.1 * i for i in range(120)):
+        rim, speed = rims(time), speeds(time)
+        slip = 1.0 - speed / rim if rim > least else 0.0
+        rows = [wheel(slip, rim=rim, known=rim > least, torque=torque)] * 4
+        found.append(judge(monitor, time, speed, known, rows))
     assert first(found) is None
 
 
