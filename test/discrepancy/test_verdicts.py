@@ -133,7 +133,8 @@ def test_beds_that_differ_from_sweep_to_sweep_are_no_effect(unproposed, options)
     assert found.verdict == 'agrees'
     assert found.noise.std[0, 0] == pytest.approx(second['sinkage_std'][0], rel=0.4)
     repeated = SimpleNamespace(columns={'trial': rows['slip']}, varying=lambda: ('normal_load',))
-    (again,) = words.fresh_bed(0.5, repeated)
+    beds = SimpleNamespace(beds_differ=0.5, ground='sweep')
+    (again,) = words.fresh_bed(beds, repeated)
     assert again.what.startswith('the sweeps of least and greatest normal load again')
 
 
@@ -148,8 +149,22 @@ def test_soil_that_differs_from_day_to_day_is_no_effect(unproposed):
     assert run(table, values, options=TWO).verdict != 'agrees'
     found = run({**table, 'date': 20573.3 + second}, values, options=TWO)
     assert (found.verdict, found.effects) == ('agrees', ())
-    assert any('differs from day to day' in note for note in found.notes)
+    assert any('differ from day to day' in note for note in found.notes)
     assert found.next_measurement[0].what.endswith('all on one day')
+
+
+def test_a_drive_whose_wheels_roll_on_different_patches_has_no_effect(unproposed):
+    table, values, soil, rows = make('basic16')
+    plain, patch = solve(rows, soil), np.random.default_rng(2).integers(0, 4, 16)
+    for number, share in enumerate((0.85, 1.1, 0.95, 1.2)):
+        other = replace(soil, frictional_modulus=share * soil.frictional_modulus)
+        change = solve(rows, other)
+        for key in ('sinkage', 'drawbar_pull', 'torque'):
+            table[key] = table[key] + np.where(patch == number, change[key] - plain[key], 0.0)
+    drive = replace(check_table('t.csv', table), true_rows=np.ones(16, dtype=bool))
+    found = diagnose(drive, reader.from_parameters(values, complete=False), options=TWO)
+    assert (found.verdict, found.effects) == ('agrees', ())
+    assert any('differ from row to row' in note for note in found.notes)
 
 
 def test_a_name_that_shrinks_no_gap_is_not_given(monkeypatch, unproposed):

@@ -93,10 +93,10 @@ class Decision:
     # Column -> factor that it lacks, or what it is, where it looks misread; nothing is named then
     misread: Mapping[str, float | str] = field(default_factory=dict)
     proposal: Proposal | None = None  # A law, where something is missing and no name is given
-    beds_differ: float = 0.0  # probability that only the beds differ, where notable
-    by_day: bool = False  # those of the days, not of the sweeps
+    beds_differ: float = 0.0  # probability that only the soil differs, where notable
+    ground: str = ''  # from what to what
 
-    def unless(self, apart: Decision, probability: float, *, by_day: bool) -> Decision:
+    def unless(self, apart: Decision, probability: float, ground: str) -> Decision:
         """Return ``apart``, the decision where beds differ, if that is the more probable one.
 
         Else the names are less sure, and no law is proposed unless beds are improbable.
@@ -104,10 +104,10 @@ class Decision:
         if not apart.verdict.left.accounted_for:
             return self  # nor do beds
         if probability > _LIKELY:
-            return replace(apart, beds_differ=probability, by_day=by_day)
+            return replace(apart, beds_differ=probability, ground=ground)
         names = _as_sure(self.names, 1.0 - probability)
         law = self.proposal if probability < _OPEN_TO_BEDS else None
-        return replace(self, names=names, proposal=law, beds_differ=probability, by_day=by_day)
+        return replace(self, names=names, proposal=law, beds_differ=probability, ground=ground)
 
     @property
     def floor(self) -> float:

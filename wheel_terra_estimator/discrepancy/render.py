@@ -57,7 +57,7 @@ def render(
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
     soil = _shifts(findings, after, 'soil')
     bed = words.another_bed(after)
-    fresh = words.fresh_bed(decision.beds_differ, table, by_day=decision.by_day)
+    fresh = words.fresh_bed(decision, table)
     beds_first = decision.beds_differ > 0.5  # more likely than not
     moved = (*soil, *_shifts(findings, after, *setting.forward.base_effects))
     return Diagnosis(
@@ -91,7 +91,7 @@ def render(
         notes=(
             *words.notes(both, findings, after, () if decision.misread else moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
-            *words.own_beds(decision.beds_differ, table, by_day=decision.by_day),
+            *words.own_beds(decision, table),
             *([bed] if bed else []),
             *words.alone(decision.gap),
         ),

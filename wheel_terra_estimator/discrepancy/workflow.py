@@ -16,8 +16,6 @@ from wheel_terra_estimator.configuration.configuration import Configuration, Rea
 from wheel_terra_estimator.discrepancy.decision import Decider
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     BED,
-    BED_SCATTER,
-    DAY_SCATTER,
     base_coordinates,
     bed_coordinates,
     soil_coordinates,
@@ -45,7 +43,7 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 _MOST_ODDS = 10.0  # nats
 _UNLIKELY = 0.05  # odds of different beds below which they are not reported
-_BEDS_DIFFER = 0.2  # prior probability, where sweeps or days have beds of their own; assumed
+_BEDS_DIFFER = 0.2  # prior probability, where rows may be on several; assumed
 
 
 @dataclass(frozen=True)
@@ -127,17 +125,14 @@ def diagnose(
     ):  # a load, slip or mere size may be an error that both share
         misread_in, misread = f'{" and ".join(asked)}: ', found[1]
     decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
-    grounds = ((table.sweeps(), BED_SCATTER), (table.days(), DAY_SCATTER))
-    possible = [(beds, scatter) for beds, scatter in grounds if beds is not None]
-    alone = reference is None and not misread
-    if possible and alone and decision.verdict.status != 'agrees':
-        place, parted = apart(findings, possible)
+    grounds = table.grounds() if reference is None and not misread else {}
+    if grounds and decision.verdict.status != 'agrees':
+        ground, parted = apart(findings, grounds)
         odds = math.exp(min(parted.selection.best - findings.selection.best, _MOST_ODDS))
         odds *= _BEDS_DIFFER / (1.0 - _BEDS_DIFFER)
         if odds > _UNLIKELY:
             other = Decider(table, both, parted, chosen.allowed_error, beds_differ=True).decision()
-            by_day = possible[place][1] is DAY_SCATTER
-            decision = decision.unless(other, odds / (1.0 + odds), by_day=by_day)
+            decision = decision.unless(other, odds / (1.0 + odds), ground)
     notes: tuple[str, ...] = ()
     if decision.verdict.status in OPEN and reference is None and not misread:
         for name, forms in _other_forms(forward, chosen).items():

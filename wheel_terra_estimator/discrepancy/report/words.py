@@ -14,7 +14,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
-from wheel_terra_estimator.discrepancy.fitting.coordinates import BED, BED_SCATTER, DAY_SCATTER
+from wheel_terra_estimator.discrepancy.fitting.coordinates import BED, BED_SCATTER, SCATTER
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.noise import ENOUGH_REPEATS, SCATTER_CHANCE
 from wheel_terra_estimator.discrepancy.numbers import (
@@ -272,33 +272,30 @@ def _repeatability(noise: Noise) -> list[str]:
     return found
 
 
-def own_beds(probability: float, table: SteadyTable, *, by_day: bool = False) -> tuple[str, ...]:
-    """Return a remark where sweeps or days have beds of their own, and these may differ."""
-    if not probability:
+def own_beds(decision: Decision, table: SteadyTable) -> tuple[str, ...]:
+    """Return a remark where the soil may differ from sweep to sweep, day to day or row to row."""
+    if not decision.beds_differ:
         return ()
-    if by_day:
-        usual = percent(DAY_SCATTER['stiffness'])
-        so = f'that the soil differs from day to day ({usual} of the stiffness are usual)'
-        return (f'{so} is {percent(probability)} likely',)
+    usual = percent(SCATTER[decision.ground]['stiffness'])
+    together = f'{_swept(table)} and bed changed together: ' if decision.ground == 'sweep' else ''
     return (
-        f'{_swept(table)} and bed changed together, from sweep to sweep: that the beds differ '
-        f'(a tenth of the stiffness is usual) is {percent(probability)} likely',
+        f'{together}that the beds differ from {decision.ground} to {decision.ground} ({usual} of '
+        f'the stiffness is usual) is {percent(decision.beds_differ)} likely',
     )
 
 
-def fresh_bed(
-    probability: float, table: SteadyTable, *, by_day: bool = False
-) -> tuple[NextMeasurement, ...]:
+def fresh_bed(decision: Decision, table: SteadyTable) -> tuple[NextMeasurement, ...]:
     """Return the measurement that tells beds that differ from an effect."""
-    if not probability:
+    if not decision.beds_differ:
         return ()
-    if by_day:
-        what = 'a sweep of each day again, all on one day'
-        return (NextMeasurement(what, ('the soil of another day', 'an effect'), 0.0, math.inf),)
-    competitors = 'another bed', f'an effect of {_swept(table)}'
-    what = 'one sweep again on a fresh bed, with a column trial'
-    if 'trial' in table.columns:
+    what = {
+        'row': 'the drive again beside its ruts',
+        'sweep': 'one sweep again on a fresh bed, with a column trial',
+        'day': 'a sweep of each day again, all on one day',
+    }[decision.ground]
+    if decision.ground == 'sweep' and 'trial' in table.columns:
         what = f'the sweeps of least and greatest {_swept(table)} again, each on two fresh beds'
+    competitors = 'another bed', f'an effect of {_swept(table)}'
     return (NextMeasurement(what, competitors, 0.0, math.inf),)
 
 
@@ -396,8 +393,7 @@ def _agreement(decision: Decision, gap_p_value: float) -> str:
     within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'
     if not floor:
         within = ' (model-error floor needed: none)'
-    bed = 'soil of each day' if decision.by_day else 'bed of each sweep'
-    beds = f' and the {bed} may be another' if decision.beds_differ else ''
+    beds = f' and the bed of each {decision.ground} may be another' if decision.ground else ''
     return f'Model and measurement agree once the soil is refitted{beds}{within}.'
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.discrepancy.fitting import noise as noises
-from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
+from wheel_terra_estimator.discrepancy.fitting.coordinates import SCATTER, Coordinate
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
@@ -139,24 +139,22 @@ def search(
     )
 
 
-def apart(
-    findings: Findings, grounds: Sequence[tuple[IndexArray, Mapping[str, float]]]
-) -> tuple[int, Findings]:
-    """Weigh the best explanations once more, where beds differ as they usually do.
+def apart(findings: Findings, grounds: Mapping[str, IndexArray]) -> tuple[str, Findings]:
+    """Weigh the best explanations once more, where the soil differs as it usually does.
 
-    ``grounds``: (N,) bed of each row, an error that its rows share, with the deviations of soil
-    coordinates between beds. Returns which of them the soil alone needs most, and the findings.
+    ``grounds``: from what to what -> (N,) ground of each row, an error that its rows share. Returns
+    which of them fits the soil alone best, and the findings.
     """
-    alone, builder = list[tuple[float, int, Setting, Fit]](), copy(findings.builder)
-    for place, ground in enumerate(grounds):
+    alone, builder = list[tuple[float, str, Setting, Fit]](), copy(findings.builder)
+    for name, ground in grounds.items():
         setting, nothing = findings.setting, findings.nothing
-        for _ in range(2):  # one bed may end far from where several do
-            builder.part_beds(*ground, setting.problem, nothing)
+        for _ in range(2):  # one ground may end far from where several do
+            builder.part_grounds(ground, SCATTER[name], setting.problem, nothing)
             problem = builder.build(findings.noise.std, findings.outliers)
             setting = replace(setting, problem=problem)
             nothing = setting.refit(nothing)
-        alone.append((setting.explain(nothing).log_evidence, place, setting, nothing))
-    _, place, setting, nothing = max(alone, key=lambda one: one[0])
+        alone.append((setting.explain(nothing).log_evidence, name, setting, nothing))
+    _, chosen, setting, nothing = max(alone, key=lambda one: one[0])
     ranked = enumerate(e.fitted for e in findings.selection.explanations)
     best = [f for place, f in ranked if len(f.names) == 1 or (f.names and place < _KEPT)]
     fits = setting.fit(
@@ -164,7 +162,7 @@ def apart(
     )
     explanations = [setting.explain(f) for f in (nothing, *fits)]
     selection = weigh(explanations, setting.floors, setting.effects)
-    return place, replace(findings, setting=setting, nothing=nothing, selection=selection)
+    return chosen, replace(findings, setting=setting, nothing=nothing, selection=selection)
 
 
 def _not_visible(
@@ -279,7 +277,7 @@ class _Builder:
         self.narrow = slip_features(self.inputs, names.index('slip') if 'slip' in names else None)
         self.by_input: list[CommonError] = []
         self._moved: FloatArray | None = None
-        self.by_bed: list[CommonError] = []
+        self.by_ground: list[CommonError] = []
         # What differs between trials, each on its bed, or from a reference is no noise.
         self.trials = np.zeros(len(table)) if table.sweeps() is None else table.trials()
         self.reference = None if forward.active is None else ~forward.active
@@ -316,21 +314,21 @@ class _Builder:
         # The reading lies off the point of linearisation: the tangent takes the cells along.
         self._moved = slope * moved[:, None]
 
-    def part_beds(
-        self, beds: IndexArray, scatter: Mapping[str, float], problem: Problem, nothing: Fit
+    def part_grounds(
+        self, ground: IndexArray, scatter: Mapping[str, float], problem: Problem, nothing: Fit
     ) -> None:
-        """Let the soil of the beds differ, linearly around a fit."""
-        self.by_bed = []
+        """Let the soil differ between grounds, linearly around a fit."""
+        self.by_ground = []
         for c, column in zip(nothing.coordinates, nothing.sensitivity.T, strict=True):
             if c.owner == 'soil' and c.name in scatter:
                 slope = np.zeros(self.table.measured.shape)
                 slope[problem.row, problem.quantity] = column / c.scale
                 std = np.full(len(self.table), scatter[c.name])
-                self.by_bed.append(CommonError(slope, std, beds))
+                self.by_ground.append(CommonError(slope, std, ground))
 
     def build(self, std: FloatArray, outliers: Outliers, *, free: bool = False) -> Problem:
         """Return the problem without some cells; ``free``: trials share no structural error."""
-        common = [*self.by_bed, *self.by_input]
+        common = [*self.by_ground, *self.by_input]
         rejected = [(row, quantity) for row, quantity, _ in outliers]
         group = self.apart if free else None
         return build_problem(

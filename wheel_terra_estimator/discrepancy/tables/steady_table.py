@@ -83,11 +83,17 @@ class SteadyTable:
         sweep = np.ravel(np.unique(levels, axis=0, return_inverse=True)[1])
         return sweep if 0 < sweep.max() < len(self) / _LEAST_ROWS else None
 
-    def days(self) -> IndexArray | None:
-        """(N,) number of the day of each row, on which the soil may be another; None of one day."""
-        dates = np.nan_to_num(self.columns.get('date', np.zeros(len(self))))
+    def grounds(self) -> dict[str, IndexArray]:
+        """Return that from which to which the soil may differ -> (N,) ground of each row.
+
+        In a drive each wheel rolls in each window on soil of its own.
+        """
+        if self.true_rows.any():
+            return {'row': np.arange(len(self))}
+        dates, sweep = np.nan_to_num(self.columns.get('date', np.zeros(len(self)))), self.sweeps()
         day = np.ravel(np.unique(np.floor(dates), return_inverse=True)[1])
-        return day if 0 < day.max() < len(self) / _LEAST_ROWS else None
+        several = 0 < day.max() < len(self) / _LEAST_ROWS
+        return {**({} if sweep is None else {'sweep': sweep}), **({'day': day} if several else {})}
 
     def trials(self) -> FloatArray:
         """(N,) number of the trial of each row: each has a bed of its own; all 0 if not stated."""
