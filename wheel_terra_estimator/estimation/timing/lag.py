@@ -43,7 +43,6 @@ class LagLearner:
         self._lags = {c: deque[int](maxlen=_MEMORY) for c in (WHEEL_ODOMETRY, INERTIAL)}
         self._counts = dict.fromkeys(self._lags, 0)
         self._repeats = deque[bool](maxlen=_MEMORY)
-        self._in_parts = False
         self._odometry: int | None = None  # last stamp of it
         self._newest: int | None = None  # stamp of either channel
         self._gap = 0  # between the last two of these
@@ -51,7 +50,6 @@ class LagLearner:
         self._led: set[int] = set()  # other channels that were received since then
         self.present: int | None = None
         self._first: int | None = None
-        self._odometry_received = False
         self.learned = dict.fromkeys(self._lags, 0)
 
     @property
@@ -73,9 +71,8 @@ class LagLearner:
 
     def begin_run(self) -> None:
         """Forget the time, not the lags: they belong to the transport."""
-        self._newest = self._first = self.present = None
+        self._newest = self._first = self.present = self._odometry = None
         self._led.clear()
-        self._odometry_received = False
 
     def note(self, channel: int, stamp: int, *, whole: bool = True) -> None:
         """Take the stamp [ns] of an accepted message; not `whole`: it holds some wheels only."""
@@ -95,9 +92,7 @@ class LagLearner:
             return
         self._led.clear()
         if channel == WHEEL_ODOMETRY:
-            self._odometry_received = True
             self._repeats.append(stamp == self._odometry and not whole)
-            self._in_parts = sum(self._repeats) > _IN_PARTS * len(self._repeats)
             self._odometry = stamp
         newest = self._newest
         if newest is not None and stamp > newest:
@@ -114,10 +109,11 @@ class LagLearner:
         if self.fixed >= 0:
             return self.fixed
         if (
-            not self._odometry_received
+            self._odometry is None
             and self._first is not None
             and self.present is not None
             and self.present - self._first < 2 * LONGEST_HOLD
         ):
             return LONGEST_HOLD  # wheel odometry may still be on its way
-        return min(max(*self.learned.values(), int(self._in_parts)), LONGEST_HOLD)
+        in_parts = sum(self._repeats) > _IN_PARTS * len(self._repeats)
+        return min(max(*self.learned.values(), int(in_parts)), LONGEST_HOLD)

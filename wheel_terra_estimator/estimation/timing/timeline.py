@@ -62,7 +62,6 @@ class Timeline:
         self._clear()
 
     def _clear(self) -> None:
-        self._begins_run = True  # the next input is the first of its run
         self.released = 0
         self._state: int | None = None  # newest released stamp
         self._last_set: int | None = None
@@ -149,9 +148,7 @@ class Timeline:
 
     def _insert(self, channel: int, measurement: Measurement) -> tuple[Fate, Due | None]:
         stamp, state = measurement.stamp, self._state
-        if not self._log.stamps:
-            self.counts['runs'] += self._begins_run
-            self._begins_run = False
+        self.counts['runs'] += self._log.first is None
         index, new = self._log.insert(channel, measurement)
         if new and index < self.released:
             self.released += 1
