@@ -686,3 +686,25 @@ def test_torques_that_break_wheels_away_are_not_wild():
     torque = whole.joints.torque.copy()
     torque[starts] += 100.0
     assert 'wild' not in faults(rolling.checked(whole=whole, joints={'torque': torque}))
+
+
+BACK = rolling.ten_minute_drive().speed[:, None] < 0.0
+
+
+@pytest.mark.parametrize('torque', [0.0, 3.0, math.nan])
+def test_a_rover_that_is_dragged_back_on_locked_wheels_has_rates_with_a_sign(torque):
+    held = torque + np.random.default_rng(1).normal(0.0, 0.2, WHOLE.joints.rate.shape)
+    joints = replace(
+        WHOLE.joints,
+        rate=np.where(BACK, 0.0, WHOLE.joints.rate),
+        torque=np.where(BACK | math.isnan(torque), held, WHOLE.joints.torque),
+    )
+    assert 'rates_unsigned' not in faults(checked(joints=joints))
+
+
+def test_no_cure_of_a_half_is_written_for_the_whole():
+    sign = np.where(np.arange(WHOLE.joints.stamp.size)[:, None] < 1100, 1, [-1, 1, 1, 1])
+    joints = replace(WHOLE.joints, rate=WHOLE.joints.rate * sign, torque=WHOLE.joints.torque * sign)
+    calibration = calibrate(replace(WHOLE, joints=joints), rolling.rover())
+    assert [finding.fault for finding in calibration.findings] == ['one_half']
+    assert 'wheels.direction' not in {change.key for change in calibration.changes}

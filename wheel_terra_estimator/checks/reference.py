@@ -23,8 +23,9 @@ from wheel_terra_estimator.checks.statistics import (
 )
 
 LEAST_REFERENCES = 10
-ALIKE_BOTH_WAYS = 0.5  # slower over faster of the speeds forward and back [-]
+ALIKE_BOTH_WAYS = 0.5  # smaller over larger of the speeds, or torques, forward and back [-]
 SELDOM_NEGATIVE = 0.1  # share of negative speeds of what has no sign, by noise, at most [-]
+ALWAYS_ZERO = 0.9  # share of rates that are 0 to the last digit where a sign is cut off [-]
 SHARES_NOISE = 0.3  # of the rates: what differs by less from the wheels has their noise in it [-]
 JUMP_FACTOR = 8.0  # a jump over the usual change [-]
 JUMP_SHARE = 0.005  # share of jumps that is a fault of the source, not a single wild reading
@@ -69,13 +70,16 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         mended = evidence.with_channel('reference', velocity=velocity)
         return [evidence.found('reference_unsigned', 0.95)], mended
     both = min(np.mean(forward > least), np.mean(forward < -least)) > SELDOM_NEGATIVE
-    if both and not _sideways(reference) and _without_sign(rim, forward):
-        calm = moving_mean(forward, LEAST_ROWS)
-        speed = np.interp(evidence.time, evidence.seconds(reference), calm)[:, None]
-        # In turns the sides may be unlike; rates that were cut off at 0 are unknown.
+    speed = np.interp(evidence.time, evidence.seconds(reference), moving_mean(forward, LEAST_ROWS))
+    cut = _cut_off(evidence, speed > least, speed < -least)
+    if both and not _sideways(reference) and (cut or _without_sign(rim, forward)):
+        # In turns the sides may be unlike; of what was cut off at 0 nothing is known.
         unknown = (evidence.moving & ~evidence.unturned)[:, None]
-        unknown = unknown | ((evidence.rate == 0.0) & (np.abs(speed) > least))
-        mended = evidence.with_rate(np.where(unknown, np.nan, evidence.rate * np.sign(speed)))
+        if cut:
+            goes_back = speed < -CLEAR_SPEED * bend_noise(forward)
+            unknown = unknown | (evidence.rate == 0.0) & goes_back[:, None]
+        rate = evidence.rate * np.sign(speed)[:, None]
+        mended = evidence.with_rate(np.where(unknown, np.nan, rate))
         finding = evidence.found('rates_unsigned', 0.95, other='reference goes')
         return [finding], mended
     return [], evidence
@@ -87,19 +91,26 @@ def _sideways(reference: VelocitySeries) -> bool:
     return bool(np.quantile(side, 0.9) > 0.2 * np.median(np.hypot(forward, side)))
 
 
-def _without_sign(speed: FloatArray, other: FloatArray) -> bool:
-    """Return whether one speed is never negative, whichever way the other goes.
+def _cut_off(evidence: Evidence, forth: Mask, back: Mask) -> bool:
+    """Return whether rates are 0 to the last digit where the torques drive the rover back.
 
-    It is much the same both ways, or 0 to the last digit on one.
+    Those of a rover that is towed or slides back on locked wheels do not.
     """
+    drive, rows = np.nansum(evidence.torque, axis=1), min(forth.sum(), back.sum())
+    if rows < LEAST_ROWS or np.mean(evidence.rate[back] == 0.0) < ALWAYS_ZERO:
+        return False
+    return bool(np.median(drive[back]) / np.median(drive[forth]) < -ALIKE_BOTH_WAYS)
+
+
+def _without_sign(speed: FloatArray, other: FloatArray) -> bool:
+    """Return whether one speed is positive and much the same whichever way the other goes."""
     least = 0.4 * float(np.quantile(np.abs(other), 0.9))
     ways = [speed[other > least], speed[other < -least]]
     if min(way.size for way in ways) < LEAST_ROWS:
         return False
     usual = [float(np.median(way)) for way in ways]
     against = [float(np.mean(way < 0.0)) for way in ways]
-    alike = min(usual) > ALIKE_BOTH_WAYS * max(usual) or 0.0 == min(usual) < max(usual)
-    return alike and max(against) <= SELDOM_NEGATIVE
+    return min(usual) > ALIKE_BOTH_WAYS * max(usual) and max(against) <= SELDOM_NEGATIVE
 
 
 def check_source(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -189,7 +200,7 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     rim, rows = ahead(evidence, reference, 0.4)
     if rows.sum() < LEAST_ROWS or hardly_moves(reference.velocity[:, 0], rows):
-        return [], evidence
+        return [not_checked('unit', 'slow_reference')], evidence
     sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim))
     ratio = float(np.median(sense * reference.velocity[rows, 0] / rim[rows]))
     if ratio < LEAST_UNIT_RATIO:

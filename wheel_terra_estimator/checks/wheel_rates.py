@@ -262,6 +262,16 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     few = rows.sum() < 2 * LEAST_MOVING_ROWS or speed.shape[1] < 3
     if few or not facts.known:
         return [], evidence
+    level = np.nanmedian(speed[rows], axis=0)
+    times = level / np.nanmin(level)
+    for unit, factor in RATE_UNITS.items():
+        most = max(factor, 1.0 / factor)
+        fast, slow = (np.abs(times - one) < SAME_SCALE * one for one in (most, 1.0))
+        if fast.any() and (fast | slow | np.isnan(times)).all():
+            wrong = fast if factor < 1.0 else slow
+            details = {'value': factor, 'unit': unit, 'how': 'straight ahead, by the other wheels'}
+            finding = evidence.found('rate_unit', 0.9, wheel=facts.named(wrong), **details)
+            return [finding], evidence.with_rate(evidence.rate * np.where(wrong, factor, 1.0))
     sense = np.sign(evidence.speed)
     common, outcomes = np.sign(row_medians(sense)), list[Outcome]()
     unlike = [np.nanmean(sense[rows & (common == way)], axis=0) for way in (1.0, -1.0)]
@@ -331,7 +341,8 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if units and not doubtful:
         return _unit_findings(evidence, units, how if ratio else 'turns seen by the gyro')
     if ratio is None or not 0.0 < ratio < MOST_COUNT:
-        return [], evidence
+        open_yet = scaled and track is None  # a gear shows in turns
+        return [not_checked('unit', 'far_off', ratio=ratio)] * bool(open_yet), evidence
     evidence.figures['wheels.rad_per_count'] = value = float(f'{ratio:.4g}')
     details = {'times': 1.0 / ratio, 'counts': 2.0 * math.pi / ratio, 'how': how}
     finding = evidence.found('rate_counts', 0.45 if units else 0.9, value=value, **details)
