@@ -347,7 +347,7 @@ def _some(recording: Recording, rows: Callable[[Channel], IndexArray]) -> Record
 def _spread(channel: Channel, facts: RoverFacts) -> IndexArray:
     """Return messages `THINNED` apart; all where single wheels take turns."""
     apart = of_one_wheel(channel, facts.names) is channel
-    step = max(round(THINNED / max(channel.period, 1e-3)), 1) if apart else 1
+    step = max(round(THINNED / max(1e-3, channel.period)), 1) if apart else 1
     return np.arange(0, channel.stamp.size, step)
 
 
