@@ -138,6 +138,17 @@ def test_noise_has_the_stated_size_and_no_message_overtakes_one_of_its_topic():
     assert everything != sorted(everything), 'different topics do'
 
 
+def test_torque_noise_that_no_file_states_is_that_of_the_estimator():
+    """A share of load times radius, for rovers of any size."""
+    rest = LEVEL | {'configuration': ['pathfinder', 'test_sand'], 'duration': 7.0}
+    drive = simulate(load(rest | {'drive.forward': [0.0]}), 4)
+    rover, wheels = drive.configuration.rover, drive.configuration.wheels
+    moment = rover.mass * rover.gravity / wheels.count * wheels.slip_radius.mean()
+    read = np.array([m.torque for m in kind(drive, WheelOdometry)])
+    assert read.std(axis=0).mean() == pytest.approx(0.015 * moment, rel=0.15)
+    assert 0.0 < np.abs(read.mean(axis=0)).max() < 4.0 * 0.02 * moment
+
+
 def test_encoder_steps_show_in_the_rate():
     drive = simulate(load(EXACT | {'sensors.encoder_counts': 1000, 'duration': 2.0}))
     step = 2.0 * np.pi / 1000 / 0.1

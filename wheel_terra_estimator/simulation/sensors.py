@@ -26,6 +26,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.rover import SensorFigures
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 from wheel_terra_estimator.simulation.scenario import Fault, Scenario
 from wheel_terra_estimator.simulation.truth import Truth
@@ -60,13 +61,14 @@ class SensorSuite:
         self._configuration: Configuration = configuration
         self._there = scenario.sensors
         self._figures = figures = configuration.sensors
+        self._torque = SensorFigures.from_configuration(configuration)  # as the estimator takes it
         self._errors = SensorErrors(configuration)
         self._random = random
         self._faults = faults
         n = configuration.wheels.count
         self._scale = scale = scenario.sensors.noise
         # (n,) zeros of the torques, as drawn [N m]
-        self.torque_zero = scale * figures.torque_zero_std * random.standard_normal(n)
+        self.torque_zero = scale * self._torque.torque_zero_std * random.standard_normal(n)
         gain = COMMON_GAIN * random.standard_normal() + OWN_GAIN * random.standard_normal(n)
         self._torque_gain = np.maximum(1.0 + scale * figures.torque_gain_std * gain, LEAST_GAIN)
         self._sinkage_zero = scale * figures.sinkage_zero_std * random.standard_normal(n)
@@ -135,10 +137,10 @@ class SensorSuite:
         # The mean rate of the period is that of its middle; drives report a filtered value too.
         rate = rate + self._scale * self._figures.wheel_rate_std * noise[0]
         torque = self._torque_gain * truth.torque + self.torque_zero
-        torque += self._scale * self._figures.torque_std * noise[1]
+        torque += self._scale * self._torque.torque_std * noise[1]
         if (wheels := self._failed('torque_spikes', time)) is not None:
             spikes = wheels & (self._random.uniform(size=n) < SPIKE_CHANCE)
-            torque = np.where(spikes, torque + SPIKE * self._figures.torque_std, torque)
+            torque = np.where(spikes, torque + SPIKE * self._torque.torque_std, torque)
         if not self._there.torque:
             torque = np.full(n, np.nan)
         elif (missing := self._failed('no_torque', time)) is not None:
