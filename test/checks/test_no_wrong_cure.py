@@ -700,11 +700,3 @@ def test_a_rover_that_is_dragged_back_on_locked_wheels_has_rates_with_a_sign(tor
         torque=np.where(BACK | math.isnan(torque), held, WHOLE.joints.torque),
     )
     assert 'rates_unsigned' not in faults(checked(joints=joints))
-
-
-def test_no_cure_of_a_half_is_written_for_the_whole():
-    sign = np.where(np.arange(WHOLE.joints.stamp.size)[:, None] < 1100, 1, [-1, 1, 1, 1])
-    joints = replace(WHOLE.joints, rate=WHOLE.joints.rate * sign, torque=WHOLE.joints.torque * sign)
-    calibration = calibrate(replace(WHOLE, joints=joints), rolling.rover())
-    assert [finding.fault for finding in calibration.findings] == ['one_half']
-    assert 'wheels.direction' not in {change.key for change in calibration.changes}

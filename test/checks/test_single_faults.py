@@ -63,12 +63,6 @@ def between_stamps(velocity):
     return of_the_wheels(velocity, 0.5 * (joints.rate + np.roll(joints.rate, -1, axis=0)))
 
 
-def later_half(factor):
-    return lambda values: np.where(
-        np.arange(len(values))[:, None] * 2 > len(values), values * factor, values
-    )
-
-
 def one_number(*numbers):
     return lambda values: np.tile(numbers, (len(values), 1))
 
@@ -94,13 +88,6 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, {'rate': by(4.0)}, 'rate_unit', None, approx(0.25, rel=0.03), 'before a gear'),
     (JOINTS, {'rate': by([RPM, 1, RPM, 1])}, 'rate_unit', f'{FL}, {RL}', approx(1.0 / RPM),
      'per minute'),
-    (JOINTS, {'rate': later_half(RPM)}, 'one_half', None, None, 'from about second 110'),
-    (JOINTS, both(later_half([-1, 1, 1, 1])), 'one_half', FL, None, 'None find what was changed'),
-    (JOINTS, {'rate': lambda v: later_half(1.0 / RPM)(v * RPM)}, 'one_half', None, None,
-     'until about second 110'),
-    (JOINTS, {'torque': later_half(1000.0)}, 'one_half', None, None, 'N mm'),
-    (REFERENCE, {'velocity': later_half(3.6)}, 'one_half', None, None, 'kilometres per hour'),
-    (IMU, {'force': later_half(1.0 / G)}, 'one_half', None, None, 'is in g'),
     (JOINTS, {'rate': np.abs}, 'rates_unsigned', None, None, ''),
     (JOINTS, {'rate': lambda v: np.maximum(v, 0.0)}, 'rates_unsigned', None, None, ''),
     (JOINTS, {'rate': in_steps}, 'rate_steps', None, None, 'steps of'),

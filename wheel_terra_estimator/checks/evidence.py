@@ -270,8 +270,7 @@ class Evidence:
         """Return the evidence with some messages of the wheel odometry."""
         recording = replace(self.recording, joints=rows_of(self.joints, kept))
         force, gyro = (None if one is None else one[kept] for one in (self.force, self.gyro))
-        time = self.time[kept] - self.time[kept][:1].sum()  # since the first one
-        left = replace(self, recording=recording, time=time, force=force, gyro=gyro)
+        left = replace(self, recording=recording, time=self.time[kept], force=force, gyro=gyro)
         return replace(left, steering=self.steering[kept]).with_rate(
             self.rate[kept], self.torque[kept]
         )

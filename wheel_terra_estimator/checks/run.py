@@ -14,12 +14,11 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import ModuleType
-from typing import Any, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.arrays import IndexArray
 from wheel_terra_estimator.checks import (
     clocks,
     geometry,
@@ -35,8 +34,6 @@ from wheel_terra_estimator.checks import (
 )
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, gather
 from wheel_terra_estimator.checks.finding import (
-    ALWAYS_SHOWN,
-    FAULTS,
     INTERNAL_ERROR,
     RANK,
     CheckReport,
@@ -47,13 +44,10 @@ from wheel_terra_estimator.checks.finding import (
     not_checked,
 )
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import Channel, Recording, Series, of_one_wheel, rows_of
+from wheel_terra_estimator.checks.series import Recording, Series, rows_of
 from wheel_terra_estimator.checks.statistics import moving_mean
 from wheel_terra_estimator.configuration.configuration import Configuration
 
-LEAST_SURE = 0.8  # confidence of a fault that one half of a drive shows alone, beyond
-LEAST_HALF = 0.5  # driving in a half over that in the other, at least [-]
-THINNED = 0.05  # time between messages by which halves are compared, at least [s]
 LEAST_LOST = 0.01  # share of messages that are lost, or with nan, that is told [-]
 LEAST_RIM_SPEED = 0.005  # rim speed that no drive stays below [m/s]
 LEAST_GOING = 0.02  # mean of half a minute that no wander of a satellite's position makes [m/s]
@@ -140,8 +134,7 @@ def _examined(
     stamped = mended(
         'order', arrived, lambda: clocks.check_transport(arrived, stated, report.figures)
     )
-    whole = mended('placeholder', stamped, lambda: _whole_rows(stamped))
-    recording = mended('sign', whole, lambda: _of_one_half(whole, facts))
+    recording = mended('placeholder', stamped, lambda: _whole_rows(stamped))
     evidence = against_each_other(recording, facts, checks, mended)
     if evidence is None:
         report.not_checked.append(not_checked('sign', 'no_rates'))
@@ -193,22 +186,13 @@ class Mended:
 
 
 def against_each_other(
-    recording: Recording,
-    facts: RoverFacts,
-    checks: Sequence[Check],
-    mended: Mended,
-    evidence: Evidence | None = None,
+    recording: Recording, facts: RoverFacts, checks: Sequence[Check], mended: Mended
 ) -> Evidence | None:
-    """Hold one channel against another; None where hardly any wheel rates are.
-
-    ``evidence``: what was gathered from the recording already.
-    """
-    rotation = facts.mounting if evidence is None else evidence.rotation
-    state = imu.ImuState(recording, rotation, facts.gravity)
+    """Hold one channel against another; None where hardly any wheel rates are."""
+    state = imu.ImuState(recording, facts.mounting, facts.gravity)
     state = mended('gravity', state, lambda: imu.check_imu(state), 'check_imu')
     facts = replace(facts, gravity=state.gravity)
-    if evidence is None:
-        evidence = gather(state.recording, facts, state.rotation, mended.report.figures)
+    evidence = gather(state.recording, facts, state.rotation, mended.report.figures)
     if evidence is None or np.isfinite(evidence.rate).any(axis=1).sum() < LEAST_MOVING_ROWS:
         return None
     for kind, module, check, *_ in checks:
@@ -253,102 +237,6 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
 )
 """Checks that hold one channel against another, in order."""
 WHILE_DRIVING = tuple(check for check in AGAINST_EACH_OTHER if check[3:])
-
-OF_A_HALF = tuple(check for check in WHILE_DRIVING if check[1] is not clocks)
-Judged: TypeAlias = 'tuple[dict[str, list[Outcome]], Evidence | None]'
-"""What each check said of a stretch, and the evidence with that mended."""
-
-
-def _of_one_half(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome], Recording]:
-    """Return faults that one half of a drive shows alone, and the other half; none: the whole.
-
-    The whole wins if it needs no more faults, and neither half then shows one of its own.
-    """
-    if recording.joints is None:
-        return [], recording
-    middle = int(np.median(recording.joints.stamp))
-
-    def half(of: Recording, late: bool) -> Recording:
-        return _some(of, lambda channel: np.flatnonzero((channel.stamp >= middle) == late))
-
-    thin = _some(recording, lambda channel: _spread(channel, facts))
-    judged = [_judged(half(thin, late), facts) for late in (False, True)]
-    alone, driven = _alone(judged), [int(e.moving.sum()) if e else 0 for _, e in judged]
-    if all(alone) or not any(alone) or min(driven) < max(LEAST_HALF * max(driven), 1):
-        return [], recording
-    told, whole = _judged(thin, facts)
-    # Corrected for a unit that it does not have, the other half is in none that is known.
-    units = {one.fault for both in alone for one in both if one.kind == 'unit'} & _named(told)
-    many, *few = (len(_named(said, LEAST_SURE)) for said in (told, *(one for one, _ in judged)))
-    if whole is not None and not units and many <= max(few):
-        late = whole.joints.stamp >= middle
-        parts = [whole.rows(rows) for rows in (~late, late)]
-        again = [half(part.recording, i > 0) for i, part in enumerate(parts)]
-        parts = [replace(part, recording=one) for part, one in zip(parts, again, strict=True)]
-        if not any(_alone([_judged(part.recording, part.facts, part) for part in parts])):
-            return [], recording
-    fault, begins = FAULTS['one_half'], bool(alone[1])
-    at = (middle - int(recording.joints.stamp[0])) * 1e-9
-    outcomes: list[Outcome] = []
-    for one in alone[begins]:
-        words = fault.words.format(words=one.words, when='from' if begins else 'until', at=at)
-        told_so = replace(one, fault='one_half', words=words, cure=fault.cure)
-        outcomes.append(replace(told_so, parameter=None, value=None, std=None))
-    return outcomes, half(recording, not begins)
-
-
-def _judged(recording: Recording, facts: RoverFacts, evidence: Evidence | None = None) -> Judged:
-    """Return what a stretch of a drive says; ``evidence``: what was gathered of it already."""
-    mended = Mended(CheckReport())
-    left = against_each_other(recording, facts, OF_A_HALF, mended, evidence)
-    return mended.by_check, left
-
-
-def _alone(judged: Sequence[Judged]) -> list[list[Finding]]:
-    """Return the faults of each half that the other one could show and does not."""
-    return [
-        [
-            one
-            for check, outcomes in own.items()
-            for one in outcomes
-            if isinstance(one, Finding)
-            and one.confidence > LEAST_SURE
-            and (FAULTS[one.fault].driving == 'slip' or one.kind in ALWAYS_SHOWN)
-            and not FAULTS[one.fault].begins
-            and not one.fault.endswith('unsigned')  # which a drive forward never shows
-            and not (check not in other or one.fault in _named(other) or _untold(one, other[check]))
-        ]
-        for (own, _), (other, _) in (judged, judged[::-1])
-    ]
-
-
-def _untold(finding: Finding, outcomes: list[Outcome]) -> bool:
-    """Return whether a check says that a stretch cannot tell a fault."""
-    kind = 'swapped_sides' if finding.fault == 'gyro_reversed' else finding.kind
-    return any(isinstance(outcome, NotChecked) and outcome.kind == kind for outcome in outcomes)
-
-
-def _named(said: dict[str, list[Outcome]], sure: float = 0.0) -> set[str]:
-    """Return the faults that checks found with more than a confidence."""
-    there = (outcome for outcomes in said.values() for outcome in outcomes)
-    return {one.fault for one in there if isinstance(one, Finding) and one.confidence > sure}
-
-
-def _some(recording: Recording, rows: Callable[[Channel], IndexArray]) -> Recording:
-    """Return a recording with some messages of each channel; none where it is one at most."""
-    there = dict[str, Any]()
-    for name in clocks.CHECKED:
-        if (channel := getattr(recording, name)) is not None:
-            kept = rows(channel)
-            there[name] = rows_of(channel, kept) if kept.size > 1 else None
-    return replace(recording, **there)
-
-
-def _spread(channel: Channel, facts: RoverFacts) -> IndexArray:
-    """Return messages `THINNED` apart; all where single wheels take turns."""
-    apart = of_one_wheel(channel, facts.names) is channel
-    step = max(round(THINNED / max(1e-3, channel.period)), 1) if apart else 1
-    return np.arange(0, channel.stamp.size, step)
 
 
 def _whole_rows(recording: Recording) -> tuple[list[Outcome], Recording]:

@@ -184,7 +184,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts, rows = evidence.facts, evidence.straight
     assert evidence.force is not None
     if rows.sum() < LEAST_MOVING_ROWS:
-        return [not_checked('unit', 'no_straight')], evidence
+        return [not_checked('gain', 'no_straight')], evidence
     level = (thrust(evidence) - facts.mass * evidence.force[:, 0]) * np.sign(evidence.rim)
     traction = _middle_mean(level[rows]) / (facts.mass * facts.gravity)
     evidence.figures['torque.level_traction'] = round(traction, 4)

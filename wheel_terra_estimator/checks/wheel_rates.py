@@ -341,8 +341,6 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if units and not doubtful:
         return _unit_findings(evidence, units, how if ratio else 'turns seen by the gyro')
     if ratio is None or not 0.0 < ratio < MOST_COUNT:
-        if scaled and track is None:  # a gear shows in turns
-            return [not_checked('unit', 'far_off', ratio=ratio)], evidence
         return [], evidence
     evidence.figures['wheels.rad_per_count'] = value = float(f'{ratio:.4g}')
     details = {'times': 1.0 / ratio, 'counts': 2.0 * math.pi / ratio, 'how': how}
