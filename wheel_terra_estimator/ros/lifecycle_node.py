@@ -123,10 +123,8 @@ class EstimatorNode(LifecycleNode):
         self._kept: KeptSoil | None = None
         self._active = self._declaring = False
         self._enabled = True
-        self._logged_level = (
-            -1,
-            False,
-        )  # level of the node that was logged last, and whether quietly
+        # Level of the node that was logged last, and whether it was expected
+        self._logged_level = -1, False
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_service(Trigger, '~/save_soil', self._save_soil)
         self.create_service(SetBool, '~/set_enabled', self._set_enabled)
