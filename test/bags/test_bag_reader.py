@@ -143,6 +143,7 @@ def test_a_reference_of_another_type_is_told_how_to_become_one(make_bag, rover, 
     bag = make_bag([*rows, ('/dvl', twist, at), ('/cmd_vel', twist, at)])
     with open_bag(bag) as opened:
         told = MeasurementReader(opened, {}, rover).notes[-1]
+        assert read_series(opened, {}, 'drive').notes[-1] == told
     assert '/dvl (geometry_msgs' in told and 'nav_msgs/msg/Odometry' in told
     assert '/cmd_vel' not in told
     with pytest.raises(UserError, match=r'/dvl.*publish it as nav_msgs/msg/Odometry'):

@@ -14,7 +14,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag
-from wheel_terra_estimator.bags.topic_choice import choose_topics, other_rovers
+from wheel_terra_estimator.bags.topic_choice import choose_topics, other_references, other_rovers
 from wheel_terra_estimator.checks.series import (
     ImuSeries,
     JointSeries,
@@ -66,6 +66,8 @@ def read_series(
         minutes = (end - first) * 1e-9 / 60.0
         notes.append(f'a long recording: only its first {minutes:.3g} minutes were checked')
     notes += [f'it also holds another rover: {options}' for options in other_rovers(bag, chosen)]
+    if 'reference_odom' not in chosen and (others := other_references(bag)):
+        notes.append(others)
 
     def made(own: str) -> Any:
         collector = collectors.get(own)
