@@ -223,17 +223,14 @@ def test_an_input_older_than_the_history_is_dropped_and_counted():
 
 def test_many_inputs_that_are_dropped_as_too_old_are_a_fault_with_its_remedy():
     core, _ = make_core(history=2.0)
-    for i in range(80):
-        for made in core.add(odometry(0.1 * i)):
-            told = made.faults.get('sinkage')
-        if i >= 40:
-            core.add(sinkage(0.1 * i - (2.5 if i > 60 else 1.5)))
-        if i == 60:
-            assert told is None
-    assert (
-        told
-        == 'many messages are more than 2 s late and dropped -> raise history, or set its clock'
-    )
+    told = dict[int, str | None]()
+    for i in range(40, 220):
+        late = 2.5 if 60 < i < 80 else 1.5  # [s]
+        (made,) = core.add(odometry(0.1 * i))[-1:]
+        told[i] = made.faults.get('sinkage')
+        core.add(sinkage(0.1 * i - late))
+    fault = 'many messages are more than 2 s late and dropped -> raise history, or set its clock'
+    assert (told[60], told[79], told[219]) == (None, fault, None)
 
 
 # -- Economy --------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline
 
 _TOO_OLD = 'stamp older than `history` (raise it, or set its clock)'
 _MOST_TOO_OLD = 0.1  # share of the messages of an input that may be dropped for that without a word
-_FEW_MESSAGES = 3
+_TOO_OLD_GAIN = 0.02  # of that share, per message: a memory of fifty
 _FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
 """Numerical errors that a step may raise; they are caught and reported."""
 
@@ -103,6 +103,7 @@ class EstimatorCore:
         self._timeline = Timeline(self._log, settings)
         self._received = [0] * len(CHANNELS)
         self._late = [0] * len(CHANNELS)
+        self._too_old = [0.0] * len(CHANNELS)  # recent share of messages
         self._deferred = False  # since the last set
         self._reruns = 0  # until the last set
         self._latest: EstimateSet | None = None
@@ -269,7 +270,9 @@ ReferenceVelocity
         channel, measurement = arrival
         contradicted = self._log.contradicted[channel]
         fate, due = self._timeline.insert(channel, measurement)
-        if not (stray or fate is Fate.TOO_OLD):
+        too_old = fate is Fate.TOO_OLD
+        self._too_old[channel] += _TOO_OLD_GAIN * (too_old - self._too_old[channel])
+        if not (stray or too_old):
             rates = measurement.rate.tolist() if isinstance(measurement, WheelOdometry) else ()
             self._lags.note(channel, measurement.stamp, whole=not isnan(sum(rates)))
         if self._log.contradicted[channel] != contradicted:
@@ -277,7 +280,7 @@ ReferenceVelocity
         if fate in (Fate.LATE, Fate.DEFERRED):
             self._late[channel] += 1
             self._deferred |= fate is Fate.DEFERRED
-        elif fate is Fate.TOO_OLD:
+        elif too_old:
             self._checks.refuse(channel, _TOO_OLD)
         elif fate is Fate.FULL:
             self._checks.refuse(channel, 'more inputs than can be held for sorting')
@@ -341,8 +344,8 @@ ReferenceVelocity
                 f'stamps {abs(by) / SECOND:.1f} s {where}: late, or a clock is off -> set the '
                 'clocks, or sensors.*_stamp_offset of the one that is off'
             )
-        for name, count, reasons in zip(names, self._received, self._checks.rejected, strict=True):
-            if reasons[_TOO_OLD] > max(_MOST_TOO_OLD * count, _FEW_MESSAGES):
+        for name, share in zip(names, self._too_old, strict=True):
+            if share > _MOST_TOO_OLD:
                 history = self._timeline.settings.history / SECOND
                 late = f'many messages are more than {history:g} s late and dropped'
                 faults.setdefault(name, f'{late} -> raise history, or set its clock')
