@@ -94,7 +94,7 @@ class Decision:
     misread: Mapping[str, float | str] = field(default_factory=dict)
     proposal: Proposal | None = None  # A law, where something is missing and no name is given
     beds_differ: float = 0.0  # probability that only the soil differs, where notable
-    ground: str = ''  # from what to what
+    ground: str = ''  # what has soil of its own then: row, sweep or day
 
     def unless(self, apart: Decision, probability: float, ground: str) -> Decision:
         """Return ``apart``, the decision where beds differ, if that is the more probable one.

@@ -142,8 +142,8 @@ def search(
 def apart(findings: Findings, grounds: Mapping[str, IndexArray]) -> tuple[str, Findings]:
     """Weigh the best explanations once more, where the soil differs as it usually does.
 
-    ``grounds``: from what to what -> (N,) ground of each row, an error that its rows share. Returns
-    which of them fits the soil alone best, and the findings.
+    ``grounds``: what may have soil of its own -> (N,) number of it of each row, an error that its
+    rows share. Returns which of them fits the soil alone best, and the findings.
     """
     alone, builder = list[tuple[float, str, Setting, Fit]](), copy(findings.builder)
     for name, ground in grounds.items():

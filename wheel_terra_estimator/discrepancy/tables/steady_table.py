@@ -84,7 +84,7 @@ class SteadyTable:
         return sweep if 0 < sweep.max() < len(self) / _LEAST_ROWS else None
 
     def grounds(self) -> dict[str, IndexArray]:
-        """Return that from which to which the soil may differ -> (N,) ground of each row.
+        """Return what may have soil of its own (row, sweep, day) -> (N,) number of it of each row.
 
         In a drive each wheel rolls in each window on soil of its own.
         """
