@@ -46,7 +46,6 @@ from wheel_terra_estimator.estimation.timing.lag import LONGEST_HOLD, LagLearner
 from wheel_terra_estimator.estimation.timing.step_grid import TimeSettings
 from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline
 
-_TOO_OLD = 'stamp older than `history` (raise it, or set its clock)'
 _MOST_TOO_OLD = 0.1  # share of the messages of an input that may be dropped for that without a word
 _TOO_OLD_GAIN = 0.02  # of that share, per message: a memory of fifty
 _FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
@@ -281,7 +280,7 @@ ReferenceVelocity
             self._late[channel] += 1
             self._deferred |= fate is Fate.DEFERRED
         elif too_old:
-            self._checks.refuse(channel, _TOO_OLD)
+            self._checks.refuse(channel, 'stamp older than `history` (raise it, or set its clock)')
         elif fate is Fate.FULL:
             self._checks.refuse(channel, 'more inputs than can be held for sorting')
         return [] if due is None else [self._published(due)]
