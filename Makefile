@@ -25,9 +25,7 @@ BIN := $(VENV)/bin
 PINS := $(wildcard requirements/*.txt)
 # Modules are compiled when they are first imported: half of the time of a set-up.
 PIP := $(BIN)/python -m pip --disable-pip-version-check install -qq --no-compile
-# Tests and demo stay on this machine and do not fight over cores.
-export OMP_NUM_THREADS ?= 1
-export OPENBLAS_NUM_THREADS ?= 1
+# Tests and demo stay on this machine.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 # Compiled tests are kept: each worker would compile all of them anew, for five seconds.
 unexport PYTHONDONTWRITEBYTECODE

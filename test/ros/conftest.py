@@ -42,12 +42,8 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope='session', autouse=True)
 def own_domain():
-    """Keep apart from other robots and from other test runs on this machine.
-
-    The libraries of nodes get one thread: of several a fork would keep none.
-    """
+    """Keep apart from other robots and from other test runs on this machine."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ |= {'OMP_NUM_THREADS': '1', 'OPENBLAS_NUM_THREADS': '1'}
     domains = random.SystemRandom().sample(range(1, 101), 100)
     for domain in domains:  # a lock keeps parallel workers and runs out of each other's domain
         path = Path(tempfile.gettempdir()) / f'wheel_terra_test_domain_{domain}.lock'
