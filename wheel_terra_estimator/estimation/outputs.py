@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,6 @@ from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.pulls import PullState
-from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.estimates import (
     NO_ENTRAPMENT_IN_SIGHT,
     EstimateSet,
@@ -32,7 +30,6 @@ from wheel_terra_estimator.estimation.sideways import Sideways
 from wheel_terra_estimator.estimation.taught import with_model_errors
 from wheel_terra_estimator.estimation.words import reasons_in_words
 
-_UNKNOWN_STD = 1.0  # of a slip velocity [m/s]
 _LEAST_LOAD_SHARE = 0.1
 """Sum of the loads over the rover's weight below which the rover is not on its wheels [-]."""
 _LEAST_FORCE_STD = 1e-4
@@ -60,7 +57,6 @@ class Sources(NamedTuple):
     speed_variance: float
     yaw_rate: float  # [rad/s]
     yaw_rate_std: float
-    headings: Headings
     rims: Floats  # [m/s], nan = unknown
     slips: tuple[WheelSlip, ...]
     loads: LoadState
@@ -88,13 +84,11 @@ class Outputs:
         self._frictional = float(soil.frictional_modulus)
         self._cohesive = float(soil.cohesive_modulus)
         self._rover, self._layout = rover, layout
-        self._rim_std = tuple(sensors.wheel_rate_std * r for r in rover.slip_radius)
         self._sinkage_zero = sensors.sinkage_zero_std
 
     def estimate_set(self, given: Sources, faults: dict[str, str]) -> EstimateSet:
         """Return the outputs of a stamp; `faults` are those of the inputs, in words."""
         layout, rover, n = self._layout, self._rover, self._rover.wheel_count
-        slip_velocity, slip_velocity_std = self._slip_velocity(given)
         variance = np.diagonal(given.covariance)[layout.sinkage]
         added_variance = self._sinkage_zero**2 + given.sinkage.unmodelled_std**2
         sinkage_std = np.sqrt(np.maximum(variance, 0.0) + added_variance)
@@ -105,8 +99,8 @@ class Outputs:
         per_wheel = {
             'slip': [wheel.slip for wheel in given.slips],
             'slip_std': [wheel.std for wheel in given.slips],
-            'slip_velocity': slip_velocity,
-            'slip_velocity_std': slip_velocity_std,
+            'slip_velocity': [wheel.velocity for wheel in given.slips],
+            'slip_velocity_std': [wheel.velocity_std for wheel in given.slips],
             'drawbar_pull': given.pulls.pull,
             'drawbar_pull_std': pull_std,
             'sinkage_rate': given.sinkage.rate,
@@ -189,19 +183,3 @@ class Outputs:
         ]
         least = _LEAST_FORCE_STD * share
         return [max(std, least) for std in loads], [max(std, least) for std in pulls]
-
-    def _slip_velocity(self, given: Sources) -> tuple[list[float], list[float]]:
-        """Return r w - v of each wheel and its deviation [m/s]; held where no rate is known."""
-        velocity, deviation = [], []
-        headings = given.headings
-        for i, (rim, rim_std) in enumerate(zip(given.rims, self._rim_std, strict=True)):
-            if isnan(rim):
-                velocity.append(given.slips[i].velocity)
-                deviation.append(_UNKNOWN_STD)
-                continue
-            velocity.append(rim - headings.speed(i, given.speed, given.yaw_rate))
-            turning = (given.yaw_rate_std * headings.by_yaw_rate[i]) ** 2
-            variance = headings.by_speed[i] ** 2 * max(given.speed_variance, 0.0)
-            std = math.sqrt(variance + turning)
-            deviation.append(math.hypot(std, rim_std))
-        return velocity, deviation

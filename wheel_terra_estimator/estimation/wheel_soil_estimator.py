@@ -758,7 +758,6 @@ class WheelSoilEstimator:
             speed_variance=variance,
             yaw_rate=self._turning.state.yaw_rate,
             yaw_rate_std=self._turning.state.yaw_rate_std,
-            headings=self._steering.state.headings,
             rims=rims,
             slips=self._slips.state,
             loads=loads,

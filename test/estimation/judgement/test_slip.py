@@ -259,5 +259,9 @@ def test_slip_and_slip_velocity_are_held_while_no_rate_is_known():
     unknown = judge.update(1.1, (float('nan'),) * 6, body._replace(speed=0.01))
     assert [(w.slip, w.velocity) for w in unknown] == [(w.slip, w.velocity) for w in known]
     assert known[0].velocity == pytest.approx(0.01)
+    assert known[0].velocity_std == pytest.approx(
+        np.hypot(0.001, parts.sensors.wheel_rate_std * parts.rover.slip_radius[0])
+    )
+    assert {wheel.velocity_std for wheel in unknown} == {1.0}
     standing = judge.update(1.2, (0.0,) * 6, body._replace(speed=0.0))
     assert {wheel.velocity for wheel in standing} == {0.0}

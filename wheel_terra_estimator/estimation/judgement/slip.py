@@ -19,6 +19,7 @@ _DRIFT = 0.05
 """Unmeasured lateral over forward speed of a steered rover [-]: 3 degrees."""
 _FORGETTING = 0.02  # growth of the deviation per stamp where no rate is known
 _LEAST_STD = 1e-3
+_UNKNOWN_VELOCITY_STD = 1.0  # of a slip velocity [m/s]
 
 
 class BodyMotion(NamedTuple):
@@ -43,6 +44,7 @@ class WheelSlip(NamedTuple):
     resting: bool = False
     judged: bool = False  # its rate is known and it is not at rest: it has a class
     velocity: float = 0.0  # rim less ground speed [m/s], held where no rate is known
+    velocity_std: float = _UNKNOWN_VELOCITY_STD
 
 
 class SlipJudge(Component[tuple[WheelSlip, ...]]):
@@ -68,30 +70,33 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
     ) -> WheelSlip:
         if isnan(rim):
             std = min(before.std + _FORGETTING, 1.0)
-            return before._replace(std=std, resting=False, judged=False)
+            return before._replace(
+                std=std, resting=False, judged=False, velocity_std=_UNKNOWN_VELOCITY_STD
+            )
         rest = self._rover.rest_speed
         if body.stopped and abs(body.speed) < rest and abs(rim) < rest:
             # All wheels stand: the yaw rate of the gyro is noise.
-            v, v_std = 0.0, 0.0
+            v, v_std = 0.0, body.speed_std
         else:
             headings = body.headings
             v = headings.speed(i, body.speed, body.yaw_rate)
             v_std = math.hypot(
-                headings.by_speed[i] * body.speed_std, body.yaw_rate_std * headings.by_yaw_rate[i]
+                headings.by_speed[i] * body.speed_std,
+                headings.by_yaw_rate[i] * body.yaw_rate_std,
+                _DRIFT * headings.across[i] * body.speed,
             )
-            drift = _DRIFT * headings.across[i] * body.speed
-            v_std = math.hypot(v_std, drift)
+        velocity, velocity_std = rim - v, math.hypot(v_std, self._rim_std[i])
         if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
-            return self._at_rest(before, time, rim - v)
+            # It stands: its slip holds its last value.
+            since = time if isnan(before.rest_since) else before.rest_since
+            resting = time - since >= self._rover.rest_time - TIME_ROUNDING
+            judged = before.judged and not resting
+            return WheelSlip(
+                before.slip, before.std, since, resting, judged, velocity, velocity_std
+            )
         slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)
-        return WheelSlip(slip, min(max(std, _LEAST_STD), 1.0), judged=True, velocity=rim - v)
-
-    def _at_rest(self, before: WheelSlip, time: float, velocity: float) -> WheelSlip:
-        """Return a wheel that stands: its slip holds its last value."""
-        since = time if isnan(before.rest_since) else before.rest_since
-        resting = time - since >= self._rover.rest_time - TIME_ROUNDING
-        judged = before.judged and not resting
-        return before._replace(rest_since=since, resting=resting, judged=judged, velocity=velocity)
+        std = min(max(std, _LEAST_STD), 1.0)
+        return WheelSlip(slip, std, NAN, False, True, velocity, velocity_std)
 
 
 def slip_and_deviation(

@@ -165,7 +165,7 @@ class Situation:
         """Typical deviation of the slip; 1 where nothing is known."""
         return median([w.slip_std for w in self.moving]) if self.moving else 1.0
 
-    @property
+    @cached_property
     def settled(self) -> bool:
         """Whether the start is over, as far as slip and sinkage tell."""
         return self.memory.rolled > _START_TRAVEL
