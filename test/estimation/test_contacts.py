@@ -269,7 +269,7 @@ def test_vibration_does_not_shake_the_loads(parts):
 
 
 def standing_pull(parts, torque, speed, lateral_motion=0.0, speed_std=0.0, others=0.0):
-    x = parts.filter().mean.copy()
+    x = parts.filter().x.copy()
     x[SPEED] = speed
     wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
     n = parts.rover.wheel_count
@@ -307,7 +307,7 @@ def test_a_wheel_that_stalls_beside_spinning_ones_has_the_pull_of_its_torque(par
     rims, loads = tuple(way * r for r in (*(0.07,) * 5, 0.0036)), (60.0,) * 6
     turns = turning_wheels(parts.rover, rims, loads)
     assert turns == (True,) * 5 + (False,)
-    x = parts.filter().mean.copy()
+    x = parts.filter().x.copy()
     spun = WheelStates(0.0, x[parts.layout.sinkage], np.array(loads), 0.2, 0.0)
     torque, pull = parts.models.torque_and_pull(spun)
     wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
@@ -336,7 +336,7 @@ def forces_at(parts, ruts=RUTS, **moved):
     """Return the forces at slip 0.3 and sinkages of 3 cm, state entries moved by so much."""
     ekf, layout = parts.filter(), parts.layout
     linearisation = Linearisation(parts.rover, layout, parts.models, 0.05)
-    x = ekf.mean
+    x = ekf.x
     x[SPEED], x[layout.sinkage], x[RUT_SHARE] = 0.7 * 0.05, 0.03, 0.5
     for name, change in moved.items():
         x[ENTRIES[name](layout)] += change

@@ -18,15 +18,15 @@ def make(n, seed=0):
 
 def test_update_is_the_textbook_one():
     kalman, P = make(6)
-    x = kalman.mean.copy()
+    x = kalman.x.copy()
     rng = np.random.default_rng(1)
     H, R, residual = rng.standard_normal((3, 6)), np.array([0.5, 1.0, 2.0]), rng.standard_normal(3)
     # Information form: another way to the same answer.
     information = np.linalg.inv(P) + H.T @ np.diag(1.0 / R) @ H
     posterior = np.linalg.inv(information)
     kalman.update(residual, H, R)
-    assert kalman.covariance == pytest.approx(posterior, rel=1e-9)
-    assert kalman.mean == pytest.approx(x + posterior @ H.T @ (residual / R), rel=1e-9)
+    np.testing.assert_allclose(kalman.P, posterior, rtol=1e-9)
+    assert kalman.x == pytest.approx(x + posterior @ H.T @ (residual / R), rel=1e-9)
 
 
 def test_considered_entries_keep_mean_and_variance_but_their_doubt_counts():
@@ -34,24 +34,24 @@ def test_considered_entries_keep_mean_and_variance_but_their_doubt_counts():
     held, _ = make(5)
     sure, _ = make(5)
     H, R = np.array([[1.0, 0.0, 2.0, 0.0, 0.0]]), np.array([0.1])
-    before = held.mean.copy()
+    before = held.x.copy()
     held.update(np.array([1.0]), H, R, considered=(2,))
-    assert held.mean[2] == before[2]
-    assert held.covariance[2, 2] == pytest.approx(P[2, 2])
+    assert held.x[2] == before[2]
+    assert held.P[2, 2] == pytest.approx(P[2, 2])
     free.update(np.array([1.0]), H, R)
-    assert held.covariance[0, 0] >= free.covariance[0, 0] - 1e-12
+    assert held.P[0, 0] >= free.P[0, 0] - 1e-12
     sure.set(2, before[2], 1e-9)
     sure.update(np.array([1.0]), H, R)
-    assert held.covariance[0, 0] > sure.covariance[0, 0]
-    assert np.linalg.eigvalsh(held.covariance).min() > 0.0
+    assert held.P[0, 0] > sure.P[0, 0]
+    assert np.linalg.eigvalsh(held.P).min() > 0.0
 
 
 @pytest.mark.filter_fails
 def test_nan_never_stays():
     kalman, _ = make(4)
     kalman.update(np.array([np.nan]), np.ones((1, 4)), np.array([1.0]))
-    assert np.isfinite(kalman.mean).all()
-    assert np.isfinite(kalman.covariance).all()
+    assert np.isfinite(kalman.x).all()
+    assert np.isfinite(kalman.P).all()
     assert kalman.restarts == 1
 
 
@@ -63,6 +63,6 @@ def test_readings_of_any_size_bring_no_warning_and_no_restart():
         H = size * rng.standard_normal((3, 4))
         H[2] = H[1] * (1.0 + 1e-13)
         kalman.update(size * rng.standard_normal(3), H, np.array([1e-12, size, 1e-12]) * size)
-    assert np.isfinite(kalman.mean).all()
-    assert (np.linalg.eigvalsh(kalman.covariance) > -1e-9).all()
+    assert np.isfinite(kalman.x).all()
+    assert (np.linalg.eigvalsh(kalman.P) > -1e-9).all()
     assert kalman.restarts == 0

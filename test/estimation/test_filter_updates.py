@@ -77,11 +77,11 @@ def references(parts, ekf, speeds):
 
 
 def test_a_reference_is_the_textbook_update(parts, ekf):
-    before, variance = 0.045, float(ekf.covariance[SPEED, SPEED])
+    before, variance = 0.045, float(ekf.P[SPEED, SPEED])
     references(parts, ekf, [0.046])
     noise, prior = parts.sensors.reference_std**2, variance + 1e-8
     expected = before + prior / (prior + noise) * 0.001
-    assert ekf.mean[SPEED] == pytest.approx(expected)
+    assert ekf.x[SPEED] == pytest.approx(expected)
 
 
 def test_references_that_agree_with_one_another_are_believed_after_their_count(parts, ekf):
@@ -89,7 +89,7 @@ def test_references_that_agree_with_one_another_are_believed_after_their_count(p
     update, opened = references(parts, ekf, [0.045] * 10 + [0.02] * 3)
     assert opened.index(True) == 11
     assert update.state.rejected == 2
-    assert ekf.mean[SPEED] == pytest.approx(0.02, abs=0.003)
+    assert ekf.x[SPEED] == pytest.approx(0.02, abs=0.003)
 
 
 def test_a_rover_that_drives_faster_than_its_wheels_is_not_believed(parts):
@@ -99,7 +99,7 @@ def test_a_rover_that_drives_faster_than_its_wheels_is_not_believed(parts):
         fresh = parts.filter()
         fresh.set(SPEED, 0.045, 0.001**2)
         references(parts, fresh, [0.045] * 5 + [speed] * 3)
-        found[speed] = fresh.mean[SPEED]
+        found[speed] = fresh.x[SPEED]
     assert found[0.06] > 0.053
     assert found[0.13] == pytest.approx(0.045, abs=0.002)
 
@@ -127,7 +127,7 @@ def test_two_references_on_standing_wheels_say_that_the_rover_slides(parts, ekf)
         sliding = time > 3.0
         assert (update.state.sliding_until > time) is sliding
         assert update.known(time) is sliding
-        assert ekf.mean[SPEED] == pytest.approx(0.03 if sliding else 0.0, abs=0.003)
+        assert ekf.x[SPEED] == pytest.approx(0.03 if sliding else 0.0, abs=0.003)
 
 
 def test_neither_a_rejected_reference_nor_one_at_rest_tells_of_slip(parts, ekf):
@@ -167,18 +167,18 @@ def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, m
         ekf, update = parts.filter(), reference_update(parts)
         ekf.set(SPEED, 0.5 + 0.1 * rng.standard_normal(), 0.1**2)
         for i, error in enumerate(wandering(rng, count, dt, 0.03, 15.0)):
-            prediction = Prediction.unchanged(ekf.mean)
+            prediction = Prediction.unchanged(ekf.x)
             update.predict(prediction, dt if i else 0.0)
             ekf.predict(*prediction)
             speed = 0.5 + error + 0.01 * rng.standard_normal()
             hear(parts, update, ekf, dt * i, speed, fastest_rim=0.6)
-        inside.append(abs(ekf.mean[SPEED] - 0.5) < 1.96 * np.sqrt(ekf.covariance[SPEED, SPEED]))
+        inside.append(abs(ekf.x[SPEED] - 0.5) < 1.96 * np.sqrt(ekf.P[SPEED, SPEED]))
     assert least <= np.mean(inside) <= most
 
 
 def test_the_error_that_lasts_keeps_its_deviation_over_any_step():
     parts = Parts(reader.load(SAND, ['sensors.reference_wander_std:=0.03']))
-    prediction, e = Prediction.unchanged(parts.filter().mean), parts.layout.reference_error
+    prediction, e = Prediction.unchanged(parts.filter().x), parts.layout.reference_error
     reference_update(parts).predict(prediction, 0.5 * parts.sensors.reference_wander_time)
     hold = prediction.F[e, e]
     assert hold == pytest.approx(np.exp(-0.5))
@@ -199,7 +199,7 @@ def rest(parts, ekf, seconds, yaw=0.0):
 
 def test_a_rover_that_stands_has_no_speed_and_learns_the_zero_of_its_gyro(parts, ekf):
     update = rest(parts, ekf, 5.0, yaw=0.003)
-    assert abs(ekf.mean[SPEED]) < 1e-3
+    assert abs(ekf.x[SPEED]) < 1e-3
     assert update.standing()
     assert update.state.zero.yaw == pytest.approx(0.003 * np.sum(1.0 / np.arange(1, 45)), rel=0.1)
     assert update.state.zero.pitch > 0.0
@@ -211,13 +211,13 @@ def test_a_fast_rover_is_not_stopped_at_once(parts):
     fast = parts.filter()
     fast.set(SPEED, 1.0, 0.02**2)
     rest(parts, fast, 0.3)
-    assert fast.mean[SPEED] > 0.8
+    assert fast.x[SPEED] > 0.8
     rest(parts, fast, 4.0)
-    assert abs(fast.mean[SPEED]) < 0.01
+    assert abs(fast.x[SPEED]) < 0.01
     slow = parts.filter()
     slow.set(SPEED, 0.06, 0.002**2)
     rest(parts, slow, 0.4)
-    assert abs(slow.mean[SPEED]) < 0.01, 'locked wheels stop it in a twentieth of a second'
+    assert abs(slow.x[SPEED]) < 0.01, 'locked wheels stop it in a twentieth of a second'
 
 
 # -- Sinkage ----------------------------------------------------------------------------------
@@ -228,7 +228,7 @@ def read_sinkage(parts, update, ekf, time, depth, count=1, unmodelled_std=0.0):
     sums = SinkageSums((depth,) + (0.0,) * 5, (count,) + (0,) * 5)
     rows = update.update(ekf, time, sums, parts.sensors.sinkage_std**2, np.full(6, unmodelled_std))
     ekf.fuse(rows)
-    return float(ekf.mean[parts.layout.sinkage.start]) if rows else None
+    return float(ekf.x[parts.layout.sinkage.start]) if rows else None
 
 
 @pytest.fixture
@@ -275,7 +275,7 @@ def test_two_readings_of_the_sinkage_are_the_textbook_update(parts, ekf, sinkage
     information = 1.0 / 0.002**2 + 1.0 / noise
     mean = (0.03 / 0.002**2 + 0.031 / noise) / information
     assert read_sinkage(parts, sinkage_update, ekf, 0.0, 0.062, 2) == pytest.approx(mean)
-    assert float(ekf.covariance[zi, zi]) == pytest.approx(1.0 / information)
+    assert float(ekf.P[zi, zi]) == pytest.approx(1.0 / information)
 
 
 def test_the_first_reading_of_a_wheel_that_dug_in_is_believed(parts, ekf, sinkage_update):
@@ -295,7 +295,7 @@ def sinkage_predicted(parts, x, loads=None, angle=NAN, angle_std=0.0, rims=FORWA
 
 
 def relaxed(parts, ekf, seconds, speed=0.05, start=None):
-    x, travel = ekf.mean.copy(), 0.0
+    x, travel = ekf.x.copy(), 0.0
     x[SPEED] = speed
     if start is not None:
         x[parts.layout.sinkage] = start
@@ -310,11 +310,11 @@ def test_digging_leaves_the_sinkage_open_until_it_is_read_or_the_wheel_rolls_on(
     process = SinkageProcess(parts.rover, parts.layout, parts.models, 0.0)
 
     def goes_on(seconds, speed, read=()):
-        ekf.mean[SPEED] = speed
+        ekf.x[SPEED] = speed
         unread = [i for i in range(6) if i not in read]
         for _ in range(round(10 * seconds)):
-            process.predict(Prediction.unchanged(ekf.mean), ekf.mean, parts.cycle(FORWARD))
-            process.end_cycle(ekf, ekf.mean[parts.layout.sinkage].copy(), unread, 0.1)
+            process.predict(Prediction.unchanged(ekf.x), ekf.x, parts.cycle(FORWARD))
+            process.end_cycle(ekf, ekf.x[parts.layout.sinkage].copy(), unread, 0.1)
         return process.state.unmodelled_std
 
     assert goes_on(20.0, 0.0, read=[2])[[1, 2]] == pytest.approx([0.1 * 0.05 * 20.0, 0.0])
@@ -322,7 +322,7 @@ def test_digging_leaves_the_sinkage_open_until_it_is_read_or_the_wheel_rolls_on(
 
 
 def test_the_sinkage_relaxes_over_travel_to_where_the_bearing_law_carries_the_load(parts, ekf):
-    at_rest = ekf.mean[parts.layout.sinkage]  # the same law without slip
+    at_rest = ekf.x[parts.layout.sinkage]  # the same law without slip
     found, travel, _ = relaxed(parts, ekf, 30.0, start=0.05)
     assert travel == pytest.approx(1.5)
     assert found == pytest.approx(at_rest, rel=0.05)
@@ -333,7 +333,7 @@ def test_the_sinkage_relaxes_over_travel_to_where_the_bearing_law_carries_the_lo
 def test_wheels_sink_backwards_as_they_do_forwards(parts, ekf):
     found = []
     for way in (1.0, -1.0):
-        x = ekf.mean.copy()
+        x = ekf.x.copy()
         x[SPEED], x[parts.layout.sinkage] = 0.03 * way, 0.05
         rims = tuple(way * rim for rim in FORWARD)
         prediction, travel = sinkage_predicted(parts, x, rims=rims)
@@ -349,7 +349,7 @@ def test_the_error_of_a_measured_leaving_angle_loosens_the_sinkage(parts, ekf):
     part, std = parts.layout.sinkage, 0.01
 
     def predicted(angle, angle_std):
-        prediction, _ = sinkage_predicted(parts, ekf.mean, angle=angle, angle_std=angle_std)
+        prediction, _ = sinkage_predicted(parts, ekf.x, angle=angle, angle_std=angle_std)
         return prediction.mean[part], np.diagonal(prediction.Q)[part]
 
     here, sure = predicted(-0.2, 0.0)
@@ -387,7 +387,7 @@ def test_what_all_wheels_share_of_the_shear_error_lasts_longer_than_what_one_has
     gain = parts.configuration.sensors.torque_gain_std
     stationary = (0.05**2 + gain**2) * np.eye(6) + 0.12**2
     assert F @ stationary @ F.T + Q == pytest.approx(stationary)
-    assert parts.filter().covariance[e, e] == pytest.approx(stationary)
+    assert parts.filter().P[e, e] == pytest.approx(stationary)
 
 
 def test_softer_ground_is_weaker_ground_where_no_torque_says_how_weak(parts):
@@ -411,7 +411,7 @@ def linearised(parts, x, loads, angle=NAN, angle_std=0.05):
 
 def forces(parts, ekf):
     loads = WheelLoads(parts.rover).state.load
-    return linearised(parts, ekf.mean, loads), loads
+    return linearised(parts, ekf.x, loads), loads
 
 
 def torque_update(parts, ekf, found, cycle, doubt=0.0, repeats=1.0):
@@ -476,7 +476,7 @@ def test_a_wheel_that_the_models_keep_missing_counts_less_and_no_other(parts, ek
     arguments = {'variance': parts.sensors.torque_std**2, **SURE}
     first, *_, last = [update.update(ekf, found, cycle, **arguments) for _ in range(21)]
     assert [row.variance for row in last[1:]] == [row.variance for row in first[1:]]
-    prior = first[0].jacobian @ ekf.covariance @ first[0].jacobian
+    prior = first[0].jacobian @ ekf.P @ first[0].jacobian
     noise = parts.sensors.torque_std**2 + (parts.rover.load_std * found.torque[0]) ** 2
     nis = off[0] ** 2 / (prior + noise)
     mean = nis + (1.0 - nis) * 0.9**21
@@ -492,18 +492,18 @@ def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ek
     entries = range(parts.layout.size)
     learned = {SHEAR_STRENGTH, *entries[parts.layout.torque_zero]}
     for i in set(entries) - learned:
-        ekf.set(i, float(ekf.mean[i]), 1e-12)
-    strong = ekf.mean.copy()
+        ekf.set(i, float(ekf.x[i]), 1e-12)
+    strong = ekf.x.copy()
     strong[SHEAR_STRENGTH] = 0.1  # the soil is stronger than the file says
     for _ in range(120):
         loads = tuple((level * (0.3 + 1.4 * rng.random(6))).tolist())
-        found, true = (linearised(parts, x, loads) for x in (ekf.mean, strong))
+        found, true = (linearised(parts, x, loads) for x in (ekf.x, strong))
         torque = true.torque + np.array([zero, -zero, 0.0, 0.0, 0.0, 0.0])
         cycle = parts.cycle(FORWARD, torque=tuple(torque.tolist()))
         ekf.fuse(torque_update(parts, ekf, found, cycle))
     update = TorqueUpdate(parts.configuration, parts.rover, parts.layout)
-    assert update.zeros(ekf.mean) == pytest.approx((zero, -zero, 0, 0, 0, 0), abs=0.15 * zero)
-    assert ekf.mean[SHEAR_STRENGTH] == pytest.approx(0.1, abs=0.01)
+    assert update.zeros(ekf.x) == pytest.approx((zero, -zero, 0, 0, 0, 0), abs=0.15 * zero)
+    assert ekf.x[SHEAR_STRENGTH] == pytest.approx(0.1, abs=0.01)
 
 
 SURE = {'model_variance': 0.0, 'repeats': 1.0}
@@ -519,7 +519,7 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
     balance = force_balance(parts)
     variances, torques, pulls = [], [], []
     for std, angle in ((1e-9, -0.2), (0.05, -0.2), (1e-9, -0.25), (0.05, NAN), (1e-9, NAN)):
-        found = linearised(parts, ekf.mean, loads, angle, std)
+        found = linearised(parts, ekf.x, loads, angle, std)
         torque = tuple(found.torque.tolist())
         cycle = parts.cycle(FORWARD, loads, torque=torque, window=window(0.0, 9.8))
         rows = torque_update(parts, ekf, found, cycle)
@@ -560,14 +560,14 @@ def test_noise_of_the_accelerometer_averages_out_over_the_same_ground(parts, ekf
 def test_the_balance_of_forces_on_a_slope(parts, ekf):
     balance = force_balance(parts)
     found, loads = forces(parts, ekf)
-    ekf.mean[parts.layout.sinkage] = 0.03  # even ruts: the body lies along the ground
+    ekf.x[parts.layout.sinkage] = 0.03  # even ruts: the body lies along the ground
     along = float(found.pull.sum()) + 12.0
     cycle = parts.cycle(FORWARD, loads, window=window(along / parts.rover.mass, 9.6))
     total = balance.sum_of_pulls(cycle, 0.0)
     row = balance.update(ekf, found, total, cycle, stationary=[None] * 6, **SURE)
     assert row.residual == pytest.approx(12.0, abs=1e-6)
     rear = int(np.argmin(parts.rover.longitudinal))
-    ekf.mean[parts.layout.sinkage.start + rear] += 0.01  # the nose points up by it
+    ekf.x[parts.layout.sinkage.start + rear] += 0.01  # the nose points up by it
     tilted = balance.update(ekf, found, total, cycle, stationary=[None] * 6, **SURE)
     tilt = 0.01 * parts.rover.rut_tilt[rear]
     assert tilt > 0.0
@@ -602,7 +602,7 @@ def test_the_jacobian_of_a_settled_sinkage_is_its_derivative(parts, ekf):
     settled, _, _ = relaxed(parts, ekf, 30.0, speed=0.04)
 
     def predicted(column, step):
-        x = ekf.mean.copy()
+        x = ekf.x.copy()
         x[SPEED], x[part] = 0.04, settled
         x[column] += step
         return sinkage_predicted(parts, x)[0]

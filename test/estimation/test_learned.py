@@ -154,7 +154,7 @@ def test_the_soil_that_is_kept_carries_what_its_drive_was_seen_to_climb():
     configuration = reader.load(['generic_six_wheel', 'hit_lss1'])
     estimator = WheelSoilEstimator(configuration)
     rover = Rover.from_configuration(configuration)
-    mean, covariance = estimator._ekf.mean.copy(), estimator._ekf.covariance
+    mean, covariance = estimator._ekf.x.copy(), estimator._ekf.P
     mean[SHEAR_STRENGTH] = -0.5
     zero = estimator._zero_velocity.state.zero
 

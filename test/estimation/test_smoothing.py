@@ -42,7 +42,7 @@ def test_a_linear_drive_smoothed_is_its_least_squares_solution():
     Q = np.diag([0.01, 0.02, 0.005])
     ekf = GatedFilter(start, spread, -bound, bound)
     ekf.buffer = buffer = HistoryBuffer()
-    buffer.mark(0, Gaussian(ekf.mean, ekf.covariance))
+    buffer.mark(0, Gaussian(ekf.x, ekf.P))
     rows, values = [], []
 
     def add(step, matrix, value, before=None):
@@ -56,16 +56,16 @@ def test_a_linear_drive_smoothed_is_its_least_squares_solution():
     add(0, whitened(spread), whitened(spread) @ start)
     for step in range(1, STEPS + 1):
         noise = Q.copy()
-        ekf.predict(F @ ekf.mean, F, Q)
+        ekf.predict(F @ ekf.x, F, Q)
         if step == WIDENED_AT:
             ekf.inflate(1, WIDENING)
             noise[1, 1] += WIDENING
         add(step, whitened(noise), np.zeros(SIZE), -whitened(noise) @ F)
         H, z = rng.normal(size=(1, SIZE)), rng.normal(size=1)
         if step % 3:
-            ekf.update(z - H @ ekf.mean, H, np.array([NOISE]))
+            ekf.update(z - H @ ekf.x, H, np.array([NOISE]))
             add(step, H / np.sqrt(NOISE), z / np.sqrt(NOISE))
-        buffer.mark(step, Gaussian(ekf.mean, ekf.covariance))
+        buffer.mark(step, Gaussian(ekf.x, ekf.P))
     system = np.vstack(rows)
     covariance = np.linalg.inv(system.T @ system)
     solution = covariance @ system.T @ np.concatenate(values)

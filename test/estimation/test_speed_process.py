@@ -79,12 +79,12 @@ def test_the_speed_between_two_cycles_is_what_the_step_makes_of_the_last_one():
     """Mean and variance of a linear function of speed and bias, by drawing them."""
     made, window = process([0.05] * 6), InertialWindow(speed_change=0.003, duration=0.1)
     ekf, rims = filter_at(0.04), speeds([0.06] * 6)
-    ekf.covariance[SPEED, GRAVITY_BIAS] = ekf.covariance[GRAVITY_BIAS, SPEED] = 3e-6
-    ekf.mean[GRAVITY_BIAS], ekf.covariance[GRAVITY_BIAS, GRAVITY_BIAS] = 0.1, 1e-4
+    ekf.P[SPEED, GRAVITY_BIAS] = ekf.P[GRAVITY_BIAS, SPEED] = 3e-6
+    ekf.x[GRAVITY_BIAS], ekf.P[GRAVITY_BIAS, GRAVITY_BIAS] = 0.1, 1e-4
     assert made.present(ekf, 0.0, rims, window, inflated=True) == (0.04, pytest.approx(1e-6))
     entries = [SPEED, GRAVITY_BIAS]
     drawn = np.random.default_rng(1).multivariate_normal(
-        ekf.mean[entries], ekf.covariance[np.ix_(entries, entries)], 50_000
+        ekf.x[entries], ekf.P[np.ix_(entries, entries)], 50_000
     )
     a, b, constant, noise, _ = made.step(0.1, rims, window, inflated=True)
     mean, variance = made.present(ekf, 0.1, rims, window, inflated=True)
@@ -98,12 +98,12 @@ def test_wheels_that_are_first_heard_roll_or_spin_or_stand():
         made, ekf = SpeedProcess(parts.configuration, parts.rover, parts.sensors), parts.filter()
         made.begin(ekf, speeds([NAN] * 6))
         made.begin(ekf, speeds([rim] * 6))
-        assert ekf.mean[SPEED] == pytest.approx(made.state.ratio * rim) and made.state.ratio > 0.5
-        assert ekf.covariance[SPEED, SPEED] == pytest.approx(std**2)
+        assert ekf.x[SPEED] == pytest.approx(made.state.ratio * rim) and made.state.ratio > 0.5
+        assert ekf.P[SPEED, SPEED] == pytest.approx(std**2)
         made.end_cycle(0.0, ekf, speeds([rim] * 6), settled=False)
         ekf.set(SPEED, 0.01, 1e-6)
         made.begin(ekf, speeds([rim] * 6))  # no more than once
-        assert ekf.mean[SPEED] == 0.01
+        assert ekf.x[SPEED] == 0.01
 
 
 def test_contacts_under_change_open_the_speed_and_the_accelerometer_bounds_it():
@@ -150,7 +150,7 @@ def test_disagreement_of_the_wheels(changes, expected):
 def test_a_rover_that_must_pull_more_slips_more_at_once():
     """At a slip per demand of 2, a demand that grows by 0.05 takes a tenth of the rim speed."""
     parts = Parts(reader.load(SAND))
-    made, mean = process([0.05] * 6), parts.filter().mean.copy()
+    made, mean = process([0.05] * 6), parts.filter().x.copy()
     mean[[SPEED, SLIP_PER_DEMAND]] = 0.04, 2.0
     ahead, astern = (parts.cycle([rim] * 6, demand_change=0.05) for rim in (0.05, -0.05))
     climbing = Prediction.unchanged(mean)
@@ -255,7 +255,7 @@ def test_without_a_reference_the_rover_does_not_move_against_its_wheels():
     ):
         ekf = filter_at(speed)
         process(rims).keep_with_rims(ekf, speeds(rims))
-        assert ekf.mean[SPEED] == kept
+        assert ekf.x[SPEED] == kept
 
 
 @pytest.mark.parametrize('way', [1.0, -1.0])
@@ -271,8 +271,8 @@ def test_without_a_reference_the_rover_is_no_faster_than_a_wheel_that_drives_it(
     ):
         made, ekf = process(rims), filter_at(way * 0.04, std)
         made.keep_behind_driving_wheels(ekf, parts.cycle(tuple(rims), torque=tuple(way * torque)))
-        assert ekf.mean[SPEED] == pytest.approx(way * kept)
-        assert ekf.covariance[SPEED, SPEED] == pytest.approx(std**2 if kept == 0.04 else 0.015**2)
+        assert ekf.x[SPEED] == pytest.approx(way * kept)
+        assert ekf.P[SPEED, SPEED] == pytest.approx(std**2 if kept == 0.04 else 0.015**2)
 
 
 def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
@@ -318,17 +318,15 @@ def test_at_rest_the_accelerometer_tells_its_zero():
     zero, cycles, dt = 0.03, 20, 0.1
     parts = Parts(reader.load(SAND))
     made, ekf = process([0.0] * 6), filter_at(0.0, 1e-4)
-    prior = float(ekf.covariance[GRAVITY_BIAS, GRAVITY_BIAS])
+    prior = float(ekf.P[GRAVITY_BIAS, GRAVITY_BIAS])
     window = InertialWindow(readings=1, speed_change=zero * dt, duration=dt)
     at_rest = parts.cycle((0.0,) * 6, still=True, window=window)
     for _ in range(cycles):
         made.learn_bias(ekf, at_rest, made.by_wheels(dt, at_rest.yaw_compensated, 0.0))
     precision = cycles * dt**2 / (noise() ** 2 * dt)
-    assert ekf.mean[GRAVITY_BIAS] == pytest.approx(zero * precision / (precision + 1 / prior), 1e-3)
-    assert ekf.covariance[GRAVITY_BIAS, GRAVITY_BIAS] == pytest.approx(
-        1 / (precision + 1 / prior), 1e-3
-    )
-    assert abs(ekf.mean[SPEED]) < 1e-6
+    assert ekf.x[GRAVITY_BIAS] == pytest.approx(zero * precision / (precision + 1 / prior), 1e-3)
+    assert ekf.P[GRAVITY_BIAS, GRAVITY_BIAS] == pytest.approx(1 / (precision + 1 / prior), 1e-3)
+    assert abs(ekf.x[SPEED]) < 1e-6
 
 
 def test_a_jolt_is_felt_at_once_and_an_accelerometer_that_jolts_for_long_is_doubted():
@@ -365,13 +363,13 @@ def test_a_start_up_transient_is_removed_and_nothing_else(speed, kept):
     made, ekf = process([0.06] * 6), filter_at(speed)
     made.remove_start_transient(ekf, Parts(reader.load(SAND)).cycle([0.06] * 6))
     expected = speed if kept else 0.8 * 0.06
-    assert ekf.mean[SPEED] == pytest.approx(expected)
+    assert ekf.x[SPEED] == pytest.approx(expected)
 
 
 def test_a_speed_is_known_no_better_than_a_set_of_soil_models():
     ekf = filter_at(0.05, 1e-6)
     process([0.06] * 6).keep_least_variance(ekf, (0.06,) * 6)
-    assert np.sqrt(ekf.covariance[SPEED, SPEED]) == pytest.approx(0.06 * 0.02)
+    assert np.sqrt(ekf.P[SPEED, SPEED]) == pytest.approx(0.06 * 0.02)
 
 
 @pytest.mark.parametrize(

@@ -145,14 +145,14 @@ LOADS = (250.0,) * 5 + (0.0,)
 
 def margin(parts, slope, direction=1.0):
     found = PullMargin(len(LOADS), parts.models)
-    sinkages = parts.filter().mean[parts.layout.sinkage]
+    sinkages = parts.filter().x[parts.layout.sinkage]
     wheels = WheelStates(1.0, sinkages, np.array(LOADS))
     found.update(0.0, wheels, direction * math.tan(slope))
     return found.state.margin
 
 
 def test_the_margin_is_the_greatest_pull_less_what_the_slope_asks(parts):
-    sinkage = parts.filter().mean[parts.layout.sinkage]
+    sinkage = parts.filter().x[parts.layout.sinkage]
     ratio = 1.0 - np.linspace(0.2, 0.95, 40)[:, None]
     _, pulls = parts.models.torque_and_pull(WheelStates(ratio, sinkage, 250.0))
     level = margin(parts, 0.0)

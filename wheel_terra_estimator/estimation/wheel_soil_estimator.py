@@ -178,10 +178,8 @@ class WheelSoilEstimator:
         self._sideways = SidewaysMotion(rover)
         self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
         self._outputs = Outputs(configuration, rover, sensors, layout)
-        self._learned = Learned(
-            configuration, layout, self._ekf.covariance, self._outputs.learned_soil
-        )
-        self._teaching = Teaching.of_filter(layout, self._ekf.covariance)
+        self._learned = Learned(configuration, layout, self._ekf.P, self._outputs.learned_soil)
+        self._teaching = Teaching.of_filter(layout, self._ekf.P)
         self._clock = _Clock()
         # What has a memory.
         self._parts: tuple[Component[Any] | GatedFilter | HistoryBuffer, ...] = tuple(
@@ -270,7 +268,7 @@ class WheelSoilEstimator:
         """Reset the variance of the gravity bias to the orientation noise that the IMU reports."""
         if stated.orientation_std != before.orientation_std:
             std = gravity_bias_std(self._rover, self._sensors, stated.orientation_std)
-            self._ekf.set(GRAVITY_BIAS, float(self._ekf.mean[GRAVITY_BIAS]), std**2)
+            self._ekf.set(GRAVITY_BIAS, float(self._ekf.x[GRAVITY_BIAS]), std**2)
 
     def _is_due(self, time: float, before: float) -> bool:
         """Return whether the period that began at `before` [s] is over; nan = none began."""
@@ -282,7 +280,7 @@ class WheelSoilEstimator:
         """Predict to a time [s], fuse the readings since the last cycle, compute the pulls."""
         ekf, layout = self._ekf, self._layout
         cycle = self._begin_cycle(time)
-        sinkage_before = ekf.mean[layout.sinkage]
+        sinkage_before = ekf.x[layout.sinkage]
 
         self._torque_coefficient.update(
             self._torque_over_load(cycle), cycle.dt, settled=self._contact_age.settled
@@ -313,7 +311,7 @@ class WheelSoilEstimator:
         unread = self._sinkage.unread(time)
         considered = layout.considered(
             settled=self._contact_age.settled,
-            opposes_rims=cycle.yaw_compensated.oppose(float(ekf.mean[SPEED])),
+            opposes_rims=cycle.yaw_compensated.oppose(float(ekf.x[SPEED])),
             unread=unread,
         )
         ekf.fuse(rows, considered)
@@ -341,7 +339,7 @@ class WheelSoilEstimator:
         stationary: Floats,
     ) -> None:
         """Compute the pulls after the update of a cycle; arguments as in `PullEvidence`."""
-        ekf, zeros = self._ekf, self._torque.zeros(self._ekf.mean)
+        ekf, zeros = self._ekf, self._torque.zeros(self._ekf.x)
         torques = zip(self._wheels.state.torque, zeros, strict=True)
         tilt_stds = self._sinkage_process.state.unmodelled_std * self._rover.rut_tilt
         evidence = PullEvidence(
@@ -353,11 +351,11 @@ class WheelSoilEstimator:
             sideways=self._lateral_forces(cycle),
             tilt_std=math.hypot(*tilt_stds),
         )
-        tilt = rut_tilt(self._rover, self._layout, ekf.mean)
-        self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)
+        tilt = rut_tilt(self._rover, self._layout, ekf.x)
+        self._pulls.update(ekf.x, ekf.P, evidence, tilt=tilt)
         if self._buffer is not None:
-            present = Gaussian(ekf.mean, ekf.covariance)
-            self._buffer.mark((evidence, ekf.mean), present)
+            present = Gaussian(ekf.x, ekf.P)
+            self._buffer.mark((evidence, ekf.x), present)
 
     def _begin_cycle(self, time: float) -> Cycle:
         """Update turning, loads, demand and direction of the drive; return the new cycle."""
@@ -370,7 +368,7 @@ class WheelSoilEstimator:
         turning = self._turning.update(
             window,
             dt,
-            float(ekf.mean[SPEED]),
+            float(ekf.x[SPEED]),
             fastest,
             headings,
             rims,
@@ -418,7 +416,7 @@ class WheelSoilEstimator:
             (torque - zero, load * radius)
             for torque, zero, load, radius, turns in zip(
                 cycle.torque,
-                self._torque.zeros(self._ekf.mean),
+                self._torque.zeros(self._ekf.x),
                 cycle.loads.load,
                 self._rover.slip_radius,
                 cycle.turns,
@@ -435,7 +433,7 @@ class WheelSoilEstimator:
         """Update the steepest climb with demand [-] and slip, while it is steady and observed."""
         steady = slip_known and self._contact_age.settled and abs(rim) >= self._rover.low_rim
         straight = self._turning.state.lateral_motion <= _SHARP_TURN
-        slip = 1.0 - float(self._ekf.mean[SPEED]) / rim if steady and straight else NAN
+        slip = 1.0 - float(self._ekf.x[SPEED]) / rim if steady and straight else NAN
         self._climb.update(demand, slip, dt)
 
     def _predict(self, cycle: Cycle) -> None:
@@ -453,7 +451,7 @@ class WheelSoilEstimator:
             )
         lacking = speed.learn_bias(self._ekf, cycle, expected)
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
-        x = self._ekf.mean
+        x = self._ekf.x
         prediction = Prediction.unchanged(x)
         step = speed.combined(by_wheels, cycle.dt, self._trusted(cycle.window, cycle.time))
         if unseen:
@@ -480,7 +478,7 @@ class WheelSoilEstimator:
 
     def _note_ruts(self, dt: float) -> None:
         """Record the rut depths along the travel of the last `dt` [s], for following wheels."""
-        x = self._ekf.mean
+        x = self._ekf.x
         speed = float(x[SPEED])
         self._ruts.advance(
             abs(speed) * dt,
@@ -509,9 +507,9 @@ class WheelSoilEstimator:
     ) -> tuple[ContactForces, SumOfPulls | None, Floats, list[Row]]:
         """Return contact forces, measured sum of pulls, pulls of locked wheels, and the rows."""
         ekf = self._ekf
-        forces = self._linearisation.update(ekf.mean, cycle, self._ruts.state.depth)
-        speed_std = math.sqrt(float(ekf.covariance[SPEED, SPEED]))
-        pulls, stationary = self._stationary.update(ekf.mean, speed_std, cycle)
+        forces = self._linearisation.update(ekf.x, cycle, self._ruts.state.depth)
+        speed_std = math.sqrt(float(ekf.P[SPEED, SPEED]))
+        pulls, stationary = self._stationary.update(ekf.x, speed_std, cycle)
         start = self._contact_age.shear_variance
         repeats = correlated_cycles(cycle.rims, cycle.dt) * self._reference.model_variance_factor
         rows = self._torque.update(
@@ -529,7 +527,7 @@ class WheelSoilEstimator:
         )
         if not cycle.window.readings:
             return forces, None, pulls, rows
-        curvature = self._turning.curvature(float(ekf.mean[SPEED]))
+        curvature = self._turning.curvature(float(ekf.x[SPEED]))
         total = self._balance.sum_of_pulls(cycle, curvature)
         balance = self._balance.update(
             ekf, forces, total, cycle, stationary=stationary, model_variance=start, repeats=repeats
@@ -580,13 +578,13 @@ class WheelSoilEstimator:
         self._clock = self._clock._replace(assessment=assessment, speed=present)
         if self._margin.due(time):
             direction = self._contact_age.state.direction or 1.0
-            states = contact_states(ekf.mean, self._layout, loads.load, self._ruts.state.depth)
+            states = contact_states(ekf.x, self._layout, loads.load, self._ruts.state.depth)
             self._margin.update(time, states, direction * loads.slope_share)
         if self._is_due(time, self._slopes.state.time):
             self._learn_slopes(time, slips, rims, motion.lateral_motion)
             self._follow_sideways(time, body, rims)
         if self._buffer is not None:
-            self._buffer.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
+            self._buffer.mark(self._instant(time, body), Gaussian(ekf.x, ekf.P))
 
     def _wheel_motions(
         self, rims: Floats, slips: tuple[WheelSlip, ...], drive_sign: float
@@ -596,7 +594,7 @@ class WheelSoilEstimator:
         The sign of `drive_sign` is the direction in which a locked wheel is driven or dragged.
         """
         rover, torques = self._rover, self._wheels.state.torque
-        sinkage = self._ekf.mean[self._layout.sinkage].tolist()
+        sinkage = self._ekf.x[self._layout.sinkage].tolist()
         motions = []
         for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
             turns = abs(rim) > rover.rest_speed
@@ -648,7 +646,7 @@ class WheelSoilEstimator:
     def _follow_sideways(self, time: float, body: BodyMotion, rims: Floats) -> None:
         """Update the lateral motion (side slip) from loads, pulls and soil strength."""
         loads, ekf, soil = self._loads.state, self._ekf, self._configuration.soil
-        strength = math.exp(float(ekf.mean[SHEAR_STRENGTH]))
+        strength = math.exp(float(ekf.x[SHEAR_STRENGTH]))
         self._sideways.update(
             time,
             SidewaysInputs(
@@ -660,12 +658,12 @@ class WheelSoilEstimator:
                 steering=self._steering.state.angles,
                 loads=loads.load,
                 pulls=tuple(self._pulls.state.pull),
-                sinkage=tuple(ekf.mean[self._layout.sinkage].tolist()),
+                sinkage=tuple(ekf.x[self._layout.sinkage].tolist()),
                 lateral_force=loads.force[1] if loads.force_known else NAN,
                 lateral_force_std=self._sensors.specific_force_bias_std,
                 cohesion=float(soil.cohesion) * strength,
                 tan_friction=math.tan(float(soil.friction_angle)) * strength,
-                shear_modulus=float(soil.shear_modulus) * math.exp(float(ekf.mean[SHEAR_MODULUS])),
+                shear_modulus=float(soil.shear_modulus) * math.exp(float(ekf.x[SHEAR_MODULUS])),
             ),
         )
 
@@ -686,7 +684,7 @@ class WheelSoilEstimator:
         sources = self._sources()._replace(
             mean=nothing, covariance=nothing, speed=speed, speed_variance=variance
         )
-        cycle = SpeedAndVariance(float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED]))
+        cycle = SpeedAndVariance(float(ekf.x[SPEED]), float(ekf.P[SPEED, SPEED]))
         return Instant(time, body, sources, cycle, self._speed_by_torque(rims))
 
     def _present_speed(self, rims: Floats) -> SpeedAndVariance:
@@ -752,8 +750,8 @@ class WheelSoilEstimator:
         speed, variance = self._clock.speed or self._present_speed(rims)
         return Sources(
             stamp=self._clock.stamp,
-            mean=self._ekf.mean,
-            covariance=self._ekf.covariance,
+            mean=self._ekf.x,
+            covariance=self._ekf.P,
             speed=speed,
             speed_variance=variance,
             yaw_rate=self._turning.state.yaw_rate,
@@ -773,12 +771,12 @@ class WheelSoilEstimator:
         """Return identified parameters: configuration key -> value; ``_std`` = deviation."""
         ekf = self._ekf
         zero, climbed = self._zero_velocity.state.zero, self._climb.state
-        return self._learned.values(ekf.mean, ekf.covariance, zero, climbed)
+        return self._learned.values(ekf.x, ekf.P, zero, climbed)
 
     def taught(self) -> tuple[Taught, ...]:
         """Return the information gained on each parameter in this drive so far."""
         ekf = self._ekf
-        return self._teaching.judged(with_model_errors(ekf.mean, ekf.covariance, self._layout))
+        return self._teaching.judged(with_model_errors(ekf.x, ekf.P, self._layout))
 
     def health(self) -> dict[str, Any]:
         """Return counters and consistency figures for diagnostics."""
@@ -798,7 +796,7 @@ class WheelSoilEstimator:
                 report[f'nis_{channel}'] = round(nis, 3)
         zero = self._zero_velocity.state.zero
         report['gyro_zero_yaw_rad_s'] = float(f'{zero.yaw:.3g}')
-        report['accelerometer_bias_m_s2'] = float(f'{float(self._ekf.mean[GRAVITY_BIAS]):.3g}')
+        report['accelerometer_bias_m_s2'] = float(f'{float(self._ekf.x[GRAVITY_BIAS]):.3g}')
         report |= self._noise.report(self._inertial.stated)
         for than, words in self._noise.in_words(self._inertial.stated).items():
             report[f'noise_beyond_{than}'] = words

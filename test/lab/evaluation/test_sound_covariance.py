@@ -20,7 +20,7 @@ def test_covariance_and_sets_stay_sound_through_faults(monkeypatch):
 
     def watched(self, *arguments, **options):
         update(self, *arguments, **options)
-        looked.append(None if len(looked) % 50 else self.covariance.copy())
+        looked.append(None if len(looked) % 50 else self.P.copy())
 
     monkeypatch.setattr(GatedFilter, 'update', watched)
     drive = SIMULATORS['A'].simulate('sensor_faults', 77, LENGTH, None)

@@ -41,40 +41,8 @@ class FilterMemory(NamedTuple):
     restarts: int
 
 
-class _SchmidtFilter(ExtendedKalmanFilter):
-    """filterpy's filter with a prediction worked out by the caller, and considered entries."""
-
-    x: FloatArray
-    P: FloatArray
-    predicted: FloatArray
-
-    def predict_x(self, u: float = 0) -> None:
-        """Take the predicted mean."""
-        self.x = self.predicted
-
-    def fuse(
-        self,
-        residual: FloatArray,
-        H: FloatArray,
-        HP: FloatArray,
-        noise: FloatArray,
-        considered: Sequence[int],
-    ) -> None:
-        """Fuse m readings with independent noise: z - h(x) (m,), H, H P (m, n), variances (m,)."""
-        S = HP @ H.T
-        S.flat[:: len(noise) + 1] += noise
-        _, gain, fails = dposv(S, HP)
-        K = gain.T if not fails else np.linalg.solve(S, HP).T
-        if considered:
-            K[list(considered)] = 0.0
-        I_KH = self._I - K @ H
-        self.x = self.x + K @ residual
-        self.P = I_KH @ self.P @ I_KH.T + (K * noise) @ K.T
-        self.y, self.S, self.K = residual, S, K
-
-
-class GatedFilter:
-    """State, covariance, gates and counters. What changes them makes new arrays.
+class GatedFilter(ExtendedKalmanFilter):
+    """State ``x`` and covariance ``P``, with bounds. What changes them makes new arrays.
 
     Parameters
     ----------
@@ -85,27 +53,24 @@ class GatedFilter:
 
     Attributes
     ----------
+    bounds : tuple of numpy.ndarray
+        Lower and upper bounds of the state, as given.
     buffer : HistoryBuffer or None
         Keeps the transitions of the state for a smoother.
     """
 
+    x: FloatArray
+    P: FloatArray
+
     def __init__(
         self, mean: FloatArray, covariance: FloatArray, lower: FloatArray, upper: FloatArray
     ) -> None:
-        size = len(mean)
-        self._ekf = _SchmidtFilter(dim_x=size, dim_z=1)
-        self._ekf.x = mean.copy()
-        self._ekf.P = covariance.copy()
+        super().__init__(dim_x=len(mean), dim_z=1)
+        self.x, self.P = mean.copy(), covariance.copy()
         self._start = FilterMemory(mean.copy(), covariance.copy(), 0)
-        self._lower, self._upper = lower, upper
-        self._identity = np.eye(size)
+        self.bounds = lower, upper
         self.restarts = 0
         self.buffer: HistoryBuffer | None = None
-
-    @property
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds of the state, (n,) each."""
-        return self._lower, self._upper
 
     def reset(self) -> None:
         """Go back to the start; restarts count from 0."""
@@ -113,21 +78,15 @@ class GatedFilter:
             self.buffer.cut()
         self.state = self._start
 
-    @property
-    def mean(self) -> FloatArray:
-        """(n,) state."""
-        return self._ekf.x
-
-    @property
-    def covariance(self) -> FloatArray:
-        """(n, n) covariance."""
-        return self._ekf.P
+    def predict_x(self, u: float = 0) -> None:
+        """Take the predicted mean."""
+        self.x = self._predicted
 
     def predict(self, mean: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
         """Go to a predicted mean with transition matrix F and process noise Q."""
-        before, ekf = self.state, self._ekf
-        ekf.predicted, ekf.F, ekf.Q = mean, transition, noise
-        ekf.predict()
+        before = self.state
+        self._predicted, self.F, self.Q = mean, transition, noise
+        super().predict()
         self._enforce_bounds()
         self._keep_transition(before, transition)
 
@@ -141,14 +100,22 @@ class GatedFilter:
         """
         # Each innovation is scaled to variance 1, so that their covariance can be factorised
         # whatever the units. A noise share below the floor would be lost in rounding.
-        HP = H @ self._ekf.P
+        HP = H @ self.P
         variance = np.einsum('ij,ij->i', HP, H) + noise
         scale = 1.0 / np.sqrt(np.maximum(variance, _LEAST_VARIANCE))
         column = scale[:, None]
         share = np.maximum(noise * scale * scale, _LEAST_SHARE)
-        ekf = self._ekf
-        ekf.fuse(residual * scale, H * column, HP * column, share, considered)
-        ekf.P = 0.5 * (ekf.P + ekf.P.T)
+        H, HP = H * column, HP * column
+        S = HP @ H.T
+        S.flat[:: len(share) + 1] += share
+        _, gain, fails = dposv(S, HP)
+        K = gain.T if not fails else np.linalg.solve(S, HP).T
+        if considered:
+            K[list(considered)] = 0.0
+        I_KH = self._I - K @ H
+        self.x = self.x + K @ (residual * scale)
+        P = I_KH @ self.P @ I_KH.T + (K * share) @ K.T
+        self.P = 0.5 * (P + P.T)
         self._enforce_bounds()
 
     def fuse(self, rows: Sequence[Row], considered: Sequence[int] = ()) -> None:
@@ -159,7 +126,7 @@ class GatedFilter:
 
     def set(self, index: int, value: float, variance: float) -> None:
         """Set one entry to a value known from elsewhere, without correlations."""
-        before, keep = self.state, self._identity.copy()
+        before, keep = self.state, self._I.copy()
         keep[index, index] = 0.0
         mean, covariance = keep @ before.mean, keep @ before.covariance @ keep
         mean[index], covariance[index, index] = value, variance
@@ -169,38 +136,37 @@ class GatedFilter:
     def inflate(self, index: int, variance: float) -> None:
         """Add variance to one entry."""
         before = self.state
-        covariance = before.covariance.copy()
-        covariance[index, index] += variance
-        self._ekf.P = covariance
-        self._keep_transition(before, self._identity)
+        self.P = before.covariance.copy()
+        self.P[index, index] += variance
+        self._keep_transition(before, self._I)
 
     @property
     def state(self) -> FilterMemory:
         """Mean, covariance and the count of restarts."""
-        return FilterMemory(self._ekf.x, self._ekf.P, self.restarts)
+        return FilterMemory(self.x, self.P, self.restarts)
 
     @state.setter
     def state(self, memory: FilterMemory) -> None:
-        self._ekf.x, self._ekf.P, self.restarts = memory
+        self.x, self.P, self.restarts = memory
 
     def _keep_transition(self, before: FilterMemory, transition: FloatArray) -> None:
         if self.buffer is not None:
-            after = Gaussian(self._ekf.x, self._ekf.P)
+            after = Gaussian(self.x, self.P)
             self.buffer.add(Gaussian(before.mean, before.covariance), transition, after)
 
     def _enforce_bounds(self) -> None:
         """Keep mean and covariance finite, within their bounds and positive."""
-        ekf = self._ekf
-        x, entries = ekf.x, ekf.P.ravel('K')
+        x, entries = self.x, self.P.ravel('K')
         # One sum of squares finds nan and inf in either.
         if not math.isfinite(x.dot(x) + entries.dot(entries)):
-            ekf.x = x = np.where(np.isfinite(x), x, 0.0)
-            ekf.P = self._start.covariance.copy()
-            entries = ekf.P.ravel('K')
+            self.x = x = np.where(np.isfinite(x), x, 0.0)
+            self.P = self._start.covariance.copy()
+            entries = self.P.ravel('K')
             self.restarts += 1
             if self.buffer is not None:
                 self.buffer.cut()
-        np.minimum(np.maximum(x, self._lower, out=x), self._upper, out=x)
+        lower, upper = self.bounds
+        np.minimum(np.maximum(x, lower, out=x), upper, out=x)
         diagonal = entries[:: len(x) + 1]
         if np.minimum.reduce(diagonal) <= 0.0:
             np.maximum(diagonal, _LEAST_DIAGONAL, out=diagonal)

@@ -107,13 +107,13 @@ class ForceBalance(Component['float | None']):
             else:
                 pull_sum += along * standing.expected
                 added_variance += standing.std**2
-        tilt = rut_tilt(self._rover, self._layout, ekf.mean)
+        tilt = rut_tilt(self._rover, self._layout, ekf.x)
         for i, gain in enumerate(self._rover.rut_tilt):
             # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
             jacobian[self._layout.sinkage.start + i] += total.weight * gain
         residual = total.along - (pull_sum + total.weight * tilt)
         variance = repeats * (total.variance - total.vibration) + total.vibration + added_variance
-        expected = float(jacobian @ ekf.covariance @ jacobian) + variance
+        expected = float(jacobian @ ekf.P @ jacobian) + variance
         self.state = smoothed_nis(self.state, residual * residual / expected)
         gate = chi_square_gate(residual, expected, self._gate)
         return Row(residual, jacobian, variance + gate)

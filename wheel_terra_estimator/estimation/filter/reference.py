@@ -97,10 +97,10 @@ class ReferenceUpdate(Component[ReferenceState]):
     def innovation(self, ekf: GatedFilter, reference: ReferenceVelocity) -> tuple[float, float]:
         """Return the innovation [m/s] and the variance h P h' of its prediction."""
         if self._error is None:
-            state, variance = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
+            state, variance = float(ekf.x[SPEED]), float(ekf.P[SPEED, SPEED])
         else:
-            state = float(self._reading @ ekf.mean)
-            variance = float(self._reading @ ekf.covariance @ self._reading)
+            state = float(self._reading @ ekf.x)
+            variance = float(self._reading @ ekf.P @ self._reading)
         return reference.forward - state, variance
 
     def known(self, time: float) -> bool:

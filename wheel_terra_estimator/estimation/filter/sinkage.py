@@ -75,8 +75,8 @@ class SinkageUpdate(Component[SinkageUpdateState]):
             if unmodelled_std[i] > 0.0:
                 ekf.inflate(index, float(unmodelled_std[i]) ** 2)
             variance = reading_variance / count + FLOOR_VARIANCE
-            residual = total / count - float(ekf.mean[index])
-            nis = residual * residual / (float(ekf.covariance[index, index]) + variance)
+            residual = total / count - float(ekf.x[index])
+            nis = residual * residual / (float(ekf.P[index, index]) + variance)
             if nis > self._gate:
                 rejected += 1
                 in_a_row[i] += 1

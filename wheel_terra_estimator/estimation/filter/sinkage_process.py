@@ -189,8 +189,8 @@ class SinkageProcess(Component[SinkageState]):
             return
         part = self._layout.sinkage
         gain = 1.0 - math.exp(-dt / _RATE_TIME)
-        change = ((ekf.mean[part] - before) / dt).tolist()
-        variance = np.diagonal(ekf.covariance)[part].tolist()
+        change = ((ekf.x[part] - before) / dt).tolist()
+        variance = np.diagonal(ekf.P)[part].tolist()
         self.state = self.state._replace(
             rate=tuple([r + gain * (c - r) for r, c in zip(self.state.rate, change, strict=True)]),
             rate_std=tuple([math.sqrt(2.0 * v) for v in variance]),

@@ -211,9 +211,9 @@ class SpeedProcess(Component[SpeedState]):
         change = now - known_one.demand
         if isnan(change):
             change = 0.0
-        slip = 1.0 - known_one.ratio + float(ekf.mean[SLIP_PER_DEMAND]) * change
+        slip = 1.0 - known_one.ratio + float(ekf.x[SLIP_PER_DEMAND]) * change
         ratio = 1.0 - _REVERSED_SLIP_SHARE * slip
-        gain_std = math.sqrt(float(ekf.covariance[SLIP_PER_DEMAND, SLIP_PER_DEMAND]))
+        gain_std = math.sqrt(float(ekf.P[SLIP_PER_DEMAND, SLIP_PER_DEMAND]))
         self.state = state._replace(
             ratio=clipped(ratio, _LEAST_REVERSED_RATIO, _MOST_REVERSED_RATIO),
             ratio_std=clipped(
@@ -337,11 +337,11 @@ class SpeedProcess(Component[SpeedState]):
             or isnan(cycle.yaw_compensated.typical)
         ):
             return 0.0
-        row = np.zeros(len(ekf.mean))
+        row = np.zeros(len(ekf.x))
         row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - 1.0, cycle.dt
-        residual = increment[0] - step.constant - float(row @ ekf.mean)
+        residual = increment[0] - step.constant - float(row @ ekf.x)
         variance = step.variance + increment[1]
-        expected = float(row @ ekf.covariance @ row) + variance
+        expected = float(row @ ekf.P @ row) + variance
         lacking = chi_square_gate(residual, expected, self._gate)
         nis = smoothed_nis(self.state.acceleration_nis, min(residual**2 / expected, self._gate))
         self.state = self.state._replace(acceleration_nis=nis)
@@ -407,7 +407,7 @@ class SpeedProcess(Component[SpeedState]):
         inflated: bool,
     ) -> tuple[float, float]:
         """Return speed [m/s] and variance extrapolated from the last cycle to a time [s]."""
-        x, P = ekf.mean, ekf.covariance
+        x, P = ekf.x, ekf.P
         speed, variance = float(x[SPEED]), float(P[SPEED, SPEED])
         if self.since_cycle(time) < TIME_ROUNDING:
             return speed, variance
@@ -436,7 +436,7 @@ class SpeedProcess(Component[SpeedState]):
         """
         rim = cycle.yaw_compensated.typical
         expected = self.state.ratio * rim
-        off = abs(float(ekf.mean[SPEED]) - expected)
+        off = abs(float(ekf.x[SPEED]) - expected)
         transient = _START_SHARE * abs(expected) < off < _MOST_TRANSIENT
         if transient and abs(rim) > self._rover.low_rim:
             ekf.set(SPEED, expected, (self.state.ratio_std * rim) ** 2)
@@ -446,7 +446,7 @@ class SpeedProcess(Component[SpeedState]):
 
         Only a slide does that, and the saturated forces of its wheels would never end the error.
         """
-        if abs(rims.typical) > self._rover.low_rim and rims.oppose(float(ekf.mean[SPEED])):
+        if abs(rims.typical) > self._rover.low_rim and rims.oppose(float(ekf.x[SPEED])):
             _reset_speed(ekf, 0.0, rims)
 
     def keep_behind_driving_wheels(self, ekf: GatedFilter, cycle: Cycle) -> None:
@@ -464,14 +464,14 @@ class SpeedProcess(Component[SpeedState]):
             if sign * torque > _DRIVING_TORQUE * load * radius
         ]
         slowest = min(known(driving), default=math.inf)
-        margin = _BOUND_DEVIATIONS * math.sqrt(float(ekf.covariance[SPEED, SPEED]))
-        if sign * float(ekf.mean[SPEED]) - slowest > margin:
+        margin = _BOUND_DEVIATIONS * math.sqrt(float(ekf.P[SPEED, SPEED]))
+        if sign * float(ekf.x[SPEED]) - slowest > margin:
             _reset_speed(ekf, sign * slowest, rims)
 
     def keep_least_variance(self, ekf: GatedFilter, rims: Floats) -> None:
         """Keep the deviation of v / rim speed above `LEAST_SLIP_STD`, by covariance inflation."""
         typical = sum(abs(rim) for rim in known(rims)) / len(rims)
-        lacking = (typical * LEAST_SLIP_STD) ** 2 - float(ekf.covariance[SPEED, SPEED])
+        lacking = (typical * LEAST_SLIP_STD) ** 2 - float(ekf.P[SPEED, SPEED])
         if lacking > 0.0:
             ekf.inflate(SPEED, lacking)
 
@@ -489,7 +489,7 @@ class SpeedProcess(Component[SpeedState]):
         inflation = state.inflation * math.exp(-self.since_cycle(time) / _INFLATION_TIME)
         ratio, ratio_std = state.ratio, state.ratio_std
         if settled and not turning and rims.along(_RATIO_RIM * self._rover.low_rim):
-            speed, variance = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
+            speed, variance = float(ekf.x[SPEED]), float(ekf.P[SPEED, SPEED])
             ratio = clipped(speed / rim, _LEAST_RATIO, _MOST_RATIO)
             std = math.sqrt(variance) / abs(rim)
             ratio_std = clipped(std, _LEAST_RATIO_STD, _MOST_RATIO_STD)
@@ -506,7 +506,7 @@ class SpeedProcess(Component[SpeedState]):
 def _reset_speed(ekf: GatedFilter, speed: float, rims: RimSpeeds) -> None:
     """Reset an impossible speed [m/s], with at least the variance of an initial slip."""
     least = (_FIRST_RATIO_STD * rims.typical) ** 2
-    ekf.set(SPEED, speed, max(float(ekf.covariance[SPEED, SPEED]), least))
+    ekf.set(SPEED, speed, max(float(ekf.P[SPEED, SPEED]), least))
 
 
 def spread(changes: Sequence[float]) -> float:

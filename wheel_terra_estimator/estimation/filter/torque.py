@@ -74,11 +74,11 @@ class TorqueUpdate(Component['tuple[float | None, ...]']):
         `repeats` cycles are one and the same (same ground).
         """
         rows, means = [], list(self.state)
-        H, zeros = forces.torque_rows, self.zeros(ekf.mean)
+        H, zeros = forces.torque_rows, self.zeros(ekf.x)
         if self._known:
             H = H.copy()
             H[self._ones] = 1.0
-        priors = np.einsum('ij,ij->i', H @ ekf.covariance, H).tolist()
+        priors = np.einsum('ij,ij->i', H @ ekf.P, H).tolist()
         models, noises = forces.torque.tolist(), forces.torque_noise.tolist()
         for i, reading in enumerate(cycle.torque):
             if isnan(reading) or not cycle.turns[i]:

@@ -67,11 +67,11 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         settled = time - self.state.since
         if settled < _SETTLING_TIME:
             return
-        variance, speed = _STD**2, float(ekf.mean[SPEED])
+        variance, speed = _STD**2, float(ekf.x[SPEED])
         if settled < abs(speed) / self._coasting:
-            P = float(ekf.covariance[SPEED, SPEED])
+            P = float(ekf.P[SPEED, SPEED])
             variance += chi_square_gate(speed, P + variance, _COASTING_GATE)
-        row = np.zeros(len(ekf.mean))
+        row = np.zeros(len(ekf.x))
         row[SPEED] = 1.0
         ekf.fuse([Row(-speed, row, variance)])
         turning = abs(yaw_rate) >= _MOST_YAW_RATE
