@@ -147,9 +147,7 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
     if arguments.reference:
         reference = _read(arguments.reference, arguments, configuration)
     options = Options(
-        tuple(arguments.only) or None,
-        arguments.allowed_error,
-        arguments.soil_known_to,
+        tuple(arguments.only) or None, arguments.allowed_error, arguments.soil_known_to
     )
     diagnosis = diagnose(table, configuration, reference, options)
     # The model file names the file of a named effect, so that it is accepted as it is.

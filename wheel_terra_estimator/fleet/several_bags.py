@@ -61,12 +61,7 @@ class _Task:
 
 
 def replay_bags(
-    bags: Sequence[Path],
-    settings: Settings,
-    *,
-    overwrite: bool,
-    jobs: int,
-    scheduler: str,
+    bags: Sequence[Path], settings: Settings, *, overwrite: bool, jobs: int, scheduler: str
 ) -> list[DriveRow]:
     """Replay recordings into one folder each and write the summary over all.
 

@@ -241,10 +241,7 @@ class EstimatorNode(LifecycleNode):
         self._listen()
         self._timers_made = [
             self.create_timer(period, callback, clock=self._steady)
-            for period, callback in (
-                (WATCH_PERIOD, self._watch),
-                (NAMES_PERIOD, self._watch_names),
-            )
+            for period, callback in ((WATCH_PERIOD, self._watch), (NAMES_PERIOD, self._watch_names))
         ]
 
     def _log_ready(self) -> None:
@@ -285,8 +282,7 @@ class EstimatorNode(LifecycleNode):
                 WithInfo(partial(self._arrive, topic)),
                 input_profile(topic),
                 event_callbacks=SubscriptionEventCallbacks(
-                    message_lost=partial(self._on_message_lost, topic),
-                    use_default_callbacks=False,
+                    message_lost=partial(self._on_message_lost, topic), use_default_callbacks=False
                 ),
                 qos_overriding_options=OVERRIDABLE,
                 raw=True,  # rclpy builds every field of a message, most of them for nothing

@@ -131,10 +131,7 @@ class Coordinate:
 
 
 def soil_coordinates(
-    soil: Soil,
-    stated: Mapping[str, float],
-    source: str = '',
-    known_to: float | None = None,
+    soil: Soil, stated: Mapping[str, float], source: str = '', known_to: float | None = None
 ) -> tuple[Coordinate, ...]:
     """Return the soil numbers that a diagnosis refits, centred on the configured soil.
 

@@ -10,13 +10,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import (
-    Effect,
-    Form,
-    magnitude,
-    shape,
-    signed,
-)
+from wheel_terra_estimator.terramechanics.effects.base import Effect, Form, magnitude, shape, signed
 
 SMALLEST_ROOM = 1e-12
 """Height left below the hub over r [-]; contact that leaves above the hub has none."""
@@ -59,10 +53,7 @@ SOIL_MOUND = Effect(
     claim='at high slip, soil piles up behind the wheel and moves the leaving angle back',
     symbol='1 - cos t_2 = b + (1 - b) [1 - exp(-kappa z x^2/(r (1 - b)))], b = 1 - cos(c_3 t_1), '
     'x = (s - onset)+/(1 - onset); about r (1 - cos t_2) += kappa z x^2 while small',
-    parameters=(
-        _KAPPA,
-        shape('onset', '-', 0.4, 0.0, 0.9, 0.15, 'slip at which it starts'),
-    ),
+    parameters=(_KAPPA, shape('onset', '-', 0.4, 0.0, 0.9, 0.15, 'slip at which it starts')),
     needs=('slip',),
     confounded_with={'stress_peak_shift': 'a rear camera: measured leaving angle'},
     validity='slip up to 0.95; a measured leaving angle overrides it',
