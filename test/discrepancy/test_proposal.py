@@ -12,7 +12,7 @@ from test_model_file import assert_errors, predicted
 from test_workflow import FEW, make, run
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy.proposal import find, words
+from wheel_terra_estimator.discrepancy import proposal as proposals
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.result import LeftOut, as_json
 from wheel_terra_estimator.discrepancy.workflow import Options
@@ -236,11 +236,11 @@ def test_a_law_says_effects_only_where_all_of_its_terms_are_some():
         targets, features = zip(*(term.split('_by_') for term in terms), strict=True)
         return SimpleNamespace(targets=targets, features=features)
 
-    assert find.equivalent_effects(law('torque_by_one', 'drawbar_pull_by_one')) == {
+    assert proposals.equivalent_effects(law('torque_by_one', 'drawbar_pull_by_one')) == {
         'drivetrain_friction',
         'pull_zero',
     }
-    assert find.equivalent_effects(law('torque_by_one', 'exponent_by_slope')) == frozenset()
+    assert proposals.equivalent_effects(law('torque_by_one', 'exponent_by_slope')) == frozenset()
 
 
 def test_a_change_is_said_in_the_units_of_the_rows():
@@ -248,11 +248,11 @@ def test_a_change_is_said_in_the_units_of_the_rows():
     rows = np.tile([0.02, 40.0, 20.0], (2, 1))
     table = type('Table', (), {'measured': rows, '__len__': lambda self: len(rows)})()
     at = OperatingPoints(np.array([0.1, 0.2]), np.array([100.0, 300.0]), Wheel(0.2, 0.1))
-    assert words._size('drawbar_pull', 0.1, table, at) == '20 N (50 % of its mean)'
-    assert words._size('torque', 0.1, table, at) == '4 N m (20 % of its mean)'
-    assert words._size('sinkage', 0.1, table, at) == '20 mm (100 % of its mean)'
+    assert proposals._size('drawbar_pull', 0.1, table, at) == '20 N (50 % of its mean)'
+    assert proposals._size('torque', 0.1, table, at) == '4 N m (20 % of its mean)'
+    assert proposals._size('sinkage', 0.1, table, at) == '20 mm (100 % of its mean)'
     rows[:, 2] = 0.0  # a placeholder: no share of its mean
-    assert words._size('torque', 0.1, table, at) == '4 N m'
+    assert proposals._size('torque', 0.1, table, at) == '4 N m'
 
 
 @pytest.mark.parametrize(('lost', 'closed'), [(1.6, 1.0 - np.sqrt(7.6 / 15.0)), (1.9, 0.0)])
@@ -263,4 +263,4 @@ def test_a_law_that_worsens_a_quantity_has_to_gain_five_times_that(lost, closed)
         'drawbar_pull': LeftOut(2.0 * np.sqrt(10.0), 2.0),
         'sinkage': LeftOut(2.0 * np.sqrt(7.0), 2.0 * np.sqrt(7.0 + lost)),
     }
-    assert find.Gap(None, None, gap, None).closed({'load': left}) == pytest.approx(closed)
+    assert proposals.Gap(None, None, gap, None).closed({'load': left}) == pytest.approx(closed)

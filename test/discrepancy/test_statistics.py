@@ -40,7 +40,6 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
 )
 from wheel_terra_estimator.discrepancy.report.words import _repeatability
 from wheel_terra_estimator.discrepancy.result import Noise
-from wheel_terra_estimator.discrepancy.selection import confidence
 from wheel_terra_estimator.discrepancy.selection import verdict as gap_test
 from wheel_terra_estimator.discrepancy.selection.verdict import _competitors
 from wheel_terra_estimator.discrepancy.selection.weights import Setting, default_floors
@@ -396,16 +395,16 @@ def test_repeats_of_a_reference_say_nothing_of_the_other_table(stated):
 
 def test_confidence_follows_what_speaks_for_a_name():
     """The fitted map has a weight per feature, and each piece of evidence acts the right way."""
-    sure = dict.fromkeys(confidence.FEATURES, 0.0)
+    sure = dict.fromkeys(gap_test.FEATURES, 0.0)
     sure.update(one=1.0, margin=3.0, margin_of_set=3.5, gain=3.0, gain_squared=9.0)
 
     def of_name(**changes):
         values = {**sure, **changes}
         values['margin_floor'] = values['margin'] * values['floor']
         values['margin_two'] = values['margin'] * values['two']
-        return confidence.confidence(values).of_name
+        return gap_test.confidence(values).of_name
 
-    assert len(confidence._weights()['name']) == len(confidence.FEATURES)
+    assert len(gap_test._weights()['name']) == len(gap_test.FEATURES)
     assert of_name() > 0.95
     behind = of_name(margin=-1.0, margin_of_set=-0.5)
     assert behind < 0.6 < of_name(margin=1.0) < of_name()

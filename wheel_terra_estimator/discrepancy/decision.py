@@ -22,16 +22,17 @@ from wheel_terra_estimator.discrepancy.assessment.held_out import (
     slip_groups,
 )
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.proposal.find import Gap, equivalent_effects, propose
+from wheel_terra_estimator.discrepancy.proposal import Gap, equivalent_effects, propose
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
-from wheel_terra_estimator.discrepancy.selection import confidence as confidences
-from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
 from wheel_terra_estimator.discrepancy.selection.readings import units_apart
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import (
+    Confidence,
     Verdict,
     chi_square_p_value,
     choose,
+    confidence,
+    features,
     largest_z_score,
     unnamed,
 )
@@ -182,7 +183,7 @@ class Decider:
             return names, False
         ahead_of_all = same or (ahead >= _CLEARLY and len(names) > 1)
         odds = _BEATS_LAW if ahead_of_all and not decision.verdict.left.significant else 1.0
-        surer = [confidences.confidence(n.features, len(n.alike), odds) for n in names]
+        surer = [confidence(n.features, len(n.alike), odds) for n in names]
         names = tuple(replace(n, confidence=c) for n, c in zip(names, surer, strict=True))
         return names, _least(names, odds) >= _LIKELY
 
@@ -240,7 +241,7 @@ def _as_sure(names: tuple[Naming, ...], share: float) -> tuple[Naming, ...]:
 
 def _least(names: tuple[Naming, ...], odds: float = 1.0) -> float:
     """Return the confidence of the least likely set of names, among what was tried."""
-    return min(confidences.confidence(name.features, odds=odds).of_set for name in names)
+    return min(confidence(name.features, odds=odds).of_set for name in names)
 
 
 def _names(units: Mapping[str, float], decision: Decision) -> tuple[Naming, ...]:
@@ -250,13 +251,13 @@ def _names(units: Mapping[str, float], decision: Decision) -> tuple[Naming, ...]
     shown = _what_rows_show(findings, fitted, decision.gap)
     found = []
     for place, key in enumerate(fitted.names):
-        values = confidences.features(selection, decision.verdict, place) | shown
+        values = features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
         alike = _known_alike(key, decision, known, units)
         values['alike'] = float(len(alike))
         alone = float(selection.totals[selection.index((key,))])
         competitors = decision.verdict.ambiguity_groups[place]
-        sure = confidences.confidence(values, len(alike))
+        sure = confidence(values, len(alike))
         found.append((alone, Naming(key, competitors, sure, values, alike)))
     return tuple(naming for _, naming in sorted(found, key=lambda item: -item[0]))
 

@@ -42,18 +42,10 @@ from wheel_terra_estimator.messages.convert import DAMAGED, INPUT_TYPES
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, Status
 from wheel_terra_estimator.messages.pipeline import RESET, TUNE, Pipeline
 from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
-from wheel_terra_estimator.ros import parameters
+from wheel_terra_estimator.ros import parameters, qos
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.outputs import EstimatePublisher
-from wheel_terra_estimator.ros.publishers import other_quality, other_type
-from wheel_terra_estimator.ros.qos import (
-    FREQUENT,
-    NOT_NUMBERED,
-    OVERRIDABLE,
-    check_overrides,
-    input_profile,
-)
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.ros.live_views import LiveViews
@@ -203,7 +195,7 @@ class EstimatorNode(LifecycleNode):
 
         Raises UserError if a parameter is unknown or its value cannot be used.
         """
-        check_overrides(self)
+        qos.check_overrides(self)
         if unread := parameters.unread(self._files, self):
             if 'wheels.names' not in self._given:
                 raise UserError(unread)
@@ -280,11 +272,11 @@ class EstimatorNode(LifecycleNode):
                 MESSAGE_TYPES[topic],
                 topic,
                 WithInfo(partial(self._arrive, topic)),
-                input_profile(topic),
+                qos.input_profile(topic),
                 event_callbacks=SubscriptionEventCallbacks(
                     message_lost=partial(self._on_message_lost, topic), use_default_callbacks=False
                 ),
-                qos_overriding_options=OVERRIDABLE,
+                qos_overriding_options=qos.OVERRIDABLE,
                 raw=True,  # rclpy builds every field of a message, most of them for nothing
             )
 
@@ -312,7 +304,7 @@ class EstimatorNode(LifecycleNode):
         taken.sort(key=lambda each: each[0])
         begun, first, last = self._seconds(), taken[0][0], taken[-1][0]
         for came, topic, data, info in taken:
-            left_out = self._overloaded and topic in FREQUENT and came < last - BEHIND
+            left_out = self._overloaded and topic in qos.FREQUENT and came < last - BEHIND
             self._process(topic, data, info, OVERLOADED if left_out else '')
         span = last - first
         limit = min(span, BEHIND) if self._overloaded else span
@@ -334,7 +326,7 @@ class EstimatorNode(LifecycleNode):
             return
         now = self._seconds()
         number = info.get('publication_sequence_number')
-        if topic in self._shared and number and number < NOT_NUMBERED:
+        if topic in self._shared and number and number < qos.NOT_NUMBERED:
             values = message.numbers[topic == 'joint_states']  # nan: this one does not tell of it
             known = [name for name, v in zip(message.names, values, strict=False) if v == v]
             wheels = [name for name in known if name in pipeline.names] if message.names else ['']
@@ -350,7 +342,7 @@ class EstimatorNode(LifecycleNode):
         self._arrival.write(f'{topic} {message.stamp}')
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)
-        if topic not in FREQUENT:  # often late: run through now, the next set is there sooner
+        if topic not in qos.FREQUENT:  # often late: run through now, the next set is there sooner
             pipeline.core.process_pending()
 
     def _take(self, estimates: EstimateSet, now: float) -> None:
@@ -564,7 +556,7 @@ class EstimatorNode(LifecycleNode):
         topics: Iterable[str] = self._pipeline.converter.topics
         found = {topic: self.get_publishers_info_by_topic(topic) for topic in topics}
         self._incompatible = {
-            topic: other_quality(publishers, self._subscriptions_made[topic].qos_profile)
+            topic: qos.other_quality(publishers, self._subscriptions_made[topic].qos_profile)
             for topic, publishers in found.items()
         }
         # With several publishers the counts of their messages cannot be separated.
@@ -598,7 +590,7 @@ class EstimatorNode(LifecycleNode):
     def _publishers_in_words(self, topic: str) -> str:
         found = self.get_publishers_info_by_topic(topic)
         count = '1 publisher' if len(found) == 1 else f'{len(found) or "no"} publishers'
-        return other_type(found, INPUT_TYPES[topic]) or count
+        return qos.other_type(found, INPUT_TYPES[topic]) or count
 
     # -- Parameters -----------------------------------------------------------------------------
 

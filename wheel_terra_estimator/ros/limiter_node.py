@@ -43,9 +43,8 @@ from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN, Status
 from wheel_terra_estimator.messages.pack import diagnostic_array
 from wheel_terra_estimator.output_folder import cannot_write, check_file
+from wheel_terra_estimator.ros import qos
 from wheel_terra_estimator.ros.parameters import descriptor
-from wheel_terra_estimator.ros.publishers import name_of, other_quality, other_type
-from wheel_terra_estimator.ros.qos import NOT_NUMBERED, input_profile, output_profile
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
 AS_THE_SOIL_GIVES = {'slowed', 'command passes'}
@@ -77,17 +76,19 @@ class TractionLimiter(Node):
         self._stuck_number: int | None = None  # a publisher that begins counts from 1 again
         kind = TwistStamped if self._stamped else Twist
         self._output = self.create_publisher(kind, 'cmd_vel_out', QoSProfile(depth=1))
-        self._scale = self.create_publisher(Float64, '~/scale', output_profile())
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', output_profile())
+        self._scale = self.create_publisher(Float64, '~/scale', qos.output_profile())
+        self._diagnostics = self.create_publisher(
+            DiagnosticArray, '/diagnostics', qos.output_profile()
+        )
         self._input = self.create_subscription(
             kind, 'cmd_vel_in', self._on_command, QoSProfile(depth=1)
         )
-        latched = output_profile(latched=True)
+        latched = qos.output_profile(latched=True)
         # The direction before the warning: in this order they are taken where both are there.
         topics: tuple[tuple[type, str, Any, QoSProfile], ...] = (
-            (JointState, 'slip', self._on_slip, input_profile()),
-            (UInt8MultiArray, 'slip_class', self._on_classes, input_profile()),
-            (JointState, 'mobility', self._on_mobility, input_profile()),
+            (JointState, 'slip', self._on_slip, qos.input_profile()),
+            (UInt8MultiArray, 'slip_class', self._on_classes, qos.input_profile()),
+            (JointState, 'mobility', self._on_mobility, qos.input_profile()),
             (Int8, 'stuck_direction', self._on_direction, latched),
             (Bool, 'stuck', self._on_stuck, latched),
         )
@@ -131,7 +132,7 @@ class TractionLimiter(Node):
     def _on_stuck(self, message: Bool, info: dict[str, Any]) -> None:
         number, before = int(info['publication_sequence_number']), self._stuck_number
         self._stuck_number = number
-        change = before is not None and (number > before or number == NOT_NUMBERED)
+        change = before is not None and (number > before or number == qos.NOT_NUMBERED)
         self._follow(limiter.after_stuck(self._state, message.data, change=change))
 
     def _release(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -219,11 +220,11 @@ class TractionLimiter(Node):
             faults.append(f'{count} publishers of ~/stuck: stop all but one')
         drivers = self.get_publishers_info_by_topic('cmd_vel_in')
         kind = 'TwistStamped' if self._stamped else 'Twist'
-        if words := other_type(drivers, f'geometry_msgs/msg/{kind}'):
+        if words := qos.other_type(drivers, f'geometry_msgs/msg/{kind}'):
             faults.append(f'{self._input.topic_name}: {words} (parameter stamped)')
-        elif words := other_quality(drivers, self._input.qos_profile):
+        elif words := qos.other_quality(drivers, self._input.qos_profile):
             faults.append(f'{self._input.topic_name}: {words}')
-        others = sorted(map(name_of, self.get_publishers_info_by_topic('cmd_vel_out')))
+        others = sorted(map(qos.name_of, self.get_publishers_info_by_topic('cmd_vel_out')))
         with suppress(ValueError):
             others.remove(self.get_fully_qualified_name())
         if others:

@@ -1,13 +1,16 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Quality of service of the estimator's topics (docs/topics.md)."""
+"""Quality of service of the topics (docs/topics.md), and why nothing comes from a publisher."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 from rclpy import qos
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from wheel_terra_estimator.errors import UserError
 
@@ -62,3 +65,24 @@ def check_overrides(node: Node) -> None:
         bad_depth = policy == 'depth' and (type(value) is not int or value < 0)
         if bad_depth or (known and str(value).lower() not in allowed.split(', ')):
             raise UserError(f'parameters: {name}: {value!r}; allowed: {allowed}')
+
+
+def name_of(publisher: TopicEndpointInfo) -> str:
+    """Return the full name of a publisher's node."""
+    return f'{publisher.node_namespace.rstrip("/")}/{publisher.node_name}'
+
+
+def other_type(publishers: Iterable[TopicEndpointInfo], kind: str) -> str:
+    """Return a message on types published in place of the required one; empty: none."""
+    others = sorted({p.topic_type for p in publishers} - {kind})
+    return f'{", ".join(others)} is published there, {kind} is needed' if others else ''
+
+
+def other_quality(publishers: Iterable[TopicEndpointInfo], asked: QoSProfile) -> str:
+    """Return a message on publishers with incompatible QoS; empty: none."""
+    for publisher in publishers:
+        compatible, reason = qos.qos_check_compatible(publisher.qos_profile, asked)
+        if compatible == qos.QoSCompatibility.ERROR:
+            reason = reason.removeprefix('ERROR: ').rstrip('; ')
+            return f'nothing comes from {name_of(publisher)}: {reason[:1].lower()}{reason[1:]}'
+    return ''

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import expit
 
-from wheel_terra_estimator.discrepancy.selection import confidence
+from wheel_terra_estimator.discrepancy.selection import verdict
 from wheel_terra_estimator.scheduler import add_jobs_argument
 from wheel_terra_lab.jobs import ResultFile, run_jobs
 from wheel_terra_lab.studies.campaigns import make_campaign, scoring
@@ -28,7 +28,7 @@ FIRST_SEED = 50_000  # below 100,000: not for scoring
 LEFT_OUT = ', kind left out'
 KINDS_LEFT_OUT = ('one', 'other formula')
 RIDGE = 1.0  # prior precision of the coefficients
-MAP = Path(confidence.__file__).with_name('confidence_map.json')
+MAP = Path(verdict.__file__).with_name('confidence_map.json')
 
 
 def names_of(task: tuple[str, str, int]) -> list[dict[str, object]]:
@@ -95,9 +95,9 @@ def fit(file: Path) -> None:
     records = ResultFile(file).rows
     # Where an effect that looks like the name was left out, its share is taken off by rule.
     records = [r for r in records if 'features' in r and not r['features'].get('alike', 0.0)]
-    x = np.array([[record['features'][name] for name in confidence.FEATURES] for record in records])
+    x = np.array([[record['features'][name] for name in verdict.FEATURES] for record in records])
     design = np.array([record['design'] for record in records])
-    result: dict[str, object] = {'features': list(confidence.FEATURES), 'names': len(records)}
+    result: dict[str, object] = {'features': list(verdict.FEATURES), 'names': len(records)}
     for key, target in (('name', 'right'), ('set', 'in_set')):
         right = np.array([float(record[target]) for record in records])
         left_out = np.empty(len(right))
