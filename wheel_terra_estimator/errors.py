@@ -9,25 +9,10 @@ import traceback
 
 EFFECT_FILE_MODULE = 'wheel_terra_effects_'
 """Begins the name of the module that a user's file of effects becomes."""
-_OF_THE_MACHINE = frozenset(
-    {
-        errno.ENOSPC,
-        errno.EDQUOT,
-        errno.EFBIG,
-        errno.EROFS,
-        errno.EIO,
-        errno.EMFILE,
-        errno.ENFILE,
-        errno.ENOMEM,
-        errno.EAGAIN,
-        errno.EACCES,
-        errno.EPERM,
-        errno.ENAMETOOLONG,
-        errno.ELOOP,
-        errno.ESTALE,
-    }
-)
-"""Message of a full disk, a missing permission or a limit of the machine."""
+_REFUSED = frozenset({errno.EACCES, errno.EPERM})  # a permission is missing
+_NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO})  # the disk
+_LIMITS = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN})  # of the machine
+_NAMES = frozenset({errno.ENAMETOOLONG, errno.ELOOP, errno.ESTALE})  # that cannot be used
 
 
 class UserError(Exception):
@@ -54,10 +39,9 @@ def outside_cause(error: BaseException) -> str | None:
             return f'{frame.f_code.co_filename}, line {line}: {words}; correct that effect file'
     if isinstance(error, MemoryError):
         return f'not enough memory ({error})'
-    if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
+    if isinstance(error, OSError) and error.errno in _REFUSED | _NO_ROOM | _LIMITS | _NAMES:
         place = error.filename or 'output or a temporary file'
-        refused = error.errno in (errno.EACCES, errno.EPERM)
-        cure = 'change its permissions' if refused else 'make room'
+        cure = 'change its permissions' if error.errno in _REFUSED else 'make room'
         return f'{place}: {error.strerror}; {cure} or use another place'
     if isinstance(error, UnicodeEncodeError) and error.reason == 'surrogates not allowed':
         return f'a name that is not UTF-8 ({error.object[:200]!a}): rename that file or folder'

@@ -21,26 +21,18 @@ if TYPE_CHECKING:
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 
-SI_UNITS: Mapping[str, str] = {
-    'stamp': 'ns',
-    'time': 's',
-    'position': 'm',
-    'normal_load': 'N',
-    **dict.fromkeys(('drawbar_pull', 'lateral_force', 'pull_margin'), 'N'),
-    'torque': 'N m',
-    'rim_travel_left': 'm',
-    **dict.fromkeys(('specific_force', 'gravity'), 'm/s^2'),
-    **dict.fromkeys(('sinkage', 'wheel_radius', 'wheel_width', 'lug_height'), 'm'),
-    **dict.fromkeys(
-        ('forward_velocity', 'lateral_velocity', 'slip_velocity', 'sinkage_rate'), 'm/s'
-    ),
-    'reference_velocity': 'm/s',
-    **dict.fromkeys(('slope', 'heading', 'steering', 'slip_angle'), 'rad'),
-    **dict.fromkeys(('entrance_angle', 'peak_stress_angle', 'leaving_angle'), 'rad'),
-    **dict.fromkeys(
-        ('yaw_rate', 'wheel_rate', 'angular_rate', 'angular_velocity', 'rate'), 'rad/s'
-    ),
+_QUANTITIES = {
+    'ns': 'stamp',
+    's': 'time',
+    'm': 'position rim_travel_left sinkage wheel_radius wheel_width lug_height',
+    'm/s': 'forward_velocity lateral_velocity slip_velocity reference_velocity sinkage_rate',
+    'm/s^2': 'specific_force gravity',
+    'N': 'normal_load drawbar_pull lateral_force pull_margin',
+    'N m': 'torque',
+    'rad': 'slope heading steering slip_angle entrance_angle peak_stress_angle leaving_angle',
+    'rad/s': 'yaw_rate wheel_rate angular_rate angular_velocity rate',
 }
+SI_UNITS = {name: unit for unit, names in _QUANTITIES.items() for name in names.split()}
 """Quantity (a column's name up to its point, without ``_std``) -> unit; all others are ratios."""
 
 

@@ -2,25 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a command writes: folders and files that are complete or absent, and never those of others.
 
-Every command that writes, and the node, uses this module. A folder::
-
-    check_folder(arguments.output, arguments.overwrite)  # before computing
-    ...
-    with new_folder(arguments.output, arguments.overwrite) as folder:
-        (folder / 'report.json').write_text(...)  # `folder` is empty and lies beside the place
-
-When the block ends, everything in ``folder`` is listed in its marker (``.wheel-terra.json``) and
-the folder is renamed to its place; after an error nothing is left and an earlier output stands
-as it was. A file::
-
-    check_file(arguments.report, arguments.overwrite)
-    ...
-    with new_file(arguments.report, arguments.overwrite) as path:
-        path.write_text(...)
-
-`check_target` decides for both what may be written to. A command that can go on with a folder
-(``--resume``) writes in place, see `working_folder`. Errors of the disk inside the blocks become a
-`UserError` of one line.
+`check_folder` and `check_file` refuse a place before anything is computed; `new_folder` and
+`new_file` write beside it and rename at the end, so that after an error an earlier output stands as
+it was. Errors of the disk inside their blocks become a `UserError` of one line.
 """
 
 from __future__ import annotations
@@ -114,7 +98,7 @@ def try_to_write(path: Path) -> None:
         place = _absolute(path).parent
         while not place.exists() and place != place.parent:
             place = place.parent
-        with tempfile.TemporaryDirectory(dir=place, prefix='.wheel-terra-') as probe:
+        with tempfile.TemporaryDirectory(dir=place, prefix=BESIDE) as probe:
             (Path(probe) / 'probe').write_bytes(bytes(LEAST_ROOM))
     except OSError as error:
         raise cannot_write(path, error) from None
@@ -169,10 +153,10 @@ def new_file(
 def _beside(path: Path) -> Iterator[Path]:
     """Yield a hidden folder beside ``path`` that goes at the end."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    prefix = f'.{path.name}{BESIDE}'
-    with tempfile.TemporaryDirectory(
-        dir=path.parent, prefix=prefix, ignore_cleanup_errors=True
-    ) as beside:
+    made = tempfile.TemporaryDirectory(
+        dir=path.parent, prefix=f'.{path.name}{BESIDE}', ignore_cleanup_errors=True
+    )
+    with made as beside:
         yield Path(beside)
 
 
@@ -193,7 +177,7 @@ def working_folder(
     `check_folder`.
     """
     entries = [*entries]
-    earlier = is_ours(path) and {*entries} <= _listed(path)
+    earlier = is_ours(path) and {*entries} <= _marked(path)[0]
     if earlier:
         _remove_leftovers(path)
     if resume and path.exists():
@@ -267,7 +251,7 @@ def facts_of(folder: Path) -> dict[str, Any]:
 
 def _remove_leftovers(folder: Path) -> None:
     """Remove what killed runs left, beside its place, of outputs that a folder lists."""
-    for name in _listed(folder):
+    for name in _marked(folder)[0]:
         for left in folder.glob(f'.{escape(name.rstrip("/"))}{BESIDE}*'):
             shutil.rmtree(left, ignore_errors=True)
 
@@ -340,10 +324,6 @@ def _absolute(path: Path) -> Path:
     return path.parent.resolve() / path.name if path.name not in ('', '..') else path.resolve()
 
 
-def _listed(folder: Path) -> set[str]:
-    return _marked(folder)[0]
-
-
 def _marked(folder: Path) -> tuple[set[str], dict[str, Any]]:
     """Return what the marker of a folder lists, and the facts in it."""
     marker = folder / MARKER
@@ -382,7 +362,7 @@ def _own_files(folder: Path) -> list[str]:
             f'{folder}: holds {there[0]} and no list of what this program wrote ({MARKER}), so it '
             'is not overwritten; choose another path, or remove it yourself'
         )
-    listed = _listed(folder) if is_ours(folder) else set()
+    listed = _marked(folder)[0] if is_ours(folder) else set()
     whole = {name for name in listed if name.endswith('/')}
     lists = {name for name in whole if is_ours(folder / name)}  # these files name their own program
     for name in lists:

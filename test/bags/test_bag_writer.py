@@ -43,7 +43,7 @@ def sets(count: int = 25) -> list[Any]:
 def bag(library_metadata, tmp_path_factory):
     path = tmp_path_factory.mktemp('bag') / 'estimates'
     with EstimateBagWriter(path, NAMES) as writer:
-        writer.clear_stuck(STAMP)
+        writer.write_stuck(False, 0, STAMP)
         for i, estimates in enumerate(sets()):
             writer.add(estimates, STAMP + i * SECOND // 10 + 7)
     return path
@@ -163,9 +163,9 @@ def test_a_reset_clears_the_stuck_warning(tmp_path):
     stuck = next(estimates for estimates in sets() if estimates.stuck)
     with EstimateBagWriter(path, NAMES) as writer:
         for estimates in (stuck, stuck):
-            writer.clear_stuck(STAMP)
+            writer.write_stuck(False, 0, STAMP)
             writer.add(estimates, STAMP)
-        writer.clear_stuck(STAMP)
+        writer.write_stuck(False, 0, STAMP)
     said = [message.data for _, topic, message in messages(path) if topic.endswith('/stuck')]
     assert said == [False, True, False, True, False]
 

@@ -23,7 +23,7 @@ from wheel_terra_estimator.bags.storage import messages_of, open_bag
 from wheel_terra_estimator.bags.writer import NAMESPACE
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.configuration.soil_file import read_values
+from wheel_terra_estimator.configuration.ros_yaml import read as read_values
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, JOINT_STATE
 from wheel_terra_estimator.simulation import scenario

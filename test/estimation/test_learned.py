@@ -10,7 +10,8 @@ from fake_estimator import SECOND, play
 from parts import SAND
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.configuration.soil_file import read_values, write_values
+from wheel_terra_estimator.configuration.ros_yaml import read as read_values
+from wheel_terra_estimator.configuration.soil_file import write_values
 from wheel_terra_estimator.estimation.contacts.demand import Climbed, SteepestClimb
 from wheel_terra_estimator.estimation.contacts.equilibrium_slip import EquilibriumSlip
 from wheel_terra_estimator.estimation.core import EstimatorCore

@@ -24,7 +24,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, SlipOnSlope
 from wheel_terra_estimator.messages.diagnostics import NODE
 from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS
-from wheel_terra_estimator.messages.unpack import Message
 
 MOST_ROWS = 20_000
 """Rows that are kept: a thousand seconds at 20 Hz, ten times what a picture can show."""
@@ -63,17 +62,12 @@ class ThinnedRows:
         return found.reshape(len(self._rows), width)
 
 
+_OWN_FIELDS = (
+    *('slip', 'slip_std', 'slip_velocity', 'drawbar_pull', 'drawbar_pull_std'),
+    *('sinkage', 'sinkage_std', 'normal_load', 'rim_travel_left', 'pull_margin'),
+)
 WHEEL_FIELDS = {
-    'slip': 'slip',
-    'slip_std': 'slip_std',
-    'slip_velocity': 'slip_velocity',
-    'drawbar_pull': 'drawbar_pull',
-    'drawbar_pull_std': 'drawbar_pull_std',
-    'sinkage': 'sinkage',
-    'sinkage_std': 'sinkage_std',
-    'normal_load': 'normal_load',
-    'rim_travel_left': 'rim_travel_left',
-    'pull_margin': 'pull_margin',
+    **{name: name for name in _OWN_FIELDS},
     'slip_angle': 'sideways_known.angle',
     'slip_angle_std': 'sideways_known.angle_std',
     'lateral_force': 'sideways_known.force',
@@ -182,7 +176,7 @@ class EstimateHistory:
     forward_velocity: FloatArray  # [m/s]
     forward_velocity_std: FloatArray
     warnings: tuple[StuckWarning, ...]
-    whole: DriveFigures | None = None  # None: the arrays are all there is
+    whole: DriveFigures | None = None  # None of what was read from a bag
     slip_on_slope: SlipOnSlope | None = None  # as the drive ended; None: not known
 
     @property
@@ -208,16 +202,6 @@ class EstimateHistory:
             running |= (self.stamp >= warning.start) & until
         return running
 
-    def figures(self) -> DriveFigures:
-        """Return the figures of the whole drive."""
-        if self.whole is not None:
-            return self.whole
-        found = DriveFigures(len(self.names))
-        for i, stamp in enumerate(self.stamp.tolist()):
-            row = {name: values[i] for name, values in self.values.items()}
-            found.add(stamp, self.slip_class[i], row)
-        return found
-
 
 class HistoryRecorder:
     """Collects estimate sets into an `EstimateHistory`.
@@ -241,7 +225,7 @@ class HistoryRecorder:
         general = (e.forward_velocity, e.forward_velocity_variance)
         row = np.concatenate([general, e.slip_class, *values.values()])
         self._rows.add(e.stamp, row)
-        _follow(self._warnings, e.stuck, e.stamp, stuck_reason(e.reasons))
+        _follow(self._warnings, e.stuck, e.stamp, e.stuck_reason)
 
     def history(self) -> EstimateHistory:
         """Return what was collected."""
@@ -261,15 +245,6 @@ class HistoryRecorder:
             whole=self._figures,
             slip_on_slope=self._slopes,
         )
-
-
-def stuck_reason(reasons: Sequence[str]) -> str:
-    """Return why the rover is called stuck, out of the reasons of its wheels.
-
-    They state it after ``rover:``, each the same; without that each reason is said once.
-    """
-    parts = [reason.rpartition('rover: ')[2] for reason in reasons]
-    return '; '.join(dict.fromkeys(part for part in parts if part))
 
 
 def read_estimates(bag: Bag) -> EstimateHistory:
@@ -301,7 +276,11 @@ class _EstimateMessages:
     def add(self, topic: str, message: Any, log_time: int) -> None:
         """Take in a message; of private topics the last part of the name."""
         if topic in _TOPIC_FIELDS:
-            self._add_joints(topic, message, log_time)
+            row = self._sets.setdefault(message.stamp, {})
+            row.update(zip(_TOPIC_FIELDS[topic], message.numbers, strict=True))
+            if topic == 'slip':
+                self._names, self._latest = message.names, row
+                row['log_time'] = log_time
         elif topic == 'slip_class' and self._latest:
             self._latest['slip_class'] = message.data
         elif topic == 'twist':
@@ -313,20 +292,15 @@ class _EstimateMessages:
         elif topic == DIAGNOSTICS:
             self._add_reasons(message)
 
-    def _add_joints(self, topic: str, message: Message, log_time: int) -> None:
-        row = self._sets.setdefault(message.stamp, {})
-        row.update(zip(_TOPIC_FIELDS[topic], message.numbers, strict=True))
-        if topic == 'slip':
-            self._names, self._latest = message.names, row
-            row['log_time'] = log_time
-
     def _add_reasons(self, message: Any) -> None:
         for status in message.status:
             texts = [pair.value for pair in status.values if pair.key == 'reason']
             self._reasons.update((status.name, text) for text in texts)
         if self._warnings and not self._warnings[-1].reason:
-            words = stuck_reason(tuple(self._reasons.values()))
-            self._warnings[-1] = replace(self._warnings[-1], reason=words)
+            # Each wheel states that of the rover, else its own.
+            words = (reason.rpartition('rover: ')[2] for reason in self._reasons.values())
+            said = '; '.join(dict.fromkeys(filter(None, words)))
+            self._warnings[-1] = replace(self._warnings[-1], reason=said)
 
     def history(self) -> EstimateHistory:
         """Return the sets that are whole; nan (class 255) for fields without a message."""

@@ -59,13 +59,10 @@ class MeasurementReader:
         self.absent: list[str] = []
         for name in self.converter.topics:
             self._find(name, remaps)
+        # Messages that could not be used, by (estimator's topic, reason)
+        self.rejected: Counter[tuple[str, str]] = self.converter.rejected
         if self.converter.wheel_odometry == 'joint_states':
             self._check_wheel_names()
-
-    @property
-    def rejected(self) -> Counter[tuple[str, str]]:
-        """Messages that could not be used, by (estimator's topic, reason)."""
-        return self.converter.rejected
 
     @property
     def notes(self) -> list[str]:

@@ -131,7 +131,7 @@ def replay(
             if writer is None:
                 continue
             if event.estimates is None:
-                writer.clear_stuck(event.log_time)
+                writer.write_stuck(False, 0, event.log_time)
             else:
                 writer.add(event.estimates, event.log_time, event.statuses)
     history, core = recorder.history(), pipeline.core

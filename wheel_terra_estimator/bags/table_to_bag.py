@@ -81,7 +81,9 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
         if not file.header:
             raise UserError(f'{table}: empty; the first line must name the columns')
         layout = _read_map(columns, file.header, table)
-        topics = {f'/{name}': INPUT_TYPES[name] for name in _used(layout)}
+        there = (layout.joints, layout.imu, layout.sinkage, layout.reference)
+        used = [name for name, those in zip(_TOPICS, there, strict=True) if those]
+        topics = {f'/{name}': INPUT_TYPES[name] for name in used}
         held = _held(table, layout)
         with BagFile(output, topics, overwrite=overwrite, inputs=[table, columns]) as bag:
             sender = _Sender(bag, layout, file, held)
@@ -119,11 +121,6 @@ def _held(table: Path, layout: ColumnMap) -> dict[str, int]:
 
 def _cells(row: list[str], columns: Mapping[str, Column]) -> list[str]:
     return [row[column.place] for column in columns.values() if column.place < len(row)]
-
-
-def _used(layout: ColumnMap) -> list[str]:
-    there = (layout.joints, layout.imu, layout.sinkage, layout.reference)
-    return [name for name, columns in zip(_TOPICS, there, strict=True) if columns]
 
 
 def _read_map(path: Path, header: list[str], table: Path) -> ColumnMap:
@@ -194,7 +191,9 @@ class _MapReader:
         value = dict(self.mapping(where, value))
         radius = 1.0
         if si == 'rad/s' and 'radius' in value:  # a rim speed
-            si, radius = 'm/s', self._radius(where, value.pop('radius'))
+            si, radius = 'm/s', value.pop('radius')
+            if not isinstance(radius, (int, float)) or not 0.0 < radius < math.inf:
+                raise UserError(f'{self.path}: {where}: radius [m] must be a number above 0')
         entry = entry_of(value, f'{self.path}: {where}')
         times = factor(si, entry.unit) if entry.unit else 1.0
         if times is None:
@@ -208,11 +207,6 @@ class _MapReader:
             )
         place = self.header.index(entry.column)
         return Column(place, entry.column, entry.sign * times / radius)
-
-    def _radius(self, where: str, radius: Any) -> float:
-        if not isinstance(radius, (int, float)) or not 0.0 < radius < math.inf:
-            raise UserError(f'{self.path}: {where}: radius [m] must be a number above 0')
-        return float(radius)
 
 
 class _Sender:
@@ -262,7 +256,11 @@ class _Sender:
             self.bag.write('/joint_states', message, stamp)
         self._imu(line, row, stamp)
         if self._is_new('/sinkage', _cells(row, self.layout.sinkage)):
-            self._sinkage(line, row, stamp)
+            sinkage = self.layout.sinkage
+            depths = [self.value(line, row, column) for column in sinkage.values()]
+            if _any_given(depths):
+                message = pack.joint_state(stamp, tuple(sinkage), position=depths)
+                self.bag.write('/sinkage', message, stamp)
         if self._is_new('/reference_odom', _cells(row, self.layout.reference)):
             self._reference(line, row, stamp, rates)
         self.sent += 1
@@ -320,13 +318,6 @@ class _Sender:
         share = (self.squared - first[4]) * seconds / turned**2 - 1.0 if turned else 0.0
         variance = speed**2 * share if share > UNSTEADY**2 else 0.0
         return (stamp + first[0]) // 2, speed, variance
-
-    def _sinkage(self, line: int, row: list[str], stamp: int) -> None:
-        columns = self.layout.sinkage
-        depths = [self.value(line, row, column) for column in columns.values()]
-        if _any_given(depths):
-            message = pack.joint_state(stamp, tuple(columns), position=depths)
-            self.bag.write('/sinkage', message, stamp)
 
     def _reference(self, line: int, row: list[str], stamp: int, rates: list[float]) -> None:
         columns, arrival = self.layout.reference, stamp

@@ -106,12 +106,11 @@ class TrackRecorder:
         if not 0.0 <= step <= PAUSE:
             step = 0.0  # a pause, or a clock that steps back: the path between is unknown
         way = estimates.forward_velocity * step
-        attitude = self._attitude(estimates.stamp)
-        climb = 0.0
-        if attitude is None:
-            self._heading += estimates.yaw_rate * step
+        latest = bisect_right(self._attitude_stamps, estimates.stamp) - 1
+        if latest >= 0 and (estimates.stamp - self._attitude_stamps[latest]) * _SECOND <= PAUSE:
+            self._heading, climb = self._attitudes[latest]
         else:
-            self._heading, climb = attitude
+            self._heading, climb = self._heading + estimates.yaw_rate * step, 0.0
         level = way * math.sqrt(max(1.0 - climb * climb, 0.0))
         self._place[0] += level * math.cos(self._heading)
         self._place[1] += level * math.sin(self._heading)
@@ -132,13 +131,6 @@ class TrackRecorder:
             dict(zip(COLUMNS, columns, strict=True)),
             f'dead reckoning from estimated velocity and {yaw}',
         )
-
-    def _attitude(self, stamp: int) -> tuple[float, float] | None:
-        """Return heading [rad] and sine of the climb last known recently; None: unknown."""
-        index = bisect_right(self._attitude_stamps, stamp) - 1
-        if index < 0 or (stamp - self._attitude_stamps[index]) * _SECOND > PAUSE:
-            return None
-        return self._attitudes[index]
 
     def _row(self, estimates: EstimateSet) -> FloatArray:
         soil = dict(zip(estimates.soil_names, estimates.soil.tolist(), strict=True))

@@ -20,7 +20,7 @@ from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading, WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.messages.pack import OUTPUT_TYPES
-from wheel_terra_estimator.messages.unpack import JOINT_STATE, ODOMETRY, TWIST, Message
+from wheel_terra_estimator.messages.unpack import JOINT_STATE, ODOMETRY, TWIST
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 BODY_VELOCITY = '/truth/odometry'
@@ -94,7 +94,8 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
             rows['slip_class'].add(time, list(message.data))
         for name, (of, field) in _OF_WHEELS.items():
             if topic == of:
-                rows[name].add(message.stamp, _ordered(message, field, names))
+                values = dict(zip(message.names, message.numbers[field], strict=False))
+                rows[name].add(message.stamp, [values.get(wheel, np.nan) for wheel in names])
     velocity = _sorted(rows['velocity'], 1).known()
     if not velocity.stamp.size:
         return None
@@ -103,13 +104,8 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
     angle = found['slip_angle']  # to be interpolated
     found['slip_angle'] = replace(angle, value=np.unwrap(angle.value, axis=0))
     source = '/ground_truth' if simulated else BODY_VELOCITY
-    return Truth(source, velocity, **{name: _known(series) for name, series in found.items()})
-
-
-def _known(series: WheelTruth) -> WheelTruth | None:
-    """Return a series of values; None of a topic without any."""
-    known = series.known()
-    return known if known.stamp.size else None
+    known = {name: series.known() for name, series in found.items()}
+    return Truth(source, velocity, **{n: k if k.stamp.size else None for n, k in known.items()})
 
 
 def _of_turning_wheels(slip: WheelTruth, classes: WheelTruth) -> WheelTruth:
@@ -165,12 +161,6 @@ def _along_wheels(
         found = headings(rover, angles.tolist())
         rows.append([found.speed(i, speed, yaw_rate) for i in range(rover.wheel_count)])
     return np.array(rows).reshape(len(stamp), rover.wheel_count)
-
-
-def _ordered(message: Message, field: int, names: tuple[str, ...]) -> list[float]:
-    """Return a field in the order of the wheels, nan where the message has none."""
-    found = dict(zip(message.names, message.numbers[field], strict=False))
-    return [float(found.get(name, np.nan)) for name in names]
 
 
 def _sorted(rows: ThinnedRows, width: int) -> WheelTruth:

@@ -58,10 +58,6 @@ class EstimateBagWriter(BagFile):
         self.note(_SETTINGS, json.dumps(configuration.flat(), separators=(',', ':')))
         self.note(_RECORDING, recording)
 
-    def clear_stuck(self, log_time: int) -> None:
-        """Write what the node sends at its start and after a reset: no stuck warning."""
-        self._write_stuck(False, 0, log_time)
-
     def add(
         self,
         estimates: EstimateSet,
@@ -74,12 +70,13 @@ class EstimateBagWriter(BagFile):
         """
         for topic, data in pack.pack(estimates, self._names):
             self.write(f'{NAMESPACE}/{topic}', data, log_time)
-        self._write_stuck(estimates.stuck, estimates.stuck_direction, log_time)
+        self.write_stuck(estimates.stuck, estimates.stuck_direction, log_time)
         found = self._diagnostics.due(estimates) if statuses is None else statuses
         if found:
             self.write(DIAGNOSTICS, pack.diagnostic_array(estimates.stamp, found), log_time)
 
-    def _write_stuck(self, stuck: bool, direction: int, log_time: int) -> None:
+    def write_stuck(self, stuck: bool, direction: int, log_time: int) -> None:
+        """Write the stuck warning where it changes; none at the start and after a reset."""
         if (stuck, direction) != self._stuck:
             self._stuck = stuck, direction
             self.write(STUCK_DIRECTION, pack.direction(direction), log_time)

@@ -25,11 +25,6 @@ from wheel_terra_estimator.terramechanics.effects.base import TOUCHABLE
 
 EXAMPLES = ('wheel-terra effects', 'wheel-terra effects lug_digging multipass')
 
-_PARAMETER_FIELDS = (
-    'name', 'unit', 'meaning', 'default', 'lower', 'upper', 'neutral', 'prior', 'prior_mean',
-    'prior_scale',
-)  # fmt: skip
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
@@ -120,19 +115,19 @@ def _parameter_text(p: EffectParameter) -> list[str]:
 
 def as_json(effects: Mapping[str, Effect]) -> str:
     """Return the catalogue for programs."""
-    return json.dumps([_record(effect) for effect in effects.values()], indent=2) + '\n'
-
-
-def _record(effect: Effect) -> dict[str, Any]:
-    return {
-        'name': effect.name,
-        **_law(effect),
-        'instrument': effect.instrument,
-        'confounded_with': dict(effect.confounded_with),
-        'incompatible_with': sorted(effect.incompatible_with),
-        'candidate': effect.candidate,
-        'other_forms': [_law(form) for form in effect.forms[1:]],
-    }
+    records = [
+        {
+            'name': effect.name,
+            **_law(effect),
+            'instrument': effect.instrument,
+            'confounded_with': dict(effect.confounded_with),
+            'incompatible_with': sorted(effect.incompatible_with),
+            'candidate': effect.candidate,
+            'other_forms': [_law(form) for form in effect.forms[1:]],
+        }
+        for effect in effects.values()
+    ]
+    return json.dumps(records, indent=2) + '\n'
 
 
 def _law(form: Effect) -> dict[str, Any]:
@@ -141,7 +136,7 @@ def _law(form: Effect) -> dict[str, Any]:
         'claim': form.claim,
         'symbol': form.symbol,
         'parameters': [
-            {name: getattr(p, name) for name in _PARAMETER_FIELDS} | {'fitted': p.free}
+            {'fitted' if name == 'free' else name: value for name, value in vars(p).items()}
             for p in form.parameters
         ],
         'touches': [name for name in TOUCHABLE if name in form.touches],

@@ -92,7 +92,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _sketch(arguments: argparse.Namespace) -> RoverSketch:
-    wheels = _names(arguments.wheels)
+    wheels = [name.strip() for name in (arguments.wheels or '').split(',') if name.strip()]
+    if len(wheels) == 1 and wheels[0].isdigit():
+        raise UserError(f'--wheels {wheels[0]}: give the names of the wheel joints, comma between')
     sketch = _described(arguments, wheels)
     if sketch is not None:
         if arguments.mass:
@@ -118,13 +120,6 @@ def _spread_to(places: Sequence[float], distance: float | None) -> Sequence[floa
         return places
     scale, middle = distance / (high - low), 0.5 * (low + high)
     return [round(middle + scale * (place - middle), 4) for place in places]
-
-
-def _names(text: str | None) -> list[str]:
-    names = [name.strip() for name in (text or '').split(',') if name.strip()]
-    if len(names) == 1 and names[0].isdigit():
-        raise UserError(f'--wheels {text}: give the names of the wheel joints, comma between')
-    return names
 
 
 def _described(arguments: argparse.Namespace, wheels: list[str]) -> RoverSketch | None:

@@ -197,12 +197,10 @@ def nearest(key: str, known: Iterable[str]) -> str:
     """
     known = list(known)
     last = key.rsplit('.', 1)[-1]
-    for candidates in (
-        sorted((other for other in known if other.startswith((f'{key}_', f'{key}/'))), key=len),
-        difflib.get_close_matches(key, known, n=1, cutoff=0.8),
-        [other for other in known if other.rsplit('.', 1)[-1] == last],
-        difflib.get_close_matches(key, known, n=1, cutoff=0.0),
-    ):
-        if candidates:
-            return candidates[0]
-    return known[0]
+    candidates = (
+        *sorted((other for other in known if other.startswith((f'{key}_', f'{key}/'))), key=len),
+        *difflib.get_close_matches(key, known, n=1, cutoff=0.8),
+        *(other for other in known if other.rsplit('.', 1)[-1] == last),
+        *difflib.get_close_matches(key, known, n=1, cutoff=0.0),
+    )
+    return candidates[0]

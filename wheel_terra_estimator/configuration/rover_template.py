@@ -54,11 +54,10 @@ def rover_file(sketch: RoverSketch) -> str:
         'rover.centre_of_gravity': [float(v) for v in sketch.centre_of_gravity],
         **sketch.suspension,
         'wheels.names': list(sketch.wheels),
-        'wheels.radius': [float(v) for v in sketch.radius],
-        'wheels.width': [float(v) for v in sketch.width],
-        'wheels.x': [float(v) for v in sketch.x],
-        'wheels.y': [float(v) for v in sketch.y],
-        'wheels.z': [float(v) for v in sketch.z],
+        **{
+            f'wheels.{name}': [float(v) for v in getattr(sketch, name)]
+            for name in ('radius', 'width', 'x', 'y', 'z')
+        },
         'wheels.direction': [int(v) for v in sketch.direction] or [1] * count,
     }
     if any(sketch.steering_joints):
@@ -71,21 +70,17 @@ def rover_file(sketch: RoverSketch) -> str:
     comment += f'Source: {sketch.source}.\n' if sketch.source else ''
     comment += 'Next: wheel-terra check RECORDING --config THIS_FILE, then wheel-terra calibrate.'
     notes = {}
-    for key in values:
-        unit = table[key].unit
+    for key in (*values, *_WORTH_STATING):
+        unit = f' [{table[key].unit}]' if table[key].unit not in ('', '-') else ''
         mark = f'{A_GUESS}: ' if key in sketch.guessed else ''
-        notes[key] = f'{mark}{table[key].meaning}' + (f' [{unit}]' if unit not in ('', '-') else '')
+        notes[key] = f'{mark}{table[key].meaning}{unit}'
     lines = [as_text(values, comment, notes)]
     lines += ['    # Worth stating if known (values shown are the defaults):']
     for key in _WORTH_STATING:
-        if key in values:
-            continue
-        parameter = table[key]
-        default = parameter.default
-        shown = [default] * count if parameter.size == 'wheels' else default
-        unit = f' [{parameter.unit}]' if parameter.unit not in ('', '-') else ''
-        mark = f'{A_GUESS}: ' if key in sketch.guessed else ''
-        lines.append(f'    # {key}: {format_value(shown)}  # {mark}{parameter.meaning}{unit}')
+        if key not in values:
+            default = table[key].default
+            shown = [default] * count if table[key].size == 'wheels' else default
+            lines.append(f'    # {key}: {format_value(shown)}  # {notes[key]}')
     return '\n'.join(lines) + '\n'
 
 

@@ -103,15 +103,11 @@ def find(name: str | Path, kind: str = '', folder: Path | None = None) -> Path:
         raise UserError(f'{text}: is a folder, not a configuration file')
     if path.exists():
         check_regular(path)
-    bare = wanted.rsplit('/', 1)[-1]
-
-    def likeness(key: str) -> float:
-        return difflib.SequenceMatcher(None, bare, key.rsplit('/', 1)[-1]).ratio()
-
-    near = sorted(shipped, key=likeness, reverse=True)[:3]
-    first = near[0].rsplit('/', 1)[-1] if near else ''
-    alike = difflib.get_close_matches(bare, [first])
-    hint = f"did you mean '{first}'? " if alike else ''
+    by_name = {key.rsplit('/', 1)[-1]: key for key in shipped}
+    close = difflib.get_close_matches(wanted.rsplit('/', 1)[-1], by_name, 3, 0.0)
+    alike = difflib.get_close_matches(wanted.rsplit('/', 1)[-1], close[:1])
+    hint = f"did you mean '{alike[0]}'? " if alike else ''
+    near = [by_name[name] for name in close]
     raise UserError(
         f'{text}: no such file, and no shipped file of this name; {hint}the nearest are '
         f'{", ".join(near)}' + ('' if folder else ' (all: wheel-terra config list)')

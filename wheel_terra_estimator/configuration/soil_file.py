@@ -10,6 +10,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from wheel_terra_estimator.configuration import ros_yaml
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import declared
@@ -35,15 +37,6 @@ class StuckState:
     # ``~/stuck_direction``: of the rims that led to it, 1 forward, -1 backward, 0 none, both or
     # unknown
     direction: int = 0
-
-
-def read_values(soil_file: Path) -> dict[str, Any]:
-    """Return the parameters in a soil file; none where it is not there yet, or empty.
-
-    Raises UserError if the file cannot be read.
-    """
-    empty = not soil_file.exists() or (soil_file.is_file() and not soil_file.stat().st_size)
-    return {} if empty else dict(ros_yaml.read(soil_file))
 
 
 def why_foreign(path: Path) -> str:
@@ -74,7 +67,8 @@ def write_values(soil_file: Path, learned: Mapping[str, Any], overwrite: bool = 
     values = {
         key: value
         for key, value in learned.items()
-        if key in table and _in_range(value, table[key].lower, table[key].upper)
+        if key in table
+        if all(table[key].lower <= v <= table[key].upper for v in np.ravel(value).tolist())
     }
     with new_file(soil_file, overwrite, foreign=why_foreign) as path:
         ros_yaml.write(path, values, _COMMENT)
@@ -119,11 +113,6 @@ def _why_no_state(path: Path) -> str:
     return ''
 
 
-def _in_range(value: Any, lower: float, upper: float) -> bool:
-    values = value if isinstance(value, (list, tuple)) else [value]
-    return all(lower <= item <= upper for item in values)
-
-
 class KeptSoil:
     """Soil, sensor biases and stuck warning of one node in the file of its ``soil_file``.
 
@@ -154,7 +143,8 @@ class KeptSoil:
     def values(self, configuration: Configuration) -> dict[str, Any]:
         """Return the parameters that were kept; those that do not suit the rover are left alone."""
         try:
-            kept = read_values(self.path)
+            there = self.path.exists() and self.path.stat().st_size
+            kept = ros_yaml.read(self.path) if there else {}
             configuration.replace(kept)
         except UserError as error:
             self._unusable = f'not used, and not written to until it is removed: {error}'

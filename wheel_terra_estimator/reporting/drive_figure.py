@@ -46,7 +46,13 @@ def drive_figure(history: EstimateHistory, truth: Truth | None, border: Border) 
         Panel('drawbar pull [N]', 0.21),
     )
     end = float(history.seconds[-1])
-    switches = _switches(names, truth)
+    switches = [
+        Switch(f'wheel {i}', name, colour=LINE_COLOURS[i % len(LINE_COLOURS)])
+        for i, name in enumerate(names)
+    ]
+    switches.append(Switch('band', f'± {BAND:g} standard deviations', on=False))
+    if truth is not None:
+        switches.append(Switch('truth', 'truth of each wheel', on=False))
     figure = TimeFigure(panels, switches, end, 'time since the first estimate [s]')
     _velocity(figure, history, truth)
     for wheel, name in enumerate(names):
@@ -57,9 +63,11 @@ def drive_figure(history: EstimateHistory, truth: Truth | None, border: Border) 
             colour = LINE_COLOURS[wheel % len(LINE_COLOURS)]
             figure.band(panel, history.seconds, line, half, colour, switch)
             figure.line(panel, history.seconds, line, name, colour, switch)
-            true = getattr(truth, quantity) if truth is not None else None
+            true: WheelTruth | None = getattr(truth, quantity, None)
             if true is not None:
-                _truth(figure, history, panel, scale, wheel, true)
+                seconds = (true.stamp - history.stamp[0]) * 1e-9
+                values = scale * true.value[:, wheel]
+                figure.truth(panel, seconds, values, 'truth', switch, 'truth')
     for slip_class, colour in CLASS_COLOURS.items():
         figure.strips(
             CLASSES,
@@ -111,17 +119,6 @@ def slopes_figure(found: SlipOnSlope) -> TimeFigure:
     return figure
 
 
-def _switches(names: list[str], truth: Truth | None) -> list[Switch]:
-    wheels = [
-        Switch(f'wheel {i}', name, colour=LINE_COLOURS[i % len(LINE_COLOURS)])
-        for i, name in enumerate(names)
-    ]
-    wheels.append(Switch('band', f'± {BAND:g} standard deviations', on=False))
-    if truth is not None:
-        wheels.append(Switch('truth', 'truth of each wheel', on=False))
-    return wheels
-
-
 def _velocity(figure: TimeFigure, history: EstimateHistory, truth: Truth | None) -> None:
     velocity = history.forward_velocity
     rim = velocity + history.values['slip_velocity'].mean(axis=1)
@@ -130,16 +127,3 @@ def _velocity(figure: TimeFigure, history: EstimateHistory, truth: Truth | None)
     if truth is not None:
         seconds = (truth.velocity.stamp - history.stamp[0]) * 1e-9
         figure.truth(VELOCITY, seconds, truth.velocity.value[:, 0], 'truth')
-
-
-def _truth(
-    figure: TimeFigure,
-    history: EstimateHistory,
-    panel: int,
-    scale: float,
-    wheel: int,
-    truth: WheelTruth,
-) -> None:
-    seconds = (truth.stamp - history.stamp[0]) * 1e-9
-    true = scale * truth.value[:, wheel]
-    figure.truth(panel, seconds, true, 'truth', f'wheel {wheel}', 'truth')

@@ -4,15 +4,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.bags.history import DriveFigures, EstimateHistory
 from wheel_terra_estimator.bags.replay import Replay
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.taught import LEARNED, Taught
@@ -129,12 +128,14 @@ def summarise(
 ) -> DriveSummary:
     """Sum a drive up; ``notes`` are said after those of the replay."""
     history = result.history
-    figures = history.figures()
+    rejected = result.rejected.most_common()
+    figures = history.whole
+    assert figures is not None  # of a replay
     return DriveSummary(
         title=title,
         duration=figures.duration,
         sets=figures.sets,
-        wheels=_wheels(history, border) if figures.sets else (),
+        wheels=_wheels(history, figures, border) if figures.sets else (),
         warnings=tuple(
             WarningSpan(*times, warning.reason, later)
             for times, warning, later in zip(
@@ -145,7 +146,12 @@ def summarise(
             )
         ),
         messages=tuple(
-            MessageRow(name, topic, result.heard[name], _rejections(name, result.rejected))
+            MessageRow(
+                name,
+                topic,
+                result.heard[name],
+                ', '.join(f'{n} x {why}' for (t, why), n in rejected if t == name),
+            )
             for name, topic in result.topics.items()
         ),
         notes=(*result.notes, *notes),
@@ -161,8 +167,9 @@ def short_names(names: Sequence[str]) -> list[str]:
     return ['_'.join(p) for p in parts]
 
 
-def _wheels(history: EstimateHistory, border: Border) -> tuple[WheelSummary, ...]:
-    figures = history.figures()
+def _wheels(
+    history: EstimateHistory, figures: DriveFigures, border: Border
+) -> tuple[WheelSummary, ...]:
     times = figures.seconds_in_class
     total = np.maximum(sum(times.values()), 1e-9)
     slips = np.abs(known(history, 'slip', border))
@@ -249,11 +256,6 @@ def deepest(wheel: WheelSummary, plus_minus: str = '±') -> str:
     if wheel.max_sinkage is None or wheel.max_sinkage_std is None:
         return NOT_KNOWN
     return f'{1e3 * wheel.max_sinkage:.0f} {plus_minus} {1e3 * wheel.max_sinkage_std:.0f}'
-
-
-def _rejections(name: str, rejected: Mapping[tuple[str, str], int]) -> str:
-    of_topic = Counter({reason: n for (topic, reason), n in rejected.items() if topic == name})
-    return ', '.join(f'{count} x {reason}' for reason, count in of_topic.most_common())
 
 
 def as_text(summary: DriveSummary) -> str:

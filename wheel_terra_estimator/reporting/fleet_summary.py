@@ -73,16 +73,6 @@ class DriveRow:
         return f'{self.bag}: {self.duration:.1f} s. {self.verdict}{found}'
 
 
-def worst_first(rows: Sequence[DriveRow]) -> list[DriveRow]:
-    """Sort by stuck warnings, time stuck, time in the class high, slip; failed ones last."""
-
-    def badness(row: DriveRow) -> tuple[float, ...]:
-        high = row.seconds.get('high', 0.0)
-        return (-bool(row.error), row.stuck_warnings, row.longest_stuck, high, row.max_slip or 0.0)
-
-    return sorted(rows, key=badness, reverse=True)
-
-
 def write_table(rows: Sequence[DriveRow], path: Path) -> None:
     """Write ``summary.csv``: one row per recording in the order given, units in the header."""
     header = ['bag', 'folder', 'duration [s]', 'sets', 'stuck_warnings', 'first_warning [s]']
@@ -107,11 +97,15 @@ def _figures(row: DriveRow) -> list[Any]:
 
 def write_summary_page(rows: Sequence[DriveRow], path: Path, report: str) -> None:
     """Write the page over all drives; ``report``: name of the report in the folder of each."""
-    drives = [row for row in rows if not row.error]
+    drives = sorted(
+        (row for row in rows if not row.error),
+        key=lambda r: (r.stuck_warnings, r.longest_stuck, r.seconds['high'], r.max_slip or 0.0),
+        reverse=True,
+    )
     warned = sum(bool(row.stuck_warnings) for row in drives)
     page = render(
         'fleet.html',
-        drives=worst_first(drives),
+        drives=drives,
         failed=[row for row in rows if row.error],
         cards=[
             (str(len(drives)), 'drives replayed'),
