@@ -32,12 +32,12 @@ def units(factor):
     return {'velocity': by(factor), 'variance': by(factor**2)}
 
 
-def stays(channel, field, column=...):
-    """Forty seconds without a new number."""
+def stays(channel, field, column=..., since=120.0, until=160.0):
+    """Seconds without a new number."""
 
     def change(values):
         values, seconds = values.copy(), getattr(WHOLE, channel).seconds
-        rows = np.flatnonzero((seconds > 120.0) & (seconds < 160.0))
+        rows = np.flatnonzero((seconds > since) & (seconds < until))
         values[rows, column] = values[rows[0], column]
         return values
 
@@ -102,6 +102,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, {'rate': lambda v: np.where(TENTH & [[0, 1, 0, 0]], 0.0, v)}, 'rate_zeros', FR, None,
      ''),
     (*stays(JOINTS, 'rate'), 'rate_frozen', ALL, None, FROZEN),
+    (*stays(JOINTS, 'rate', since=30.0, until=math.inf), 'rate_frozen', ALL, None, 'to 189'),
     (JOINTS, both(lambda v: v[np.arange(len(v)) // 2 * 2]), 'rates_held', None, None, '2 times'),
     (JOINTS, {'rate': by([1, 1, 0.5, 1])}, 'wheel_counts', RL, None, ''),
     (JOINTS, {'rate': by([1, 1, 1.2, 1])}, 'wheel_scale', RL, approx(0.2 / 1.2, rel=0.01), ''),

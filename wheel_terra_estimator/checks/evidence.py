@@ -48,7 +48,8 @@ LEAST_MOVING_ROWS = 30  # least rows of driving for a check
 LEAST_DRIVING = 3.0  # least driving for a check [s]
 EVEN_GROUND_STD = math.radians(0.8)  # deviation of a tilt by circles on a plane, at most [rad]
 NO_NOISE = 5e-4  # noise of rates that have none, over the working rate, at most [-]
-BEND_OF_NOISE = math.sqrt(70.0)  # deviation of fourth differences, in which no motion is left [-]
+BEND = 4  # order of the differences in which no motion is left
+BEND_OF_NOISE = math.sqrt(70.0)  # their deviation over that of the values [-]
 AROUND = 0.25  # half of the time around a velocity that rim speeds are averaged over [s]
 
 
@@ -234,9 +235,12 @@ class Evidence:
     def exactly_even(self) -> Mask:
         """Rows in which no rate changes, of rates without noise (a simulator's); else none."""
         rate = np.nan_to_num(self.rate)
-        exact = noise_of(rate[self.moving]) < NO_NOISE * self.working_rate
         same = np.append(True, (np.diff(rate, axis=0) == 0.0).all(axis=1))
-        return _shared(same & exact)
+        # Rates that stay show no noise, and they may be most of the drive.
+        changed = np.append(0, np.cumsum(self.moving & ~same))
+        bends = changed[BEND + 1 :] - changed[: -BEND - 1] > BEND
+        noisy = noise_of(rate, bends) > NO_NOISE * self.working_rate
+        return _shared(same & (not noisy))
 
     @cached_property
     def straight(self) -> Mask:
@@ -347,9 +351,12 @@ def gather(
     return Evidence(recording, facts, time, rate, torque, force, gyro, rotation, figures, steering)
 
 
-def noise_of(values: FloatArray) -> float:
-    """Return the noise of (k, ...) values that follow one another, whatever moves them."""
-    return robust_std(np.diff(values, 4, axis=0).ravel()) / BEND_OF_NOISE
+def noise_of(values: FloatArray, bends: Mask | slice = slice(None)) -> float:
+    """Return the noise of (k, ...) values that follow one another, whatever moves them.
+
+    `bends` chooses some of the (k - BEND,) differences; nan: there is none.
+    """
+    return robust_std(np.diff(values, BEND, axis=0)[bends].ravel()) / BEND_OF_NOISE
 
 
 def once(function: Callable[[Evidence], Result]) -> Callable[[Evidence], Result]:
