@@ -62,12 +62,17 @@ class ThinnedRows:
         return found.reshape(len(self._rows), width)
 
 
-_OWN_FIELDS = (
-    *('slip', 'slip_std', 'slip_velocity', 'drawbar_pull', 'drawbar_pull_std'),
-    *('sinkage', 'sinkage_std', 'normal_load', 'rim_travel_left', 'pull_margin'),
-)
 WHEEL_FIELDS = {
-    **{name: name for name in _OWN_FIELDS},
+    'slip': 'slip',
+    'slip_std': 'slip_std',
+    'slip_velocity': 'slip_velocity',
+    'drawbar_pull': 'drawbar_pull',
+    'drawbar_pull_std': 'drawbar_pull_std',
+    'sinkage': 'sinkage',
+    'sinkage_std': 'sinkage_std',
+    'normal_load': 'normal_load',
+    'rim_travel_left': 'rim_travel_left',
+    'pull_margin': 'pull_margin',
     'slip_angle': 'sideways_known.angle',
     'slip_angle_std': 'sideways_known.angle_std',
     'lateral_force': 'sideways_known.force',
