@@ -214,6 +214,8 @@ def _check_output(output: Path, overwrite: bool) -> None:
             f'{output}: what is wanted cannot be told from the name; end it in '
             f'{", ".join(PICTURES)} or .csv'
         )
+    if not output.parent.is_dir():
+        raise UserError(f'{output}: there is no folder {output.parent}; make it first')
     check_file(output, overwrite)
 
 
