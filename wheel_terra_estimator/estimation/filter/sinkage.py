@@ -20,9 +20,6 @@ from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
 # Tuned on simulated drives, seeds 1000 to 1019.
 _ACCEPTED_AFTER = 3
 """Rejected readings in a row from which on they are accepted: the sinkage has really changed."""
-_FIRST_ACCEPTED_AFTER = 2
-"""The same at the start, where the configured soil or the first reading may be far off. In between
-the rejected readings must outnumber those used before."""
 _AGE = 2.0  # up to which a reading counts as known [s]
 FLOOR_VARIANCE = 1e-10  # of a reading [m^2]
 
@@ -32,7 +29,6 @@ class SinkageUpdateState(NamedTuple):
 
     time: tuple[float, ...]  # of the last reading that was used [s], -inf = none yet
     rejected_in_a_row: tuple[int, ...]
-    used: tuple[int, ...]  # number of readings used, at most `_ACCEPTED_AFTER`
     rejected: int = 0  # readings of all wheels
     nis: float | None = None  # running mean; None = no reading yet
 
@@ -42,7 +38,7 @@ class SinkageUpdate(Component[SinkageUpdateState]):
 
     def __init__(self, configuration: Configuration, layout: StateLayout) -> None:
         n = layout.wheel_count
-        super().__init__(SinkageUpdateState((-math.inf,) * n, (0,) * n, (0,) * n))
+        super().__init__(SinkageUpdateState((-math.inf,) * n, (0,) * n))
         self._gate = float(configuration.filter.gate)
         self._layout = layout
 
@@ -66,8 +62,7 @@ class SinkageUpdate(Component[SinkageUpdateState]):
         if not any(sums.readings):
             return []
         when, in_a_row = list(self.state.time), list(self.state.rejected_in_a_row)
-        used, rejected, mean_nis = list(self.state.used), self.state.rejected, self.state.nis
-        rows = []
+        rejected, mean_nis, rows = self.state.rejected, self.state.nis, []
         for i, (total, count) in enumerate(zip(*sums, strict=True)):
             if not count:
                 continue
@@ -80,18 +75,14 @@ class SinkageUpdate(Component[SinkageUpdateState]):
             if nis > self._gate:
                 rejected += 1
                 in_a_row[i] += 1
-                needed = max(used[i] + 1, _FIRST_ACCEPTED_AFTER)
-                if in_a_row[i] < min(needed, _ACCEPTED_AFTER):
+                if in_a_row[i] < _ACCEPTED_AFTER:
                     continue
                 ekf.inflate(index, residual * residual)
             in_a_row[i] = 0
-            used[i] = min(used[i] + 1, _ACCEPTED_AFTER)
             mean_nis = smoothed_nis(mean_nis, min(nis, self._gate))
             when[i] = time
             jacobian = np.zeros(self._layout.size)
             jacobian[index] = 1.0
             rows.append(Row(residual, jacobian, variance))
-        self.state = SinkageUpdateState(
-            tuple(when), tuple(in_a_row), tuple(used), rejected, mean_nis
-        )
+        self.state = SinkageUpdateState(tuple(when), tuple(in_a_row), rejected, mean_nis)
         return rows
