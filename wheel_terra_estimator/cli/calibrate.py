@@ -60,7 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
     text = as_file(calibration, configuration, name, guessed)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(text, encoding='utf-8')
-    print(f'{name}: {len(calibration.changes)} parameters identified')
+    count = len(calibration.changes)
+    print(f'{name}: {count} parameter{"" if count == 1 else "s"} identified')
     print('\n'.join(summary(calibration)))
     for note in recording.notes:
         print(f'note: {note}')

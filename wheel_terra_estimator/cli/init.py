@@ -86,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     if others := ', '.join(sketch.left_out):
         print(f'  not named like wheels: {others}; if they are: --wheels')
     for key in sorted(sketch.guessed):
-        print(f'  {key} is a guess: measure it')
+        print(f'  {key} is a guess: check it')
     print(f'next: wheel-terra check RECORDING --config {shlex.quote(str(arguments.output))}')
     return 0
 
