@@ -189,7 +189,7 @@ def test_the_error_that_lasts_keeps_its_deviation_over_any_step():
 
 
 def rest(parts, ekf, seconds, yaw=0.0):
-    update = ZeroVelocityUpdate(parts.rover.gravity)
+    update = ZeroVelocityUpdate(parts.rover)
     for i in range(round(10 * seconds)):
         window = InertialWindow(readings=5, rate_readings=5, pitch_rate=5 * 0.002)
         cycle = parts.cycle((0.0,) * 6, time=0.1 * i, still=True, window=window, yaw_rate=yaw)

@@ -113,8 +113,8 @@ class Rover:
 
 _UNSTATED_LOAD_STD = 0.2
 """Deviation of a wheel's load over the mean load where the suspension of more than four wheels is
-not stated: the axles of a rocker-bogie may carry 1.28, 0.83 and 0.91 of the loads of a rigid
-chassis."""
+not stated (the axles of a rocker-bogie may carry 1.28, 0.83 and 0.91 of the loads of a rigid
+chassis), and under a rigid chassis on natural ground (rms 0.09 in simulator B, 0.2 in C)."""
 _FEW_WHEELS = 4  # number up to which the suspension hardly matters
 
 
@@ -126,9 +126,6 @@ def _load_std(configuration: Configuration) -> float:
     return _UNSTATED_LOAD_STD
 
 
-_INDETERMINATE_LOAD_STD = 0.2
-"""Deviation of a wheel's load over the mean load under a rigid chassis on natural ground: rms 0.09
-in simulator B, 0.2 in C."""
 _SUPPORTED = 3  # wheels whose loads follow from the balances
 
 
@@ -138,7 +135,7 @@ def _indeterminate_load_std(configuration: Configuration) -> float:
         configuration.rover.suspension == 'rigid' and configuration.wheels.count > _SUPPORTED
     )
     stated = 'rover.load_std' in configuration.stated
-    return _INDETERMINATE_LOAD_STD if indeterminate and not stated else 0.0
+    return _UNSTATED_LOAD_STD if indeterminate and not stated else 0.0
 
 
 _UNSTATED_TORQUE = {'torque_std': 0.015, 'torque_zero_std': 0.02}

@@ -22,12 +22,12 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
+from wheel_terra_estimator.estimation.contacts.wheel_models import LEAST_SINKAGE
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.estimation.scalars import TINY
 
-_NO_LOAD = 1e-3  # of all wheels [N]
 _LEAST_STD = 1e-3  # of a lateral force [N]
-_LEAST_SINKAGE = 1e-4  # [m]
 _STEP = 0.02  # step for the stiffness, over the greatest speed [-]
 _PLACES = np.array([0.1 * u + 0.9 * u**3 for u in np.linspace(-1.0, 1.0, 49)])
 """Lateral speeds at which forces are computed, over the greatest [-]: closest where forces change
@@ -134,7 +134,7 @@ class SidewaysMotion(Component[SidewaysState]):
         fading = math.exp(-travel / _MEMORY)
         error = state.error * fading
         share = 1.0 + (state.variance_share - 1.0) * fading * fading
-        if fastest < self._rover.rest_speed or sum(given.loads) <= _NO_LOAD:
+        if fastest < self._rover.rest_speed or sum(given.loads) <= LEAST_LOAD:
             latest = self._at_rest(given)
             self.state = SidewaysState(time, error, share, fastest, lateral_force, 0.0, latest)
             return latest
@@ -235,7 +235,7 @@ class _Contacts(NamedTuple):
 
 def _contacts(rover: Rover, given: SidewaysInputs) -> _Contacts:
     radius = np.array(rover.rim_radius)
-    entry = np.arccos(1.0 - np.minimum(np.maximum(given.sinkage, _LEAST_SINKAGE) / radius, 1.0))
+    entry = np.arccos(1.0 - np.minimum(np.maximum(given.sinkage, LEAST_SINKAGE) / radius, 1.0))
     swept = _CONTACT_SHARE * entry
     strength = given.tan_friction * np.array(given.loads)
     return _Contacts(

@@ -20,7 +20,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
-from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
+from wheel_terra_estimator.estimation.contacts.cycle import TURN, Cycle, RimSpeeds
 from wheel_terra_estimator.estimation.contacts.demand import Demand, SteepestClimb
 from wheel_terra_estimator.estimation.contacts.linearisation import (
     ContactForces,
@@ -99,8 +99,6 @@ from wheel_terra_estimator.estimation.words import COST
 
 _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
-_TURN = 0.1
-"""Lateral speed ratio above which the yaw moment balance constrains the pulls [-]."""
 _SHARP_TURN = 0.3
 """Lateral speed ratio above which slip is due to turning and is no sign of entrapment [-]."""
 _ANGLE_KNOWN = 0.6  # slip angle std up to which lateral forces are used [rad]
@@ -167,7 +165,7 @@ class WheelSoilEstimator:
         self._sinkage_process = SinkageProcess(rover, layout, models, angle_std)
         self._soil_process = SoilProcess(configuration, layout)
         self._reference = ReferenceUpdate(configuration, rover, sensors, layout)
-        self._zero_velocity = ZeroVelocityUpdate(rover.gravity)
+        self._zero_velocity = ZeroVelocityUpdate(rover)
         self._sinkage = SinkageUpdate(configuration, layout)
         self._torque = TorqueUpdate(configuration, rover, layout)
         self._balance = ForceBalance(configuration, rover, sensors, layout)
@@ -670,7 +668,7 @@ class WheelSoilEstimator:
     def _lateral_forces(self, cycle: Cycle) -> Sideways | None:
         """Return the lateral forces in a turn, None where they are unknown."""
         sideways = self._sideways.state.latest
-        if sideways is None or cycle.lateral_motion < _TURN:
+        if sideways is None or cycle.lateral_motion < TURN:
             return None
         if max(sideways.angle_std) > _ANGLE_KNOWN:
             return None

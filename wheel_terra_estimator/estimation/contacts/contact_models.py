@@ -18,6 +18,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray, Quantity
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
+    LEAST_BEARING,
     LEAST_SINKAGE,
     MOST_RATIO,
     Bearing,
@@ -40,7 +41,6 @@ _MOTION_CELLS, _ANGLE_CELLS = 96, 24
 _DEEPEST = 0.5 * math.pi  # entrance angle [rad]
 _FURTHEST = 0.5 * math.pi  # of the angle whose tangent is (v/(r w) - 1) over the entrance angle
 _SHALLOW = 1e-4  # entrance angle at which the limit of a shallow contact is taken [rad]
-_LEAST_LIFT = 0.05  # vertical force over that of the normal stress alone, at least [-]
 
 
 class RimForces(NamedTuple):
@@ -73,7 +73,7 @@ def rim_forces(
     lift_n, push_n, lift_t, push_t, turn = (part(motion, angle, grid=False) for part in _table())
     cosine, sine = np.cos(shift), np.sin(shift)
     up, ahead = lift_n + friction * lift_t, friction * push_t - push_n
-    lift = np.maximum(up * cosine + ahead * sine, _LEAST_LIFT * lift_n)
+    lift = np.maximum(up * cosine + ahead * sine, LEAST_BEARING * lift_n)
     push = ahead * cosine - up * sine
     return RimForces(lift * angle**3, push / lift, friction * turn / lift)
 

@@ -12,6 +12,8 @@ from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.scalars import NAN, known, median
 
+TURN = 0.1
+"""Lateral motion (see `Cycle`) from which wheels differ by the turn of the rover [-]."""
 _TOGETHER = 0.5  # least typical rim speed over their magnitude where the sides drive together [-]
 
 

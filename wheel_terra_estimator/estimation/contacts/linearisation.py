@@ -137,7 +137,7 @@ class Linearisation(Component[FloatArray]):
     def smoothed(self, forces: WheelForces, moment: FloatArray, turning: BoolArray) -> FloatArray:
         """Return the smoothed derivatives; `moment`: load times radius of each wheel [N m]."""
         old, new = self.state, np.array([forces.d_torque, forces.d_pull])
-        slopes = smoothed_slopes(old, new, _SLOPE_KEEP)
+        slopes = smoothed_slopes(old, new)
         # A wheel that comes free or locks has new derivatives at once.
         change = np.abs(new[0, STRENGTH] - old[0, STRENGTH])
         other = change > _NEW_CONTACT * moment
@@ -172,6 +172,6 @@ def turning_wheels(rover: Rover, rims: Floats, loads: Floats) -> tuple[bool, ...
     )
 
 
-def smoothed_slopes(old: FloatArray, new: FloatArray, keep: float) -> FloatArray:
-    """Return derivatives of which the share `keep` is that of the cycle before; nan = none."""
-    return np.where(np.isnan(old), new, keep * old + (1.0 - keep) * new)
+def smoothed_slopes(old: FloatArray, new: FloatArray) -> FloatArray:
+    """Return derivatives smoothed with those of the cycle before; nan = none."""
+    return np.where(np.isnan(old), new, _SLOPE_KEEP * old + (1.0 - _SLOPE_KEEP) * new)

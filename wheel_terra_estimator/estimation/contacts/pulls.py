@@ -21,6 +21,7 @@ from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
+from wheel_terra_estimator.estimation.contacts.stationary_wheels import MOST_DRAG
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
@@ -34,7 +35,6 @@ _MODEL_STD = 0.01  # of the load
 _LEVEL_STD = 0.2  # of the load, where loads are those of level ground
 _GAIN_SHARE = 0.5  # of the torques' gain error that the pull takes over
 _MOST_TORQUE = 1.2  # of load times radius
-_MOST_DRAG = 2.0  # of the load
 _EXCESS_GAIN = 0.2  # smoothing of reading less model, per cycle
 _SHRINKAGE = 2.0
 """Noise variances taken off the square of an excess (James and Stein 1961): nothing below its
@@ -206,5 +206,5 @@ def distributed(
         pull = pull + gain * (value - shares @ pull)
         errors = errors - gain[:, None] * column
     return [
-        clipped(f, -_MOST_DRAG * load, load) for f, load in zip(pull.tolist(), loads, strict=True)
+        clipped(f, -MOST_DRAG * load, load) for f, load in zip(pull.tolist(), loads, strict=True)
     ]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.estimation.contacts.cycle import Cycle
+from wheel_terra_estimator.estimation.contacts.cycle import TURN, Cycle
 from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
     STRENGTH,
@@ -31,9 +31,7 @@ from wheel_terra_estimator.estimation.scalars import NAN, known
 _SLIDING_RATIO = 3.0
 """v/(r w) taken for a locked wheel: its shear is saturated long before [-]."""
 _SLIDING_DEVIATIONS = 2.0  # of the speed, from which a rover slides on wheels that stand
-_MOST_DRAG = 2.0  # of the load: friction and the soil pushed ahead
-_STRAIGHT = 0.1
-"""Lateral motion above which a torque against the drag is no sign of a jammed drive [-]."""
+MOST_DRAG = 2.0  # of the load: friction and the soil pushed ahead
 _DRAGGED_STD = 0.1
 """Deviation of a dragged wheel's pull over its load, besides torque gain and turning [-]."""
 _IDLE_STD = 0.3
@@ -108,11 +106,11 @@ class StationaryWheels:
             )
         )
         by_torque, by_pull = forces.d_torque[STRENGTH], forces.d_pull[STRENGTH]
-        jammed = (direction * torques > 0.0) & ~creeps & (cycle.lateral_motion < _STRAIGHT)
+        jammed = (direction * torques > 0.0) & ~creeps & (cycle.lateral_motion < TURN)
         usable = (by_torque != 0.0) & ~jammed
         gain = np.where(usable, by_pull / np.where(usable, by_torque, 1.0), 0.0)
         pull = forces.pull + gain * (direction * torques - forces.torque)
-        most = _MOST_DRAG * loads
+        most = MOST_DRAG * loads
         # Where no wheel turns faster than the uncertainty of the speed, the rover comes to rest.
         standing = all(abs(rim) < least_speed for rim in known(cycle.rims))
         limit = max(rover.rest_speed, least_speed) if standing else rover.rest_speed

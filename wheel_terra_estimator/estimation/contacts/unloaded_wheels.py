@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.contacts.cycle import Cycle
+from wheel_terra_estimator.estimation.contacts.cycle import TURN, Cycle
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, median
 
@@ -20,7 +20,6 @@ _LOADED_SHARE = 0.4  # with more it carries its load again
 _LEAST_RIM_SHARE = 0.95  # of the typical rim speed: a slower one is held
 _COMPARABLE_TORQUE = 5.0
 """Typical torque over noise and zero of the sensors above which torques can be compared [-]."""
-_MOST_LATERAL_MOTION = 0.1  # above it torques differ for other reasons [-]
 
 
 class UnloadedState(NamedTuple):
@@ -54,7 +53,7 @@ class UnloadedWheels(Component[UnloadedState]):
         typical = median([torque[i] for i in rolling])
         typical_rim = median([rims[i] for i in rolling])
         comparable = abs(typical) > _COMPARABLE_TORQUE * self._noise
-        comparable = comparable and cycle.lateral_motion < _MOST_LATERAL_MOTION
+        comparable = comparable and cycle.lateral_motion < TURN
         unloaded, since = list(state.unloaded), list(state.since)
         for i in rolling:
             share = torque[i] / typical if comparable else 1.0

@@ -34,7 +34,7 @@ from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 # Effects of a table or of an instrument that the filter must not apply: loads are terrain-normal
 # already, and the pull comes from specific force, not from an attitude.
 _NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias', 'pull_zero', 'pull_gain'})
-_LEAST_BEARING = 0.05  # vertical force over that of the normal stress alone, at least [-]
+LEAST_BEARING = 0.05  # vertical force over that of the normal stress alone, at least [-]
 MOST_RATIO = 3.0
 """v/(r w) beyond which the shear is saturated, so that torque and pull stay the same [-]."""
 LEAST_SINKAGE = 1e-4  # [m]
@@ -212,5 +212,5 @@ class WheelModels:
         log_depth = np.log(np.maximum(peak_depth, _LEAST_DEPTH) / c.reference_depth)
         normal = c.width * c.radius * a * sigma
         carried = normal + c.width * c.shear_radius * b * tau
-        carried = np.maximum(carried, _LEAST_BEARING * normal)
+        carried = np.maximum(carried, LEAST_BEARING * normal)
         return Bearing(carried, c.sinkage_exponent, log_depth)

@@ -47,7 +47,6 @@ _LAW_ERROR = 0.05  # error of the bearing law per contact length, over the sinka
 _DIGGING = 0.05  # deviation of the slip-sinkage, over slip velocity times slip [-]
 _UNMODELLED_DIGGING = 0.1
 """The same, lasting, where nothing measures the sinkage [-]: 0 to 0.1 in four simulators."""
-_SLOPE_KEEP = 0.9  # smoothing of the derivatives over about a second of cycles
 _RATE_TIME = 0.5  # time constant of the published rate [s]
 _FIRST_RATE_STD = 1.0  # [m/s], before anything is known
 
@@ -149,7 +148,7 @@ class SinkageProcess(Component[SinkageState]):
         raw = np.array(
             [np.log(carried[0] / carried[1]) / _RATIO_STEP, np.abs(slip) * log_depths[0]]
         )
-        slopes = smoothed_slopes(self.state.slopes, raw, _SLOPE_KEEP)
+        slopes = smoothed_slopes(self.state.slopes, raw)
         # Model error: a share of the sinkage per contact length, and unmodelled slip-sinkage.
         spun = np.maximum(slip, 0.0) ** 2 * rim * dt
         unmodelled_std = (self.state.unmodelled_std + _UNMODELLED_DIGGING * spun) * np.exp(

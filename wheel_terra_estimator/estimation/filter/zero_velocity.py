@@ -14,6 +14,7 @@ from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import GyroZero
+from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.estimation.scalars import NAN
 
 # Tuned on simulated drives, seeds 1000 to 1019.
@@ -23,7 +24,6 @@ _COASTING = 0.1
 """Deceleration of a rover that slides on after its wheels have stopped [g]; as long as that takes
 the update is gated."""
 _COASTING_GATE = 9.0  # greatest NIS of the update meanwhile [-]
-_GYRO_SETTLING_TIME = 0.5  # [s]
 _MOST_YAW_RATE = 0.05  # of a rover at rest, by the zero of the gyro [rad/s]
 _MOST_CYCLES = 200.0  # in the running mean of the zero
 _KEPT_SHARE = 0.5  # weight of a zero kept in a new run, over that in the old one [-]
@@ -40,9 +40,10 @@ class ZeroVelocityState(NamedTuple):
 class ZeroVelocityUpdate(Component[ZeroVelocityState]):
     """Fuses zero velocity at rest, and learns the zero of the gyro meanwhile."""
 
-    def __init__(self, gravity: float) -> None:
+    def __init__(self, rover: Rover) -> None:
         super().__init__(ZeroVelocityState())
-        self._coasting = _COASTING * gravity  # [m/s^2]
+        self._coasting = _COASTING * rover.gravity  # [m/s^2]
+        self._rest_time = rover.rest_time
 
     def keep_zero_of(self, old: ZeroVelocityState) -> None:
         """Begin a run with the gyro's zero of an old one, at a lower weight."""
@@ -75,7 +76,7 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         row[SPEED] = 1.0
         ekf.fuse([Row(-speed, row, variance)])
         turning = abs(yaw_rate) >= _MOST_YAW_RATE
-        if settled > _GYRO_SETTLING_TIME and window.rate_readings and not turning:
+        if settled > self._rest_time and window.rate_readings and not turning:
             self._learn_zero(yaw_rate, window.pitch_rate / window.rate_readings)
 
     def _learn_zero(self, yaw_rate: float, pitch_rate: float) -> None:
