@@ -181,7 +181,7 @@ class EstimateHistory:
     forward_velocity: FloatArray  # [m/s]
     forward_velocity_std: FloatArray
     warnings: tuple[StuckWarning, ...]
-    whole: DriveFigures | None = None  # None of what was read from a bag
+    whole: DriveFigures
     slip_on_slope: SlipOnSlope | None = None  # as the drive ended; None: not known
 
     @property
@@ -324,14 +324,20 @@ class _EstimateMessages:
         def column(name: str) -> NDArray[Any]:
             return np.array([row.get(name, unknown[name]) for row in whole.values()])
 
+        classes = column('slip_class').astype(np.uint8).reshape(shape)
+        values = {name: column(name).reshape(shape) for name in WHEEL_FIELDS}
+        figures = DriveFigures(len(self._names))
+        for i, stamp in enumerate(whole):
+            figures.add(stamp, classes[i], {name: rows[i] for name, rows in values.items()})
         return EstimateHistory(
             names=self._names,
             stamp=np.array(list(whole), dtype=np.int64),
             forward_velocity=column('forward_velocity'),
             forward_velocity_std=column('forward_velocity_std'),
-            slip_class=column('slip_class').astype(np.uint8).reshape(shape),
-            values={name: column(name).reshape(shape) for name in WHEEL_FIELDS},
+            slip_class=classes,
+            values=values,
             warnings=tuple(_in_stamps(self._warnings, whole)),
+            whole=figures,
         )
 
 

@@ -130,7 +130,6 @@ def summarise(
     history = result.history
     rejected = result.rejected.most_common()
     figures = history.whole
-    assert figures is not None  # of a replay
     return DriveSummary(
         title=title,
         duration=figures.duration,
