@@ -700,3 +700,113 @@ def test_a_rover_that_is_dragged_back_on_locked_wheels_has_rates_with_a_sign(tor
         torque=np.where(BACK | math.isnan(torque), held, WHOLE.joints.torque),
     )
     assert 'rates_unsigned' not in faults(checked(joints=joints))
+
+
+@pytest.mark.parametrize('climbs', [True, False])
+def test_a_rover_that_slides_back_on_a_slope_has_rates_with_a_sign(climbs):
+    """On 20 degrees it slides back for a third of the drive while its wheels go on."""
+    time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
+    speed, slope = 0.0 * time + 0.3, 0.0 * time + 0.35 * climbs
+    whole = rolling.recording(rolling.Motion(time, speed, 0.0 * time, slope))
+    velocity = whole.reference.velocity.copy()
+    velocity[np.arange(len(velocity)) % 60 > 40, 0] -= 0.5
+    report = checked(whole=whole, reference={'velocity': velocity})
+    assert ('rates_unsigned' in faults(report)) == (not climbs)
+
+
+@pytest.mark.parametrize('stands', [True, False])
+def test_a_locked_wheel_that_the_others_drag_keeps_the_sign_of_its_torque(stands):
+    """Of six wheels one is locked; those beside it turn faster than the others."""
+    middle, y = ('middle_left', 'middle_right'), [rolling.HALF_TRACK, -rolling.HALF_TRACK] * 3
+    rate, torque = (
+        np.hstack([one, one[:, :2]]) for one in (WHOLE.joints.rate, WHOLE.joints.torque)
+    )
+    random = np.random.default_rng(3)
+    rate, torque = random.normal(rate, 0.004), random.normal(torque, 0.2)
+    rate[:, ::2] *= 1.2
+    rate[:, 0] *= not stands
+    torque[:, 0] *= -1.0
+    file = {'wheels.names': [*rolling.NAMES, *middle], 'wheels.x': [0.1, 0.1, -0.1, -0.1, 0.0, 0.0]}
+    file |= {'wheels.radius': [rolling.RADIUS] * 6, 'wheels.width': [0.1] * 6, 'wheels.y': y}
+    joints = replace(WHOLE.joints, names=(*rolling.NAMES, *middle), rate=rate, torque=torque)
+    report = checked(rolling.rover(**file), sinkage=None, joints=joints)
+    assert ('torque_sign' in faults(report)) == (not stands)
+
+
+def test_rates_without_a_sign_reverse_no_wheels_of_a_rover_that_turns_backwards_alone():
+    drive = rolling.ten_minute_drive()
+    speed = np.where(drive.time > 105.0, -drive.speed, drive.speed)
+    whole = rolling.recording(replace(drive, speed=speed))
+    assert faults(checked(whole=whole)) == []
+    told = faults(checked(whole=whole, joints={'rate': np.abs(whole.joints.rate)}))
+    assert told == ['rates_unsigned']
+
+
+def test_turns_about_the_z_of_a_leaning_rover_are_no_scale_of_its_gyro():
+    """On 20 degrees uphill the heading turns 1/cos(20 degrees) times as fast as the rover does."""
+    time = np.arange(0.0, 220.0, 1.0 / rolling.RATE)
+    yaw, still = 0.15 * np.sign(np.sin(time)) * (time > 10.0), 0.0 * time
+    whole = rolling.recording(rolling.Motion(time, still + 0.3, yaw, still + 0.35))
+    psi = np.interp(whole.imu.seconds, time, np.cumsum(yaw) / rolling.RATE)
+    lean = scipy.spatial.transform.Rotation.from_euler('y', -0.35)
+    turned = lean * scipy.spatial.transform.Rotation.from_rotvec(np.outer(psi, [0.0, 0.0, 1.0]))
+    assert 'gyro_scale' not in faults(checked(whole=whole, imu={'orientation': turned.as_quat()}))
+    rate = 0.9 * whole.imu.rate
+    report = checked(whole=whole, imu={'orientation': turned.as_quat(), 'rate': rate})
+    (told,) = [f for f in report.findings if f.fault == 'gyro_scale']
+    assert told.value == pytest.approx(1.0 / 0.9, abs=0.02)
+
+
+def test_a_gyro_against_its_orientation_may_be_either_where_the_wheels_see_no_turn():
+    psi = np.interp(
+        WHOLE.imu.seconds, WHOLE.joints.seconds, np.cumsum(rolling.ten_minute_drive().yaw_rate)
+    )
+    yaw = scipy.spatial.transform.Rotation.from_rotvec(np.outer(psi / rolling.RATE, [0, 0, 1]))
+    mean = WHOLE.joints.rate.mean(axis=1, keepdims=True) + 0.0 * WHOLE.joints.rate
+    back = WHOLE.imu.rate * [1.0, 1.0, -1.0]
+    joints = replace(WHOLE.joints, rate=mean)
+    report = checked(joints=joints, imu={'rate': back, 'orientation': yaw.as_quat()})
+    assert [f.confidence for f in report.findings if f.fault == 'orientation'] == [0.5]
+
+
+@pytest.mark.parametrize('scale', [0.88, 1.12])
+def test_the_track_of_sides_that_differ_on_straights_is_not_written(scale):
+    """One side has another radius than the file says: circles to the left alone fit a track."""
+    drive = rolling.ten_minute_drive()
+    whole = rolling.recording(replace(drive, yaw_rate=np.abs(drive.yaw_rate)))
+    file = rolling.rover(**{'wheels.radius': [rolling.RADIUS, scale * rolling.RADIUS] * 2})
+    assert 'track' not in faults(checked(file, whole=whole))
+    assert 'wheels.y' not in {change.key for change in calibrate(whole, file).changes}
+
+
+def test_a_late_reference_of_a_rover_that_turns_late_is_no_fault_of_its_wheels():
+    """The chassis turns 0.18 s after its wheels; what arrives as stamped is stamped well."""
+    imu = later('imu', 0.18, stamp=0.18)['imu']
+    reference = later('reference', 0.37, stamp=0.37)['reference']
+    told = [f for f in checked(imu=imu, reference=reference).findings if f.kind == 'delay']
+    assert [f.fault for f in told] == ['reference_offset']
+
+
+def test_the_unit_of_rates_is_told_in_turns_about_a_point_between_steered_wheels():
+    """The rims of steered wheels run faster than the rover: it turns slowly about its middle."""
+    time = np.arange(0.0, 200.0, 1.0 / rolling.RATE)
+    yaw = np.interp(time, [40.0, 42.0], [0.0, 0.8])
+    speed = np.interp(time, [10.0, 11.0, 40.0, 42.0], [0.0, 0.28, 0.28, 0.3])
+    whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    x, y = np.array([0.4, 0.4, -0.4, -0.4]), np.array(rolling.PARAMETERS['wheels.y'])
+    along, aside = speed[:, None] - yaw[:, None] * y, yaw[:, None] * x
+    angle = np.arctan(aside / np.where(along == 0.0, 1.0, along))
+    rate = along / np.cos(angle) / rolling.RADIUS
+    rate += np.random.default_rng(2).normal(0.0, 0.004, rate.shape)
+    steered = [f'{name}_steering' for name in rolling.NAMES]
+    none = np.full(rate.shape, np.nan)
+    joints = replace(
+        whole.joints,
+        names=(*rolling.NAMES, *steered),
+        rate=np.hstack([np.degrees(rate), none]),
+        torque=np.hstack([whole.joints.torque, none]),
+        position=np.hstack([none, angle]),
+    )
+    rover = rolling.rover(**{'wheels.x': x.tolist(), 'wheels.steering_joints': steered})
+    (told,) = [f for f in checked(rover, whole=whole, joints=joints).findings if f.kind == 'unit']
+    assert told.fault == 'rate_unit' and told.value == pytest.approx(math.radians(1.0))

@@ -173,8 +173,9 @@ def _late_channels(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
         return late
     for name, lag in late.items():
         other = next((lag for key, lag in lags.items() if key != name), None)
-        if other is not None and other.steady:
-            wheels = abs(other.value - lag.value) < abs(other.value)
+        off = 0.0 if other is None else abs(other.value) - abs(other.value - lag.value)
+        if other is not None and other.steady and abs(off) > 2.0 * LEAST_STD[other.by]:
+            wheels = off > 0.0
         else:
             wheels = _by_arrival(evidence, name, lag)
         if wheels:

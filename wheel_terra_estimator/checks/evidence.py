@@ -50,6 +50,7 @@ EVEN_GROUND_STD = math.radians(0.8)  # deviation of a tilt by circles on a plane
 NO_NOISE = 5e-4  # noise of rates that have none, over the working rate, at most [-]
 BEND = 4  # order of the differences in which no motion is left
 BEND_OF_NOISE = math.sqrt(70.0)  # their deviation over that of the values [-]
+SLIDES_BACK = 0.15  # slope against the wheels from which a rover may slide back on them [-]
 AROUND = 0.25  # half of the time around a velocity that rim speeds are averaged over [s]
 
 
@@ -255,6 +256,13 @@ class Evidence:
             return _shared(np.zeros(self.time.size, dtype=bool))
         rate = np.abs(self.gyro[:, 2])
         return _shared(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
+
+    def climbs(self, rows: Mask) -> bool:
+        """Whether the wheels drive uphill, so steeply that a rover may slide back on them."""
+        if self.force is None or not rows.any():
+            return False
+        ahead = np.median(self.force[rows, 0] * np.sign(self.rim[rows]))
+        return bool(ahead > SLIDES_BACK * self.facts.gravity)
 
     def rim_at(self, stamp: IntArray, values: FloatArray) -> FloatArray:
         """Return means of (k,) values within `AROUND` of stamps [ns]; nan for none."""

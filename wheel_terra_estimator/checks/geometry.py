@@ -381,6 +381,9 @@ def rolling_track(evidence: Evidence) -> TriedRatio | NotChecked:
     track = measured_track(evidence)
     if isinstance(track, NotChecked):
         return track
+    unlike = max(_unlike(evidence))
+    if unlike > LEAST_UNLIKE:
+        return not_checked('radius', 'one_wheel', unlike=100.0 * unlike)
     soft = evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
     if soft or _depth(evidence).value > SOFT_DEPTH or turning.left_in_turns(evidence) > MOST_UNLIKE:
         return not_checked('track', 'slip_in_turns')

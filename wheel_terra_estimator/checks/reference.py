@@ -11,7 +11,13 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import NO_NOISE, Evidence, Mask, noise_of
+from wheel_terra_estimator.checks.evidence import (
+    NO_NOISE,
+    Evidence,
+    Mask,
+    noise_of,
+    row_medians,
+)
 from wheel_terra_estimator.checks.finding import Outcome, not_checked
 from wheel_terra_estimator.checks.series import VelocitySeries, nearest
 from wheel_terra_estimator.checks.statistics import (
@@ -56,33 +62,45 @@ KNOWN_UNITS = {
 }
 
 
-def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return a reference or rates that are positive both ways, and the evidence mended."""
+def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return rates that are positive both ways, whatever their signs, and the evidence mended."""
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < LEAST_REFERENCES:
         return [], evidence
     rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
     forward = reference.velocity[:, 0]
     least = 0.4 * float(np.quantile(np.abs(forward), 0.9))
-    # A position has no sign either, and is no speed.
-    if _without_sign(forward, rim) and np.median(np.abs(forward)) < BEYOND * np.abs(rim).max():
-        velocity = reference.velocity * np.where(rim < 0.0, -1.0, 1.0)[:, None]
-        mended = evidence.with_channel('reference', velocity=velocity)
-        return [evidence.found('reference_unsigned', 0.95)], mended
     both = min(np.mean(forward > least), np.mean(forward < -least)) > SELDOM_NEGATIVE
     speed = np.interp(evidence.time, evidence.seconds(reference), moving_mean(forward, LEAST_ROWS))
     cut = _cut_off(evidence, speed > least, speed < -least)
-    if both and not _sideways(reference) and (cut or _without_sign(rim, forward)):
-        # In turns the sides may be unlike; of what was cut off at 0 nothing is known.
-        unknown = (evidence.moving & ~evidence.unturned)[:, None]
-        if cut:
-            goes_back = speed < -CLEAR_SPEED * bend_noise(forward)
-            unknown = unknown | (evidence.rate == 0.0) & goes_back[:, None]
-        rate = evidence.rate * np.sign(speed)[:, None]
-        mended = evidence.with_rate(np.where(unknown, np.nan, rate))
-        finding = evidence.found('rates_unsigned', 0.95, other='reference goes')
-        return [finding], mended
-    return [], evidence
+    slides = evidence.climbs(evidence.moving & (speed < -least))
+    unsigned = cut or (_without_sign(rim, forward) and not slides)
+    if not both or _sideways(reference) or not unsigned:
+        return [], evidence
+    # In turns the sides may be unlike; of what was cut off at 0 nothing is known.
+    unknown = (evidence.moving & ~evidence.unturned)[:, None]
+    if cut:
+        goes_back = speed < -CLEAR_SPEED * bend_noise(forward)
+        unknown = unknown | (evidence.rate == 0.0) & goes_back[:, None]
+    rate = np.where(unknown, np.nan, evidence.rate * np.sign(speed)[:, None])
+    finding = evidence.found('rates_unsigned', 0.95, other='reference goes')
+    return [finding], evidence.with_rate(rate)
+
+
+def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return a reference that is positive both ways, and the evidence with its sense."""
+    reference = evidence.recording.reference
+    if reference is None or reference.stamp.size < LEAST_REFERENCES:
+        return [], evidence
+    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
+    forward = reference.velocity[:, 0]
+    # A position has no sign either, and is no speed.
+    position = np.median(np.abs(forward)) >= BEYOND * np.abs(rim).max()
+    if position or not _without_sign(forward, rim):
+        return [], evidence
+    velocity = reference.velocity * np.where(rim < 0.0, -1.0, 1.0)[:, None]
+    mended = evidence.with_channel('reference', velocity=velocity)
+    return [evidence.found('reference_unsigned', 0.95)], mended
 
 
 def _sideways(reference: VelocitySeries) -> bool:
@@ -186,8 +204,7 @@ def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[Flo
 
     In turns on the spot the mean of the rims is next to nothing.
     """
-    typical = evidence.common_rate * float(np.nanmean(evidence.radius))
-    rim = np.abs(evidence.rim_at(series.stamp, typical))
+    rim = np.abs(evidence.rim_at(series.stamp, row_medians(evidence.speed)))
     usual = float(np.nanquantile(rim, 0.9)) if np.isfinite(rim).any() else 0.0
     least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
     mean = np.abs(evidence.rim_at(series.stamp, evidence.rim))

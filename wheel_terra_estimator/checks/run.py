@@ -215,6 +215,7 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('unit', turning, 'check_steering_unit'),
     ('radius', wheel_rates, 'check_scales'),
     ('swapped_sides', turning, 'check_axes'),
+    ('sign', reference, 'check_unsigned', DRIVING),
     ('sign', turning, 'check_signs', DRIVING),
     ('sign', reference, 'check_sense', DRIVING),
     ('sign', turning, 'check_steering'),

@@ -157,7 +157,10 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     if yaw is not None:
         along = along * math.cos(yaw.value) + across * math.sin(yaw.value)
     design = np.column_stack([along, sense, np.ones(sense.size)])[rows]
-    table = np.column_stack([moving_mean(np.nan_to_num(t), width) for t in evidence.torque.T])
+    size = np.nan_to_num(np.abs(evidence.rate), nan=evidence.working_rate)
+    turns = [moving_mean(one, width) > evidence.rest_rate for one in size.T]
+    own = np.where(np.column_stack(turns), evidence.torque, 0.0)  # one that stands takes no power
+    table = np.column_stack([moving_mean(np.nan_to_num(t), width) for t in own.T])
     measured = [block_fit(design, column)[0] for column in table[rows].T]
     rows = rows & (along * sense > UPHILL_ENOUGH * evidence.facts.gravity)
     if not evidence.enough(rows):

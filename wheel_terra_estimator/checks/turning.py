@@ -51,7 +51,6 @@ from wheel_terra_estimator.checks.statistics import (
     worst,
 )
 from wheel_terra_estimator.checks.torque import Slopes, slope_fit
-from wheel_terra_estimator.estimation.measurements import heading_of
 
 Mask = BoolArray
 
@@ -68,7 +67,6 @@ MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2  # residual of a cure; of steered wheels
 UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
 CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
-SLIDES_BACK = 0.15  # slope against the wheels from which a rover may slide back on them [-]
 SLIDE = ', or the rover slides back'
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
@@ -347,7 +345,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         outcomes += [not_checked(kind, why) for kind in ('swapped_sides', 'exchanged_wheels')]
     agreement = _direction(mended, signs)
     blame = _blame(agreement, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
-    slides = agreement[0] is not None and agreement[0] < 0.0 and _climbs(evidence, rows)
+    slides = agreement[0] is not None and agreement[0] < 0.0 and evidence.climbs(rows)
     if blame == 'wheels':
         signs, turn = -signs, -turn
         if slides:
@@ -443,14 +441,6 @@ def _direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
     return by_reference, by_force
 
 
-def _climbs(evidence: Evidence, rows: Mask) -> bool:
-    """Whether the wheels drive uphill, so steeply that a rover may slide back on them."""
-    if evidence.force is None:
-        return False
-    ahead = np.median(evidence.force[rows, 0] * np.sign(evidence.rim[rows]))
-    return bool(ahead > SLIDES_BACK * evidence.facts.gravity)
-
-
 def _backwards(
     evidence: Evidence, mended: Evidence, signs: FloatArray, chosen: _Chosen
 ) -> tuple[Finding, Evidence]:
@@ -542,11 +532,18 @@ def _turns_as_oriented(evidence: Evidence, imu: ImuSeries, least: float = 0.0) -
 
 
 def _heading(evidence: Evidence, imu: ImuSeries) -> FloatArray | None:
-    """Return the heading by the orientation (k,) [rad]; None where there is none."""
+    """Return the turn about the body's z by the orientation (k,) [rad]; None where there is none.
+
+    On a slope the heading turns faster than the body does about its z, or slower.
+    """
     known = np.isfinite(imu.orientation).all(axis=1)
     if known.mean() < 0.9:
         return None
-    heading = np.unwrap(heading_of(imu.orientation[known]))
+    before, after = imu.orientation[known][:-1], imu.orientation[known][1:]
+    turn = before[:, 3:] * after[:, :3] - after[:, 3:] * before[:, :3]
+    turn -= np.cross(before[:, :3], after[:, :3])
+    about = 2.0 * np.arctan(turn @ evidence.rotation[2] / (before * after).sum(axis=1))
+    heading = np.cumsum(np.nan_to_num(np.append(0.0, about)))
     return np.asarray(np.interp(evidence.time, evidence.seconds(imu)[known], heading))
 
 
@@ -555,9 +552,12 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     imu = evidence.recording.imu
     if imu is None or evidence.gyro is None:
         return [], evidence
-    if _turns_as_oriented(evidence, imu, LEAST_TURNED) < 0:  # the gyro turns as the wheels do here
-        how = 'it turns against gyro and wheels'
-        return [evidence.found('orientation', 0.97, how=how)], evidence
+    if _turns_as_oriented(evidence, imu, LEAST_TURNED) < 0:
+        told = track_ratio(evidence) is not None  # the gyro turns as the wheels do here
+        how = (
+            f'it turns against {"gyro and wheels" if told else "the gyro, or the gyro is reversed"}'
+        )
+        return [evidence.found('orientation', 0.97 if told else 0.5, how=how)], evidence
     axes = (*evidence.gyro[:, :2].T, evidence.yaw)
     aside, across, gyro = (_turns(evidence, integrated(evidence.time, axis)) for axis in axes)
     headings = {
