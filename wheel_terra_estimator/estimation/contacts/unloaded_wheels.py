@@ -57,8 +57,10 @@ class UnloadedWheels(Component[UnloadedState]):
         unloaded, since = list(state.unloaded), list(state.since)
         for i in rolling:
             share = torque[i] / typical if comparable else 1.0
-            rim_share = rims[i] / typical_rim if typical_rim else 0.0
-            free = _seems_free(share, rim_share, comparable=comparable, unloaded=unloaded[i])
+            turns = rims[i] * typical_rim > _LEAST_RIM_SHARE * typical_rim**2
+            free = abs(share) < _FREE_SHARE and turns
+            if unloaded[i]:
+                free = not comparable or share < _LOADED_SHARE
             if free == unloaded[i]:
                 since[i] = NAN
             elif isnan(since[i]):
@@ -67,10 +69,3 @@ class UnloadedWheels(Component[UnloadedState]):
                 unloaded[i], since[i] = free, NAN
         self.state = UnloadedState(tuple(unloaded), tuple(since))
         return self.state
-
-
-def _seems_free(share: float, rim_share: float, *, comparable: bool, unloaded: bool) -> bool:
-    """Return whether shares of the typical torque and rim speed indicate no load."""
-    if unloaded:
-        return not comparable or share < _LOADED_SHARE
-    return comparable and abs(share) < _FREE_SHARE and rim_share > _LEAST_RIM_SHARE

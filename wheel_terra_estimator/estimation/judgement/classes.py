@@ -63,26 +63,22 @@ class SlipClassifier:
     def update(self, state: ClassState, time: float, slip: float) -> ClassState:
         """Return the class of a wheel that is judged, at a time [s], from its published slip."""
         current, outside_since = state
+        borders, magnitude, target = self._borders, abs(slip), current
         if current == UNKNOWN:
-            target = instantaneous_class(slip, self._borders)
-            if target < len(self._borders):
+            target = instantaneous_class(slip, borders)
+            if target < len(borders):
                 return ClassState(target)
         else:
-            target = self._target(current, abs(slip))
+            while target < len(borders) and magnitude > borders[target] + self._half_band:
+                target += 1
+            while target > 0 and magnitude <= borders[target - 1] - self._half_band:
+                target -= 1
             if target == current:
                 return ClassState(current)
         since = time if isnan(outside_since) else outside_since
         if time - since >= self._dwell - TIME_ROUNDING:
             return ClassState(target)
         return ClassState(current, since)
-
-    def _target(self, current: int, magnitude: float) -> int:
-        target, top = current, len(self._borders)
-        while target < top and magnitude > self._borders[target] + self._half_band:
-            target += 1
-        while target > 0 and magnitude <= self._borders[target - 1] - self._half_band:
-            target -= 1
-        return target
 
 
 class PublishedClasses:

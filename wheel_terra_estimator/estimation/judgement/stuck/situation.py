@@ -244,9 +244,8 @@ class Situation:
         """Whether the wheels stall at their torque limit, or are about to."""
         if self.pulls_at_rest:
             return self.torque_share > _STALL_SHARE_AT_REST
-        return self._near_limit(self.torque_share) and (
-            self.slowed or self.rim < (1.0 - _SLOWING) * self.fastest
-        )
+        slow = self.slowed or self.rim < (1.0 - _SLOWING) * self.fastest
+        return self.settled and self.torque_share > NEAR_LIMIT and slow
 
     @cached_property
     def pulls_at_rest(self) -> bool:
@@ -258,15 +257,9 @@ class Situation:
         """Wheels that pull near their limit and hardly turn, while another turns or all stand."""
         if self.pulls_at_rest:
             return tuple([w.torque_share > _STALL_SHARE_AT_REST for w in self.motion.wheels])
-        return tuple(
-            [
-                self._near_limit(w.torque_share) and abs(w.rim_speed) < _STALL_RATIO * self.fastest
-                for w in self.motion.wheels
-            ]
-        )
-
-    def _near_limit(self, torque_share: float) -> bool:
-        return self.settled and torque_share > NEAR_LIMIT
+        slow = _STALL_RATIO * self.fastest if self.settled else 0.0
+        wheels = self.motion.wheels
+        return tuple([w.torque_share > NEAR_LIMIT and abs(w.rim_speed) < slow for w in wheels])
 
     @property
     def slip_magnitude(self) -> float:
