@@ -27,6 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtr, ndtri
+from scipy.stats import qmc
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.estimation.component import Component
@@ -36,7 +37,6 @@ from wheel_terra_estimator.estimation.scalars import TINY, gain_of
 
 _DEMANDS = np.tan(np.radians(SLOPES))
 _DRAWS = 64
-_BASES = 2, 3, 5, 7  # of the Halton sequence
 
 
 # Prior, walks and noise of the curve; set on simulators A, B and C, seeds 6000 to 6002.
@@ -159,23 +159,9 @@ class SlopeCurve(Component[CurveState]):
         )
 
 
-def _halton() -> FloatArray:
-    """Return evenly spread draws of four standard normal numbers, (draws, 4); Halton (1960)."""
-    columns = []
-    for base in _BASES:
-        column = np.zeros(_DRAWS)
-        for k in range(1, _DRAWS + 1):
-            rest, place = k, 1.0
-            while rest:
-                rest, digit = divmod(rest, base)
-                place /= base
-                column[k - 1] += digit * place
-        columns.append(ndtri(column))
-    draws = np.array(columns).T
-    return np.asarray((draws - draws.mean(axis=0)) / draws.std(axis=0))
-
-
-_STANDARD = _halton()
+# Evenly spread draws of four standard normal numbers, (draws, 4); Halton (1960).
+_STANDARD = ndtri(qmc.Halton(4, scramble=False).random(_DRAWS + 1)[1:])
+_STANDARD = (_STANDARD - _STANDARD.mean(axis=0)) / _STANDARD.std(axis=0)
 
 
 def slips_at(
