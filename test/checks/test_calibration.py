@@ -17,6 +17,7 @@ from wheel_terra_estimator.checks.imu import gross_tilt
 from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.errors import UserError
 
 WRONG = {
     'wheels.radius': [0.94 * rolling.RADIUS] * 4,
@@ -226,3 +227,10 @@ def test_no_zero_of_a_gyro_whose_unit_no_turn_tells(unit):
     zeros = [f for f in calibration.findings if f.fault == 'gyro_bias']
     assert len(zeros) == (unit > 1.0)
     assert all(f.confidence <= 0.5 and 'degrees per second' in f.words for f in zeros)
+
+
+def test_a_few_wheel_rates_are_called_few():
+    whole = rolling.recording()
+    joints = rows_of(whole.joints, np.arange(whole.joints.stamp.size) < 20)
+    with pytest.raises(UserError, match='hardly any wheel rates; record a longer drive'):
+        calibrate(replace(whole, joints=joints), rolling.rover())

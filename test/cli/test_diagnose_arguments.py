@@ -10,11 +10,15 @@ import pytest
 from wheel_terra_estimator.cli.main import main
 
 
-def test_packed_recording_is_a_recording(tmp_path, refused):
-    packed = tmp_path / 'drive.mcap.zstd'
-    packed.write_bytes(b'no recording')
-    arguments = ['diagnose', str(packed), '-o', str(tmp_path / 'out'), '--config', 'pathfinder']
-    refused(arguments, 'cannot be unpacked')
+@pytest.mark.parametrize(
+    ('name', 'words'),
+    [('drive.mcap.zstd', 'cannot be unpacked'), ('drive.bag', 'a bag of ROS 1')],
+)
+def test_a_recording_is_no_table(tmp_path, refused, name, words):
+    bag = tmp_path / name
+    bag.write_bytes(b'no recording')
+    arguments = ['diagnose', str(bag), '-o', str(tmp_path / 'out'), '--config', 'pathfinder']
+    refused(arguments, words)
 
 
 def _table(path: Path) -> str:

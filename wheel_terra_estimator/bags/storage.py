@@ -28,12 +28,13 @@ from wheel_terra_estimator.input_file import check_regular
 from wheel_terra_estimator.messages.unpack import TYPES, DamagedMessageError, unpack
 
 STORAGE_SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
+_ROS_1_SUFFIX = '.bag'
 _Source: TypeAlias = McapFile | SqliteFile
 
 
 def is_bag(path: Path) -> bool:
     """Return whether a path names a recording, and no table."""
-    return path.is_dir() or path.name.endswith(STORAGE_SUFFIXES)
+    return path.is_dir() or path.name.endswith((*STORAGE_SUFFIXES, _ROS_1_SUFFIX))
 
 
 class Bag:
@@ -127,7 +128,7 @@ def _open_sources(path: Path, notes: list[str], stack: ExitStack) -> list[_Sourc
     if not there:
         raise UserError(f'{path}: no such bag; give a rosbag2 folder, a .mcap or a .db3 file')
     if not folder:
-        if path.suffix == '.bag':
+        if path.suffix == _ROS_1_SUFFIX:
             raise UserError(
                 f'{path}: a bag of ROS 1; convert it: pip install rosbags, then rosbags-convert '
                 f'--src {path} --dst {path.stem}'

@@ -54,7 +54,7 @@ def calibrate(
     """Return what a recording tells of the rover file; without wheel rates a `UserError`."""
     report, evidence = examine(recording, configuration, remapped)
     if evidence is None:
-        raise UserError(f'{recording.name}: it has no wheel rates to calibrate with')
+        raise UserError(f'{recording.name}: hardly any wheel rates; record a longer drive')
     changes = _Changes(configuration.flat())
     _directions(changes, report, configuration)
     for finding in _sure(report):
