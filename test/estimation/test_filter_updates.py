@@ -67,12 +67,12 @@ def hear(parts, update, ekf, time, speed, still=False, fastest_rim=0.05):
     )
 
 
-def references(parts, ekf, speeds):
-    """Fuse one reference per second; return for each whether the speed was opened to it."""
+def references(parts, ekf, speeds, gap=1.0):
+    """Fuse references `gap` seconds apart; return for each whether the speed was opened to it."""
     update, opened = reference_update(parts), []
     for i, speed in enumerate(speeds):
         ekf.inflate(SPEED, 1e-8)
-        opened.append(hear(parts, update, ekf, float(i), speed))
+        opened.append(hear(parts, update, ekf, gap * i, speed))
     return update, opened
 
 
@@ -84,11 +84,15 @@ def test_a_reference_is_the_textbook_update(parts, ekf):
     assert ekf.x[SPEED] == pytest.approx(expected)
 
 
-def test_references_that_agree_with_one_another_are_believed_after_their_count(parts, ekf):
+@pytest.mark.parametrize('gap', [0.1, 0.5, 1.0, 2.0])
+def test_references_that_agree_are_believed_once_they_last_for_seconds(parts, ekf, gap):
+    """Errors of satellites jump for a second or two, at whatever rate they are read."""
     ekf.set(SPEED, 0.045, 0.005**2)
-    update, opened = references(parts, ekf, [0.045] * 10 + [0.02] * 3)
-    assert opened.index(True) == 11
-    assert update.state.rejected == 2
+    good, lasting = round(10.0 / gap), round(5.0 / gap)
+    _, opened = references(parts, ekf, [0.045] * good + [0.02] * lasting, gap)
+    first = opened.index(True)
+    assert first > good
+    assert 2.0 < gap * (first - good + 1) <= 4.0
     assert ekf.x[SPEED] == pytest.approx(0.02, abs=0.003)
 
 

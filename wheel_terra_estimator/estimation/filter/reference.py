@@ -43,8 +43,10 @@ _RUN_EXCESS = 4.0
 _BEYOND_RIM = 1.5  # over the fastest rim speed: no rover drives faster than its wheels [-]
 _BEYOND_STD = 5.0  # deviations added to that bound
 _SAME_STD = 4.0  # deviations within which two references disagree by the same amount
-_COUNT_BEYOND = 4  # consistent outliers beyond the rim speed that are accepted
-_COUNT = 2  # other consistent outliers that are accepted
+_LASTING = 2.2
+"""Time since a reference was last believed from which outliers that agree are believed [s]: a speed
+changes unseen by wheels and accelerometer only slowly, while errors of satellites jump."""
+_LASTING_BEYOND = 4.2  # the same for outliers beyond the rim speed [s]
 _GATE = 4.0  # NIS to which that of an outlier is reduced [-]
 _GATE_BEYOND = 0.01  # the same for one beyond the rim speed [-]
 
@@ -168,8 +170,8 @@ class ReferenceUpdate(Component[ReferenceState]):
             )
             change = abs(residual - state.last_rejected)
             same = change < _SAME_STD * math.sqrt(2.0 * variance + total)
-            agreeing = state.rejected_in_a_row + 1
-            inflated = same and agreeing >= (_COUNT_BEYOND if beyond else _COUNT)
+            lasts = time - state.slip_time > (_LASTING_BEYOND if beyond else _LASTING)
+            inflated = same and lasts and state.rejected_in_a_row > 0
             if inflated:
                 ekf.inflate(SPEED, residual * residual)
             else:
@@ -177,7 +179,7 @@ class ReferenceUpdate(Component[ReferenceState]):
                 variance += chi_square_gate(residual, total, gate)
             state = state._replace(
                 rejected=state.rejected + 1,
-                rejected_in_a_row=0 if inflated else agreeing,
+                rejected_in_a_row=0 if inflated else state.rejected_in_a_row + 1,
                 last_rejected=residual,
             )
         else:
