@@ -35,18 +35,16 @@ _WALK = 1e-9  # the same of a wheel that rolls, added to the model error [m^2/s]
 _SPIN_TRAVEL = 0.1  # share of the slip velocity that counts as travel over new soil [-]
 _SPIN_RELAXATION = 0.3  # share of it that counts for the relaxation [-]
 _LEAST_CONTACT = 0.02  # length of a contact [m]
-_LEAST_CONTACT_SINKAGE = 1e-3  # [m]
-_LEAST_SINKAGE = 5e-4  # [m], for the step on log sinkage
+_LEAST_SINKAGE = 5e-4  # [m], for contact length and the step on log sinkage
 _RATIO_STEP = 0.02  # of v / rim speed, for the derivative of the bearing law
 _PRESSURE_POWER = 0.5
 """Load goes with z^(N + 1/2): pressure with z^N, length of the contact with its root."""
 _LONGEST_STEP = 0.7  # change of ln sinkage in one cycle [-]
 _RELAXATION_SLOPE = 0.9  # share of the relaxation that acts on the covariance [-]
-_LEAST_MEMORY = 0.05  # least derivative of a sinkage by the one before [-]
 _LAW_ERROR = 0.05  # error of the bearing law per contact length, over the sinkage [-]
-_DIGGING = 0.05  # deviation of the slip-sinkage, over slip velocity times slip [-]
 _UNMODELLED_DIGGING = 0.1
-"""The same, lasting, where nothing measures the sinkage [-]: 0 to 0.1 in four simulators."""
+"""Deviation of the slip-sinkage over slip velocity times slip, where nothing measures the sinkage
+[-]: 0 to 0.1 in four simulators."""
 _RATE_TIME = 0.5  # time constant of the published rate [s]
 _FIRST_RATE_STD = 1.0  # [m/s], before anything is known
 
@@ -130,8 +128,8 @@ class SinkageProcess(Component[SinkageState]):
         speed, rim, by_speed, dt = motion
         slip = slip_of_speed_ratio(states.speed_ratio)
         radius = np.array(self._rover.rim_radius)
-        shortest = _LEAST_CONTACT_SINKAGE
-        length = np.maximum(np.sqrt(2.0 * radius * np.maximum(z, shortest)), _LEAST_CONTACT)
+        floored = np.maximum(z, _LEAST_SINKAGE)
+        length = np.maximum(np.sqrt(2.0 * radius * floored), _LEAST_CONTACT)
         travel = (np.abs(speed) + _SPIN_RELAXATION * np.abs(rim - speed)) * dt
         alpha = -np.expm1(-travel / length)
         slower = np.array([0.0, _RATIO_STEP])[:, None]
@@ -142,14 +140,12 @@ class SinkageProcess(Component[SinkageState]):
         power = exponents[0] + _PRESSURE_POWER
         growth = np.log(states.load / carried[0]) / power
         growth = np.minimum(np.maximum(growth, -_LONGEST_STEP), _LONGEST_STEP)
-        floored = np.maximum(z, _LEAST_SINKAGE)
         target = floored * np.exp(growth)
         sensitivity = alpha * target / power
         raw = np.array(
             [np.log(carried[0] / carried[1]) / _RATIO_STEP, np.abs(slip) * log_depths[0]]
         )
         slopes = smoothed_slopes(self.state.slopes, raw)
-        # Model error: a share of the sinkage per contact length, and unmodelled slip-sinkage.
         spun = np.maximum(slip, 0.0) ** 2 * rim * dt
         unmodelled_std = (self.state.unmodelled_std + _UNMODELLED_DIGGING * spun) * np.exp(
             -np.abs(speed) * dt / length
@@ -158,7 +154,7 @@ class SinkageProcess(Component[SinkageState]):
             slopes=np.where(relaxes, slopes, self.state.slopes),
             unmodelled_std=np.where(relaxes, unmodelled_std, self.state.unmodelled_std),
         )
-        noise = (_LAW_ERROR * floored) ** 2 * 2.0 * alpha + (_DIGGING * spun) ** 2 + _WALK * dt
+        noise = (_LAW_ERROR * floored) ** 2 * 2.0 * alpha + _WALK * dt
         if states.leaving_angle is not None:
             angle = states.leaving_angle - self._leaving_angle_std
             there = self._models.bearing(states._replace(leaving_angle=angle)).load
@@ -166,9 +162,8 @@ class SinkageProcess(Component[SinkageState]):
             noise += np.where(np.isnan(angle), 0.0, error)
         zi = self._entries[relaxes]
         ki = zi - layout.sinkage.start + layout.stiffness.start
-        memory = np.maximum(1.0 - alpha * _RELAXATION_SLOPE, _LEAST_MEMORY)
         prediction.mean[zi] = (z + alpha * (target - z))[relaxes]
-        prediction.F[zi, zi] = memory[relaxes]
+        prediction.F[zi, zi] = 1.0 - _RELAXATION_SLOPE * alpha[relaxes]
         prediction.F[zi, ki] = -sensitivity[relaxes]
         prediction.F[zi, SLIP_SINKAGE] = (-sensitivity * slopes[1])[relaxes]
         prediction.F[zi, SPEED] = (-sensitivity * slopes[0] / rim * by_speed)[relaxes]

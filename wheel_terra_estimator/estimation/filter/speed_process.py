@@ -79,7 +79,6 @@ the contacts."""
 _MOST_WALK = 0.6  # limit of that walk [1/sqrt(m)]
 _WATCHED_SHARE = 0.5
 """Factor on ``filter.ratio_walk`` where measured sinkages would show such a change [-]."""
-_DEMAND_ERROR = 0.3  # error of the slip due to a change of demand, over that slip [-]
 _SLIP_PER_DEMAND_WALK = 0.2  # [1/sqrt(m)]
 _INFLATION_RATE = 2.0
 """Process noise of an expected change of speed, over its square [1/s]: it takes half a second."""
@@ -276,10 +275,8 @@ class SpeedProcess(Component[SpeedState]):
         if demand_change and not isnan(rim):
             # v = (1 - s) rim, and ds = slip_per_demand times the change of the demand.
             gain = -step.wheel_weight * rim * demand_change
-            lost = gain * float(mean[SLIP_PER_DEMAND])
-            mean[SPEED] += lost
+            mean[SPEED] += gain * float(mean[SLIP_PER_DEMAND])
             F[SPEED, SLIP_PER_DEMAND] = gain
-            Q[SPEED, SPEED] += (_DEMAND_ERROR * lost) ** 2
             walk = _SLIP_PER_DEMAND_WALK**2
             Q[SLIP_PER_DEMAND, SLIP_PER_DEMAND] = walk * abs(rim) * dt
 
