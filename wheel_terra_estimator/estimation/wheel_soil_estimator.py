@@ -298,10 +298,7 @@ class WheelSoilEstimator:
         self._unloaded.update(cycle)
         forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
         if cycle.still:
-            # Contacts form again after a standstill.
-            self._contact_age.stop()
-            self._linearisation.reset()
-            self._sinkage_process.forget_slopes()
+            self._contact_age.stop()  # contacts form again after a standstill
         else:
             forces, total, stationary, force_rows = self._force_rows(cycle)
             if self._contact_age.settled or cycle.reference_known:

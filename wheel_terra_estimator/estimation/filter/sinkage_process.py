@@ -86,10 +86,6 @@ class SinkageProcess(Component[SinkageState]):
         self._leaving_angle_std = leaving_angle_std
         self._entries = np.arange(layout.size)[layout.sinkage]
 
-    def forget_slopes(self) -> None:
-        """Reset the smoothed derivatives, when the wheels stand."""
-        self.state = self.state._replace(slopes=self._start.slopes)
-
     def predict(self, prediction: Prediction, x: FloatArray, cycle: Cycle) -> float:
         """Add the sinkages to a prediction from a state `x` (size,); return the travel [m]."""
         layout, rims, loads, dt = self._layout, cycle.rims, cycle.loads.load, cycle.dt
