@@ -15,6 +15,7 @@ from rolling_rover import START, recording, rover, starts_and_curves
 from wheel_terra_estimator.checks import run
 from wheel_terra_estimator.checks.finding import INTERNAL_ERROR
 from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.series import rows_of
 
 WHOLE = recording()
 CONFIGURATION = rover()
@@ -54,7 +55,7 @@ def channels(draw, series):
     if series is None or draw(st.integers(0, 7)) == 0:
         return None
     random = np.random.default_rng(draw(st.integers(0, 2**32)))
-    size = draw(st.sampled_from((1, 2, 3, 9, 10, 11, 40, 200, 800, 2000)))
+    size = draw(st.sampled_from((0, 1, 2, 3, 9, 10, 11, 40, 200, 800, 2000)))
     rows = slice(*sorted(random.integers(0, series.stamp.size, 2))) if draw(st.booleans()) else None
     rows = slice(0, size) if rows is None else rows
     kind, value = draw(st.sampled_from(STAMPS)), draw(st.sampled_from(NUMBERS))
@@ -181,3 +182,12 @@ def test_a_few_wheel_rates_in_a_long_time_are_not_correlated():
     assert time.process_time() - begun < 5.0
     reasons = [entry.reason for entry in report.not_checked if entry.kind == 'delay']
     assert any('too seldom' in reason for reason in reasons)
+
+
+@pytest.mark.parametrize('left', [0, 1])
+@pytest.mark.parametrize('name', ['joints', 'imu', 'reference', 'sinkage'])
+def test_no_check_fails_on_a_channel_of_one_message_or_none(name, left):
+    channel = getattr(WHOLE, name)
+    few = rows_of(channel, np.arange(channel.stamp.size) < left)
+    report = check_recording(replace(WHOLE, **{name: few}), CONFIGURATION)
+    assert INTERNAL_ERROR not in [entry.reason for entry in report.not_checked]

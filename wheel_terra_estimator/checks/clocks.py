@@ -92,12 +92,14 @@ STAMPED = ('joints', 'wheel_odometry', 'imu', 'reference', 'sinkage')
 
 
 def corrected(recording: Recording, facts: RoverFacts) -> Recording:
-    """Return the recording with the stamp offsets of the rover file subtracted."""
+    """Return the channels that hold a message, with the stamp offsets of the rover file off."""
     changes: dict[str, Any] = {}
     for name in STAMPED:
         channel, key = getattr(recording, name), 'wheel_odometry' if name == 'joints' else name
         offset = round(float(getattr(facts.sensors, f'{key}_stamp_offset')) * 1e9)
-        if channel is not None and offset:
+        if channel is not None and not channel.stamp.size:
+            changes[name] = None
+        elif channel is not None and offset:
             changes[name] = shifted(channel, offset)
     return replace(recording, **changes) if changes else recording
 

@@ -232,7 +232,7 @@ def _referred_to_slip_radius(evidence: Evidence, ratio: Estimate) -> Estimate:
 def _depth(evidence: Evidence) -> Estimate:
     """Return sinkage over radius on the straight."""
     series, facts = evidence.recording.sinkage, evidence.facts
-    if series is None or not series.stamp.size:
+    if series is None:
         return FIRM_DEPTH
     straight = evidence.rim_at(series.stamp, evidence.straight.astype(float)) > 0.99
     _, rows = without_stated_errors(facts, series)
