@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a command writes: folders and files that are complete or absent, and never those of others.
 
-`check_folder` and `check_file` refuse a place before anything is computed; `new_folder` and
-`new_file` write beside it and rename at the end, so that after an error an earlier output stands as
-it was. Errors of the disk inside their blocks become a `UserError` of one line.
+A place is refused before anything is computed; output is written beside it and renamed at the end,
+so that after an error an earlier one stands. Errors of the disk become a `UserError` of one line.
 """
 
 from __future__ import annotations

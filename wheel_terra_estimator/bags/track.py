@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A map of a drive: where the rover was, and what the ground was like there.
 
-The position is reckoned in the plane from the estimated body velocity along the heading: that of
-the reported orientation where there is one, else the estimated yaw rate; the height from the pitch
-of the reported orientation.
+The position is reckoned in the plane from the estimated velocity along the reported heading, else
+by the estimated yaw rate; the height from the reported pitch.
 """
 
 from __future__ import annotations

@@ -2,14 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The declared parameters: one table from which checks, descriptors and documentation come.
 
-To add a parameter, add an entry to ``parameters.yaml``: the reader then accepts and checks the key,
-the node declares it, ``configuration.<section>.<name>`` has its value, and
-``python tools/document_parameters.py`` writes it to ``docs/parameters.md``
-(checked by a test). A removed key moves to ``retired``, with its replacement.
-
-The keys ``effects.<name>.enabled``, ``effects.<name>.form`` (where there are several),
-``effects.<name>.<parameter>`` and ``effects.<name>.<parameter>_std`` come from the catalogue of
-effects.
+A parameter is an entry of ``parameters.yaml``, or of the catalogue of effects; a removed key moves
+to ``retired``, with its replacement. ``tools/document_parameters.py`` documents them.
 """
 
 from __future__ import annotations

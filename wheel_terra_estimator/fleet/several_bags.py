@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many recordings side by side: a folder each, a summary of all, resumable after an end.
 
-The folder of a recording notes in its marker a digest of all that its content follows from
-(recording, configuration, remaps, version of the program) and the row of the summary. A later run
-passes over recordings whose digest is there already, whatever their names.
+The marker of a folder holds a digest of all that its content follows from: a later run passes over
+recordings whose digest is there already, whatever their names.
 """
 
 from __future__ import annotations

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A figure over one axis: panels under one another, drawn once as SVG and laid out by the page.
 
-Curves are paths in the data's x and in thousandths of the panel's height; the page stretches them
-to any width, so that screen, phone and paper show the same drawing. All words are HTML beside the
-drawing: none covers a curve. The script of the template only zooms and reads values.
+Curves are paths in the data's x and in thousandths of the panel's height, so that screen, phone and
+paper show one drawing; words are HTML beside it. The script of the template only zooms and reads.
 """
 
 from __future__ import annotations

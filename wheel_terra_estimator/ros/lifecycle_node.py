@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node: hears the rover's topics, publishes slip, sinkage, pull, classes and warnings.
 
-It is an adapter of `Pipeline`; what it adds is transport: life cycle, quality of service,
-parameters, services, what is kept over a restart, and diagnostics when nothing arrives.
-Estimation is driven by messages and their stamps alone; the timers run on the steady clock and
-watch over silence.
+It adds transport to `Pipeline`: life cycle, quality of service, parameters, services, what is kept
+over a restart. Messages and their stamps alone drive the estimation; timers watch over silence.
 """
 
 from __future__ import annotations

@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scales velocity commands by what the soil still gives, as the estimator sees it.
 
-Stands between whoever drives and the base: ``cmd_vel_in`` to ``cmd_vel_out``, as
-geometry_msgs/Twist or geometry_msgs/TwistStamped (parameter ``stamped``). What passes is decided
-by `traction_limiter`; this is its transport. It says what it does on ``~/scale``, on
-``/diagnostics`` and in the log.
+The transport of `traction_limiter`, between whoever drives (``cmd_vel_in``) and the base
+(``cmd_vel_out``).
 """
 
 from __future__ import annotations

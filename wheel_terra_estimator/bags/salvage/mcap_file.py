@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of an MCAP file, whole or damaged, in the order of their log times.
 
-A file is a number of pieces, chunks or stretches of messages outside of chunks. With a summary
-whose checksum is right they come from its index, and damage is met when a piece is read. Else the
-file is surveyed once from front to end: every chunk is unpacked and counted, schemas and channels
-are taken from wherever they stand, and behind damage the next record is looked for. A piece is
-held only while its messages are due.
+A file is a number of pieces: chunks, or stretches of messages outside of chunks. They come from the
+index of a summary whose checksum is right, else from a survey of the whole file, in which behind
+damage the next record is looked for. A piece is held only while its messages are due.
 """
 
 from __future__ import annotations

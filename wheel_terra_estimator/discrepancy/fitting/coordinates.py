@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Free parameters in coordinates whose prior is a standard normal.
 
-Soil numbers move under a prior that is wide on purpose: one that is wrong by more than stated must
-not come out as a missing effect. How well each is known: as stated, as the user says, or by the
-class of its source, from the scatter of published numbers and fitted soils (docs/diagnose.md).
+Priors of the soil are wide on purpose: one that is wrong by more than stated must not come out as a
+missing effect. Where their widths come from: docs/diagnose.md.
 """
 
 from __future__ import annotations
