@@ -18,11 +18,6 @@ from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped
 
-_LEAST_GAP = 0.01  # between references [s]
-_RISE = 1.76
-"""Rise of the chi-square quantile (one degree of freedom) for each factor of e by which the false
-alarm rate falls, between 5 and 0.05 % [-]."""
-
 # Tuned on simulated drives, seeds 1000 to 1019, and the nine snow immobilisations.
 _KNOWN_TIME = 5.0
 """Age of the last reference up to which slip counts as observed [s]."""
@@ -38,8 +33,6 @@ _MEAN_COUNT = 6.0
 """References over which their innovations' mean is taken."""
 _MOST_DEVIATIONS = 3.0  # limit of one normalised innovation in that mean
 _MOST_VARIANCE_FACTOR = 100.0
-_RUN_EXCESS = 4.0
-"""Square of that mean over its variance above which the innovations are biased [-]."""
 _BEYOND_RIM = 1.5  # over the fastest rim speed: no rover drives faster than its wheels [-]
 _BEYOND_STD = 5.0  # deviations added to that bound
 _SAME_STD = 4.0  # deviations within which two references disagree by the same amount
@@ -123,13 +116,10 @@ class ReferenceUpdate(Component[ReferenceState]):
 
         Innovations of a consistent filter are white. If several keep one sign, model errors bias
         the speed, which a gate on single innovations cannot detect. The running mean of white
-        normalised innovations with gain 1/n has the variance 1 / (2 n - 1). For more than one
-        reference a second the limit rises, so that the rate of false alarms per second is the same.
+        normalised innovations with gain 1/n has the variance 1 / (2 n - 1).
         """
         square = self.state.mean_innovation**2 * (2.0 * _MEAN_COUNT - 1.0)
-        gap = clipped(self.state.gap, _LEAST_GAP, 1.0)
-        excess = square * _RUN_EXCESS / (_RUN_EXCESS - _RISE * math.log(gap))
-        return clipped(excess**2, 1.0, _MOST_VARIANCE_FACTOR)
+        return clipped(square**2, 1.0, _MOST_VARIANCE_FACTOR)
 
     def update(
         self,
