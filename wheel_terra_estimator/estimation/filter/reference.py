@@ -23,11 +23,10 @@ _KNOWN_TIME = 5.0
 """Age of the last reference up to which slip counts as observed [s]."""
 _FRESH_TIME = 10.0
 """The same up to which the stuck warning takes the speed as measured [s]."""
-_LONGEST_GAP = 10.0  # between references, in its smoothed value [s]
-_GAP_GAIN = 0.3  # smoothing of it, per reference
+_LONGEST_SLIDE = 20.0  # [s]
 _MOVING_STD = 3.0  # deviations from 0 of a reference that shows motion
 _MOVING_REST = 2.0  # times ``rest_speed``
-_SLIDE_GAPS = 2.0  # duration assumed for a slide on locked wheels, in gaps of the references
+_SLIDE_GAPS = 2.0  # duration assumed for a slide on locked wheels, in gaps to the last reference
 _SHORTEST_SLIDE = 1.0  # [s]
 _MEAN_COUNT = 6.0
 """References over which their innovations' mean is taken."""
@@ -51,7 +50,6 @@ class ReferenceState(NamedTuple):
     slip_time: float = -math.inf
     """Of the last one that shows the slip [s]: not rejected, and not at rest."""
     slip_time_before: float = -math.inf  # of the one before it [s]
-    gap: float = 10.0  # between them, smoothed [s]
     sliding_until: float = -1.0  # a slide on locked wheels is assumed until then [s]
     rejected: int = 0
     rejected_in_a_row: int = 0
@@ -136,13 +134,9 @@ class ReferenceUpdate(Component[ReferenceState]):
         `still`: no wheel turns; `fastest_rim` is the greatest rim speed [m/s], `variance` that of
         the reading, as stated or, if greater, as observed [(m/s)^2].
         """
-        state = self.state
-        if state.time > -math.inf:
-            gap = state.gap + _GAP_GAIN * (min(time - state.time, _LONGEST_GAP) - state.gap)
-            state = state._replace(gap=gap)
-        self.state = state._replace(time=time)
         if still:
             self._note_slide(ekf, time, reference.forward, variance)
+        self.state = self.state._replace(time=time)
         residual, prior = self.innovation(ekf, reference)
         total = prior + variance
         nis = residual * residual / total
@@ -197,6 +191,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         until = time
         moves = abs(forward) > max(noise, _MOVING_REST * self._rover.rest_speed)
         if moves and (self.state.rejected_in_a_row or time < self.state.sliding_until):
-            until += max(_SLIDE_GAPS * self.state.gap, _SHORTEST_SLIDE)
+            gap = time - self.state.time
+            until += clipped(_SLIDE_GAPS * gap, _SHORTEST_SLIDE, _LONGEST_SLIDE)
             ekf.inflate(SPEED, forward**2)
         self.state = self.state._replace(sliding_until=until)
