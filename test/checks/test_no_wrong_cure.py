@@ -702,15 +702,17 @@ def test_a_rover_that_is_dragged_back_on_locked_wheels_has_rates_with_a_sign(tor
     assert 'rates_unsigned' not in faults(checked(joints=joints))
 
 
+@pytest.mark.parametrize('turned', [1.0, -1.0])  # of an IMU that looks back
 @pytest.mark.parametrize('climbs', [True, False])
-def test_a_rover_that_slides_back_on_a_slope_has_rates_with_a_sign(climbs):
+def test_a_rover_that_slides_back_on_a_slope_has_rates_with_a_sign(climbs, turned):
     """On 20 degrees it slides back for a third of the drive while its wheels go on."""
     time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
     speed, slope = 0.0 * time + 0.3, 0.0 * time + 0.35 * climbs
     whole = rolling.recording(rolling.Motion(time, speed, 0.0 * time, slope))
     velocity = whole.reference.velocity.copy()
     velocity[np.arange(len(velocity)) % 60 > 40, 0] -= 0.5
-    report = checked(whole=whole, reference={'velocity': velocity})
+    imu = {'force': whole.imu.force * [turned, turned, 1.0]}
+    report = checked(whole=whole, imu=imu, reference={'velocity': velocity})
     assert ('rates_unsigned' in faults(report)) == (not climbs)
 
 
@@ -810,3 +812,15 @@ def test_the_unit_of_rates_is_told_in_turns_about_a_point_between_steered_wheels
     rover = rolling.rover(**{'wheels.x': x.tolist(), 'wheels.steering_joints': steered})
     (told,) = [f for f in checked(rover, whole=whole, joints=joints).findings if f.kind == 'unit']
     assert told.fault == 'rate_unit' and told.value == pytest.approx(math.radians(1.0))
+
+
+def test_rates_in_rpm_at_a_slip_of_a_third_may_be_counts_of_a_coarse_encoder():
+    """Speed is 0.067 of the rims': 0.64 of 2 pi/60, or 94 counts per turn."""
+    file, slips = rolling.rover(), {'velocity': 0.64 * WHOLE.reference.velocity}
+    rpm = {'rate': WHOLE.joints.rate * 60.0 / (2.0 * math.pi)}
+    blind = replace(WHOLE.imu, rate=0.0 * WHOLE.imu.rate)
+    told = checked(file, imu=blind, joints=rpm, reference=slips).findings
+    assert {f.fault: f.confidence for f in told if f.kind == 'unit'} == {
+        'rate_unit': 0.45,
+        'rate_counts': 0.45,
+    }

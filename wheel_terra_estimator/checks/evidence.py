@@ -257,13 +257,6 @@ class Evidence:
         rate = np.abs(self.gyro[:, 2])
         return _shared(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
 
-    def climbs(self, rows: Mask) -> bool:
-        """Whether the wheels drive uphill, so steeply that a rover may slide back on them."""
-        if self.force is None or not rows.any():
-            return False
-        ahead = np.median(self.force[rows, 0] * np.sign(self.rim[rows]))
-        return bool(ahead > SLIDES_BACK * self.facts.gravity)
-
     def rim_at(self, stamp: IntArray, values: FloatArray) -> FloatArray:
         """Return means of (k,) values within `AROUND` of stamps [ns]; nan for none."""
         at = (stamp - self.origin) * 1e-9

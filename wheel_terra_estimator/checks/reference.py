@@ -13,6 +13,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import (
     NO_NOISE,
+    SLIDES_BACK,
     Evidence,
     Mask,
     noise_of,
@@ -73,8 +74,7 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     both = min(np.mean(forward > least), np.mean(forward < -least)) > SELDOM_NEGATIVE
     speed = np.interp(evidence.time, evidence.seconds(reference), moving_mean(forward, LEAST_ROWS))
     cut = _cut_off(evidence, speed > least, speed < -least)
-    slides = evidence.climbs(evidence.moving & (speed < -least))
-    unsigned = cut or (_without_sign(rim, forward) and not slides)
+    unsigned = cut or (_without_sign(rim, forward) and not _slides(evidence, speed < -least))
     if not both or _sideways(reference) or not unsigned:
         return [], evidence
     # In turns the sides may be unlike; of what was cut off at 0 nothing is known.
@@ -85,6 +85,15 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     rate = np.where(unknown, np.nan, evidence.rate * np.sign(speed)[:, None])
     finding = evidence.found('rates_unsigned', 0.95, other='reference goes')
     return [finding], evidence.with_rate(rate)
+
+
+def _slides(evidence: Evidence, back: Mask) -> bool:
+    """Whether a rover that goes back may slide down a slope, however its IMU is turned."""
+    rows = evidence.moving & back
+    if evidence.force is None or not rows.any():
+        return False
+    steep = float(np.median(np.linalg.norm(evidence.force[rows, :2], axis=1)))
+    return steep > SLIDES_BACK * evidence.facts.gravity
 
 
 def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.evidence import (
     LEAST_MOVING_ROWS,
+    SLIDES_BACK,
     Evidence,
     accelerometer_signs,
     mounting_yaw,
@@ -345,7 +346,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         outcomes += [not_checked(kind, why) for kind in ('swapped_sides', 'exchanged_wheels')]
     agreement = _direction(mended, signs)
     blame = _blame(agreement, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
-    slides = agreement[0] is not None and agreement[0] < 0.0 and evidence.climbs(rows)
+    slides = agreement[0] is not None and agreement[0] < 0.0 and _climbs(evidence, rows)
     if blame == 'wheels':
         signs, turn = -signs, -turn
         if slides:
@@ -439,6 +440,14 @@ def _direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
         if isinstance(slopes, Slopes) and slopes.gain.sigmas_from(0.0) > SCALE_SIGMAS:
             by_force = float(np.sign(slopes.gain.value))
     return by_reference, by_force
+
+
+def _climbs(evidence: Evidence, rows: Mask) -> bool:
+    """Whether the wheels drive uphill, so steeply that a rover may slide back on them."""
+    if evidence.force is None:
+        return False
+    ahead = np.median(evidence.force[rows, 0] * np.sign(evidence.rim[rows]))
+    return bool(ahead > SLIDES_BACK * evidence.facts.gravity)
 
 
 def _backwards(

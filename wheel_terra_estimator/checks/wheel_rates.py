@@ -359,7 +359,7 @@ def _fitting_units(
         by_turn = track is not None and turning.ordinary_track(track * factor)
         fits = by_turn and not usual
         if ratio is not None:
-            least = LEAST_BAND if factor < MOST_COUNT else UNIT_BAND[0]
+            least = LEAST_BAND if ratio < MOST_COUNT else UNIT_BAND[0]
             both = fits and ratio / factor > NO_SCALE  # the reference is in another unit as well
             fits = least < ratio / factor < UNIT_BAND[1]
             fits = both or (fits and (track is None or by_turn or not usual))
