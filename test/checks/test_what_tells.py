@@ -11,6 +11,8 @@ import rolling_rover as rolling
 from rolling_rover import checked, faults
 from scipy.spatial.transform import Rotation
 
+from wheel_terra_estimator.checks.statistics import step_of
+
 WHOLE = rolling.recording()
 FLAT = replace(WHOLE.imu, force=WHOLE.imu.force * [1.0, 0.0, 1.0])  # curves tell nothing
 
@@ -128,3 +130,12 @@ def test_a_reference_from_the_future_is_off_whatever_its_speeds_are():
 def test_half_of_the_wheels_below_the_ground_reverse_no_sinkage():
     half = replace(WHOLE.sinkage, sinkage=WHOLE.sinkage.sinkage - [0.0, 0.06, 0.0, 0.06])
     assert 'sinkage_sign' not in faults(checked(sinkage=half))
+
+
+@pytest.mark.parametrize(('scatter', 'step'), [(0.003, 0.0), (0.5, 0.1)])
+def test_one_wild_value_makes_no_steps_and_hides_none(scatter, step):
+    """A rate times the length of a pause is one."""
+    values = np.random.default_rng(1).normal(2.0, scatter, 2000)
+    values = step * np.round(values / step) if step else values
+    values[500] = 5.0e5
+    assert step_of(values) == pytest.approx(step, rel=1e-3)

@@ -27,7 +27,7 @@ LONGEST_PAUSE = 3600.0  # between stamps of one drive [s]
 DRIFT = 6.0  # slopes change more slowly than this [s], speeds faster
 UNIFORM_STD = 1.0 / math.sqrt(12.0)  # of what lies anywhere in an interval, over its length [-]
 MOST_STEPS = 200  # different values of a reading beyond which steps do not matter
-SAME_VALUE = 1e-6  # share of the greatest value below which two values are one
+SAME_VALUE = 1e-6  # share of a great value below which two values are one
 OFF_A_STEP = 0.05  # distance from a multiple of a step, as a share of it
 LEAST_HALF = 12  # rows of a half that something is found on, at least
 LEAST_FALL = 0.7  # greatest residual with a remedy over that without, on the other half [-]
@@ -205,10 +205,11 @@ def averaged(time: FloatArray, values: FloatArray, at: FloatArray, width: float)
 
 def step_of(values: FloatArray) -> float:
     """Return the number that values (k,) are multiples of; 0 where they are not."""
-    top = float(np.abs(values).max()) if values.size else 0.0
-    if not top:
+    sizes = np.abs(values[values != 0.0])
+    if not sizes.size:
         return 0.0
-    distinct = np.unique(np.round(np.abs(values) / (SAME_VALUE * top))) * SAME_VALUE * top
+    same = SAME_VALUE * float(np.quantile(sizes, 0.9))  # the greatest may be an outlier
+    distinct = np.unique(np.round(np.abs(values) / same)) * same
     if not 1 < len(distinct) <= min(MOST_STEPS, values.size / 4):
         return 0.0
     step = float(np.quantile(np.diff(distinct), 0.1, method='lower'))
