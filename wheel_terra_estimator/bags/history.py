@@ -91,7 +91,6 @@ _TOPIC_FIELDS = {
 }
 """Topic -> quantities that are its position, velocity and effort."""
 
-
 _ROW = np.full(256, list(SlipClass).index(SlipClass.UNKNOWN), dtype=np.intp)
 """Class to its place among all."""
 _ROW[list(SlipClass)] = np.arange(len(SlipClass))

@@ -17,7 +17,6 @@ _JOINT_WORDS = ('joint_states', 'wheel', 'joint')
 _IMU_WORDS = ('imu/data', 'imu')
 WHEEL_RATES = '/joint_states'  # a namespace that has them is a rover
 
-
 _OTHER_REFERENCES = (
     'sensor_msgs/msg/NavSatFix',
     'geometry_msgs/msg/PoseStamped',

@@ -26,7 +26,6 @@ TOPICS = {
 }
 """Full default name of every output and its type."""
 
-
 _VERSION, _SETTINGS, _RECORDING = (
     f'{diagnostics.NODE}.{key}' for key in ('version', 'settings', 'recording')
 )

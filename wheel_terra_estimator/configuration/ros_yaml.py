@@ -69,7 +69,6 @@ _HEXADECIMAL = re.compile(r'[+-]?0[xX][0-9a-fA-F]+\.?[0-9a-fA-F]*([pP][+-]?[0-9]
 _NOT_FINITE = re.compile(r'([+-]?)\.?(inf(?:inity)?|nan)', re.IGNORECASE)
 _OUR_SECTION = re.compile(rf'/\*\*|(.*/)?{NODE_NAME}')
 
-
 # That of libyaml where it is compiled in: the parser of ROS itself, and four times as fast.
 _SafeLoader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 

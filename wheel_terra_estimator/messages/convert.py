@@ -40,7 +40,6 @@ INPUT_TYPES = {
 }
 """Input topics of the estimator (relative names) and their message types."""
 
-
 _FASTEST = 30.0  # lateral speed that no rover has [m/s]
 DAMAGED = 'damaged message'  # why bytes are refused that are no message of their type
 _NO_WHEEL = 'contains none of the configured wheels'

@@ -47,7 +47,6 @@ _ORDERS = {
 }
 """First bytes of a message -> order of its bytes."""
 
-
 MOST_SEEN, LARGEST_SEEN = 16, 65_536  # layouts that are remembered, and their size [byte]
 
 

@@ -24,7 +24,6 @@ OVERRIDABLE = QoSOverridingOptions(
 )
 """Users may set ``qos_overrides.<topic>.<subscription|publisher>.<policy>``."""
 
-
 FAST_DEPTH = 250
 """Queue of topics that may come at 1000 Hz: a quarter of a second in which the node is held up."""
 

@@ -53,7 +53,6 @@ _CHUNK = struct.Struct('<BQQQQII')
 _WINDOWS = (2**12, 2**20)
 """Bytes that a search through damage looks at together: at first, and at most."""
 
-
 Buffer: TypeAlias = 'bytes | mmap'
 
 

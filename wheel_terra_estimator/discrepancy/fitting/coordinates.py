@@ -59,7 +59,6 @@ _COHESION_FLOOR = {'': 10.0, 'published': 50.0, 'proxy': 50.0}  # [Pa], beside t
 _LEAST_RATIO = 0.03  # deviation of an angle ratio that is nought, where all are known to a share
 _OF_PROXIES = ('stiffness', 'sinkage_exponent', 'shear_modulus')  # known worse than published ones
 
-
 # Stated uncertainties are often optimistic: the coordinates are this many times wider, and the
 # evidence weighs both widths.
 WIDENING = 2.5

@@ -109,11 +109,9 @@ class Forward:
                 soil['friction_angle'] = np.arctan(value)
             else:
                 soil[name] = value
-        names = dict.fromkeys(self.base_effects)
         of_effects = (c.owner for c in keys.values() if c.owner not in ('soil', BED))
-        names.update(dict.fromkeys(of_effects))
         settings: dict[str, dict[str, Any]] = {}
-        for name in names:
+        for name in dict.fromkeys((*self.base_effects, *of_effects)):
             setting = {**self.catalogue[name].defaults(), **self.base_effects.get(name, {})}
             for c in keys.values():  # terms of a sparse law have no defaults
                 if c.owner == name:
@@ -145,10 +143,8 @@ class Forward:
         contact.lateral_force = quadrature.lateral_force(contact, terms)
         terms.apply('on_outputs', contact)
         outputs = np.empty((*angle.shape, len(QUANTITIES)))
-        outputs[..., 0] = contact.sinkage
-        outputs[..., 1] = contact.drawbar_pull
-        outputs[..., 2] = contact.torque
-        outputs[..., 3] = contact.lateral_force
+        for q, quantity in enumerate(QUANTITIES):
+            outputs[..., q] = getattr(contact, quantity)
         if self.readings is not None:
             outputs[..., :3] = self.readings.read(outputs[..., :3])
         return np.asarray(load - contact.normal_load), outputs

@@ -247,7 +247,6 @@ FEATURES = (
     'strength',  # in deviations of the prior
 )
 
-
 # The odds of a model family that is never quite right, tempered: 1.5 to 2.4 on mixed campaigns.
 _TEMPERATURE = 1.5
 

@@ -22,7 +22,6 @@ from wheel_terra_estimator.errors import UserError
 MINIMUM_ROWS = 6
 MOST_ROWS = 240  # more are averaged over neighbouring inputs: the time grows with their cube
 
-
 _FAR = 8.0  # pooled robust deviations from the median of a cell
 
 

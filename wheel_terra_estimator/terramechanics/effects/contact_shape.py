@@ -149,7 +149,6 @@ SOIL_ADHESION = Effect(
     on_outputs=_below_the_rim,
 )
 
-
 _LEAST = 1e-9  # keeps a wheel without load free of divisions by zero [m]
 
 
