@@ -73,6 +73,15 @@ def test_a_quality_of_service_that_cannot_be_is_named(policy, good, bad):
         check_overrides(node(bad))
 
 
+def test_an_empty_list_is_refused_by_its_name(executor):
+    from wheel_terra_estimator.errors import UserError
+    from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode
+
+    arguments = [*ROVER[:1], '-p', 'sensors.imu_position:=[]']
+    with pytest.raises(UserError, match=r'sensors\.imu_position is an empty list'):
+        EstimatorNode(context=executor.context, cli_args=arguments)
+
+
 def test_a_failure_while_it_is_configured_is_logged():
     """By a lifecycle manager it is told nothing but that it failed."""
     from wheel_terra_estimator.ros.lifecycle_node import EstimatorNode

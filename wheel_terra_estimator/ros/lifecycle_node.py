@@ -99,7 +99,16 @@ class EstimatorNode(LifecycleNode):
     """
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(NODE, automatically_declare_parameters_from_overrides=True, **options)
+        try:
+            super().__init__(NODE, automatically_declare_parameters_from_overrides=True, **options)
+        except ValueError:  # rclpy's, which names no parameter
+            empty = [key for key, p in self._parameter_overrides.items() if p.value is None]
+            if not empty:
+                raise
+            raise UserError(
+                f'parameters: {empty[0]} is an empty list, which ROS parameters cannot hold; '
+                'leave it out'
+            ) from None
         self._given = parameters.overrides(self)
         self._files = parameters.files([*sys.argv, *(options.get('cli_args') or ())])
         self._known = declared()
