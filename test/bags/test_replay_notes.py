@@ -132,7 +132,7 @@ def test_time_in_class_counts_no_pauses():
                 slip_velocity=np.array([-0.02, 0.5]),
             )
         )
-    figures = recorder.history().whole
+    figures = recorder.history().figures()
     assert figures.slip_travel == pytest.approx([0.02, 0.0])
     times = figures.seconds_in_class
     assert [times[c][0] for c in SlipClass] == pytest.approx([1.0, 0.0, 0.5, 0.5, 0.0])

@@ -17,12 +17,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator import api
-from wheel_terra_estimator.bags.history import (
-    WHEEL_FIELDS,
-    DriveFigures,
-    EstimateHistory,
-    StuckWarning,
-)
+from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, StuckWarning
 from wheel_terra_estimator.bags.replay import Replay
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.configuration import reader
@@ -133,9 +128,6 @@ def an_hour() -> tuple[EstimateHistory, Truth]:
     classes = np.repeat(random.integers(0, 4, (count // 100, len(names))), 100, axis=0)
     classes[:20] = 255
     warning = StuckWarning(int(stamp[20_000]), int(stamp[22_000]), 'median slip 0.83: digging in')
-    figures = DriveFigures(len(names))
-    for i, time in enumerate(stamp.tolist()):
-        figures.add(time, classes[i].astype(np.uint8), {n: v[i] for n, v in values.items()})
     history = EstimateHistory(
         names,
         stamp,
@@ -144,7 +136,6 @@ def an_hour() -> tuple[EstimateHistory, Truth]:
         values['slip'][:, 0],
         values['slip_std'][:, 0],
         (warning,),
-        figures,
     )
     known = {
         name: WheelTruth(stamp, values[name] + 0.01) for name in ('slip', 'sinkage', 'drawbar_pull')

@@ -9,12 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.bags.history import (
-    WHEEL_FIELDS,
-    DriveFigures,
-    EstimateHistory,
-    StuckWarning,
-)
+from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, StuckWarning
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SlipClass
@@ -53,7 +48,6 @@ def history(slip, classes=0, warnings=()):
         np.full(100, 0.1),
         np.full(100, 0.01),
         warnings,
-        DriveFigures(2),
     )
 
 

@@ -24,6 +24,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, SlipOnSlope
 from wheel_terra_estimator.messages.diagnostics import NODE
 from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS
+from wheel_terra_estimator.messages.unpack import Message
 
 MOST_ROWS = 20_000
 """Rows that are kept: a thousand seconds at 20 Hz, ten times what a picture can show."""
@@ -90,6 +91,7 @@ _TOPIC_FIELDS = {
     if not set(WHEEL_FIELDS).isdisjoint(names := [_QUANTITIES.get(f, f) for f in fields])
 }
 """Topic -> quantities that are its position, velocity and effort."""
+
 
 _ROW = np.full(256, list(SlipClass).index(SlipClass.UNKNOWN), dtype=np.intp)
 """Class to its place among all."""
@@ -180,7 +182,7 @@ class EstimateHistory:
     forward_velocity: FloatArray  # [m/s]
     forward_velocity_std: FloatArray
     warnings: tuple[StuckWarning, ...]
-    whole: DriveFigures
+    whole: DriveFigures | None = None  # None: the arrays are all there is
     slip_on_slope: SlipOnSlope | None = None  # as the drive ended; None: not known
 
     @property
@@ -205,6 +207,16 @@ class EstimateHistory:
             until = True if warning.end is None else self.stamp < warning.end
             running |= (self.stamp >= warning.start) & until
         return running
+
+    def figures(self) -> DriveFigures:
+        """Return the figures of the whole drive."""
+        if self.whole is not None:
+            return self.whole
+        found = DriveFigures(len(self.names))
+        for i, stamp in enumerate(self.stamp.tolist()):
+            row = {name: values[i] for name, values in self.values.items()}
+            found.add(stamp, self.slip_class[i], row)
+        return found
 
 
 class HistoryRecorder:
@@ -280,11 +292,7 @@ class _EstimateMessages:
     def add(self, topic: str, message: Any, log_time: int) -> None:
         """Take in a message; of private topics the last part of the name."""
         if topic in _TOPIC_FIELDS:
-            row = self._sets.setdefault(message.stamp, {})
-            row.update(zip(_TOPIC_FIELDS[topic], message.numbers, strict=True))
-            if topic == 'slip':
-                self._names, self._latest = message.names, row
-                row['log_time'] = log_time
+            self._add_joints(topic, message, log_time)
         elif topic == 'slip_class' and self._latest:
             self._latest['slip_class'] = message.data
         elif topic == 'twist':
@@ -295,6 +303,13 @@ class _EstimateMessages:
             _follow(self._warnings, bool(message.data), log_time)
         elif topic == DIAGNOSTICS:
             self._add_reasons(message)
+
+    def _add_joints(self, topic: str, message: Message, log_time: int) -> None:
+        row = self._sets.setdefault(message.stamp, {})
+        row.update(zip(_TOPIC_FIELDS[topic], message.numbers, strict=True))
+        if topic == 'slip':
+            self._names, self._latest = message.names, row
+            row['log_time'] = log_time
 
     def _add_reasons(self, message: Any) -> None:
         for status in message.status:
@@ -323,20 +338,14 @@ class _EstimateMessages:
         def column(name: str) -> NDArray[Any]:
             return np.array([row.get(name, unknown[name]) for row in whole.values()])
 
-        classes = column('slip_class').astype(np.uint8).reshape(shape)
-        values = {name: column(name).reshape(shape) for name in WHEEL_FIELDS}
-        figures = DriveFigures(len(self._names))
-        for i, stamp in enumerate(whole):
-            figures.add(stamp, classes[i], {name: rows[i] for name, rows in values.items()})
         return EstimateHistory(
             names=self._names,
             stamp=np.array(list(whole), dtype=np.int64),
             forward_velocity=column('forward_velocity'),
             forward_velocity_std=column('forward_velocity_std'),
-            slip_class=classes,
-            values=values,
+            slip_class=column('slip_class').astype(np.uint8).reshape(shape),
+            values={name: column(name).reshape(shape) for name in WHEEL_FIELDS},
             warnings=tuple(_in_stamps(self._warnings, whole)),
-            whole=figures,
         )
 
 

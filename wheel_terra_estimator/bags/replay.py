@@ -228,7 +228,7 @@ def _notes(
         count = sum(topic.message_count for topic in unknown)
         yield f'{count} messages not used, on {", ".join(topic.name for topic in unknown)}'
     wheels = pipeline.converter.wheel_odometry
-    if history.whole.sets > 2 * pipeline.received[wheels] > 0:
+    if history.whole and history.whole.sets > 2 * pipeline.received[wheels] > 0:
         yield (
             f'{wheels} is so infrequent that wheels are mostly unknown: raise filter.silence '
             f'({pipeline.configuration.filter.silence:g} s) to twice the period of its messages'

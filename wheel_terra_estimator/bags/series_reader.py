@@ -40,7 +40,7 @@ def read_series(
     ``remaps`` are the estimator's topics to the bag's.
     """
     chosen = choose_topics(bag, remaps)
-    collectors: dict[str, Any] = {
+    collectors: dict[str, _Collector] = {
         own: _COLLECTORS[own](topic, INPUT_TYPES[own])
         for own, topic in chosen.items()
         if own in _COLLECTORS
@@ -155,6 +155,9 @@ class _Collector:
         alike.add(len(self.stamps), data)
         self.stamps.append(layout.stamp(data))
         self._log_times.append(log_time)
+
+    def series(self) -> Any:
+        raise NotImplementedError
 
     @property
     def times(self) -> tuple[Any, Any]:

@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """``wheel-terra demo``: two shipped drives through the real node, and a blind trial.
 
-Where rclpy or the laboratory is missing the drives go through ``wheel-terra replay``, which gives
-the same numbers. The trial is a table of ``wheel-terra trial``, diagnosed before its truth is read.
+The entrapment of a simulated six-wheel rover, whose ground truth is known, and a piece of a real
+drive of the Pathfinder rover. The node receives them over DDS; where rclpy or the laboratory is
+missing the same drives go through ``wheel-terra replay``, which gives the same numbers. The trial
+is a table made by ``wheel-terra trial``, in which an effect is hidden: it is diagnosed blind, then
+compared with the withheld truth.
 """
 
 from __future__ import annotations

@@ -129,7 +129,7 @@ def summarise(
     """Sum a drive up; ``notes`` are said after those of the replay."""
     history = result.history
     rejected = result.rejected.most_common()
-    figures = history.whole
+    figures = history.figures()
     return DriveSummary(
         title=title,
         duration=figures.duration,

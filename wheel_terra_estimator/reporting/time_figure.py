@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A figure over one axis: panels under one another, drawn once as SVG and laid out by the page.
 
-Curves are paths in the data's x and in thousandths of the panel's height, so that screen, phone and
-paper show one drawing; words are HTML beside it. The script of the template only zooms and reads.
+Curves are paths in the data's x and in thousandths of the panel's height; the page stretches them
+to any width, so that screen, phone and paper show the same drawing. All words are HTML beside the
+drawing: none covers a curve. The script of the template only zooms and reads values.
 """
 
 from __future__ import annotations
@@ -175,24 +176,27 @@ class TimeFigure:
 
     def drawn(self) -> list[Drawn]:
         """Return the panels for the template."""
-        found = []
-        for number, panel in enumerate(self.panels):
-            if rows := len(panel.strips):
-                low, high = 0.0, 1.0
-                curves = tuple(curve for place, curve in self._strips if place == number)
-                marks = ((name, (row + 0.5) / rows) for row, name in enumerate(panel.strips))
-            else:
-                mine = [line for line in self._lines if line.panel == number]
-                low, high = panel.limits or limits(*(line.y for line in mine if line.y.ndim == 1))
-                curves = tuple(replace(line.curve, path=_path(line, low, high)) for line in mine)
-                marks = ((text, (high - y) / (high - low)) for y, text in nice(low, high))
-            ticks = tuple(Mark(*mark) for mark in marks)
-            found.append(Drawn(panel.title, panel.share, low, high, curves, ticks, bool(rows)))
-        return found
+        return [
+            self._strip_panel(number, panel) if panel.strips else self._line_panel(number, panel)
+            for number, panel in enumerate(self.panels)
+        ]
 
     def _classes(self, switches: Sequence[str]) -> str:
         keys = [switch.key for switch in self.switches]
         return ' '.join(f's{keys.index(key)}' for key in switches if key in keys)
+
+    def _line_panel(self, number: int, panel: Panel) -> Drawn:
+        mine = [line for line in self._lines if line.panel == number]
+        low, high = panel.limits or limits(*(line.y for line in mine if line.y.ndim == 1))
+        curves = tuple(replace(line.curve, path=_path(line, low, high)) for line in mine)
+        ticks = tuple(Mark(text, (high - value) / (high - low)) for value, text in nice(low, high))
+        return Drawn(panel.title, panel.share, low, high, curves, ticks, strips=False)
+
+    def _strip_panel(self, number: int, panel: Panel) -> Drawn:
+        rows = len(panel.strips)
+        curves = tuple(curve for place, curve in self._strips if place == number)
+        ticks = tuple(Mark(name, (row + 0.5) / rows) for row, name in enumerate(panel.strips))
+        return Drawn(panel.title, panel.share, 0.0, 1.0, curves, ticks, strips=True)
 
 
 def _path(line: _Line, low: float, high: float) -> str:

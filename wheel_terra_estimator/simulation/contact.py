@@ -2,10 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forces of the soil on wheels whose sinkage is given: the reference quadrature off its balance.
 
-There the load balance finds the sinkage, here the factor by which the normal stress exceeds the
-bearing strength at a sinkage (``support_ratio``; above 1 the wheel is sinking). Lateral motion
-shears the soil too: the shear stress of Janosi and Hanamoto acts along the displacement. Where
-``rover.contact_law`` of the truth names another law, the ground is of that one.
+The stress distribution, the shear and all effects are those of the reference model. What differs
+is what is known: there the load balance finds the sinkage, here the sinkage is a state and the
+load balance finds by which factor the normal stress exceeds the bearing strength of the soil at
+that sinkage (``support_ratio``). At 1 the two agree; above 1 the wheel is sinking.
+
+Lateral motion shears the soil too: the shear displacement is a vector, the shear stress of Janosi
+and Hanamoto acts along it. Where ``rover.contact_law`` of the truth names another law, the ground
+is of that one.
 """
 
 from __future__ import annotations

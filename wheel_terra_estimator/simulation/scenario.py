@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenario files: rover, course, sensors, faults and random variations.
 
-They are ROS parameter files with the keys of ``scenario_keys.yaml``; what starts with
-``variation.`` is drawn anew for each seed.
+A scenario is a ROS parameter file like every configuration file. The keys in
+``scenario_keys.yaml`` are all there are. What starts with ``variation.`` is drawn anew for each
+seed.
 """
 
 from __future__ import annotations

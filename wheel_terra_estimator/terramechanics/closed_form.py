@@ -2,10 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed form of the contact: the stress on each side of its peak as one force at its centroid.
 
-The mobilised share of the shear strength comes from the shear displacement at that centroid, that
-of cohesion from the middle of the side (docs/models). Over the validation family the error is some
-ten times smaller than that of triangular stresses (coefficients A, B, C). Where the rim skids or
-slides sideways the displacement turns inside the contact: four nodes replace the centroid there.
+Area and centroid of the normal stress follow from its exponent, the mobilised share of the shear
+strength from the shear displacement at that centroid, that of cohesion from the one at the middle
+of the side (docs/models). Nothing is fitted; over the validation family its error is some ten times
+smaller than that of triangular stresses (coefficients A, B, C).
+
+Where the rim skids the shear displacement reverses inside the contact, and where the wheel slides
+sideways its direction changes along it, so that one place does not represent a side: there four
+nodes on each side replace the centroid.
 """
 
 from __future__ import annotations

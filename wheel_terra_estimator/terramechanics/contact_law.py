@@ -144,6 +144,7 @@ BEKKER_WONG_JANOSI, WONG_REECE, RESISTIVE_FORCE = LAWS
 PEAK_SHIFT = 0.32
 PLATE_DEPTH = 0.02  # at which the resistive stress is that of the soil's plate test [m]
 
+
 ContactLaw: TypeAlias = WheelSoilModel | ResistiveForce
 
 

@@ -121,6 +121,8 @@ def solve_entrance_angle(
         angle = np.where(done, angle, step)
         if np.all(done | (good & (error < _NEAR * load))):
             return angle, np.ones_like(done)
+        if np.all(done | (high - low < 1e-13)):
+            break
     return _first_crossing(carried, load, angle, done)
 
 

@@ -94,7 +94,10 @@ def mobilised_shares(
 
 
 def shear_stress(
-    contact: Contact, angle: Quantity, normal_stress: Quantity, sine: Quantity | None = None
+    contact: Contact,
+    angle: Quantity,
+    normal_stress: Quantity,
+    sine: Quantity | None = None,
 ) -> Quantity:
     """Shear stress along the wheel (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa].
 

@@ -2,10 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steady rows out of a drive: windows over whole lug periods, with their deviations.
 
-A window yields a row per wheel (slip, load, torque, sinkage) and one of the mean wheel with the
-pull, which the accelerometer gives for all wheels together alone (docs/discrepancy/drives.md). The
-scatter between lug passages is correlated, and a window too short to tell how much: naive standard
-errors cover 28 % instead of 95 %, so that the correlation is pooled over all windows.
+The slip of a drive is not set: it follows from the slope, and is known only as well as the
+reference velocity. Nor is the pull of a wheel measured: the accelerometer gives the sum over the
+wheels. So each window yields
+
+- one row per wheel with slip, normal load (from the specific force and the load model), torque and
+  sinkage, no pull;
+- one row for the mean wheel (mean slip, mean load) with the pull per wheel, m f_x / n, and nothing
+  else. It is left out where the wheels differ in size or in slip so much that the mean of their
+  pulls is not the pull of the mean wheel.
+
+No cell is used twice and no pull is made up. Pull is taken along the chassis and turned to the
+local slope by the tilt that the measured sinkages give (wheels that sink deeper behind tip the
+chassis nose-up).
+
+Deviations of a window's means come from the scatter of the means over single lug passages, with
+their lag-one correlation pooled over all windows of the run: a window of its own is too short to
+know it (naive standard errors cover 28 % instead of 95 %). Errors that a whole drive shares (zero
+and gain of torque and sinkage sensors, bias of the accelerometer, as ``sensors.*`` state them) are
+added at sqrt(number of windows) times their size: the rows together then know a common shift
+exactly as well as the instrument does, and a zero error within its stated size is not taken for an
+effect.
 """
 
 from __future__ import annotations
@@ -467,11 +484,7 @@ def _columns(
 def _add_shared_errors(
     columns: dict[str, FloatArray], configuration: Configuration, windows: int
 ) -> None:
-    """Widen deviations by what all rows of a sensor share (zero, gain, bias).
-
-    At sqrt(windows) times its size, the rows together know a common shift exactly as well as the
-    instrument does: a zero error within its stated size is not taken for an effect.
-    """
+    """Widen deviations by what all rows of a sensor share, see the module's text."""
     sensors, rover = configuration.sensors, configuration.rover
     bias = float(sensors.specific_force_bias_std) * float(rover.mass) / configuration.wheels.count
     shared = {  # zero and gain

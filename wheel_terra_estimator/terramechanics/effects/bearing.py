@@ -179,9 +179,25 @@ SLIP_SINKAGE_EXPONENT = Effect(
     'u = max(r w, |(v, v_y)|), and k *= 1 - side q^2, q = r |v_y|/(r |v_y| + b |v|)',
     parameters=(
         _N1,
-        signed('n2', '-', 0.0, -2.0, 3.0, 0.5, 'coefficient of a skid beyond n1', free=False),
+        signed(
+            'n2',
+            '-',
+            0.0,
+            -2.0,
+            3.0,
+            0.5,
+            'what the coefficient of a skidding wheel has beyond n1',
+            free=False,
+        ),
         magnitude(
-            'side', '-', 0.0, 0.0, 0.98, 0.5, 'share of stiffness lost past the flank', free=False
+            'side',
+            '-',
+            0.0,
+            0.0,
+            0.98,
+            0.5,
+            'share of the stiffness lost where all soil comes in past the flank',
+            free=False,
         ),
     ),
     needs=('slip',),

@@ -97,6 +97,7 @@ BULLDOZING = Effect(
     ),
 )
 
+
 _NODES = gauss_rule(8)  # over the flank in the soil
 _CENTRE = 2.0 / 3.0  # distance from the hub at which soil rubs on the flank, share of the radius
 

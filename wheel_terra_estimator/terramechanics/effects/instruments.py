@@ -10,7 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, Form, magnitude, shape, signed
+from wheel_terra_estimator.terramechanics.effects.base import (
+    Effect,
+    Form,
+    magnitude,
+    shape,
+    signed,
+)
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio, speed_ratio
 
 

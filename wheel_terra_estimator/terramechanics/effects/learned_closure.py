@@ -2,9 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A sparse law in the closures of the model, found from rows that no listed effect explains.
 
-A target is changed by a sum x of coefficients times dimensionless features of the row, bounded by
-L: x' = L x / (L + |x|). Factors are multiplied by exp(x'), offsets are increased by x'. Each pair
-of target and feature (``torque_by_rim_speed``) is a parameter; files state them as flat lists.
+A closure (a target) is changed by a sum of coefficients times dimensionless features of the row::
+
+    x = sum of coefficient * feature        x' = L x / (L + |x|)   (bounded by L)
+
+Factors are multiplied by exp(x'), offsets are increased by x'. Each pair of target and feature is
+one parameter here (``torque_by_rim_speed``); a feature may be the product of two
+(``torque_by_slip_times_load``). Configuration files state them as flat lists.
 """
 
 from __future__ import annotations

@@ -36,7 +36,14 @@ LUG_DIGGING = Effect(
     parameters=(
         _KD,
         magnitude(
-            'rework', '-', 0.0, 0.0, 1.0, 0.3, 'digging per rim travel 0, per advance 1', free=False
+            'rework',
+            '-',
+            0.0,
+            0.0,
+            1.0,
+            0.3,
+            'digging counted per rim travel (0) or per advance (1)',
+            free=False,
         ),
     ),
     touches=frozenset({'sinkage'}),
@@ -112,7 +119,14 @@ LUG_SUPPORT = Effect(
             parameters=(
                 magnitude('share', '-', 0.3, 0.0, 2.0, 0.3, 'sinkage saved per lug height'),
                 shape(
-                    'free_height', 'm', 0.005, 0.0, 0.05, 0.003, 'height without effect', free=False
+                    'free_height',
+                    'm',
+                    0.005,
+                    0.0,
+                    0.05,
+                    0.003,
+                    'height of lugs that carry nothing yet',
+                    free=False,
                 ),
             ),
             validity='thin lugs; the defaults give the two values of the source',

@@ -41,6 +41,7 @@ COHESION = Effect(
     on_inputs=_cohesion,
 )
 
+
 REFERENCE_SPEED = 0.05  # [m/s]; rover speed, below which Ding et al. 2010 saw no influence
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The shape of the contact: mound, peak of the stress, a wheel that is neither rigid nor clean."""
+"""What moves the angles of the contact with slip: a mound behind it, the peak of the stress."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, Form, magnitude, shape, signed
-from wheel_terra_estimator.terramechanics.stresses import rolling_sinkage
+from wheel_terra_estimator.terramechanics.effects.base import (
+    Effect,
+    Form,
+    magnitude,
+    shape,
+    signed,
+)
 
 SMALLEST_ROOM = 1e-12
 """Height left below the hub over r [-]; contact that leaves above the hub has none."""
@@ -44,7 +49,9 @@ def _raise(contact: Contact, rise: Quantity) -> None:
     contact.leaving_angle = np.where(rise > 0.0, raised, contact.leaving_angle)
 
 
-_KAPPA = magnitude('kappa', '-', 1.0, 0.0, 8.0, 1.0, 'mound at s = 1 over the sinkage')
+_KAPPA = magnitude(
+    'kappa', '-', 1.0, 0.0, 8.0, 1.0, 'height of the mound at s = 1 over the sinkage'
+)
 
 SOIL_MOUND = Effect(
     name='soil_mound',
@@ -52,7 +59,10 @@ SOIL_MOUND = Effect(
     claim='at high slip, soil piles up behind the wheel and moves the leaving angle back',
     symbol='1 - cos t_2 = b + (1 - b) [1 - exp(-kappa z x^2/(r (1 - b)))], b = 1 - cos(c_3 t_1), '
     'x = (s - onset)+/(1 - onset); about r (1 - cos t_2) += kappa z x^2 while small',
-    parameters=(_KAPPA, shape('onset', '-', 0.4, 0.0, 0.9, 0.15, 'slip at which it starts')),
+    parameters=(
+        _KAPPA,
+        shape('onset', '-', 0.4, 0.0, 0.9, 0.15, 'slip at which it starts'),
+    ),
     needs=('slip',),
     confounded_with={'stress_peak_shift': 'a rear camera: measured leaving angle'},
     validity='slip up to 0.95; a measured leaving angle overrides it',
@@ -68,7 +78,14 @@ SOIL_MOUND = Effect(
             parameters=(
                 _KAPPA,
                 shape(
-                    'band', 'm', 0.003, 0.0, 0.03, 0.003, 'soil dragged by a smooth rim', free=False
+                    'band',
+                    'm',
+                    0.003,
+                    0.0,
+                    0.03,
+                    0.003,
+                    'layer that a smooth rim drags along',
+                    free=False,
                 ),
             ),
             needs=('slip', 'lug_height'),
@@ -97,7 +114,16 @@ STRESS_PEAK_SHIFT = Effect(
     symbol='t_m = (c1 + c2 s) t_1 (+ skid |s| t_1 where s < 0)',
     parameters=(
         magnitude('c2', '-', 0.2, -0.5, 0.8, 0.2, 'shift at s = 1'),
-        signed('skid', '-', 0.0, -1.0, 1.0, 0.2, 'shift of a skid beyond c2', free=False),
+        signed(
+            'skid',
+            '-',
+            0.0,
+            -1.0,
+            1.0,
+            0.2,
+            'shift forward of a skidding wheel, beyond c2',
+            free=False,
+        ),
     ),
     needs=('slip',),
     confounded_with={
@@ -121,76 +147,4 @@ STRESS_PEAK_SHIFT = Effect(
             on_inputs=_retreat,
         ),
     ),
-)
-
-
-def _layer(contact: Contact, p: SimpleNamespace) -> None:
-    contact.radius = contact.radius + p.thickness
-    contact.shear_radius = contact.shear_radius + p.thickness
-
-
-def _below_the_rim(contact: Contact, p: SimpleNamespace) -> None:
-    contact.sinkage = contact.sinkage - p.thickness
-
-
-SOIL_ADHESION = Effect(
-    name='soil_adhesion',
-    claim='soil sticks to the rim: a layer of it rolls with the wheel',
-    symbol='r, R += thickness for the soil; z, at the rim, -= thickness',
-    parameters=(magnitude('thickness', 'm', 0.002, 0.0, 0.05, 0.003, 'thickness of the layer'),),
-    confounded_with={
-        'wheel_radius_bias': 'sinkage, which a misread slip changes less; a look at the rim',
-        'lug_shear_radius': 'rows with other lugs or none; sinkage',
-        'sinkage_offset': 'pull and torque; the zero reading on a hard floor',
-    },
-    validity='an even layer; the recorded slip keeps the configured radius',
-    source='geometry of a coated wheel; sticking soil: Bekker 1969 (book, no DOI)',
-    on_inputs=_layer,
-    on_outputs=_below_the_rim,
-)
-
-_LEAST = 1e-9  # keeps a wheel without load free of divisions by zero [m]
-
-
-def _widening(contact: Contact, p: SimpleNamespace) -> Quantity:
-    """Circle of the same chord over the rim, r*/r = 1 + f/z0; nothing of the contact's shape."""
-    modulus = np.maximum(contact.bearing_modulus, 1.0) / (
-        contact.reference_depth**contact.sinkage_exponent
-    )
-    sinkage = rolling_sinkage(
-        contact.normal_load, contact.rim_radius, contact.width, modulus, contact.sinkage_exponent
-    )
-    return 1.0 + p.compliance * contact.normal_load / np.maximum(sinkage, _LEAST)
-
-
-def _flatten(contact: Contact, p: SimpleNamespace) -> None:
-    """Widen the contact."""
-    flatter = _widening(contact, p)
-    contact.radius = contact.radius * flatter
-    # The belt runs at the rim's speed along a longer contact: j and its force grow alike.
-    contact.shear_radius = contact.shear_radius * flatter
-    contact.scale_speed(flatter)
-
-
-def _arm(contact: Contact, p: SimpleNamespace) -> None:
-    """Keep the arm of the shear at the height of the hub."""
-    contact.torque = contact.torque / _widening(contact, p)
-
-
-WHEEL_FLEXIBILITY = Effect(
-    name='wheel_flexibility',
-    claim='the wheel flattens under its load: it bears on the soil like a larger rigid one',
-    symbol='r* = r (1 + compliance W/z0), z0 = [3 W/((3 - N) b k sqrt(2 r))]^(2/(2N+1));'
-    ' T keeps the arm of the hub',
-    parameters=(magnitude('compliance', 'm/N', 2e-5, 0.0, 1e-3, 5e-5, 'flattening per load'),),
-    confounded_with={
-        'multipass': 'deflection on a hard floor; a load series',
-        'hard_layer': 'deflection on a hard floor; a penetrometer',
-    },
-    validity='deflection below the sinkage; exponent below 1.3; z0 is that of the rigid wheel '
-    'without slip',
-    source='substitute circle of a flattened wheel (Schmid 1995, J. Terramech. 32), '
-    '2 r (z + f) = 2 r* z; z0 after Bekker 1969 (book, no DOI)',
-    on_inputs=_flatten,
-    on_outputs=_arm,
 )
