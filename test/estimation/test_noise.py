@@ -80,11 +80,12 @@ def test_noise_that_messages_of_the_imu_state_is_told_as_stated():
     noise, times = ObservedNoise(sensors(), given=()), 0.1 * np.arange(400)
     by_imu = StatedNoise(angular_rate_std=0.0005)
     observed = read(noise, 'gyro', 0.02, times)
-    assert noise.report(by_imu)['gyro_noise_stated_rad_s'] == 0.0005
-    words = noise.in_words(by_imu)
-    assert list(words) == ['default']  # vibration is no fault
-    assert f'gyro noise {observed / 0.0005:.0f} times what is stated' in words['default']
-    assert '(covariance of imu/data, or sensors.angular_rate_std: ' in words['default']
+    found = noise.report(by_imu)
+    assert found['gyro_noise_stated_rad_s'] == 0.0005
+    assert 'noise_beyond_stated' not in found  # vibration is no fault
+    words = found['noise_beyond_default']
+    assert f'gyro noise {observed / 0.0005:.0f} times what is stated' in words
+    assert '(covariance of imu/data, or sensors.angular_rate_std: ' in words
 
 
 def test_what_nobody_stated_is_known_after_the_first_seconds():
@@ -135,9 +136,10 @@ def test_the_noise_of_references_is_seen_beside_a_filter_that_follows_them(noise
 def test_a_vibrating_rover_is_told_in_words(noise):
     std = 20.0 * noise.stated['accelerometer']
     read(noise, 'accelerometer', std, 0.01 * np.arange(6000))
-    assert noise.report()['accelerometer_noise_seen_m_s2'] == pytest.approx(std, rel=0.15)
-    assert list(noise.in_words()) == ['stated']
-    words = noise.in_words()['stated']
+    found = noise.report()
+    assert found['accelerometer_noise_seen_m_s2'] == pytest.approx(std, rel=0.15)
+    assert 'noise_beyond_default' not in found
+    words = found['noise_beyond_stated']
     assert 'accelerometer noise' in words
     assert 'sensors.specific_force_std: 0.' in words
 
@@ -165,14 +167,15 @@ def test_a_reference_is_held_against_its_own_covariance(noise, share, told):
     innovations = std * np.random.default_rng(7).normal(size=300)
     observed = compared(noise, innovations, std**2, 1e-6 * std**2, (share * std) ** 2)
     assert observed == pytest.approx(std, rel=0.3)
-    assert noise.report()['reference_noise_stated_m_s'] == pytest.approx(share * std)
-    assert ('covariance of reference_odom' in noise.in_words().get('stated', '')) is told
-    assert 'default' not in noise.in_words()
+    found = noise.report()
+    assert found['reference_noise_stated_m_s'] == pytest.approx(share * std)
+    assert ('covariance of reference_odom' in found.get('noise_beyond_stated', '')) is told
+    assert 'noise_beyond_default' not in found
 
 
 def test_a_factor_that_tells_nothing_is_not_written_out(noise):
     compared(noise, [0.05, -0.05] * 10, 1e-4, 1e-6, 1e-300)
-    assert 'reference noise over 1000 times what is stated' in noise.in_words()['stated']
+    assert 'reference noise over 1000 times what is stated' in noise.report()['noise_beyond_stated']
 
 
 # Noise of the IMU as its messages state it: the same as in a file, and no placeholder.

@@ -792,7 +792,4 @@ class WheelSoilEstimator:
         zero = self._zero_velocity.state.zero
         report['gyro_zero_yaw_rad_s'] = float(f'{zero.yaw:.3g}')
         report['accelerometer_bias_m_s2'] = float(f'{float(self._ekf.x[GRAVITY_BIAS]):.3g}')
-        report |= self._noise.report(self._inertial.stated)
-        for than, words in self._noise.in_words(self._inertial.stated).items():
-            report[f'noise_beyond_{than}'] = words
-        return report
+        return report | self._noise.report(self._inertial.stated)

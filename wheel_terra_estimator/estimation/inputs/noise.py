@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Container, Mapping
 from math import isnan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
@@ -255,31 +255,22 @@ class ObservedNoise(Component[ObservedNoiseState]):
             return own, True, sensor == 'reference'
         return self.stated[sensor], False, sensor not in self._defaults
 
-    def report(self, by_imu: StatedNoise = NOTHING_STATED) -> dict[str, float]:
-        """Return stated and observed noise by key, with the unit at its end.
+    def report(self, by_imu: StatedNoise = NOTHING_STATED) -> dict[str, Any]:
+        """Return stated and observed noise by key, with the unit at its end, and messages.
 
-        `by_imu` is what the messages of the IMU state, where no file does.
+        `by_imu` is what the messages of the IMU state, where no file does. ``noise_beyond_stated``
+        and ``noise_beyond_default`` tell of sensors much noisier than stated, and than a default;
+        an IMU that is noisier than its messages state counts among the latter.
         """
-        found = {}
-        for name, sensor in SENSORS.items():
-            observed = self.observed(name)
-            if observed is not None:
-                stated, _, _ = self._stated(name, by_imu)
-                found[f'{name}_noise_stated_{sensor.unit}'] = float(f'{stated:.3g}')
-                found[f'{name}_noise_seen_{sensor.unit}'] = float(f'{observed:.3g}')
-        return found
-
-    def in_words(self, by_imu: StatedNoise = NOTHING_STATED) -> dict[str, str]:
-        """Return messages on sensors much noisier than stated, and than a default, by these words.
-
-        An IMU that is noisier than its messages state counts among the latter.
-        """
+        found: dict[str, Any] = {}
         words: dict[str, list[str]] = {'stated': [], 'default': []}
         for name, sensor in SENSORS.items():
             observed = self.observed(name)
             if observed is None:
                 continue
             stated, by_message, binding = self._stated(name, by_imu)
+            found[f'{name}_noise_stated_{sensor.unit}'] = float(f'{stated:.3g}')
+            found[f'{name}_noise_seen_{sensor.unit}'] = float(f'{observed:.3g}')
             if 0.0 < _FAULT_FACTOR * stated < observed:
                 where = sensor.key
                 if by_message:
@@ -290,7 +281,8 @@ class ObservedNoise(Component[ObservedNoiseState]):
                 words['stated' if binding else 'default'].append(
                     f'{name.replace("_", " ")} noise {times} times {than} ({where}: {observed:.2g})'
                 )
-        return {than: '; '.join(found) for than, found in words.items() if found}
+        told = {f'noise_beyond_{than}': '; '.join(each) for than, each in words.items() if each}
+        return found | told
 
 
 _BY_MESSAGE = {'reference': 'covariance of reference_odom, or sensors.reference_std_floor'}
