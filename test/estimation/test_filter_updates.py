@@ -576,7 +576,7 @@ def test_the_balance_of_forces_on_a_slope(parts, ekf):
     tilt = 0.01 * parts.rover.rut_tilt[rear]
     assert tilt > 0.0
     assert tilted.residual == pytest.approx(12.0 - parts.rover.mass * 9.6 * tilt)
-    standing = [StationaryPull(NAN, 5.0, 20.0), *[None] * 5]
+    standing = [StationaryPull(5.0, 20.0), *[None] * 5]
     held = balance.update(ekf, found, total, cycle, stationary=standing, **SURE)
     assert held.residual - tilted.residual == pytest.approx(float(found.pull[0]) - 5.0)
 

@@ -159,7 +159,7 @@ def _along_wheels(
     rows = []
     for speed, yaw_rate, angles in zip(body, turning, np.transpose(columns), strict=True):
         found = headings(rover, angles.tolist())
-        rows.append([found.speed(i, speed, yaw_rate) for i in range(rover.wheel_count)])
+        rows.append(found.speeds(speed, yaw_rate))
     return np.array(rows).reshape(len(stamp), rover.wheel_count)
 
 

@@ -41,8 +41,7 @@ _IDLE_STD = 0.3
 class StationaryPull(NamedTuple):
     """Pull of a wheel that does not turn under a load."""
 
-    pull: float  # by its torque [N], nan where none is known
-    expected: float  # that pull, else the wheel's share of the slope [N]
+    expected: float  # by its torque, else the wheel's share of the slope [N]
     std: float  # of `expected` [N]
 
 
@@ -122,7 +121,7 @@ class StationaryWheels:
     ) -> StationaryPull:
         """Return what to expect of a wheel that gives `pull` [N], nan = unknown."""
         if isnan(pull):
-            return StationaryPull(pull, load * slope_share, _IDLE_STD * load)
+            return StationaryPull(load * slope_share, _IDLE_STD * load)
         # In turns it is pushed sideways, too.
         share = _DRAGGED_STD + self._gain_std + min(lateral_motion, 1.0)
-        return StationaryPull(pull, pull, share * load)
+        return StationaryPull(pull, share * load)

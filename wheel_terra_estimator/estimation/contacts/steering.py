@@ -45,10 +45,6 @@ class Headings(NamedTuple):
     steered: bool
     """False: no wheel of the rover steers."""
 
-    def speed(self, wheel: int, speed: float, yaw_rate: float) -> float:
-        """Return the ground speed of a wheel along its heading [m/s]."""
-        return self.by_speed[wheel] * speed + self.by_yaw_rate[wheel] * yaw_rate
-
     def speeds(self, speed: float, yaw_rate: float) -> FloatArray:
         """Return the ground speed of each wheel along its heading, (n,) [m/s]."""
         return np.array(self.by_speed) * speed + np.array(self.by_yaw_rate) * yaw_rate

@@ -57,16 +57,17 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
 
     def update(self, time: float, rims: Floats, body: BodyMotion) -> tuple[WheelSlip, ...]:
         """Judge all wheels at a time [s]; `rims` are their rim speeds [m/s], nan = unknown."""
+        speeds = body.headings.speeds(body.speed, body.yaw_rate).tolist()
         self.state = tuple(
             [
-                self._judged(i, before, time, rim, body)
-                for i, (before, rim) in enumerate(zip(self.state, rims, strict=True))
+                self._judged(i, before, time, rim, v, body)
+                for i, (before, rim, v) in enumerate(zip(self.state, rims, speeds, strict=True))
             ]
         )
         return self.state
 
     def _judged(
-        self, i: int, before: WheelSlip, time: float, rim: float, body: BodyMotion
+        self, i: int, before: WheelSlip, time: float, rim: float, v: float, body: BodyMotion
     ) -> WheelSlip:
         if isnan(rim):
             std = min(before.std + _FORGETTING, 1.0)
@@ -79,7 +80,6 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
             v, v_std = 0.0, body.speed_std
         else:
             headings = body.headings
-            v = headings.speed(i, body.speed, body.yaw_rate)
             v_std = math.hypot(
                 headings.by_speed[i] * body.speed_std,
                 headings.by_yaw_rate[i] * body.yaw_rate_std,
