@@ -31,7 +31,7 @@ def process(rims, ratio=0.8, keys=()):
     made = SpeedProcess(parts.configuration, parts.rover, parts.sensors)
     ekf = parts.filter()
     # The ratio is remembered from a drive at speed.
-    fast = RimSpeeds((1.0,) * len(rims), 1.0)
+    fast = RimSpeeds((1.0,) * len(rims), 1.0, 1.0)
     ekf.set(SPEED, ratio, 1e-4)
     made.end_cycle(0.0, ekf, fast, settled=True)
     made.end_cycle(0.0, ekf, speeds(rims), settled=False)
@@ -40,8 +40,8 @@ def process(rims, ratio=0.8, keys=()):
 
 
 def speeds(rims):
-    known = [r for r in rims if r == r]
-    return RimSpeeds(tuple(rims), float(np.median(known)) if known else NAN)
+    known = [r for r in rims if r == r] or [NAN]
+    return RimSpeeds(tuple(rims), float(np.median(known)), float(np.median(np.abs(known))))
 
 
 def step(speed, before=0.05, now=0.05, inflation=0.0, window=None, inflated=True):

@@ -23,6 +23,7 @@ class RimSpeeds(NamedTuple):
     each: Floats
     typical: float
     """Median of the known ones, so that no single wheel decides; nan = none is known."""
+    magnitude: float  # median of their magnitudes
 
     @classmethod
     def of(cls, rims: Floats, yaw_rate: float, headings: Headings) -> RimSpeeds:
@@ -36,8 +37,8 @@ class RimSpeeds(NamedTuple):
                     for rim, by_yaw_rate in zip(rims, headings.by_yaw_rate, strict=True)
                 ]
             )
-        measured = known(each)
-        return cls(each, median(measured) if measured else NAN)
+        measured = known(each) or [NAN]
+        return cls(each, median(measured), median([abs(rim) for rim in measured]))
 
     def along(self, least: float) -> bool:
         """Return whether both sides drive the same way, faster than `least` [m/s].
@@ -45,12 +46,6 @@ class RimSpeeds(NamedTuple):
         In a turn on the spot the sides nearly cancel: the typical speed is mostly noise.
         """
         return abs(self.typical) > max(least, _TOGETHER * self.magnitude)
-
-    @property
-    def magnitude(self) -> float:
-        """Median of the magnitudes of the known ones [m/s]; nan = none is known."""
-        measured = known(self.each)
-        return median([abs(rim) for rim in measured]) if measured else NAN
 
     def oppose(self, speed: float) -> bool:
         """Return whether all wheels turn against a body speed [m/s]; in a spot turn some do not."""

@@ -148,7 +148,7 @@ class SpeedProcess(Component[SpeedState]):
     def __init__(self, configuration: Configuration, rover: Rover, sensors: SensorFigures) -> None:
         self._walk = float(configuration.filter.ratio_walk)
         self._gate = float(configuration.filter.gate)
-        unknown = RimSpeeds((NAN,) * rover.wheel_count, NAN)
+        unknown = RimSpeeds((NAN,) * rover.wheel_count, NAN, NAN)
         super().__init__(
             SpeedState(
                 NAN, unknown, _FIRST_RATIO, _FIRST_RATIO_STD, self._walk, slow_rims=unknown.each
