@@ -147,8 +147,8 @@ def margin(parts, slope, direction=1.0):
     found = PullMargin(len(LOADS), parts.models)
     sinkages = parts.filter().x[parts.layout.sinkage]
     wheels = WheelStates(1.0, sinkages, np.array(LOADS))
-    found.update(0.0, wheels, direction * math.tan(slope))
-    return found.state.margin
+    found.update(wheels, direction * math.tan(slope))
+    return found.state
 
 
 def test_the_margin_is_the_greatest_pull_less_what_the_slope_asks(parts):

@@ -571,11 +571,11 @@ class WheelSoilEstimator:
             ),
         )
         self._clock = self._clock._replace(assessment=assessment, speed=present)
-        if self._margin.due(time):
-            direction = self._contact_age.state.direction or 1.0
-            states = contact_states(ekf.x, self._layout, loads.load, self._ruts.state.depth)
-            self._margin.update(time, states, direction * loads.slope_share)
         if self._is_due(time, self._slopes.state.time):
+            if int(time) != self._slopes.state.latest_second:
+                direction = self._contact_age.state.direction or 1.0
+                states = contact_states(ekf.x, self._layout, loads.load, self._ruts.state.depth)
+                self._margin.update(states, direction * loads.slope_share)
             self._learn_slopes(time, slips, rims, motion.lateral_motion)
             self._follow_sideways(time, body, rims)
         if self._buffer is not None:
@@ -756,7 +756,7 @@ class WheelSoilEstimator:
             loads=loads,
             pulls=self._pulls.state,
             sinkage=self._sinkage_process.state,
-            margin=self._margin.state.margin,
+            margin=self._margin.state,
             assessment=self._clock.assessment,
             slip_on_slope=self._slopes.state.latest,
             sideways=self._sideways.state.latest,

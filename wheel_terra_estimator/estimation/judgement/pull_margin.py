@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from wheel_terra_estimator.arrays import Floats
@@ -15,29 +13,17 @@ from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, 
 
 _SLIPS = (0.3, 0.6, 0.9)
 """Slips whose greatest pull counts [-]: traction curves are flat around their maximum."""
-_PERIOD = 1.0  # between two updates [s]
 
 
-class MarginState(NamedTuple):
-    """Margin of each wheel [N] and when it was worked out [s]."""
-
-    margin: Floats
-    time: float = -10.0
-
-
-class PullMargin(Component[MarginState]):
-    """Works out the pull margins, once a second."""
+class PullMargin(Component[Floats]):
+    """Works out the pull margin of each wheel [N]."""
 
     def __init__(self, wheel_count: int, models: WheelModels) -> None:
-        super().__init__(MarginState((0.0,) * wheel_count))
+        super().__init__((0.0,) * wheel_count)
         self._models = models
 
-    def due(self, time: float) -> bool:
-        """Return whether the margins are to be recomputed at a time [s]."""
-        return time - self.state.time >= _PERIOD
-
-    def update(self, time: float, wheels: WheelStates, demand: float) -> None:
-        """Compute the margins of all wheels at a time [s]; their speed ratios are not used.
+    def update(self, wheels: WheelStates, demand: float) -> None:
+        """Compute the margins of all wheels; their speed ratios are not used.
 
         `demand` is the required traction coefficient in the direction of the drive [-].
         """
@@ -45,4 +31,4 @@ class PullMargin(Component[MarginState]):
         _, pull = self._models.torque_and_pull(wheels._replace(speed_ratio=ratios[:, None]))
         margin = pull.max(axis=0) - demand * wheels.load
         margin = np.where(wheels.load >= LEAST_LOAD, margin, 0.0)
-        self.state = MarginState(tuple(margin.tolist()), time)
+        self.state = tuple(margin.tolist())
