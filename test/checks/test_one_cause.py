@@ -241,3 +241,9 @@ def test_slopes_to_one_side_alone_are_not_called_none():
     report = rolling.checked(whole=rolling.recording(climb))
     (reason,) = {e.reason for e in report.not_checked if e.kind == 'gain'}
     assert 'slopes one way only, of 7.9 degrees' in reason
+
+
+def test_names_out_of_order_steer_no_wheel_wrongly():
+    """Where a wheel stands is open then, and so where it has to point."""
+    names = [rolling.NAMES[i] for i in (0, 2, 1, 3)]
+    assert [f.fault for f in steered(lambda angle: angle, names=names).findings] == ['axes']

@@ -325,7 +325,9 @@ def check_axes(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     places = {'wheels.x': wheels.y.tolist(), 'wheels.y': wheels.x.tolist()}
     turned = replace(turned, configuration=facts.configuration.replace(places))
     details = {'x': listed(wheels.y, '.3f'), 'y': listed(wheels.x, '.3f')}
-    return [evidence.found('axes', 0.9, **details)], replace(evidence, facts=turned)
+    unknown = np.full_like(evidence.steering, np.nan)  # where a wheel has to point is open as well
+    found = evidence.found('axes', 0.9, **details)
+    return [found], replace(evidence, facts=turned, steering=unknown)
 
 
 def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
