@@ -35,9 +35,13 @@ _MOST_VARIANCE_FACTOR = 100.0
 _BEYOND_RIM = 1.5  # over the fastest rim speed: no rover drives faster than its wheels [-]
 _BEYOND_STD = 5.0  # deviations added to that bound
 _SAME_STD = 4.0  # deviations within which two references disagree by the same amount
+_JUMP_STD = 2.5
+_UNSEEN_ACCELERATION = 0.05
+"""Deviations, and acceleration [m/s^2], by which a reference differs from the last one without a
+jump: a speed changes gradually, errors of satellites begin at once."""
 _LASTING = 2.2
-"""Time since a reference was last believed from which outliers that agree are believed [s]: a speed
-changes unseen by wheels and accelerometer only slowly, while errors of satellites jump."""
+"""Time since a reference was last believed from which agreeing outliers that began with a jump are
+believed [s]: errors of satellites last for a second or two."""
 _LASTING_BEYOND = 4.2  # the same for outliers beyond the rim speed [s]
 _GATE = 4.0  # NIS to which that of an outlier is reduced [-]
 _GATE_BEYOND = 0.01  # the same for one beyond the rim speed [-]
@@ -54,6 +58,8 @@ class ReferenceState(NamedTuple):
     rejected: int = 0
     rejected_in_a_row: int = 0
     last_rejected: float = 0.0  # innovation of the last rejected one [m/s]
+    forward: float = math.nan  # the last one [m/s]
+    jumped: bool = False  # whether the first rejected one in a row differs much from that before it
     nis: float | None = None  # running mean; None = no reading yet
     mean_innovation: float = 0.0
     """Running mean of the innovations, each over its deviation."""
@@ -136,7 +142,8 @@ class ReferenceUpdate(Component[ReferenceState]):
         """
         if still:
             self._note_slide(ekf, time, reference.forward, variance)
-        self.state = self.state._replace(time=time)
+        gap, step = time - self.state.time, abs(reference.forward - self.state.forward)
+        self.state = self.state._replace(time=time, forward=reference.forward)
         residual, prior = self.innovation(ekf, reference)
         total = prior + variance
         nis = residual * residual / total
@@ -155,7 +162,11 @@ class ReferenceUpdate(Component[ReferenceState]):
             change = abs(residual - state.last_rejected)
             same = change < _SAME_STD * math.sqrt(2.0 * variance + total)
             lasts = time - state.slip_time > (_LASTING_BEYOND if beyond else _LASTING)
-            inflated = same and lasts and state.rejected_in_a_row > 0
+            if not state.rejected_in_a_row:
+                unseen = _JUMP_STD * math.sqrt(2.0 * variance) + _UNSEEN_ACCELERATION * gap
+                state = state._replace(jumped=step > unseen)
+            believed = lasts or not (beyond or state.jumped)
+            inflated = same and believed and state.rejected_in_a_row > 0
             if inflated:
                 ekf.inflate(SPEED, residual * residual)
             else:
