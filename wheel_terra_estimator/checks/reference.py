@@ -63,12 +63,20 @@ KNOWN_UNITS = {
 }
 
 
-def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return rates that are positive both ways, whatever their signs, and the evidence mended."""
+def _beside_rims(evidence: Evidence) -> tuple[VelocitySeries, FloatArray] | None:
+    """Return the reference and the rim speeds at its stamps [m/s]; None where it is too short."""
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < LEAST_REFERENCES:
+        return None
+    return reference, np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
+
+
+def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return rates that are positive both ways, whatever their signs, and the evidence mended."""
+    there = _beside_rims(evidence)
+    if there is None:
         return [], evidence
-    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
+    reference, rim = there
     forward = reference.velocity[:, 0]
     least = 0.4 * float(np.quantile(np.abs(forward), 0.9))
     both = min(np.mean(forward > least), np.mean(forward < -least)) > SELDOM_NEGATIVE
@@ -98,10 +106,10 @@ def _slides(evidence: Evidence, back: Mask) -> bool:
 
 def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return a reference that is positive both ways, and the evidence with its sense."""
-    reference = evidence.recording.reference
-    if reference is None or reference.stamp.size < LEAST_REFERENCES:
+    there = _beside_rims(evidence)
+    if there is None:
         return [], evidence
-    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
+    reference, rim = there
     forward = reference.velocity[:, 0]
     # A position has no sign either, and is no speed.
     position = np.median(np.abs(forward)) >= BEYOND * np.abs(rim).max()
