@@ -105,7 +105,6 @@ class EstimatorNode(LifecycleNode):
             empty = [key for key, p in self._parameter_overrides.items() if p.value is None]
             if not empty:
                 raise
-            self.handle.destroy_when_not_in_use()  # else others still see a node of this name
             raise UserError(
                 f'parameters: {empty[0]} is an empty list, which ROS parameters cannot hold; '
                 'leave it out'
