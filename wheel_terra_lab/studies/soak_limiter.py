@@ -47,6 +47,7 @@ STEP = 0.2 * 0.5  # [m/s] that may be added by one message
 SETTLED = 1.0  # [s] after which limiter and monitor know the same
 ON_TIME = 0.2  # [s] between two looks of the monitor at most
 REACHED = 10  # messages of one command after which the ramp is behind
+LOST, SILENT = 'lost', 'no message for'  # what the estimator says of its inputs
 PATIENCE = 600.0  # [s] for what must come sooner or later, however little processor time there is
 FAULTS = (
     'none',
@@ -187,7 +188,7 @@ class DrivenRover(Rover):
             if status.name == 'traction_limiter: limiter':
                 self.interlock = {v.key: v.value for v in status.values}['interlock']
             elif status.name.endswith(': estimator'):
-                self.heard_of.update(word for word in ('lost', 'silent') if word in status.message)
+                self.heard_of.update(words for words in (LOST, SILENT) if words in status.message)
 
 
 class Soak:
@@ -295,9 +296,9 @@ class Soak:
         def untold(word: str) -> bool:
             return not self._until(lambda: self.rover.heard_of[word] > told[word], PATIENCE)
 
-        if fault == 'inputs silent' and untold('silent'):
+        if fault == 'inputs silent' and untold(SILENT):
             self.problems.append('inputs fell silent without a word')
-        if self._lost() > lost and untold('lost'):
+        if self._lost() > lost and untold(LOST):
             self.problems.append(f'{fault}: {self._lost() - lost} messages lost without a word')
         for name, node in self._nodes.items():
             if not node.runs():
