@@ -11,10 +11,12 @@ MOST = 3
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Name each retry and its reason."""
+    """Name each retry, its place in the test and its reason."""
     retried = terminalreporter.stats.get('rerun', [])
     for report in retried:
-        reason = (report.longreprtext.splitlines() or [''])[-1]
+        lines = report.longreprtext.splitlines() or ['']
+        places = [line for line in lines if line.startswith(f'{report.location[0]}:')]
+        reason = ' '.join([*places[:1], lines[-1]])
         terminalreporter.write_line(f'tried again: {report.nodeid} ({reason})')
     if len(retried) > MOST:
         terminalreporter.write_line(f'{len(retried)} retries, {MOST} are allowed: the run fails')

@@ -161,6 +161,8 @@ def test_loss_is_told_and_counted(heard, node_here, publishers):
     wheels = Counted(node, estimator, publishers)
     until(lambda: estimator.count_publishers('joint_states') == publishers)
     estimator._watch_names()  # as it does every second
+    inputs = {s.topic_name: s for s in estimator.subscriptions}
+    until(lambda: inputs['/joint_states'].get_publisher_count() == publishers)
     while not wheels.figure('received'):
         wheels.send()
         until(lambda: True)
