@@ -64,14 +64,22 @@ def test_a_topic_that_is_named_for_two_inputs_is_checked_as_both(make_bag):
 def test_missing_wheel_odometry_says_which_and_what_is_there(make_bag, rover, drive):
     others = [row for row in drive if row[0] != '/joint_states']
     sinkage = [('/sinkage', *row[1:]) for row in drive if row[0] == '/joint_states']
-    bag = make_bag(others + sinkage)  # joint states that are none of the wheels'
+    odometry = [('/wheel_odom', *row[1:]) for row in drive if row[0] == '/reference_odom']
+    bag = make_bag(others + sinkage + odometry)  # joint states that are none of the wheels'
     with pytest.raises(UserError) as error:
         list(read(bag, {}, rover))
     text = str(error.value)
     assert str(bag) in text
     assert '/joint_states is not in the bag' in text
     assert '/imu/data (sensor_msgs/msg/Imu)' in text
-    assert '-p wheel_odometry:=odom --remap odom:=/reference_odom' in text
+    assert '-p wheel_odometry:=odom --remap odom:=/wheel_odom' in text  # the reference is none
+
+
+def test_joint_states_of_which_none_can_be_read_are_no_wrong_names(make_bag, rover):
+    with open_bag(make_bag()) as bag:
+        bag.messages = lambda topics: iter([(1, topics[0], b'\0\1\0\0')])
+        with pytest.raises(UserError, match='no message on /joint_states can be read'):
+            MeasurementReader(bag, {}, rover)
 
 
 @pytest.fixture

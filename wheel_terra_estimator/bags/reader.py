@@ -134,9 +134,8 @@ class MeasurementReader:
         if name == 'reference_odom' and name not in chosen:
             remedy = other_references(self.bag) or remedy
         elif name == 'joint_states' and name not in chosen:
-            odometry = [t.name for t in there if t.type == INPUT_TYPES['odom'] and t.message_count]
-            if odometry:
-                remedy = f'use -p wheel_odometry:=odom --remap odom:={odometry[0]}'
+            if 'odom' in chosen:
+                remedy = f'use -p wheel_odometry:=odom --remap odom:={chosen["odom"]}'
         elif name == 'joint_states' and chosen[name] != WHEEL_RATES:
             ways = [as_options(chosen), *other_rovers(self.bag, chosen)]
             remedy = f'choose with {"; or, of another rover, with ".join(ways)}'
@@ -153,9 +152,15 @@ class MeasurementReader:
                     self.rejected.clear()  # they are counted when they are read
                     return
                 heard.update(dict.fromkeys(message.names))
+        topic = self.topics['joint_states']
+        if not heard:
+            raise UserError(
+                f'{self.bag.path}: no message on {topic} can be read and names a joint; copy the '
+                'bag again, or record that topic again'
+            )
         raise UserError(
             f'{self.bag.path}: no wheel of wheels.names ({", ".join(wanted)}) is on '
-            f'{self.topics["joint_states"]}, which holds {names_in_words(heard)}; '
+            f'{topic}, which holds {names_in_words(heard)}; '
             'set -p wheels.names:=[...] to the names in the bag, front to rear, left before right'
         )
 
