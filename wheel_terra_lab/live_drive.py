@@ -49,6 +49,7 @@ from wheel_terra_estimator.bags.writer import (
     STUCK_DIRECTION,
     TOPICS,
 )
+from wheel_terra_estimator.cli.terminal import termination_as_interrupt
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
@@ -312,7 +313,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     configuration_reader.add_arguments(parser)
     arguments = parser.parse_args(argv)
     try:
-        _run(arguments)
+        with termination_as_interrupt():
+            _run(arguments)
     except UserError as error:
         print(f'live_drive: {error}', file=sys.stderr)
         return NOT_FOUND if isinstance(error, NodeNotFoundError) else 2

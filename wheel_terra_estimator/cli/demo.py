@@ -18,8 +18,9 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
@@ -32,12 +33,10 @@ SEAL_SHA256 = '78c7f9baa4662e0969d5b5dff2c94fbd5cbd89ae14923cf0fcc754b1af82c5c7'
 """Of the shipped ``sealed.json``, which states the effect hidden in the table beside it."""
 NODE_NOT_FOUND = 4
 """Exit status of the laboratory's ``live_drive`` where DDS does not connect it with the node."""
-AT_ONCE = 2
-"""Parts that run side by side: most of a drive is work of one core."""
 DOMAINS = 101
 """ROS domains that every system has."""
 ONE_THREAD = {'OMP_NUM_THREADS': '1', 'OPENBLAS_NUM_THREADS': '1'}
-Ended: TypeAlias = 'subprocess.CompletedProcess[str]'
+Part: TypeAlias = Callable[[], tuple[int, str]]  # waits for the end; status, output
 EXAMPLES = ('wheel-terra demo', 'wheel-terra demo --no-node -o /tmp/demo --overwrite')
 
 
@@ -100,17 +99,24 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
     else:
         why = '' if arguments.no_node else f'Without {" and ".join(absent)} (docs/install.md) '
         print(f'{why}the drives go through `wheel-terra replay`; the numbers are the same.')
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        drives = [pool.submit(_drive, i, output, live) for i in range(len(DRIVES))]
-        trial = pool.submit(_trial, output / 'trial')
-        try:
-            for drive, part in zip(DRIVES, drives, strict=True):
-                if status := _ended(f'{drive.name}: {drive.title}', part):
-                    return status
-            if status := _ended('trial: which effect is missing in the model of a wheel?', trial):
+    with ExitStack() as stack:  # where it ends early, so do the parts
+
+        def begin(command: Sequence[str], environment: Mapping[str, str]) -> Part:
+            return stack.enter_context(_running(command, environment))
+
+        drives = [begin(_command(d, output, live), _environment(i)) for i, d in enumerate(DRIVES)]
+        trial = begin(_trial_command(output / 'trial'), ONE_THREAD)
+        for drive, part in zip(DRIVES, drives, strict=True):
+            status = _ended(f'{drive.name}: {drive.title}', part)
+            if live and status == NODE_NOT_FOUND:
+                print('DDS does not reach the node on this machine: `wheel-terra replay` instead.')
+                replay = begin(_command(drive, output, False), ONE_THREAD)
+                status = _ended(f'{drive.name}, replayed', replay)
+            if status:
                 return status
-        finally:  # after Ctrl-C or an error nothing new begins
-            pool.shutdown(wait=False, cancel_futures=True)
+        title = 'trial: which effect is missing in the model of a wheel?'
+        if status := _ended(f'{title} (SHA-256 of the answer: {SEAL_SHA256[:16]}...)', trial):
+            return status
     shown = [f'{drive.name}: {_outcome(drive, output)}' for drive in DRIVES]
     shown.append(f'trial: {_named(output / "trial")}')
     print('\nReports with pictures, to be opened in a browser:')
@@ -122,34 +128,44 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
     return 0
 
 
-def _ended(title: str, part: Future[Ended]) -> int:
+def _ended(title: str, part: Part) -> int:
     """Print the title, then the output of a part; return its status."""
     print(f'\n=== {title}\n', flush=True)
-    done = part.result()
-    print(done.stdout, end='', flush=True)
-    return done.returncode
+    status, said = part()
+    print(said, end='', flush=True)
+    return status
 
 
-def _run(command: Sequence[str], environment: Mapping[str, str]) -> Ended:
-    """Run a command of the package; return its status and its output."""
-    return subprocess.run(
-        [sys.executable, '-m', *command],
-        env={**os.environ, **environment},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
+@contextmanager
+def _running(command: Sequence[str], environment: Mapping[str, str]) -> Iterator[Part]:
+    """Run a command of the package beside this one; yield what waits for its end."""
+    with tempfile.TemporaryFile('w+', encoding='utf-8') as said:
+        process = subprocess.Popen(
+            [sys.executable, '-m', *command],
+            env={**os.environ, **environment},
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,  # Ctrl-C stops it once, by way of the end of this block
+        )
+
+        def wait() -> tuple[int, str]:
+            status = process.wait()
+            said.seek(0)
+            return status, said.read()
+
+        try:
+            yield wait
+        finally:
+            process.terminate()
+            process.wait()
 
 
-def _trial(folder: Path) -> Ended:
-    """Diagnose the shipped table blind."""
+def _trial_command(folder: Path) -> list[str]:
+    """Return what diagnoses the shipped table blind."""
     shipped = demo_recording('trial')
     command = ['wheel_terra_estimator.cli.main', 'diagnose', '--overwrite']
     command += [str(shipped / 'blind.csv'), '--config', str(shipped / 'rig.yaml')]
-    done = _run([*command, '-o', str(folder / 'diagnosis')], ONE_THREAD)
-    done.stdout = f'a table with a hidden effect (SHA-256 {SEAL_SHA256[:16]}...)\n{done.stdout}'
-    return done
+    return [*command, '-o', str(folder / 'diagnosis')]
 
 
 def _named(folder: Path) -> str:
@@ -163,16 +179,6 @@ def _named(folder: Path) -> str:
     found = ' + '.join(effect['name'] for effect in report['effects']) or report['verdict']
     judged = 'right' if found == hidden else 'wrong'
     return f'hidden effect {hidden}, identified {found}: {judged}'
-
-
-def _drive(number: int, output: Path, live: bool) -> Ended:
-    """Run a drive; where DDS does not connect it with the node, replay it."""
-    done = _run(_command(DRIVES[number], output, live), _environment(number))
-    if live and done.returncode == NODE_NOT_FOUND:
-        note = 'DDS does not reach the node on this machine: using `wheel-terra replay` instead.\n'
-        done = _run(_command(DRIVES[number], output, False), _environment(number))
-        done.stdout = note + done.stdout
-    return done
 
 
 def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:
