@@ -267,6 +267,17 @@ def test_a_clock_that_was_set_is_one_finding_whatever_it_stamps(by):
     assert all(topic in told[0].words for topic in ('/imu/data', '/sinkage', '/reference_odom'))
 
 
+@pytest.mark.parametrize('how', ['doubled', 'reversed'])
+def test_messages_in_another_order_are_one_fault_of_each_topic(how):
+    changes = {}
+    for name in ('joints', 'imu', 'reference'):
+        channel = getattr(WHOLE, name)
+        rows = np.arange(channel.stamp.size)
+        changed = rows_of(channel, rows.repeat(2) if how == 'doubled' else rows[::-1])
+        changes[name] = replace(changed, log_time=np.sort(changed.log_time))
+    assert {finding.kind for finding in checked(**changes).findings} == {'order'}
+
+
 def in_messages_of_their_own(joints, apart):
     """Each wheel in its own message, so many seconds after the one before."""
     wheels = len(joints.names)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome, found, not_checked, of_offset
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import Channel, Recording, of_one_wheel, shifted
+from wheel_terra_estimator.checks.series import Channel, Recording, of_one_wheel, rows_of, shifted
 from wheel_terra_estimator.checks.statistics import (
     Trial,
     averaged,
@@ -131,7 +131,7 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def _too_late(evidence: Evidence, off: dict[str, float]) -> list[Outcome]:
     """Return inputs that the estimator gets too late, but for those whose stamps are ``off``."""
-    own = _late(evidence, 'joints') + off.get('wheel_odometry', 0.0)
+    own = _late(evidence, 'joints', NEARLY_ALL) + off.get('wheel_odometry', 0.0)
     outcomes, history = list[Outcome](), evidence.facts.configuration.history
     for name in ('imu', 'sinkage', 'reference'):
         if name in off:
@@ -424,11 +424,13 @@ def check_transport(
         order, jumps = _order(one, most_back), _steps(channel)
         step = float(jumps[np.argmax(np.abs(jumps))])
         outcomes += order
-        if step and not order:
+        if order:
+            mended[name] = _in_order(channel)
+        elif step:
             steps[channel.topic] = step
             if np.count_nonzero(jumps) <= MOST_STEPS:
                 mended[name] = shifted(channel, np.round(1e9 * np.cumsum(jumps)).astype(np.int64))
-        elif not order:
+        else:
             outcomes += _drop_outs(name, one, figures)
         if channel.late.size and not step:
             parts = np.array_split(channel.late, min(QUARTERS, channel.late.size))
@@ -580,6 +582,19 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     if not words:
         return []
     return [found('order', channel.topic, 0.99, how='; '.join(words))]
+
+
+def _in_order(channel: Channel) -> Channel:
+    """Return the messages in the order of their stamps, without copies of the one before."""
+    channel = rows_of(channel, np.argsort(channel.stamp, kind='stable'))
+    same = np.diff(channel.stamp) == 0
+    for part in fields(channel):
+        values = getattr(channel, part.name)
+        if part.name != 'log_time' and isinstance(values, np.ndarray):
+            table = values.reshape(len(values), -1)
+            equal = (table[1:] == table[:-1]) | (np.isnan(table[1:]) & np.isnan(table[:-1]))
+            same &= equal.all(axis=1)
+    return rows_of(channel, np.append(True, ~same))
 
 
 def _silent(recording: Recording) -> list[Outcome]:

@@ -128,8 +128,9 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     if mute:
         at = joints.position
         angles = at is not None and np.isfinite(at[:, joints.names.index(mute[0])]).any()
-        how = 'position only, take its change' if angles else 'velocity empty, or too short'
-        outcomes.append(_missing(joints.topic, mute, f'without a rate: {how}'))
+        how = 'without a rate: velocity is empty, NaN, infinite or of another length'
+        how += '; take the change of its position' if angles else ''
+        outcomes.append(_missing(joints.topic, mute, how))
     for name in spare:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
             outcomes.append(found('spare_joint', joints.topic, 0.7, wheel=name))
