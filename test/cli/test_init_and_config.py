@@ -303,7 +303,7 @@ def test_wheels_by_name_and_where_they_are(init, capsys):
     assert rover.wheels.x.tolist() == [0.0, 0.0]
     one = init('--overwrite', '--wheels', 'wheel', '--radius', 0.1, '--mass', 15)
     assert one.wheels.y.tolist() == [0.0]
-    capsys.readouterr()
+    assert '(1 wheel, 15 kg)' in capsys.readouterr().out
     init('--overwrite', '--wheels', 'a, b, c, d, e', *MEASURES)
     said = capsys.readouterr().out
     assert 'wheels.x is a guess' in said and 'wheels.y is a guess' in said
@@ -371,6 +371,15 @@ def test_a_turning_joint_that_is_left_out_is_told(init, tmp_path, capsys):
 
     init('--bag', changed(PATHFINDER, tmp_path / 'bag', rename), *MEASURES)
     assert 'not named like wheels: nose; ' in capsys.readouterr().out
+
+
+def test_wheels_that_cannot_be_are_refused_and_nothing_is_written(init, tmp_path, capsys):
+    assert init('--bag', PATHFINDER, '--wheels', 'front_left_wheel_joint,nose', *MEASURES) == 2
+    said = capsys.readouterr().err
+    assert '--wheels nose: not on /joint_states' in said and 'rear_right_wheel_joint' in said
+    assert init('--wheels', 'left,left', *MEASURES) == 2
+    assert f'{tmp_path / "rover.yaml"}: wheels.names' in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_all_measures_that_are_missing_are_named_at_once(init, tmp_path, capsys):

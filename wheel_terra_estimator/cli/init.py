@@ -81,8 +81,13 @@ def run(arguments: argparse.Namespace) -> int:
         sketch = replace(sketch, guessed=sketch.guessed | {'rover.suspension'})
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(rover_file(sketch), encoding='utf-8')
-    reader.load([arguments.output])
-    print(f'rover file: {arguments.output} ({len(sketch.wheels)} wheels, {sketch.mass:g} kg)')
+        try:
+            reader.load([path])
+        except UserError as error:
+            raise UserError(str(error).replace(str(path), str(arguments.output))) from None
+    count = len(sketch.wheels)
+    wheels = '1 wheel' if count == 1 else f'{count} wheels'
+    print(f'rover file: {arguments.output} ({wheels}, {sketch.mass:g} kg)')
     if others := ', '.join(sketch.left_out):
         print(f'  not named like wheels: {others}; if they are: --wheels')
     for key in sorted(sketch.guessed):
@@ -104,8 +109,8 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
         sketch = replace(sketch, x=x, y=y)
         return replace(sketch, name=arguments.name or sketch.name)
     topic = _odometry_alone(arguments) if arguments.bag and wheels else ''
-    if arguments.bag:
-        wheels = wheels or _wheels_of(arguments.bag, arguments.remap)
+    if arguments.bag and not topic:
+        wheels = _wheels_of(arguments.bag, arguments.remap, wheels)
     elif not wheels:
         raise UserError('give --urdf, --bag or --wheels')
     if topic:
@@ -149,7 +154,8 @@ def _odometry_alone(arguments: argparse.Namespace) -> str:
     return '' if 'joint_states' in chosen else chosen.get('odom', '')
 
 
-def _wheels_of(path: Path, remaps: list[str]) -> list[str]:
+def _wheels_of(path: Path, remaps: list[str], given: list[str]) -> list[str]:
+    """Return the given wheels, if a recording has them, or the joints that are named like some."""
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.bags.series_reader import read_series
     from wheel_terra_estimator.bags.storage import open_bag
@@ -158,9 +164,17 @@ def _wheels_of(path: Path, remaps: list[str]) -> list[str]:
     with open_bag(path) as bag:
         recording = read_series(bag, parse_remaps(remaps), path.name)
         if recording.joints is None:
-            raise UserError(f'{path}: no joint states in it; name the wheels with --wheels')
+            raise UserError(
+                f'{path}: no joint states in it; name their topic (--remap joint_states:=/TOPIC), '
+                'or where there is odometry only the wheels (--wheels)'
+            )
     print(*(f'note: {note}\n' for note in recording.notes), sep='', end='')
     joints = recording.joints
+    if unknown := ', '.join(name for name in given if name not in joints.names):
+        there = ', '.join(joints.names)
+        raise UserError(f'--wheels {unknown}: not on {joints.topic} of {path}, which has {there}')
+    if given:
+        return given
     names = list(wheel_names(joints.names))
     rates = zip(joints.names, joints.rate.T, strict=True)
     others = [n for n, rate in rates if n not in names and (abs(rate) > 0.0).any()]
