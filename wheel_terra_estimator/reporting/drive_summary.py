@@ -88,6 +88,12 @@ class DriveSummary:
     """What the drive has taught of soil and sensors, where it was replayed."""
 
     @property
+    def extent(self) -> str:
+        """How much was estimated, in words."""
+        wheels = '1 wheel' if len(self.wheels) == 1 else f'{len(self.wheels)} wheels'
+        return f'{self.duration:.1f} s, {wheels}, {self.sets} estimates'
+
+    @property
     def verdict(self) -> str:
         """The drive in a sentence."""
         if not self.sets:
@@ -260,8 +266,7 @@ def deepest(wheel: WheelSummary, plus_minus: str = '±') -> str:
 def as_text(summary: DriveSummary) -> str:
     """Return the summary for a terminal."""
     lines = [
-        f'{summary.title}: {summary.duration:.1f} s, {len(summary.wheels)} wheels, '
-        f'{summary.sets} estimates',
+        f'{summary.title}: {summary.extent}',
         '',
         f'  {summary.verdict}',
     ]
