@@ -73,6 +73,11 @@ def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path):
     assert last - first < gone[-1] - gone[0] + 0.2
 
 
+def test_what_is_lost_before_all_that_is_read_is_at_no_time_of_it(tmp_path):
+    _, notes = contents(damaged(tmp_path, DEMO.with_name('pathfinder'), 100))
+    assert 'lost: 14' in notes[0] and notes[0].endswith('; before the first of these')
+
+
 def test_every_command_says_what_is_damaged(make_bag, drive, config, tmp_path, capsys):
     """Of a bag that is cut in half; a check begins with the loss."""
     bag = make_bag(drive[:50])

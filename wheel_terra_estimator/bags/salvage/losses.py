@@ -81,6 +81,9 @@ class Losses:
                 joined.append([begin, end])
         texts = []
         for begin, end in joined[:SHOWN_SPANS]:
+            if end == first:
+                texts.append('before the first of these')
+                continue
             ends = f'to {(end - first) * 1e-9:.1f} s' if end < last else 'on'
             texts.append(f'from {(begin - first) * 1e-9:.1f} s {ends}')
         more = len(joined) - SHOWN_SPANS
