@@ -6,6 +6,7 @@ import argparse
 import re
 import socket
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -154,8 +155,7 @@ def test_the_refused_are_all_commands():
 def test_a_refused_run_leaves_nothing_and_its_place_free(command, tmp_path, monkeypatch, capsys):
     """The next try is refused for the same reason, not because of what the first one left."""
     monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 0.2)
-    refused = argparse.Namespace(returncode=2, stdout='')
-    monkeypatch.setattr(demo.subprocess, 'run', lambda *_, **__: refused)
+    monkeypatch.setattr(demo, '_running', lambda *_: nullcontext(lambda: (2, '')))
     with socket.create_server(('127.0.0.1', 0)) as silent:
         paths = {name: tmp_path / f'given.{name}' for name in ('bag', 'bad', 'table')}
         for path in paths.values():
