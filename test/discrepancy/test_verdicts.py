@@ -434,6 +434,16 @@ def test_a_slip_by_another_rule_is_asked_for_and_no_effect(few_known, rule, read
     assert said in found.sentence
 
 
+def test_slips_that_are_all_off_alike_are_not_surely_a_biased_radius():
+    table, values, *_ = make('sweep40')
+    few = Options(effects=('wheel_radius_bias', 'lug_shear_radius', 'soil_adhesion'))
+    found = run({**table, 'slip': table['slip'] + 0.03}, values, options=few)
+    assert found.effects[0].name == 'wheel_radius_bias'
+    assert found.effects[0].confidence <= 0.5
+    assert 'the same error of all slips' in found.sentence
+    assert any('hard floor' in item.what for item in found.next_measurement)
+
+
 def test_a_bias_of_the_radius_as_high_as_the_lugs_asks_for_the_radius_of_the_slip():
     table, values, _, rows = make('sweep40')
     ratio = 1.0 + rows['lug_height'] / rows['wheel_radius']

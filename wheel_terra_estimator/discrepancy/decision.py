@@ -44,6 +44,9 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME as
 
 _USUAL_Z_SCORE = 2.5  # stated deviations: a larger shift lowers the confidence of a name
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
+# Beside a free soil it fits within one nat of a biased radius, whichever is true (17 tables of
+# another laboratory): the radius alone is measured on a hard floor.
+_SAME_ERROR = 'the same error of all slips (reference speed, or readings that lag behind a sweep)'
 _SURE = 2.0  # deviations within which a bias of the radius is the height of the lugs
 _RARE = 3.0  # deviations of its prior, beyond which a gain may as well be something else
 _MOST_TRIED = 3  # doubtful names, after which none is given
@@ -143,7 +146,7 @@ class Decider:
             if verdict.status != 'named':
                 return self._left_open(replace(decision, doubtful=doubtful))
             tried.append(verdict.index)
-            names, likely = self._against_law(decision, _names(self.table.units, decision))
+            names, likely = self._against_law(decision, _names(self.table, decision))
             if likely and any(item.after < item.refit for item in decision.gap.values()):
                 share = _OF_SEVERAL if len(names) >= _SEVERAL else 1.0
                 return replace(decision, names=_as_sure(names, share))
@@ -244,7 +247,7 @@ def _least(names: tuple[Naming, ...], odds: float = 1.0) -> float:
     return min(confidence(name.features, odds=odds).of_set for name in names)
 
 
-def _names(units: Mapping[str, float], decision: Decision) -> tuple[Naming, ...]:
+def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
     """Return the named effects with their confidence; first the one that alone explains more."""
     findings, fitted, known = decision.findings, decision.after, catalogue()
     selection = findings.selection
@@ -253,7 +256,7 @@ def _names(units: Mapping[str, float], decision: Decision) -> tuple[Naming, ...]
     for place, key in enumerate(fitted.names):
         values = features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
-        alike = _known_alike(key, decision, known, units)
+        alike = _known_alike(key, decision, known, table)
         values['alike'] = float(len(alike))
         alone = float(selection.totals[selection.index((key,))])
         competitors = decision.verdict.ambiguity_groups[place]
@@ -263,22 +266,24 @@ def _names(units: Mapping[str, float], decision: Decision) -> tuple[Naming, ...]
 
 
 def _known_alike(
-    name: str, decision: Decision, known: Mapping[str, Effect], units: Mapping[str, float]
+    name: str, decision: Decision, known: Mapping[str, Effect], table: SteadyTable
 ) -> tuple[str, ...]:
-    """Return what looks like a name and was not tried: effects, another unit or radius."""
+    """Return what looks like a name and was not tried: effects, another unit, slip or radius."""
     findings, fitted = decision.findings, decision.after
     points, found = findings.setting.forward.points, list[str]()
     heights = points.wheel.lug_height / points.wheel.radius
     lug = float(np.max(heights)) if np.ptp(heights) == 0.0 else 0.0
     due = {'rim': -lug / (1.0 + lug), 'lug_tip': lug}.get(points.slip_radius, 0.0)
     for c, u, value, scatter, _ in fitted.numbers():
-        if c.key == f'{name}.bias' == 'wheel_radius_bias.bias' and due:
+        if c.key == f'{name}.bias' == 'wheel_radius_bias.bias':
+            if not table.true_rows.any():  # slips of a drive are our own
+                found.append(_SAME_ERROR)
             other = 'rim' if points.slip_radius == 'lug_tip' else 'lug_tip'
-            if abs(value - due) < _SURE * scatter:
+            if due and abs(value - due) < _SURE * scatter:
                 found.append(f'a slip that refers to the other radius (slip_radius: {other})')
         elif c.unit == '-' and effect_of(c.owner) == effect_of(name) in _GAINS:
             column, gain = min(known[c.owner].touches), 1.0 + value
-            text = units_apart(column, 1.0 / gain, scatter / gain, units.get(column, 1.0))
+            text = units_apart(column, 1.0 / gain, scatter / gain, table.units.get(column, 1.0))
             if text:
                 found.append(f'another unit of the column ({text})')
             elif abs(u) > _RARE:
