@@ -277,7 +277,8 @@ def own_beds(decision: Decision, table: SteadyTable) -> tuple[str, ...]:
     if not decision.beds_differ:
         return ()
     usual = percent(SCATTER[decision.ground]['stiffness'])
-    together = f'{_swept(table)} and bed changed together: ' if decision.ground == 'sweep' else ''
+    swept = _swept(table) if decision.ground == 'sweep' else ''
+    together = f'{swept} and bed changed together: ' if swept else ''
     return (
         f'{together}that the beds differ from {decision.ground} to {decision.ground} ({usual} of '
         f'the stiffness is usual) is {percent(decision.beds_differ)} likely',
@@ -293,9 +294,12 @@ def fresh_bed(decision: Decision, table: SteadyTable) -> tuple[NextMeasurement, 
         'sweep': 'one sweep again on a fresh bed, with a column trial',
         'day': 'a sweep of each day again, all on one day',
     }[decision.ground]
-    if decision.ground == 'sweep' and 'trial' in table.columns:
-        what = f'the sweeps of least and greatest {_swept(table)} again, each on two fresh beds'
-    competitors = 'another bed', f'an effect of {_swept(table)}'
+    swept = _swept(table)
+    if decision.ground == 'sweep' and not swept:  # trials alone
+        what = 'the sweep again on three more fresh beds'
+    elif decision.ground == 'sweep' and 'trial' in table.columns:
+        what = f'the sweeps of least and greatest {swept} again, each on two fresh beds'
+    competitors = 'another bed', f'an effect of {swept or "slip"}'
     return (NextMeasurement(what, competitors, 0.0, math.inf),)
 
 
