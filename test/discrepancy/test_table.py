@@ -234,6 +234,25 @@ def test_copies_count_once_but_repeats_stay():
     assert any('copies' in note for note in checked.notes)
 
 
+def test_readings_at_the_end_of_a_range_or_held_are_left_out_but_not_coarse_ones():
+    slip = np.tile(np.linspace(0.05, 0.7, 10), 2)
+    load = np.repeat([60.0, 90.0], 10)
+    noise = np.random.default_rng(4).normal(0.0, 0.3, 20)
+    pull = np.round(load * 0.4 * (1.0 - np.exp(-6.0 * slip)) + noise, 2)
+    columns = {'slip': slip, 'normal_load': load, 'torque': 0.2 * pull}
+    clipped = check_table('x.csv', {**columns, 'drawbar_pull': np.minimum(pull, 24.0)})
+    left = np.isfinite(clipped.measured[:, 1])
+    np.testing.assert_array_equal(left, pull < 24.0)
+    assert any('drawbar_pull is exactly 24 N in' in note for note in clipped.notes)
+    held = pull.copy()
+    held[3:8] = pull[3]
+    assert np.isnan(check_table('x.csv', {**columns, 'drawbar_pull': held}).measured[3:8, 1]).all()
+    for fine in (pull, np.round(pull), np.round(pull, 1)):
+        assert np.isfinite(
+            check_table('x.csv', {**columns, 'drawbar_pull': fine}).measured[:, 1]
+        ).all()
+
+
 def test_readings_that_look_odd_are_said_and_used():
     still = check_table('x.csv', rows(sinkage=np.full(8, 0.004), sinkage_std=np.full(8, 1e-3)))
     assert any('0.004 m in all 8 rows' in note for note in still.notes)

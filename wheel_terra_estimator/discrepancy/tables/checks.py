@@ -83,6 +83,7 @@ def check_table(
             'a repeated measurement would scatter'
         )
     _check_dead_columns(table, remarks)
+    table = _without_held_readings(table, remarks)
     _check_range_of_design(table, remarks)
     if len(table) > most:
         before, table = len(table), averaged(table, most)
@@ -107,6 +108,7 @@ _MILLIMETRES = 'looks like millimetres; divide the column by 1000'
 _NO_LENGTH = 'is not a positive length in m'
 _NO_DEVIATION = 'is not positive, or next to nothing; leave it empty where the deviation is unknown'
 _FEW = 2  # readings of exactly nought that are no sign of a channel that was off
+_HELD_CHANCE = 1e-3  # that so many readings are equal, below which their sensor did not move
 _LEAST_DEVIATION = 1e-12  # [m], [N], [N m] or [rad]: below all that is measured
 
 _MOST = math.inf
@@ -272,6 +274,32 @@ def _check_dead_columns(table: SteadyTable, remarks: list[str]) -> None:
             f'{table.name}, line {table.lines[here][0]}, column {quantity}: {said}; no '
             f'measurement is that constant: leave the column out, or state its {quantity}_std'
         )
+
+
+def _without_held_readings(table: SteadyTable, remarks: list[str]) -> SteadyTable:
+    """Leave out readings that are equal in more rows than can be by chance, noughts aside.
+
+    The sensor is at the end of its range, or stands still. That one of the others equals another is
+    seen from them, and at least as likely as the smallest step over the range says.
+    """
+    measured = table.measured.copy()
+    for q, quantity in enumerate(QUANTITIES):
+        values, counts = np.unique(measured[np.isfinite(measured[:, q]), q], return_counts=True)
+        if len(values) < _FEW:
+            continue
+        step = float(np.diff(values).min()) / (values[-1] - values[0])
+        pairs, total = counts * (counts - 1), int(counts.sum())
+        for value, count in zip(values.tolist(), counts.tolist(), strict=True):
+            others = max(total - count, 2)
+            equal = (pairs.sum() - count * (count - 1)) / (others * (others - 1))
+            chance = math.comb(total, count) * max(equal, step) ** (count - 1)
+            if value != 0.0 and count > _FEW and chance < _HELD_CHANCE:
+                measured[measured[:, q] == value, q] = np.nan
+                remarks.append(
+                    f'{quantity} is exactly {value:g} {unit_of(quantity)} in {count} rows: taken '
+                    'for a sensor at the end of its range, or one that stood still, and left out'
+                )
+    return replace(table, measured=measured).select(np.isfinite(measured).any(axis=1))
 
 
 def check_wheel_of_model(table: SteadyTable, configuration: Configuration) -> None:
