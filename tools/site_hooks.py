@@ -23,6 +23,8 @@ EFFECTS = 'effects.md'
 """Page whose formulas are written as the terminal shows them, in indented lines."""
 CONTRIBUTING = 'development/contributing.md'
 """Page that shows ``CONTRIBUTING.md`` of the repository."""
+WORTH, FIGURES = 'worth.md', '<!-- readme_figures: begin -->\n'
+"""Page that shows the table of figures in ``README.md``, and the line before both their figures."""
 
 BOOSTS = {
     'laboratory/': 0.2,
@@ -70,6 +72,10 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
         root = Path(page.file.abs_src_path).parents[2]
         markdown = (root / 'CONTRIBUTING.md').read_text(encoding='utf-8')
         markdown = _OUTSIDE.sub(r'\1 (`\2`)', markdown).replace('](docs/', '](../')
+    if page.file.src_uri == WORTH:
+        readme = (Path(page.file.abs_src_path).parents[1] / 'README.md').read_text(encoding='utf-8')
+        table = readme.partition(FIGURES)[2].partition('<!--')[0]
+        markdown = markdown.replace(FIGURES, f'{table}\n')
     for start, boost in BOOSTS.items():
         if page.file.src_uri.startswith(start):
             page.meta.setdefault('search', {'boost': boost})

@@ -268,14 +268,14 @@ def kinds(rows: Sequence[Row]) -> str:
 
 
 def page(rows: Sequence[Row]) -> str:
-    """Return what stands in docs/worth.md: README's table, then the worst kinds of drives."""
+    """Return what stands in docs/worth.md: where the table is from, the worst kinds of drives."""
     seeds = sorted(int(seed) for seed in by_soil(rows))
     said = (
         f'Seeds {seeds[0]} to {seeds[-1]}, on each every second kind of drive, commit '
         f"{_one_commit(rows)}; the rover file's soil is off by 20 % and more. Drive by drive: "
         '`docs/figures.csv`.\n'
     )
-    return f'{said}\n{markdown(rows)}\n{kinds(rows)}'
+    return f'{said}\n{kinds(rows)}'
 
 
 def _put(page: Path, text: str) -> None:
@@ -288,7 +288,7 @@ def _put(page: Path, text: str) -> None:
 
 
 def write(rows: Sequence[Row]) -> None:
-    """Put the tables into README and worth, README's cells into the file of all figures."""
+    """Put the tables into README and worth.md, README's cells into the file of all figures."""
     commit = _one_commit(rows)
     seeds = sorted(int(seed) for seed in by_soil(rows))
     _put(README, markdown(rows))
