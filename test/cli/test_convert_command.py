@@ -106,7 +106,8 @@ def test_a_map_that_cannot_be_used(convert, example, capsys, old, new, words):
     ('log', 'words'),
     [
         (LOG.replace('.1,30', '.1,abc'), "line 3, column rpm_fl: 'abc' is not a number"),
-        (LOG.replace('100.0', '1.7e12'), 'column time: 1.7e+12 s is not from 0 to 2038; is'),
+        (LOG.replace('100.0', '1.7e12'), 'column time: 1.7e+12 s is not within 1970 to 2038; is'),
+        (LOG.replace('100.0', ''), 'column time: no time; delete the row'),
         ('', 'log.csv: empty; the first line must name the columns'),
         (LOG.replace('.', ','), 'line 2: 17 cells but 13 columns; use commas between'),
     ],

@@ -232,7 +232,11 @@ class _Sender:
         seconds = self.value(line, row, self.layout.time)
         if not 0.0 <= seconds < _LATEST:
             where = f'{self.table}, line {line}, column {self.layout.time.name}'
-            raise UserError(f'{where}: {seconds:g} s is not from 0 to 2038; is its unit right?')
+            if math.isnan(seconds):
+                raise UserError(f'{where}: no time; delete the row, or fill in its time')
+            raise UserError(
+                f'{where}: {seconds:g} s is not within 1970 to 2038; is its unit right?'
+            )
         stamp = max(round(seconds * 1e6) * 1000, 1)  # of a date no more is held; 0 is no stamp
         joints = self.layout.joints
         rates, torques, angles = (
