@@ -289,6 +289,8 @@ def test_joints_to_choose_the_wheels_from_turn_about_y(init, capsys):
         ('<robot name="r"><link name="base_link"/></robot>', '--wheels'),
         ('<sdf/>', '<robot>'),
         (EXPANDED.replace('radius="0.2"', 'radius="${r}"'), 'xacro rover.urdf > rover.urdf'),
+        (CART.replace('mass value="40"', 'mass value="-40"'), 'mass of link chassis is -40 kg'),
+        (CART.replace('right_wheel_joint', 'left_wheel_joint'), "two joints are named 'left_"),
     ],
 )
 def test_what_is_no_urdf(init, tmp_path, capsys, text, word):

@@ -200,7 +200,11 @@ class _Robot:
     def __init__(self, path: Path, root: ElementTree.Element) -> None:
         self.path = path
         self.name = root.get('name', path.stem)
-        self.joints = {j.get('name', ''): j for j in root.iter('joint') if j.get('type')}
+        joints = [(j.get('name', ''), j) for j in root.iter('joint') if j.get('type')]
+        self.joints = dict(joints)
+        for name, joint in joints:
+            if self.joints[name] is not joint:
+                raise UserError(f'{path}: two joints are named {name!r}; rename one')
         self._links = {link.get('name', ''): link for link in root.iter('link')}
         self._above = {
             _link(joint, 'child'): joint for joint in self.joints.values()
@@ -334,8 +338,10 @@ class _Robot:
             if mass_of is None:
                 continue
             mass = _numbers(mass_of.get('value'), (0.0,), self.path)[0]
+            if mass < 0.0:
+                raise UserError(f'{self.path}: the mass of link {name} is {mass:g} kg; correct it')
             pose = self._link_pose(name)
-            if pose is not None and mass > 0.0:
+            if pose is not None and mass:
                 total += mass
                 moment += mass * (pose @ _origin(link.find('inertial'), self.path))[:3, 3]
         centre = moment / total if total else moment
