@@ -202,6 +202,9 @@ def test_what_to_do_next_follows_from_what_stays_open(named):
     said = in_words(replace(whole, effects=(effect,)))
     assert 'does not explain' in said['open'][0]
     assert 'best model so far' in said['next'][0]
+    alike = replace(effect, remainder=False, alike=('another unit of the column',))
+    said = in_words(replace(whole, effects=(alike,)))
+    assert said['open'][0].endswith('from another unit of the column.')
 
 
 @pytest.mark.parametrize(

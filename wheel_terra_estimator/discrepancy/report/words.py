@@ -91,6 +91,8 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
             by = by or known[name].confounded_with.get(effect.name)
             what = f'; what separates them: {by}' if by else ''
             left.append(f'These rows cannot tell {plain(effect.name)} from {plain(name)}{what}.')
+        for other in effect.alike:
+            left.append(f'These rows cannot tell {plain(effect.name)} from {other}.')
     if diagnosis.verdict in OPEN and not still_off:
         left.append('Why these rows need a different soil, or more scatter, than stated.')
     settled = not left
