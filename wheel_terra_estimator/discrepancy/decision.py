@@ -45,8 +45,9 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME as
 _USUAL_Z_SCORE = 2.5  # stated deviations: a larger shift lowers the confidence of a name
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
 # Beside a free soil it fits within one nat of a biased radius, whichever is true (17 tables of
-# another laboratory): the radius alone is measured on a hard floor.
+# another laboratory): the radius alone is measured on a hard floor. Assumed half as frequent.
 _SAME_ERROR = 'the same error of all slips (reference speed, or readings that lag behind a sweep)'
+_SELDOM = 0.5
 _SURE = 2.0  # deviations within which a bias of the radius is the height of the lugs
 _RARE = 3.0  # deviations of its prior, beyond which a gain may as well be something else
 _MOST_TRIED = 3  # doubtful names, after which none is given
@@ -186,7 +187,7 @@ class Decider:
             return names, False
         ahead_of_all = same or (ahead >= _CLEARLY and len(names) > 1)
         odds = _BEATS_LAW if ahead_of_all and not decision.verdict.left.significant else 1.0
-        surer = [confidence(n.features, len(n.alike), odds) for n in names]
+        surer = [confidence(n.features, n.features['alike'], odds) for n in names]
         names = tuple(replace(n, confidence=c) for n, c in zip(names, surer, strict=True))
         return names, _least(names, odds) >= _LIKELY
 
@@ -257,10 +258,10 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
         values = features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
         alike = _known_alike(key, decision, known, table)
-        values['alike'] = float(len(alike))
+        values['alike'] = sum(_SELDOM if other == _SAME_ERROR else 1.0 for other in alike)
         alone = float(selection.totals[selection.index((key,))])
         competitors = decision.verdict.ambiguity_groups[place]
-        sure = confidence(values, len(alike))
+        sure = confidence(values, values['alike'])
         found.append((alone, Naming(key, competitors, sure, values, alike)))
     return tuple(naming for _, naming in sorted(found, key=lambda item: -item[0]))
 

@@ -356,7 +356,7 @@ def wrong_columns(misread: Mapping[str, float | str]) -> str:
         usual = 'of one wheel or of a pair?' if name == 'normal_load' else ''
         which = units_apart(name, times) or usual
         aside = f' ({which})' if which else ''
-        parts.append(f'the unit of {plain(name)} looks wrong{aside}, times {times:.4g}')
+        parts.append(f'the unit of {plain(name)} looks wrong{aside}, it lacks a factor {times:.4g}')
     text = ' and '.join(parts)
     return (
         f'{text[0].upper()}{text[1:]}: that explains the rows far better than any effect. '

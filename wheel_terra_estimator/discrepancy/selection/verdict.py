@@ -294,12 +294,12 @@ def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, fl
     }
 
 
-def confidence(values: Mapping[str, float], alike: int = 0, odds: float = 1.0) -> Confidence:
+def confidence(values: Mapping[str, float], alike: float = 0.0, odds: float = 1.0) -> Confidence:
     """Map features to probabilities.
 
     ``odds``: by which something that the map does not know speaks for the names. ``alike``: effects
-    that are known to look like the name and were not tried: each may be the truth as well, and the
-    set does not have it.
+    that are known to look like the name and were not tried, as a number of equally frequent ones:
+    each may be the truth as well, and the set does not have it.
     """
     weights = _weights()
     vector = np.array([values[name] for name in FEATURES])
