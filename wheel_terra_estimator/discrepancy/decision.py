@@ -257,34 +257,36 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
     for place, key in enumerate(fitted.names):
         values = features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
-        alike = _known_alike(key, decision, known, table)
-        values['alike'] = sum(_SELDOM if other == _SAME_ERROR else 1.0 for other in alike)
-        alone = float(selection.totals[selection.index((key,))])
         competitors = decision.verdict.ambiguity_groups[place]
+        alike = _known_alike(key, decision, known, table.units)
+        values['alike'] = float(len(alike))
+        # Slips of a drive are our own.
+        if 'wheel_radius_bias' in (key, *competitors) and not table.true_rows.any():
+            alike = (*alike, _SAME_ERROR)
+            values['alike'] += _SELDOM
+        alone = float(selection.totals[selection.index((key,))])
         sure = confidence(values, values['alike'])
         found.append((alone, Naming(key, competitors, sure, values, alike)))
     return tuple(naming for _, naming in sorted(found, key=lambda item: -item[0]))
 
 
 def _known_alike(
-    name: str, decision: Decision, known: Mapping[str, Effect], table: SteadyTable
+    name: str, decision: Decision, known: Mapping[str, Effect], units: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """Return what looks like a name and was not tried: effects, another unit, slip or radius."""
+    """Return what looks like a name and was not tried: effects, another unit or radius."""
     findings, fitted = decision.findings, decision.after
     points, found = findings.setting.forward.points, list[str]()
     heights = points.wheel.lug_height / points.wheel.radius
     lug = float(np.max(heights)) if np.ptp(heights) == 0.0 else 0.0
     due = {'rim': -lug / (1.0 + lug), 'lug_tip': lug}.get(points.slip_radius, 0.0)
     for c, u, value, scatter, _ in fitted.numbers():
-        if c.key == f'{name}.bias' == 'wheel_radius_bias.bias':
-            if not table.true_rows.any():  # slips of a drive are our own
-                found.append(_SAME_ERROR)
+        if c.key == f'{name}.bias' == 'wheel_radius_bias.bias' and due:
             other = 'rim' if points.slip_radius == 'lug_tip' else 'lug_tip'
-            if due and abs(value - due) < _SURE * scatter:
+            if abs(value - due) < _SURE * scatter:
                 found.append(f'a slip that refers to the other radius (slip_radius: {other})')
         elif c.unit == '-' and effect_of(c.owner) == effect_of(name) in _GAINS:
             column, gain = min(known[c.owner].touches), 1.0 + value
-            text = units_apart(column, 1.0 / gain, scatter / gain, table.units.get(column, 1.0))
+            text = units_apart(column, 1.0 / gain, scatter / gain, units.get(column, 1.0))
             if text:
                 found.append(f'another unit of the column ({text})')
             elif abs(u) > _RARE:
