@@ -262,7 +262,7 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
         values['alike'] = float(len(alike))
         # Slips of a drive are our own.
         if 'wheel_radius_bias' in (key, *competitors) and not table.true_rows.any():
-            alike = (*alike, _SAME_ERROR)
+            alike = (_SAME_ERROR, *alike)
             values['alike'] += _SELDOM
         alone = float(selection.totals[selection.index((key,))])
         sure = confidence(values, values['alike'])
