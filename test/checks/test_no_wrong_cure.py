@@ -824,3 +824,28 @@ def test_rates_in_rpm_at_a_slip_of_a_third_may_be_counts_of_a_coarse_encoder():
         'rate_unit': 0.45,
         'rate_counts': 0.45,
     }
+
+
+def test_out_and_back_in_the_world_is_no_reversing():
+    """After half a turn in place a velocity in the world is negative, and the wheels are not."""
+    time = np.arange(0.0, 150.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [10, 11, 58, 59, 70, 71, 130, 131], [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0])
+    yaw = np.interp(time, [60, 61, 66, 67], [0.0, math.pi / 6.0, math.pi / 6.0, 0.0])
+    whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    way = np.interp(whole.reference.seconds, time, np.sign(np.cos(np.cumsum(yaw) / rolling.RATE)))
+    world = {'velocity': whole.reference.velocity * way[:, None]}
+    assert faults(checked(whole=whole, reference=world)) == ['reference_world']
+
+
+@pytest.mark.parametrize('share', [1.0, 0.6])
+def test_rates_of_a_rover_that_drives_down_backwards_show_that_they_have_no_sign(share):
+    """On 12 degrees; one that goes by other than its wheels may slide."""
+    drive = rolling.ten_minute_drive(turns=False)
+    steep = rolling.recording(replace(drive, slope=0.2 * (drive.time > 4.0)))
+    back = (steep.reference.velocity[:, :1] < -0.1) * (share - 1.0) + 1.0
+    report = checked(
+        whole=steep,
+        joints={'rate': np.abs(steep.joints.rate)},
+        reference={'velocity': back * steep.reference.velocity},
+    )
+    assert ('rates_unsigned' in faults(report)) == (share == 1.0)

@@ -32,6 +32,7 @@ from wheel_terra_estimator.checks.statistics import (
 LEAST_REFERENCES = 10
 ALIKE_BOTH_WAYS = 0.5  # smaller over larger of the speeds, or torques, forward and back [-]
 SELDOM_NEGATIVE = 0.1  # share of negative speeds of what has no sign, by noise, at most [-]
+AS_FAST = (0.7, 1.3)  # nearly all speeds over rim speeds of a rover that drives back, no slide [-]
 ALWAYS_ZERO = 0.9  # share of rates that are 0 to the last digit where a sign is cut off [-]
 SHARES_NOISE = 0.3  # of the rates: what differs by less from the wheels has their noise in it [-]
 JUMP_FACTOR = 8.0  # a jump over the usual change [-]
@@ -44,6 +45,7 @@ LEAST_STD = 1e-4  # standard deviation [m/s] that is proposed at least
 AHEAD = 0.3  # mean of the rims over the usual size of one, above which the rover goes ahead [-]
 CLEAR_HEADING = 1.0  # turn in which a frame of the world is told from one of the rover [rad]
 STEADY = 0.9  # length of the mean direction of a velocity that keeps to a frame [-]
+ASIDE_SHARE = 0.5  # speed aside over speed of a rover that skids in turns, at most [-]
 ASIDE = 'reference.aside_deg'
 FAR_ASIDE = math.radians(12.0)  # direction in which 2 % of a speed along x are lost [rad]
 MOST_SLIPPING, USUAL_SLIP = 1.0 / 3.0, (0.75, 1.1)
@@ -82,8 +84,11 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     both = min(np.mean(forward > least), np.mean(forward < -least)) > SELDOM_NEGATIVE
     speed = np.interp(evidence.time, evidence.seconds(reference), moving_mean(forward, LEAST_ROWS))
     cut = _cut_off(evidence, speed > least, speed < -least)
-    unsigned = cut or (_without_sign(rim, forward) and not _slides(evidence, speed < -least))
+    share = -forward[forward < -least] / np.maximum(rim[forward < -least], 1e-9)
+    unsigned = cut or (_without_sign(rim, forward) and not _slides(evidence, speed < -least, share))
     if not both or _sideways(reference) or not unsigned:
+        return [], evidence
+    if _direction(evidence, reference, rim)[1]:  # back in the world, not by the rover
         return [], evidence
     # In turns the sides may be unlike; of what was cut off at 0 nothing is known.
     unknown = (evidence.moving & ~evidence.unturned)[:, None]
@@ -95,13 +100,18 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [finding], evidence.with_rate(rate)
 
 
-def _slides(evidence: Evidence, back: Mask) -> bool:
-    """Whether a rover that goes back may slide down a slope, however its IMU is turned."""
+def _slides(evidence: Evidence, back: Mask, share: FloatArray) -> bool:
+    """Whether a rover that goes back may slide down a slope, however its IMU is turned.
+
+    One that drives down it goes as fast as its wheels: ``share`` of their speed (k,) [-].
+    """
     rows = evidence.moving & back
     if evidence.force is None or not rows.any():
         return False
     steep = float(np.median(np.linalg.norm(evidence.force[rows, :2], axis=1)))
-    return steep > SLIDES_BACK * evidence.facts.gravity
+    low, high = np.quantile(share, (0.1, 0.9))
+    driven = evidence.facts.known and AS_FAST[0] < low and high < AS_FAST[1]
+    return steep > SLIDES_BACK * evidence.facts.gravity and not driven
 
 
 def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -123,7 +133,7 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 def _sideways(reference: VelocitySeries) -> bool:
     """Return whether a velocity is not that along x of the rover alone."""
     forward, side = reference.velocity[:, 0], np.abs(reference.velocity[:, 1])
-    return bool(np.quantile(side, 0.9) > 0.2 * np.median(np.hypot(forward, side)))
+    return bool(np.quantile(side, 0.9) > ASIDE_SHARE * np.quantile(np.hypot(forward, side), 0.9))
 
 
 def _cut_off(evidence: Evidence, forth: Mask, back: Mask) -> bool:
@@ -187,22 +197,18 @@ def check_frame(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome], Evidence]:
     """Find a velocity that is given in a world frame: it keeps its direction there."""
     rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
-    moving = np.abs(rim) > 0.3 * np.quantile(np.abs(rim), 0.9)
-    if moving.sum() < LEAST_ROWS:
+    direction, in_world = _direction(evidence, reference, rim)
+    if math.isnan(abs(direction)):
         return [], evidence
     velocity = reference.velocity[:, 0] + 1j * reference.velocity[:, 1]
-    direction = (velocity * np.sign(rim) / np.maximum(np.abs(velocity), 1e-9))[moving]
-    heading = integrated(evidence.time, evidence.yaw)
-    psi = np.interp(evidence.seconds(reference), evidence.time, heading)[moving]
-    in_body, in_world = abs(direction.mean()), abs((direction * np.exp(-1j * psi)).mean())
-    if np.ptp(psi) > CLEAR_HEADING and in_world > max(STEADY, 0.5 * (1.0 + in_body)):
+    if in_world:
         along = np.column_stack([np.abs(velocity) * np.sign(rim), 0.0 * rim, 0.0 * rim])
         mended = evidence.with_channel('reference', velocity=along)
         return [evidence.found('reference_world', 0.95)], mended
-    if in_body < STEADY:
+    if abs(direction) < STEADY:
         unclear: list[Outcome] = [not_checked('mounting', 'reference_frame')]
         return unclear if _sideways(reference) else [], evidence
-    aside = float(np.angle(direction.mean()))  # whatever jumps there are
+    aside = float(np.angle(direction))  # whatever jumps there are
     if abs(aside) < FAR_ASIDE:
         return [], evidence
     angle = math.degrees(aside)
@@ -214,6 +220,25 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         'reference', velocity=np.column_stack([turned.real, turned.imag, 0.0 * rim])
     )
     return [evidence.found('reference_turned', 0.5, value=angle, angle=angle)], mended
+
+
+def _direction(
+    evidence: Evidence, reference: VelocitySeries, rim: FloatArray
+) -> tuple[complex, bool]:
+    """Return the mean direction of a velocity along the wheels, nan where these hardly turn.
+
+    And whether it turns with the heading, as in a frame of the world.
+    """
+    moving = np.abs(rim) > 0.3 * np.quantile(np.abs(rim), 0.9)
+    if moving.sum() < LEAST_ROWS:
+        return math.nan, False
+    velocity = reference.velocity[:, 0] + 1j * reference.velocity[:, 1]
+    direction = (velocity * np.sign(rim) / np.maximum(np.abs(velocity), 1e-9))[moving]
+    heading = integrated(evidence.time, evidence.yaw)
+    psi = np.interp(evidence.seconds(reference), evidence.time, heading)[moving]
+    in_body, in_world = abs(direction.mean()), abs((direction * np.exp(-1j * psi)).mean())
+    turns = np.ptp(psi) > CLEAR_HEADING and in_world > max(STEADY, 0.5 * (1.0 + in_body))
+    return complex(direction.mean()), bool(turns)
 
 
 def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[FloatArray, Mask]:
