@@ -849,3 +849,32 @@ def test_rates_of_a_rover_that_drives_down_backwards_show_that_they_have_no_sign
         reference={'velocity': back * steep.reference.velocity},
     )
     assert ('rates_unsigned' in faults(report)) == (share == 1.0)
+
+
+def test_a_wheel_that_a_rover_of_two_turns_about_is_not_frozen():
+    """Half a minute about the left wheel, whose coarse encoder shows nothing."""
+    time = np.arange(0.0, 80.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [4.0, 5.0, 75.0, 76.0], [0.0, 0.3, 0.3, 0.0])
+    yaw = np.interp(time, [30, 31, 60, 61], [0.0, 0.75, 0.75, 0.0])  # speed over half the track
+    whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    stands = np.abs(whole.joints.rate[:, :2]) < 0.2
+    rate = np.where(stands, 0.0, whole.joints.rate[:, :2])
+    joints = {'names': rolling.NAMES[:2], 'rate': rate, 'torque': whole.joints.torque[:, :2]}
+    two = {key: rolling.PARAMETERS[key][:2] for key in rolling.PARAMETERS if 'wheels' in key}
+    file = rolling.rover(**two, **{'rover.suspension': 'shares'})
+    assert 'rate_frozen' not in faults(checked(file, whole=whole, joints=joints, sinkage=None))
+    dead = joints | {'rate': rate * [0.0, 1.0]}
+    assert 'rate_frozen' in faults(checked(file, whole=whole, joints=dead, sinkage=None))
+
+
+def test_counts_that_come_and_go_at_a_crawl_are_no_zeros_of_a_wheel_in_another_unit():
+    time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [4.0, 5.0, 60.0, 61.0], [0.0, 0.3, 0.3, 0.02])
+    whole = rolling.recording(rolling.Motion(time, speed, 0.0 * time, 0.0 * time))
+    turned = np.cumsum(speed) / rolling.RATE / rolling.RADIUS
+    counts = np.floor(turned[:, None] / 0.02 + [0.1, 0.3, 0.6, 0.8])
+    random = np.random.default_rng(2)
+    interval = random.uniform(0.99, 1.01, time.size) / rolling.RATE
+    rate = 0.02 * np.diff(counts, axis=0, prepend=counts[:1]) / interval[:, None]
+    told = checked(whole=whole, joints={'rate': rate * [30.0 / math.pi, 1.0, 1.0, 1.0]}).findings
+    assert {f.kind for f in told} >= {'unit'} and 'jumps' not in {f.kind for f in told}

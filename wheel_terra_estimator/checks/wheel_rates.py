@@ -134,9 +134,11 @@ def _stands(evidence: Evidence, index: int) -> float:
         if side.sum() > 1:  # which the rover may turn about
             busy &= ~(evidence.rate[:, side] == 0.0).all(axis=1) | straight
             along = np.delete(evidence.rate, index, axis=1)[:, np.delete(side, index)]
+        else:  # which alone it may turn about
+            busy &= straight
         mean = np.abs(moving_mean(np.nan_to_num(own), evidence.rows_in(NOISE_TIME)))
         small = np.isfinite(own) & (mean < NEXT_TO_NOTHING * np.abs(row_medians(along)))
-        zero |= small if side.sum() > 1 else small & straight & (evidence.gyro is not None)
+        zero |= small & (side.sum() > 1 or evidence.gyro is not None)
     longest = 0.0
     for start, end in runs(zero | ~busy):
         rows = np.flatnonzero(busy[start:end]) + start
@@ -168,7 +170,8 @@ def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     Zeros of a reference may last for any time while the wheels drive.
     """
     outcomes, zero = list[Outcome](), evidence.rate == 0.0
-    fast = np.abs(evidence.rate) > LIVELY * evidence.working_rate
+    size = np.abs(evidence.rate)
+    fast = size > LIVELY * np.nanquantile(size, 0.9, axis=0)
     count = [np.unique(one).size > FINE for one in evidence.rate.T]  # else counts come and go
     for column, drives, fine in zip(zero.T, fast.T, count, strict=True):
         short = _sudden(column, drives, evidence.time, SHORT_ZERO + evidence.period)
