@@ -878,3 +878,14 @@ def test_counts_that_come_and_go_at_a_crawl_are_no_zeros_of_a_wheel_in_another_u
     rate = 0.02 * np.diff(counts, axis=0, prepend=counts[:1]) / interval[:, None]
     told = checked(whole=whole, joints={'rate': rate * [30.0 / math.pi, 1.0, 1.0, 1.0]}).findings
     assert {f.kind for f in told} >= {'unit'} and 'jumps' not in {f.kind for f in told}
+
+
+@pytest.mark.parametrize(('seconds', 'sure'), [(0.3, False), (0.0, True)])
+def test_a_lag_of_a_chassis_is_no_clock_for_sure(seconds, sure):
+    """What is stamped 0.3 s late when it comes is late for sure only if it would come before."""
+    imu = later('imu', seconds, stamp=0.3)
+    (told,) = [f for f in checked(**imu, reference=None).findings if f.kind == 'delay']
+    assert (told.confidence > 0.8) == sure
+    written = calibrate(replace(WHOLE, **imu, reference=None), rolling.rover()).changes
+    assert ('sensors.imu_stamp_offset' in {c.key for c in written}) == sure
+    assert sure or not any('stamp_offset' in change.key for change in written)

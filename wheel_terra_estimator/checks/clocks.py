@@ -44,6 +44,7 @@ SMOOTH = 0.02  # unlike part that a lag leaves of speeds that are made smooth, b
 FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part, at most
 LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
 """Deviation of a lag by chassis and filters; log time leaves the age of a velocity open [s]."""
+CHASSIS_SIGMAS = 2.5  # of these, up to which a lag may be that of a chassis (a Husky turns 0.28 s late)
 AGREEING_LAGS = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS, SHARP_SIGMAS = 4.0, 10.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]
@@ -213,11 +214,16 @@ def _outcome(evidence: Evidence, name: str, lag: Lag) -> Outcome:
         off = ' and '.join(f'{late:+.2f} s' for late in lag.halves)
         return not_checked('delay', 'drifts', topic=channel.topic, off=off)
     std = _whole_std(evidence, name, lag)
-    against, sure = lag.by + lag.trial.words('unlike part', ''), 0.97
+    in_future = lag.value > 0.0 and float(np.median(channel.late)) < FUTURE
+    against, sure, alternative = lag.by + lag.trial.words('unlike part', ''), 0.97, ''
     if lag.by == BY_LOG:
-        on_the_way = -LONGEST_WAY < lag.value < 0.0
-        alternative, sure = (', or its messages come late', 0.5) if on_the_way else ('', 0.97)
-        against = f'log time: two clocks{alternative}'
+        against = 'log time: two clocks'
+        if -LONGEST_WAY < lag.value < 0.0:
+            alternative = ', or its messages come late'
+    elif abs(lag.value) < CHASSIS_SIGMAS * LEAST_STD[lag.by] and not in_future:
+        alternative = ', or chassis, soil or filters lag so much'
+    if alternative:
+        against, sure = f'{against}{alternative}', 0.5
     details = of_offset(name, lag.value, std, against, evidence.facts)
     return evidence.found(f'{name}_offset', sure, **details)
 
