@@ -889,3 +889,13 @@ def test_a_lag_of_a_chassis_is_no_clock_for_sure(seconds, sure):
     written = calibrate(replace(WHOLE, **imu, reference=None), rolling.rover()).changes
     assert ('sensors.imu_stamp_offset' in {c.key for c in written}) == sure
     assert sure or not any('stamp_offset' in change.key for change in written)
+
+
+@pytest.mark.parametrize('starts', [True, False])
+def test_an_imu_upside_down_may_be_turned_about_either_axis_where_no_start_tells(starts):
+    drive = rolling.ten_minute_drive()
+    drive = drive if starts else replace(drive, speed=0.0 * drive.speed + 0.3)
+    whole = rolling.recording(drive)
+    back = {name: getattr(whole.imu, name) * [1.0, -1.0, -1.0] for name in ('force', 'rate')}
+    (told,) = [f for f in checked(whole=whole, imu=back).findings if f.fault == 'imu_upside']
+    assert (told.confidence > 0.8) == starts and ('x axis' in told.words) == (not starts)

@@ -476,6 +476,9 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if upright > -CLEAR_AGREEMENT:
             sure = UNTURNED
             words['alternative'] = ', or linear_acceleration has the wrong sign: drive circles'
+    if mounting_yaw(mended) is None:  # about another axis it would be upright as well
+        sure = 0.5
+        words['alternative'] = f'{words.get("alternative", "")}, which way its x axis points is open'
     std = math.degrees(STEEPEST_MEAN) / 3.0
     return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended
 
