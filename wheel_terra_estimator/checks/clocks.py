@@ -44,7 +44,7 @@ SMOOTH = 0.02  # unlike part that a lag leaves of speeds that are made smooth, b
 FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}  # unlike part, at most
 LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
 """Deviation of a lag by chassis and filters; log time leaves the age of a velocity open [s]."""
-CHASSIS_SIGMAS = 2.5  # of these, up to which a lag may be that of a chassis (a Husky turns 0.28 s late)
+CHASSIS_SIGMAS = 2.5  # of these, up to which a lag may be theirs (a Husky turns 0.28 s late)
 AGREEING_LAGS = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS, SHARP_SIGMAS = 4.0, 10.0
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]

@@ -478,7 +478,8 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             words['alternative'] = ', or linear_acceleration has the wrong sign: drive circles'
     if mounting_yaw(mended) is None:  # about another axis it would be upright as well
         sure = 0.5
-        words['alternative'] = f'{words.get("alternative", "")}, which way its x axis points is open'
+        words.setdefault('alternative', '')
+        words['alternative'] += '; which way its x axis points is open: drive brisk starts'
     std = math.degrees(STEEPEST_MEAN) / 3.0
     return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended
 
