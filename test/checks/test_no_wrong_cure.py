@@ -899,3 +899,16 @@ def test_an_imu_upside_down_may_be_turned_about_either_axis_where_no_start_tells
     back = {name: getattr(whole.imu, name) * [1.0, -1.0, -1.0] for name in ('force', 'rate')}
     (told,) = [f for f in checked(whole=whole, imu=back).findings if f.fault == 'imu_upside']
     assert (told.confidence > 0.8) == starts and ('x axis' in told.words) == (not starts)
+
+
+def test_a_gyro_that_turns_sixty_times_as_its_orientation_is_in_degrees():
+    """So little is turned, and by slip, that neither shows the scale well."""
+    drive = rolling.ten_minute_drive(turns=False)
+    turns = 0.06 * np.sin(0.3 * drive.time) * (drive.time > 110.0)
+    whole = rolling.recording(replace(drive, yaw_rate=turns))
+    straight = {'rate': rolling.recording(drive).joints.rate}
+    half = 0.47 * np.interp(whole.imu.seconds, drive.time, np.cumsum(turns) / rolling.RATE)
+    shown = np.column_stack([0.0 * half, 0.0 * half, np.sin(half), np.cos(half)])
+    imu = {'rate': np.degrees(whole.imu.rate), 'orientation': shown}
+    told = checked(whole=whole, joints=straight, imu=imu).findings
+    assert {f.fault for f in told if f.kind in ('unit', 'gain')} == {'gyro_degrees'}

@@ -69,6 +69,7 @@ UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
 CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
 SLIDE = ', or the rover slides back'
+DEGREE, NEAR_DEGREES = math.radians(1.0), 0.15  # [rad]; error of a scale that few turns tell [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
@@ -587,11 +588,15 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         parts = [block_fit(both, turns)[0].value for turns in (aside, across, gyro)]
         off = min((cure.value - 1.0, 1.0 / math.hypot(*parts) - 1.0), key=abs)
         if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
-            details = {'value': cure.value, 'times': 1.0 / cure.value, 'against': name}
-            finding = evidence.found('gyro_scale', 0.9, std=cure.std, **details)
+            details = {'times': 1.0 / cure.value, 'against': name}
+            finding = evidence.found('gyro_scale', 0.9, value=cure.value, std=cure.std, **details)
             times = np.array([1.0, 1.0, cure.value])
             if not 0.5 < cure.value < 2.0:  # another unit, of all axes
                 times[:] = cure.value
+            if abs(cure.value / DEGREE - 1.0) < NEAR_DEGREES:
+                how = f'turning by {name}'
+                finding = evidence.found('gyro_degrees', 0.95, value=DEGREE, **details, how=how)
+                times[:] = DEGREE
             evidence = evidence.with_channel('imu', rate=imu.rate * times)
             return [finding], replace(evidence, gyro=evidence.gyro * times)
     return [], evidence
