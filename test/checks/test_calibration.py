@@ -166,6 +166,16 @@ def test_zeros_of_the_torques_are_told_where_straights_are_driven_both_ways():
     assert np.array(after.after) - stood == pytest.approx(zeros, abs=0.1)
 
 
+def test_loads_that_a_slope_shifts_to_the_rear_are_no_zeros():
+    """Up forwards, down backwards: the rear wheels carry more of the slope both ways."""
+    joints = rolling.recording().joints
+    share = 0.053 * rolling.MASS * rolling.GRAVITY * rolling.RADIUS / 4.0
+    shifted = share * np.array([-1.0, -1.0, 1.0, 1.0])
+    turning = np.abs(joints.rate) > 0.5
+    told, _ = calibrated(joints=replace(joints, torque=joints.torque + shifted * turning))
+    assert 'sensors.torque_zero' not in {change.key for change in told.changes}
+
+
 def test_a_scale_that_may_be_the_mass_is_left_to_the_user():
     joints = rolling.recording().joints
     wrong = replace(rolling.recording(), joints=replace(joints, torque=1.4 * joints.torque))

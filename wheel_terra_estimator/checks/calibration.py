@@ -25,6 +25,7 @@ WORTH_CHANGING = 0.2  # relative change of a noise or rate that is written, at l
 NOISE_STD = 0.1  # relative deviation of a noise that a drive tells [-]
 LEAST_SURE = 0.8  # confidence from which a cure is written [-]
 CLEAR = 2.0  # deviations by which a number is off, from which another is written [-]
+CLEAR_ZERO = 2.5  # the same of the largest torque zero, over the largest of their deviations [-]
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,8 @@ def _torques(changes: _Changes, evidence: Evidence) -> None:
     zeros = torque.torque_zeros(evidence)
     if zeros is None or torque.like_a_pitch(evidence, zeros):
         return
-    if any(zero.sigmas_from(0.0) > CLEAR for zero in zeros):
+    std = max(zero.std for zero in zeros)  # loads that shift with slopes are in none of them alone
+    if max(abs(zero.value) for zero in zeros) > CLEAR_ZERO * std:
         zeros = torque.whole_zeros(evidence, zeros)
         after, std = [round(zero.value, 3) for zero in zeros], max(zero.std for zero in zeros)
         source = 'straight stretches driven both ways'
