@@ -114,6 +114,20 @@ def test_a_lateral_reference_corrects_the_model_and_fades():
     assert late.velocity_variance == pytest.approx(alone.velocity_variance, rel=1e-3)
 
 
+def test_forces_that_an_unknown_yaw_rate_would_change_are_that_uncertain():
+    """A gyro as noisy as that of a shaken rover, on wheels that hardly turn: forces are drawn."""
+    slow = {'speed': 0.01, 'rims': (0.01,) * 4, 'shear_modulus': 0.002}
+    noise = 0.01  # [rad/s]
+    drawn = np.random.default_rng(3).normal(0.0, noise, 300)
+    forces = [told(**slow, yaw_rate=rate, yaw_rate_std=noise).force for rate in drawn]
+    scatter = np.std(forces, axis=0)
+    assert (scatter > 5.0).all()  # [N], so that it is the noise that counts
+    found = told(**slow, yaw_rate_std=noise)
+    assert (found.force_std > 0.7 * scatter).all()
+    known = told(**slow, yaw_rate_std=1e-6)
+    assert (known.force_std < 0.5 * scatter).all()
+
+
 def test_at_rest_angles_are_held_and_not_known():
     motion = SidewaysMotion(ROVER)
     before = motion.update(0.0, STRAIGHT._replace(lateral_force=1.0))

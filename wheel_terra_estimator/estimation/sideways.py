@@ -190,9 +190,13 @@ class SidewaysMotion(Component[SidewaysState]):
         angle_std = _angle_std(along, across, np.sqrt(var_along), np.sqrt(var_across))
         forces = _wheel_forces(contacts, velocity, rover.rest_speed, given.shear_modulus)
         _, std = _measured_force(rover, given)
+        # The sum is measured; of what turning would change, the wheels have opposite parts.
+        turned = velocity + given.yaw_rate_std * np.outer((1.0, -1.0), x)
+        changes = _wheel_forces(contacts, turned, rover.rest_speed, given.shear_modulus) - forces
+        by_turning = 0.5 * np.square(changes).sum(axis=0)
         loads = np.array(given.loads)
         shared = std * loads / max(float(loads.sum()), TINY)
-        force_std = np.hypot(_FORCE_SHARE * np.abs(forces), shared)
+        force_std = np.sqrt((_FORCE_SHARE * forces) ** 2 + shared**2 + by_turning)
         return Sideways(
             _floats(angle),
             _floats(np.minimum(angle_std, UNKNOWN_ANGLE_STD)),
