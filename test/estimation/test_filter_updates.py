@@ -122,6 +122,20 @@ def test_a_rover_that_drives_faster_than_its_wheels_is_not_believed(parts):
     assert found[0.13] == pytest.approx(0.045, abs=0.002)
 
 
+def test_a_reference_after_a_long_gap_is_believed_at_once_and_not_the_models(parts):
+    """Rims run at 0.05 m/s, readings come every 10 s: one shows a rover that no longer advances.
+
+    One that is faster than the wheels is wild, and one on standing wheels may be.
+    """
+    for speed, still, expected in ((0.002, False, 0.002), (0.07, False, 0.045), (0.05, True, 0.0)):
+        fresh = parts.filter()
+        fresh.set(SPEED, 0.0 if still else 0.045, 0.001**2)
+        update, _ = references(parts, fresh, [float(fresh.x[SPEED])] * 3, gap=10.0)
+        assert hear(parts, update, fresh, 30.0, speed, still=still) is (speed == expected)
+        assert fresh.x[SPEED] == pytest.approx(expected, abs=0.003)
+        assert (update.model_variance_factor > 50.0) is (speed == expected)
+
+
 def test_models_are_doubted_while_the_references_keep_to_one_side(parts, ekf):
     """Each of these is within its gate; six to one side are none by chance (0.4 %)."""
     rng = np.random.default_rng(7)

@@ -41,7 +41,7 @@ _UNSEEN_ACCELERATION = 0.05
 jump: a speed changes gradually, errors of satellites begin at once."""
 _LASTING = 2.2
 """Time since a reference was last believed from which agreeing outliers that began with a jump are
-believed [s]: errors of satellites last for a second or two."""
+believed [s], and gap from which readings are seldom: errors of satellites last a second or two."""
 _LASTING_BEYOND = 4.2  # the same for outliers beyond the rim speed [s]
 _GATE = 4.0  # NIS to which that of an outlier is reduced [-]
 _GATE_BEYOND = 0.01  # the same for one beyond the rim speed [-]
@@ -51,6 +51,7 @@ class ReferenceState(NamedTuple):
     """Memory of past references."""
 
     time: float = -math.inf  # of the last one [s]
+    gap: float = math.inf  # between the last two [s]
     slip_time: float = -math.inf
     """Of the last one that shows the slip [s]: not rejected, and not at rest."""
     slip_time_before: float = -math.inf  # of the one before it [s]
@@ -143,7 +144,8 @@ class ReferenceUpdate(Component[ReferenceState]):
         if still:
             self._note_slide(ekf, time, reference.forward, variance)
         gap, step = time - self.state.time, abs(reference.forward - self.state.forward)
-        self.state = self.state._replace(time=time, forward=reference.forward)
+        gap_before = self.state.gap
+        self.state = self.state._replace(time=time, gap=gap, forward=reference.forward)
         residual, prior = self.innovation(ekf, reference)
         total = prior + variance
         nis = residual * residual / total
@@ -166,7 +168,14 @@ class ReferenceUpdate(Component[ReferenceState]):
                 unseen = _JUMP_STD * math.sqrt(2.0 * variance) + _UNSEEN_ACCELERATION * gap
                 state = state._replace(jumped=step > unseen)
             believed = lasts or not (beyond or state.jumped)
-            inflated = same and believed and state.rejected_in_a_row > 0
+            # Where readings are seldom, the slip has more often changed than one is wild: it is
+            # believed at once, unless the rover would be faster than its wheels.
+            faster = abs(reference.forward) > fastest_rim + _MOVING_STD * math.sqrt(variance)
+            alone = min(gap, gap_before) > _LASTING and not (still or faster)
+            inflated = alone or (same and believed and state.rejected_in_a_row > 0)
+            if alone:
+                # The models did not foresee it, and would draw the speed back until the next one.
+                state = state._replace(mean_innovation=score)
             if inflated:
                 ekf.inflate(SPEED, residual * residual)
             else:
