@@ -63,7 +63,13 @@ def hear(parts, update, ekf, time, speed, still=False, fastest_rim=0.05):
     """Fuse a reference of the stated deviation; return whether the speed was opened to it."""
     reading, variance = ReferenceVelocity(0, speed, 0.0), parts.sensors.reference_std**2
     return update.update(
-        ekf, time, reading, still=still, fastest_rim=fastest_rim, variance=variance
+        ekf,
+        time,
+        reading,
+        still=still,
+        fastest_rim=fastest_rim,
+        opposed=speed < 0.0,
+        variance=variance,
     )
 
 
@@ -125,9 +131,16 @@ def test_a_rover_that_drives_faster_than_its_wheels_is_not_believed(parts):
 def test_a_reference_after_a_long_gap_is_believed_at_once_and_not_the_models(parts):
     """Rims run at 0.05 m/s, readings come every 10 s: one shows a rover that no longer advances.
 
-    One that is faster than the wheels is wild, and one on standing wheels may be.
+    One that is faster than the wheels or against them is wild, and one on standing wheels may be.
     """
-    for speed, still, expected in ((0.002, False, 0.002), (0.07, False, 0.045), (0.05, True, 0.0)):
+    cases = (
+        (0.002, False, 0.002),
+        (-0.002, False, -0.002),
+        (-0.03, False, 0.045),
+        (0.07, False, 0.045),
+        (0.05, True, 0.0),
+    )
+    for speed, still, expected in cases:
         fresh = parts.filter()
         fresh.set(SPEED, 0.0 if still else 0.045, 0.001**2)
         update, _ = references(parts, fresh, [float(fresh.x[SPEED])] * 3, gap=10.0)

@@ -494,6 +494,7 @@ class WheelSoilEstimator:
             reference,
             still=cycle.still,
             fastest_rim=self._wheels.fastest(),
+            opposed=cycle.yaw_compensated.oppose(reference.forward),
             variance=noise,
         )
 

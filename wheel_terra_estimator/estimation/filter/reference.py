@@ -134,12 +134,14 @@ class ReferenceUpdate(Component[ReferenceState]):
         *,
         still: bool,
         fastest_rim: float,
+        opposed: bool,
         variance: float,
     ) -> bool:
         """Fuse a reference velocity at a time [s]; return whether its variance was inflated.
 
-        `still`: no wheel turns; `fastest_rim` is the greatest rim speed [m/s], `variance` that of
-        the reading, as stated or, if greater, as observed [(m/s)^2].
+        `still`: no wheel turns; `opposed`: all wheels turn against the reading; `fastest_rim` is
+        the greatest rim speed [m/s], `variance` that of the reading, as stated or, if greater, as
+        observed [(m/s)^2].
         """
         if still:
             self._note_slide(ekf, time, reference.forward, variance)
@@ -169,9 +171,10 @@ class ReferenceUpdate(Component[ReferenceState]):
                 state = state._replace(jumped=step > unseen)
             believed = lasts or not (beyond or state.jumped)
             # Where readings are seldom, the slip has more often changed than one is wild: it is
-            # believed at once, unless the rover would be faster than its wheels.
-            faster = abs(reference.forward) > fastest_rim + _MOVING_STD * math.sqrt(variance)
-            alone = min(gap, gap_before) > _LASTING and not (still or faster)
+            # believed at once, unless the rover would be faster than its wheels or against them.
+            noise = _MOVING_STD * math.sqrt(variance)
+            possible = abs(reference.forward) < (0.0 if opposed else fastest_rim) + noise
+            alone = min(gap, gap_before) > _LASTING and possible and not still
             inflated = alone or (same and believed and state.rejected_in_a_row > 0)
             if alone:
                 # The models did not foresee it, and would draw the speed back until the next one.
