@@ -69,9 +69,11 @@ def _is_empty(domain):
 
 
 @pytest.fixture(autouse=True)
-def no_node_stays():
-    """Managed nodes of this process lie in cycles: the next test would hear of another node."""
-    yield
+def no_node_is_left():
+    """Managed nodes of this process lie in cycles: the next test would hear of another node.
+
+    Before each test: pytest holds what a test was given until after its teardown.
+    """
     gc.collect()
 
 
