@@ -36,9 +36,9 @@ SETTINGS = {
 PANELS = ('sinkage [mm]', 'drawbar pull [N]', 'torque [N m]', 'lateral force [N]')
 SCALES = (1e3, 1.0, 1.0)
 SMOOTH = frozenset({'rim_friction'})
-HASHES = re.compile(
-    'p[0-9a-f]{10}'
-)  # names of clips: of places to the last bit, which machines vary
+HASHES = re.compile('p[0-9a-f]{10}')
+"""Names of clips in a picture: hashes of places, which differ from machine to machine in the last
+bit."""
 
 
 def draw(effect: Effect, path: Path) -> None:
