@@ -198,8 +198,9 @@ def _torques(changes: _Changes, evidence: Evidence) -> None:
     zeros = torque.torque_zeros(evidence)
     if zeros is None or torque.like_a_pitch(evidence, zeros):
         return
-    std = max(zero.std for zero in zeros)  # loads that shift with slopes are in none of them alone
-    if max(abs(zero.value) for zero in zeros) > CLEAR_ZERO * std:
+    # Loads that slopes shift look like zeros of single wheels, whose own deviations are small.
+    largest_std = max(zero.std for zero in zeros)
+    if max(abs(zero.value) for zero in zeros) > CLEAR_ZERO * largest_std:
         zeros = torque.whole_zeros(evidence, zeros)
         after, std = [round(zero.value, 3) for zero in zeros], max(zero.std for zero in zeros)
         source = 'straight stretches driven both ways'

@@ -44,10 +44,10 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME as
 
 _USUAL_Z_SCORE = 2.5  # stated deviations: a larger shift lowers the confidence of a name
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
-# Beside a free soil it fits within one nat of a biased radius, whichever is true (17 tables of
-# another laboratory): the radius alone is measured on a hard floor. Assumed half as frequent.
+# Beside a free soil it fits within one nat of a biased radius, whichever is true (16 of 17 tables
+# of an independent simulation): the radius alone is measured on a hard floor.
 _SAME_ERROR = 'the same error of all slips (reference speed, or readings that lag behind a sweep)'
-_SELDOM = 0.5
+_SAME_ERROR_ODDS = 0.5  # how frequent it is assumed to be beside a wrong radius [-]
 _SURE = 2.0  # deviations within which a bias of the radius is the height of the lugs
 _RARE = 3.0  # deviations of its prior, beyond which a gain may as well be something else
 _MOST_TRIED = 3  # doubtful names, after which none is given
@@ -263,7 +263,7 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
         # Slips of a drive are our own.
         if 'wheel_radius_bias' in (key, *competitors) and not table.true_rows.any():
             alike = (_SAME_ERROR, *alike)
-            values['alike'] += _SELDOM
+            values['alike'] += _SAME_ERROR_ODDS
         alone = float(selection.totals[selection.index((key,))])
         sure = confidence(values, values['alike'])
         found.append((alone, Naming(key, competitors, sure, values, alike)))

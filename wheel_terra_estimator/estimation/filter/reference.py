@@ -170,10 +170,10 @@ class ReferenceUpdate(Component[ReferenceState]):
                 unseen = _JUMP_STD * math.sqrt(2.0 * variance) + _UNSEEN_ACCELERATION * gap
                 state = state._replace(jumped=step > unseen)
             believed = lasts or not (beyond or state.jumped)
+            fastest = 0.0 if opposed else fastest_rim
+            possible = abs(reference.forward) < fastest + _MOVING_STD * math.sqrt(variance)
             # Where readings are seldom, the slip has more often changed than one is wild: it is
             # believed at once, unless the rover would be faster than its wheels or against them.
-            noise = _MOVING_STD * math.sqrt(variance)
-            possible = abs(reference.forward) < (0.0 if opposed else fastest_rim) + noise
             alone = min(gap, gap_before) > _LASTING and possible and not still
             inflated = alone or (same and believed and state.rejected_in_a_row > 0)
             if alone:
