@@ -63,27 +63,12 @@ class InputJudge(Stepped, Protocol):
 
 
 class EstimatorCore:
-    """Estimates of one rover from its measurements.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        Rover, soil, sensors, filter.
-    estimator : Estimator, optional
-        Processes the inputs; default: ``WheelSoilEstimator``.
-    judged_by : callable, optional
-        Creates the monitor of the inputs from a configuration.
-
-    Attributes
-    ----------
-    warning : StuckMemory
-        The stuck warning; it survives a restart of the estimator but not `reset`.
-    """
+    """Estimates of one rover from its measurements."""
 
     def __init__(
         self,
         configuration: Configuration,
-        estimator: Estimator | None = None,
+        estimator: Estimator | None = None,  # default: ``WheelSoilEstimator``
         judged_by: Callable[[Configuration], InputJudge] | None = None,
     ) -> None:
         self._estimator = estimator or _estimator(configuration)
@@ -97,7 +82,7 @@ class EstimatorCore:
         self._checks = InputChecks(configuration)
         self._guard = OutputGuard(configuration)
         self._classes = PublishedClasses(configuration)
-        self.warning = StuckMemory(configuration)
+        self.warning = StuckMemory(configuration)  # it survives all restarts but `reset`
         self._log = InputLog(self._runners(), settings)
         self._timeline = Timeline(self._log, settings)
         self._received = [0] * len(CHANNELS)
@@ -113,14 +98,7 @@ class EstimatorCore:
         self._resets = 0
 
     def add(self, measurement: Measurement) -> list[EstimateSet]:
-        """Process a measurement and return the estimates that became due, oldest first.
-
-        Parameters
-        ----------
-        measurement : WheelOdometry, InertialReading, SinkageReading, LeavingAngleReading or \
-ReferenceVelocity
-            In the order of arrival.
-        """
+        """Process the next measurement that arrived; return the estimates now due, oldest first."""
         channel = CHANNELS[type(measurement)]
         self._received[channel] += 1
         checked = self._checks.check(channel, self._errors.corrected(measurement))

@@ -49,15 +49,7 @@ class LinearErrors:
 
 
 class SensorErrors:
-    """Stated errors of the sensors of one rover.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        ``sensors.torque_zero`` [N m], ``torque_gain`` [-], ``sinkage_zero`` [m], ``sinkage_gain``
-        [-], ``specific_force_bias`` [m/s^2], ``angular_rate_bias`` [rad/s], ``imu_position`` [m]
-        and the ``*_stamp_offset`` [s].
-    """
+    """Errors that ``sensors.*`` states: of torque [N m], sinkage [m], IMU and stamps."""
 
     def __init__(self, configuration: Configuration) -> None:
         sensors = configuration.sensors

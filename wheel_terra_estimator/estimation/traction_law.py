@@ -27,13 +27,7 @@ def _parameter(default: float, upper: float, meaning: str, lower: float = 0.0) -
 
 @dataclass(frozen=True)
 class LimiterTuning:
-    """Parameters of the limiter; the node declares them as they stand here.
-
-    Raises
-    ------
-    UserError
-        Two bounds are in the wrong order.
-    """
+    """Parameters of the limiter; the node declares them as they stand here."""
 
     comfortable_slip: float = _parameter(
         0.3, 1.0, 'median slip up to which the command passes unchanged [-]'
@@ -62,7 +56,7 @@ class LimiterTuning:
     )
 
     def __post_init__(self) -> None:
-        """Check the order of the bounds."""
+        """Raise a `UserError` where two bounds are in the wrong order."""
         for lower, upper in (
             ('comfortable_slip', 'critical_slip'),
             ('stop_rim_travel', 'slow_rim_travel'),
@@ -72,19 +66,11 @@ class LimiterTuning:
 
 
 def traction_scale(
-    slip: Sequence[float], rim_travel_left: Sequence[float], tuning: LimiterTuning
+    slip: Sequence[float],  # ratio per wheel [-]; at least one
+    rim_travel_left: Sequence[float],  # before entrapment, per wheel [m]
+    tuning: LimiterTuning,
 ) -> tuple[float, str]:
-    """Return the scale in [0, 1] of a command on this soil, and why; 0 is a stop.
-
-    Parameters
-    ----------
-    slip : sequence of float
-        Slip ratio per wheel [-]; at least one.
-    rim_travel_left : sequence of float
-        Rim travel left before entrapment per wheel [m].
-    tuning : LimiterTuning
-        Parameters.
-    """
+    """Return the scale in [0, 1] of a command on this soil, and why; 0 is a stop."""
     # The median: a single spinning wheel (on a stone, lifted off) is no entrapment, nor is braking.
     typical = median([max(s, 0.0) for s in slip])
     # Two wheels that dig in are the beginning of an entrapment, whatever the others do.

@@ -52,21 +52,12 @@ class RimForces(NamedTuple):
 
 
 def rim_forces(
-    ratio: Quantity, angle: Quantity, friction: Quantity = 1.0, shift: Quantity = 0.0
+    ratio: Quantity,  # v/(r w) with the radius of the rim, not negative [-]
+    angle: Quantity,  # of entrance, above 0 and up to pi/2 [rad]
+    friction: Quantity = 1.0,  # factor on the tangential part of the stress; 1 is the theory [-]
+    shift: Quantity = 0.0,  # rotation of the stresses towards the front [rad]
 ) -> RimForces:
-    """Return the forces of smooth wheels by resistive force theory; arguments broadcast.
-
-    Parameters
-    ----------
-    ratio : float or numpy.ndarray
-        v/(r w) with the radius of the rim, not negative [-].
-    angle : float or numpy.ndarray
-        Entrance angle, above 0 and up to pi/2 [rad].
-    friction : float or numpy.ndarray
-        Factor on the part of the stress that is tangential to the rim; 1 is the theory [-].
-    shift : float or numpy.ndarray
-        Rotation of the stresses towards the front [rad].
-    """
+    """Return the forces of smooth wheels by resistive force theory; arguments broadcast."""
     motion = np.arctan2(np.subtract(ratio, 1.0), angle)
     motion, angle = np.broadcast_arrays(motion, angle)
     # Lift and push of the normal stress, of the tangential one, and torque.

@@ -96,15 +96,7 @@ class Bearing(NamedTuple):
 
 
 class WheelModels:
-    """Contact models of all wheels of a rover.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        Wheels.
-    soil, effects
-        As the contact law takes them; see `contact_models`.
-    """
+    """Contact models of all wheels of a rover on a soil, with the effects of `contact_models`."""
 
     def __init__(self, configuration: Configuration, soil: Soil, effects: EffectSettings) -> None:
         wheels = configuration.wheels
@@ -128,17 +120,10 @@ class WheelModels:
         self._modulus = np.maximum(self._contacts.bearing_modulus, _LEAST_MODULUS)
 
     def forces(self, states: WheelStates) -> WheelForces:
-        """Return torque and pull of all wheels with their derivatives.
+        """Return torque and pull of all wheels with their derivatives, at states of (n,) entries.
 
-        Parameters
-        ----------
-        states : WheelStates
-            (n,) entries; stiffness and slip-sinkage have no part in it.
-
-        Notes
-        -----
-        Where the speed opposes the rim the shear is saturated: the forces are those of slip 1 at
-        any such speed.
+        Stiffness and slip-sinkage have no part in it. Where the speed opposes the rim the shear is
+        saturated: the forces are those of slip 1 at any such speed.
         """
         values = np.empty((len(STEPPED), len(STEPPED) + 1, len(self._radius)))
         for stepped, name in zip(values, STEPPED, strict=True):
@@ -185,10 +170,7 @@ class WheelModels:
     def bearing(self, states: WheelStates) -> Bearing:
         """Return the load that the bearing law carries at the sinkage of each wheel.
 
-        Parameters
-        ----------
-        states : WheelStates
-            Centroid and rim speed have no part in it.
+        Centroid and rim speed have no part in it.
         """
         c, factor = copy(self._contacts), np.exp(states.strength)
         c.slip = slip = slip_of_speed_ratio(states.speed_ratio)

@@ -42,21 +42,10 @@ class FilterMemory(NamedTuple):
 
 
 class GatedFilter(ExtendedKalmanFilter):
-    """State ``x`` and covariance ``P``, with bounds. What changes them makes new arrays.
+    """State ``x`` (n,) and covariance ``P`` (n, n). What changes them makes new arrays.
 
-    Parameters
-    ----------
-    mean, covariance : numpy.ndarray
-        (n,) and (n, n) start.
-    lower, upper : numpy.ndarray
-        (n,) physical bounds of the state, enforced after each update.
-
-    Attributes
-    ----------
-    bounds : tuple of numpy.ndarray
-        Lower and upper bounds of the state, as given.
-    buffer : HistoryBuffer or None
-        Keeps the transitions of the state for a smoother.
+    The physical `bounds`, lower and upper (n,), are enforced after each update. A `buffer` keeps
+    the transitions of the state for a smoother.
     """
 
     x: FloatArray

@@ -45,14 +45,8 @@ def instantaneous_class(slip: float, borders: Sequence[float]) -> int:
 class SlipClassifier:
     """Rules by which the class of a wheel changes.
 
-    Parameters
-    ----------
-    borders : sequence of float
-        Upper bounds of the classes low, moderate, high, increasing.
-    hysteresis : float
-        Width of the band [-] that |s| must cross to leave a class.
-    dwell : float
-        Time [s] for which |s| must be outside of a class to leave it.
+    `borders` are the upper bounds of the classes low, moderate and high, increasing. |s| leaves a
+    class by crossing a band of the width `hysteresis` [-] for the time `dwell` [s].
     """
 
     def __init__(self, borders: Sequence[float], hysteresis: float, dwell: float) -> None:

@@ -50,13 +50,7 @@ class DiskBuffer(Generic[Item]):
         return len(self._places) - 1
 
     def append(self, item: Item) -> None:
-        """Add an item.
-
-        Raises
-        ------
-        UserError
-            No room is left.
-        """
+        """Add an item; a `UserError` where no room is left."""
         end = self._places[-1]
         data = pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL)
         try:

@@ -38,38 +38,16 @@ class Arrival(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """What to do after a message came.
+    """What to do after a message came."""
 
-    Attributes
-    ----------
-    accepted : list of Arrival
-        To be used, in this order.
-    stepped_back : bool
-        The run has ended; `accepted` belongs to the new one.
-    strays : list of (Suspicion, Arrival)
-        Held before and now known not to fit; those behind may still be late inputs.
-    """
-
-    accepted: list[Arrival]
-    stepped_back: bool = False
+    accepted: list[Arrival]  # to be used, in this order
+    stepped_back: bool = False  # the run has ended; `accepted` belongs to the new one
     strays: tuple[tuple[Suspicion, Arrival], ...] = ()
+    """Held before and now known not to fit; those behind may still be late inputs."""
 
 
 class ClockWatch:
-    """Watches the stamps of one run.
-
-    Parameters
-    ----------
-    channels : int
-        Number of channels.
-    clock_step : int
-        A stamp further than this before the newest of its own channel does not fit [ns].
-    max_lag : int
-        Disorder that is expected [ns]; never taken for a step.
-    history : int
-        How far back late inputs are used [ns]; further ahead than this a message would push the
-        others out of use, so it does not fit either.
-    """
+    """Watches the stamps of one run."""
 
     def __init__(self, channels: int, clock_step: int, max_lag: int, history: int) -> None:
         self.retune(clock_step, max_lag, history)
@@ -86,7 +64,12 @@ class ClockWatch:
         self._odometry_held_from = 0, 0  # stamp of the first of them, and the time of the run then
 
     def retune(self, clock_step: int, max_lag: int, history: int) -> None:
-        """Go on with other limits."""
+        """Go on with other limits [ns].
+
+        A stamp more than `clock_step` before the newest of its channel does not fit; disorder up to
+        `max_lag` is never taken for a step. Late inputs are used up to `history` back; a message
+        further ahead than that would push the others out of use, so it does not fit either.
+        """
         self._clock_step = max(clock_step, max_lag)
         self._reach = max(history, self._clock_step)
         self._reach_back = max(history + max_lag, clock_step)

@@ -74,29 +74,19 @@ def _differs(one: InertialReading, other: InertialReading) -> bool:
 
 
 class InputChecks:
-    """Judges measurements of one rover.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Topic of each channel, for messages.
-    rejected : list of collections.Counter
-        Per channel: reason in words -> how often something was left out for it.
-    refused : list of int
-        Per channel: messages of which nothing was left to use.
-    """
+    """Judges measurements of one rover, and counts per channel what it leaves out."""
 
     def __init__(self, configuration: Configuration) -> None:
         wheels = configuration.wheels
-        self.names = (
+        self.names = (  # topics of the channels
             configuration.wheel_odometry,
             'imu/data',
             'sinkage',
             'leaving_angle',
             'reference_odom',
         )
-        self.rejected: list[Counter[str]] = [Counter() for _ in self.names]
-        self.refused = [0] * len(self.names)
+        self.rejected: list[Counter[str]] = [Counter() for _ in self.names]  # by reason in words
+        self.refused = [0] * len(self.names)  # messages of which nothing was left to use
         self._inertial_before: InertialReading | None = None
         self._outlier: InertialReading | None = None
         self._count = wheels.count

@@ -99,29 +99,15 @@ class InputLog:
     """Inputs of one run, and the `runners` that make the same steps through them.
 
     Reference velocities are thinned by stamps to the `reference_period` of the settings.
-
-    Attributes
-    ----------
-    entries, stamps : list
-        The log; forgotten entries are taken off its front.
-    first : int or None
-        First stamp of the run, from which the grid counts.
-    counts : dict
-        ``steps``, ``reruns``, ``steps_repeated``.
-    repeated : list of int
-        Per channel: inputs whose stamp the channel had given before.
-    contradicted : list of int
-        Those of them that held other numbers than the first.
-    forgotten : int
-        Stamp [ns] up to which no state before an input is kept; 0: the start of the run is known.
     """
 
     def __init__(self, runners: Sequence[Stepped], settings: TimeSettings) -> None:
         self._runners = runners
         self.grid = StepGrid(settings.output_rate)
-        self.entries: list[Entry] = []
-        self.stamps: list[int] = []
+        self.entries: list[Entry] = []  # forgotten ones are taken off the front
+        self.stamps: list[int] = []  # of the entries
         self.counts = {'steps': 0, 'reruns': 0, 'steps_repeated': 0}
+        # Per channel: inputs whose stamp it had given before, and those with other numbers.
         self.repeated = [0] * len(CHANNELS)
         self.contradicted = [0] * len(CHANNELS)
         self._reference_period = settings.reference_period
@@ -133,10 +119,10 @@ class InputLog:
     def clear(self, *, keep_soil: bool) -> None:
         """Begin a new run; soil and biases kept with inflated covariance, or reset."""
         self._origin = self._snapshot() if keep_soil else self._pristine, keep_soil
-        self.forgotten = 0
+        self.forgotten = 0  # stamp up to which no state is kept; 0: the start of the run is known
         self.entries.clear()
         self.stamps.clear()
-        self.first: int | None = None
+        self.first: int | None = None  # stamp of the run, from which the grid counts
         self._ran = 0  # entries[:_ran] have been run, and not changed since
         self._position = -1  # entries[:_position] made the state of the last step; -1: none did
         self._provisional = False  # the runners have made a part of the next step
