@@ -9,7 +9,7 @@ from parts import step_inputs
 from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.filter.initial_state import (
-    PRIORS,
+    LEAST_SHEAR_MODULUS_STD,
     SoilPriors,
     bounds,
     layout_of,
@@ -72,8 +72,8 @@ def test_the_prior_of_a_soil_that_nobody_states_is_the_spread_of_the_shipped_one
 
 def test_a_soil_that_somebody_states_is_known_as_well_as_he_says():
     stated = reader.from_parameters({**TEN_LINES, 'soil.shear_modulus': 0.02})
-    least = PRIORS.least_shear_modulus_std
-    assert SoilPriors.from_configuration(stated).shear_modulus_std == pytest.approx(least)
+    prior = SoilPriors.from_configuration(stated).shear_modulus_std
+    assert prior == pytest.approx(LEAST_SHEAR_MODULUS_STD)
     named = reader.from_parameters({**TEN_LINES, 'soil.name': 'beach'})
     assert not named.soil_stated
 

@@ -16,7 +16,7 @@ from wheel_terra_estimator.estimation.contacts.contact_models import contact_mod
 from wheel_terra_estimator.estimation.contacts.demand import Climbed
 from wheel_terra_estimator.estimation.contacts.equilibrium_slip import steady_pull
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
-from wheel_terra_estimator.estimation.filter.initial_state import PRIORS
+from wheel_terra_estimator.estimation.filter.initial_state import OWN_STIFFNESS_SHARE
 from wheel_terra_estimator.estimation.filter.state import (
     GRAVITY_BIAS,
     SHEAR_MODULUS,
@@ -147,5 +147,5 @@ class Learned:
             learned, before = float(covariance[entry].mean()), float(self._start[entry].mean())
             wide[entry] = max(learned, min(learned + spread**2, before))
         # The start of the next run adds the wheels' own part again.
-        wide[stiffness, stiffness] /= 1.0 + PRIORS.own_stiffness_share**2 / self._layout.wheel_count
+        wide[stiffness, stiffness] /= 1.0 + OWN_STIFFNESS_SHARE**2 / self._layout.wheel_count
         return wide

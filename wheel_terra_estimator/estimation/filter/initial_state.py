@@ -29,55 +29,46 @@ from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 _BY_SLIP = 'slip_sinkage_exponent'
 
-
-@dataclass(frozen=True)
-class PriorTuning:
-    """Standard deviations at the start that the configuration does not state, and bounds.
-
-    The spreads are those between a soil and its model in published fits (docs/models), or wide
-    enough to say nothing; the bounds are physical limits, or far outside any fit.
-    """
-
-    speed_std: float = 1.0  # [m/s]
-    slip_sinkage_std: float = 0.1  # of n1 [-]
-    centroid_std: float = 0.06  # [-]
-    slip_per_demand_mean: float = 1.0
-    """Slip per required traction coefficient: the inverse slope of a traction curve [-], 0.5 on
-    firm ground to 3 near the greatest pull (docs/models/validation.md)."""
-    slip_per_demand_std: float = 1.0
-    rut_share_mean: float = 0.3
-    rut_share_std: float = 0.4
-    sinkage_share: float = 0.5  # of the sinkage at rest
-    sinkage_floor: float = 0.005  # [m]
-    own_stiffness_share: float = 0.5
-    """Spread of the stiffness between wheels, over that of all wheels together."""
-    least_strength_std: float = 0.2  # [ln]
-    least_shear_modulus_std: float = 0.3  # [ln]
-    least_stiffness_std: float = 0.2  # [ln]
-    unstated_strength_std: float = 0.3
-    """Where no soil is stated: the spread of the shipped soils (config/soils) [ln]."""
-    unstated_shear_modulus_std: float = 1.0  # [ln]
-    unstated_stiffness_std: float = 1.3  # of the pressure one centimetre deep [ln]
-    most_deviations: float = 3.0
-    """Least bounds of soil parameters about the configured ones, in prior deviations."""
-    kept_share: float = 0.5
-    """Weight of the old covariance, against that of a start, where a new run keeps the soil [-]."""
-    most_speed: float = 20.0  # [m/s]
-    most_gravity_bias: float = 2.0  # [m/s^2]
-    most_strength: float = 2.0  # [ln]
-    most_shear_modulus: float = 1.3  # [ln]
-    most_slip_sinkage: float = 0.8
-    most_centroid: float = 0.3
-    most_rut_share: float = 0.9  # soil springs back
-    most_slip_per_demand: float = 8.0  # near the top of the traction curve
-    most_stiffness: float = 3.0  # [ln]; more, if the configured soil is softer than that:
-    hardest_sinkage: float = 2e-3  # of a wheel at rest on the hardest ground [m]
-    most_shear_error: float = 1.5  # [ln]
-    most_torque_zero: float = 1e4  # [N m]
-    highest: float = 0.02  # of a wheel above the surface, over its radius [-]
-
-
-PRIORS = PriorTuning()
+# Standard deviations at the start that the configuration does not state, and bounds. The spreads
+# are those between a soil and its model in published fits (docs/models), or wide enough to say
+# nothing; the bounds are physical limits, or far outside any fit.
+_SPEED_STD = 1.0  # [m/s]
+_SLIP_SINKAGE_STD = 0.1  # of n1 [-]
+_CENTROID_STD = 0.06  # [-]
+_SLIP_PER_DEMAND_MEAN = 1.0
+"""Slip per required traction coefficient: the inverse slope of a traction curve [-], 0.5 on
+firm ground to 3 near the greatest pull (docs/models/validation.md)."""
+_SLIP_PER_DEMAND_STD = 1.0
+_RUT_SHARE_MEAN = 0.3
+_RUT_SHARE_STD = 0.4
+_SINKAGE_SHARE = 0.5  # of the sinkage at rest
+_SINKAGE_FLOOR = 0.005  # [m]
+OWN_STIFFNESS_SHARE = 0.5
+"""Spread of the stiffness between wheels, over that of all wheels together."""
+_LEAST_STRENGTH_STD = 0.2  # [ln]
+LEAST_SHEAR_MODULUS_STD = 0.3  # [ln]
+_LEAST_STIFFNESS_STD = 0.2  # [ln]
+_UNSTATED_STRENGTH_STD = 0.3
+"""Where no soil is stated: the spread of the shipped soils (config/soils) [ln]."""
+_UNSTATED_SHEAR_MODULUS_STD = 1.0  # [ln]
+_UNSTATED_STIFFNESS_STD = 1.3  # of the pressure one centimetre deep [ln]
+_MOST_DEVIATIONS = 3.0
+"""Least bounds of soil parameters about the configured ones, in prior deviations."""
+_KEPT_SHARE = 0.5
+"""Weight of the old covariance, against that of a start, where a new run keeps the soil [-]."""
+_MOST_SPEED = 20.0  # [m/s]
+_MOST_GRAVITY_BIAS = 2.0  # [m/s^2]
+_MOST_STRENGTH = 2.0  # [ln]
+_MOST_SHEAR_MODULUS = 1.3  # [ln]
+_MOST_SLIP_SINKAGE = 0.8
+_MOST_CENTROID = 0.3
+_MOST_RUT_SHARE = 0.9  # soil springs back
+_MOST_SLIP_PER_DEMAND = 8.0  # near the top of the traction curve
+_MOST_STIFFNESS = 3.0  # [ln]; more, if the configured soil is softer than that:
+_HARDEST_SINKAGE = 2e-3  # of a wheel at rest on the hardest ground [m]
+_MOST_SHEAR_ERROR = 1.5  # [ln]
+_MOST_TORQUE_ZERO = 1e4  # [N m]
+_HIGHEST = 0.02  # of a wheel above the surface, over its radius [-]
 
 
 @dataclass(frozen=True)
@@ -112,9 +103,9 @@ def _soil_deviations(configuration: Configuration) -> tuple[float, float, float]
     """Return the deviations of strength, shear modulus and stiffness [ln]."""
     if not configuration.soil_stated:
         return (
-            PRIORS.unstated_strength_std,
-            PRIORS.unstated_shear_modulus_std,
-            PRIORS.unstated_stiffness_std,
+            _UNSTATED_STRENGTH_STD,
+            _UNSTATED_SHEAR_MODULUS_STD,
+            _UNSTATED_STIFFNESS_STD,
         )
     soil, std = configuration.soil, configuration.soil_std
     phi = float(soil.friction_angle)
@@ -123,9 +114,9 @@ def _soil_deviations(configuration: Configuration) -> tuple[float, float, float]
     stiffness = std['frictional_modulus'] / max(float(soil.frictional_modulus), 1.0)
     modulus = std['shear_modulus'] / float(soil.shear_modulus)
     return (
-        max(strength, PRIORS.least_strength_std),
-        max(modulus, PRIORS.least_shear_modulus_std),
-        max(stiffness, PRIORS.least_stiffness_std),
+        max(strength, _LEAST_STRENGTH_STD),
+        max(modulus, LEAST_SHEAR_MODULUS_STD),
+        max(stiffness, _LEAST_STIFFNESS_STD),
     )
 
 
@@ -161,26 +152,26 @@ def initial_filter(
     n = rover.wheel_count
     mean = np.zeros(layout.size)
     deviations = {
-        SPEED: PRIORS.speed_std,
+        SPEED: _SPEED_STD,
         GRAVITY_BIAS: gravity_bias_std(rover, sensors, sensors.orientation_std),
         SHEAR_STRENGTH: priors.strength_std,
         SHEAR_MODULUS: priors.shear_modulus_std,
-        SLIP_SINKAGE: PRIORS.slip_sinkage_std,
-        CENTROID: PRIORS.centroid_std,
-        SLIP_PER_DEMAND: PRIORS.slip_per_demand_std,
-        RUT_SHARE: PRIORS.rut_share_std,
+        SLIP_SINKAGE: _SLIP_SINKAGE_STD,
+        CENTROID: _CENTROID_STD,
+        SLIP_PER_DEMAND: _SLIP_PER_DEMAND_STD,
+        RUT_SHARE: _RUT_SHARE_STD,
     }
     P = np.zeros((layout.size, layout.size))
     for index, std in deviations.items():
         P[index, index] = std**2
-    mean[RUT_SHARE] = PRIORS.rut_share_mean
-    mean[SLIP_PER_DEMAND] = PRIORS.slip_per_demand_mean
+    mean[RUT_SHARE] = _RUT_SHARE_MEAN
+    mean[SLIP_PER_DEMAND] = _SLIP_PER_DEMAND_MEAN
     level = WheelStates(1.0, 0.0, np.array(loads))
     z = steady_sinkage(models, level, np.array(rover.rim_radius))
     mean[layout.sinkage] = z
-    spread = PRIORS.sinkage_share * z + PRIORS.sinkage_floor
+    spread = _SINKAGE_SHARE * z + _SINKAGE_FLOOR
     P[layout.sinkage, layout.sinkage] = np.diag(spread**2)
-    own = PRIORS.own_stiffness_share * priors.stiffness_std
+    own = OWN_STIFFNESS_SHARE * priors.stiffness_std
     P[layout.stiffness, layout.stiffness] = priors.stiffness_std**2 + np.eye(n) * own**2
     own_error = np.eye(n) * priors.shear_error_std**2
     P[layout.shear_error, layout.shear_error] = own_error + priors.shear_error_common_std**2
@@ -191,7 +182,7 @@ def initial_filter(
     lower, upper = bounds(rover, layout, priors)
     # However soft the configured soil is, the ground may be hard.
     exponent = float(configuration.soil.sinkage_exponent) + _LOAD_EXPONENT
-    hardest = exponent * np.log(np.maximum(z, PRIORS.hardest_sinkage) / PRIORS.hardest_sinkage)
+    hardest = exponent * np.log(np.maximum(z, _HARDEST_SINKAGE) / _HARDEST_SINKAGE)
     upper[layout.stiffness] = np.maximum(upper[layout.stiffness], hardest)
     return GatedFilter(mean, P, lower, upper)
 
@@ -199,27 +190,27 @@ def initial_filter(
 def bounds(rover: Rover, layout: StateLayout, priors: SoilPriors) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds of the state, (size,) each."""
     upper = np.zeros(layout.size)
-    most = PRIORS.most_deviations
-    upper[[SPEED, GRAVITY_BIAS]] = PRIORS.most_speed, PRIORS.most_gravity_bias
-    upper[SHEAR_STRENGTH] = max(PRIORS.most_strength, most * priors.strength_std)
-    upper[SHEAR_MODULUS] = PRIORS.most_shear_modulus
-    upper[SLIP_SINKAGE] = PRIORS.most_slip_sinkage
-    upper[CENTROID] = PRIORS.most_centroid
-    upper[RUT_SHARE] = PRIORS.most_rut_share
-    upper[SLIP_PER_DEMAND] = PRIORS.most_slip_per_demand
-    upper[layout.stiffness] = max(PRIORS.most_stiffness, most * priors.stiffness_std)
-    upper[layout.shear_error] = PRIORS.most_shear_error
-    upper[layout.torque_zero] = PRIORS.most_torque_zero
+    most = _MOST_DEVIATIONS
+    upper[[SPEED, GRAVITY_BIAS]] = _MOST_SPEED, _MOST_GRAVITY_BIAS
+    upper[SHEAR_STRENGTH] = max(_MOST_STRENGTH, most * priors.strength_std)
+    upper[SHEAR_MODULUS] = _MOST_SHEAR_MODULUS
+    upper[SLIP_SINKAGE] = _MOST_SLIP_SINKAGE
+    upper[CENTROID] = _MOST_CENTROID
+    upper[RUT_SHARE] = _MOST_RUT_SHARE
+    upper[SLIP_PER_DEMAND] = _MOST_SLIP_PER_DEMAND
+    upper[layout.stiffness] = max(_MOST_STIFFNESS, most * priors.stiffness_std)
+    upper[layout.shear_error] = _MOST_SHEAR_ERROR
+    upper[layout.torque_zero] = _MOST_TORQUE_ZERO
     if layout.reference_error is not None:
-        upper[layout.reference_error] = PRIORS.most_speed
+        upper[layout.reference_error] = _MOST_SPEED
     lower = -upper
     lower[[SLIP_PER_DEMAND, RUT_SHARE]] = 0.0
     # Slip makes a wheel sink, never rise; else wheels that leave soft ground would seem to slip.
     lower[SLIP_SINKAGE] = -max(priors.slip_sinkage, 0.0)
     # Ground may be harder than any soil (K small), but no soil has a K of decimetres.
-    lower[SHEAR_MODULUS] = -max(PRIORS.most_shear_modulus, most * priors.shear_modulus_std)
+    lower[SHEAR_MODULUS] = -max(_MOST_SHEAR_MODULUS, most * priors.shear_modulus_std)
     upper[layout.sinkage] = rover.rim_radius
-    lower[layout.sinkage] = [-PRIORS.highest * r for r in rover.rim_radius]
+    lower[layout.sinkage] = [-_HIGHEST * r for r in rover.rim_radius]
     return lower, upper
 
 
@@ -231,7 +222,7 @@ def with_soil_of(old: FilterMemory, start: FilterMemory, layout: StateLayout) ->
     kept += range(layout.size)[layout.torque_zero]
     block = np.ix_(kept, kept)
     covariance, mean = start.covariance.copy(), start.mean.copy()
-    share = PRIORS.kept_share
+    share = _KEPT_SHARE
     covariance[block] = share * old.covariance[block] + (1.0 - share) * covariance[block]
     mean[kept] = old.mean[kept]
     return FilterMemory(mean, covariance, start.restarts)
