@@ -26,17 +26,7 @@ class ResultFile:
     """Rows of finished jobs: CSV where the name ends so, lines of JSON otherwise.
 
     Each row is in the file as soon as it is added. Half a line at the end, which a killed run may
-    leave, does not count. Values that come back from CSV are text.
-
-    Parameters
-    ----------
-    path : Path
-        The file; made with the first row.
-
-    Raises
-    ------
-    UserError
-        A line is no row.
+    leave, does not count; a line that is no row raises UserError. Values from CSV are text.
     """
 
     def __init__(self, path: Path) -> None:
@@ -92,9 +82,9 @@ class ResultFile:
 
 
 def run_jobs(
-    function: Callable[[Task], Row | Sequence[Row]],
+    function: Callable[[Task], Row | Sequence[Row]],  # at the top of a module
     tasks: Mapping[Any, Task],
-    results: ResultFile,
+    results: ResultFile,  # takes the rows in the order of finishing
     key_of: Callable[[Row], Hashable],
     *,
     jobs: int = 1,
@@ -103,25 +93,9 @@ def run_jobs(
 ) -> None:
     """Run the tasks whose key is in no row of the file, and add what they give.
 
-    Parameters
-    ----------
-    function : callable
-        One at the top of a module: task -> row or rows.
-    tasks : mapping
-        Key -> task.
-    results : ResultFile
-        Takes the rows in the order of finishing.
-    key_of : callable
-        Row -> key of its task.
-    jobs, scheduler
-        See `scheduler.finished`.
-    tell : callable
-        Is told number, count and last row of each finished task.
-
-    Raises
-    ------
-    Exception
-        What a task raised; those that run end, the others do not start.
+    `jobs` and `scheduler` are those of `scheduler.finished`; `tell` gets number, count and last row
+    of each finished task. What a task raises is raised: those that run end, the others do not
+    start.
     """
     done = {key_of(row) for row in results.rows}
     waiting = [task for key, task in tasks.items() if key not in done]

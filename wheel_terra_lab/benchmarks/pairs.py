@@ -12,25 +12,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Figure:
-    """Processor times [s] of ours and of what stands beside it, one of each per pair.
-
-    Attributes
-    ----------
-    name : str
-        What was timed.
-    beside : str
-        The floor or peer.
-    ours, other : tuple of float
-        Time of one unit of work [s], pair by pair.
-    drive : float
-        Length [s] of the drive of a replay; 0 for everything else.
-    """
+    """Processor times [s] of ours and of what stands beside it, one of each per pair."""
 
     name: str
-    beside: str
-    ours: tuple[float, ...]
+    beside: str  # the floor or peer
+    ours: tuple[float, ...]  # time of one unit of work [s], pair by pair
     other: tuple[float, ...]
-    drive: float = 0.0
+    drive: float = 0.0  # length of the drive of a replay [s]; 0 for everything else
 
     @property
     def ratios(self) -> list[float]:
@@ -64,23 +52,13 @@ class Figure:
 
 def timed_pairs(
     name: str,
-    ours: tuple[Callable[[], object], int],
+    ours: tuple[Callable[[], object], int],  # with the units of work that one call does
     beside: str,
     other: tuple[Callable[[], object], int],
     pairs: int,
     drive: float = 0.0,
 ) -> Figure:
-    """Time two callables in turn; of several pairs, each after one call that does not count.
-
-    Parameters
-    ----------
-    name, beside, drive
-        As in `Figure`.
-    ours, other : (callable, int)
-        What is called, and how many units of work one call does.
-    pairs : int
-        Number of pairs.
-    """
+    """Time two callables in turn; of several pairs, each after one call that does not count."""
     if pairs > 1:
         for call, _ in (ours, other):
             call()

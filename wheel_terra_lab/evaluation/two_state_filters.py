@@ -99,15 +99,7 @@ class _LowPass:
 
 
 class TwoStateFilter:
-    """Offset and gain of the slip over a demand.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        Radius, mass, gravity, noise of the reference.
-    demand : 'torque' or 'pitch'
-        What the slip follows.
-    """
+    """Offset and gain of the slip over a demand."""
 
     def __init__(
         self, configuration: Configuration, demand: Demand, tuning: TwoStateTuning | None = None

@@ -41,20 +41,12 @@ def decoupled_pull(
 
 @dataclass(frozen=True)
 class EquivalentContact:
-    """Angles of a contact on its equivalent circle, one entry per measurement.
+    """Angles of a contact on its equivalent circle, one entry per measurement."""
 
-    Attributes
-    ----------
-    radius : float or numpy.ndarray
-        r_e [m].
-    entrance_angle, peak_angle, leaving_angle : float or numpy.ndarray
-        [rad]; the leaving angle is negative behind the hub.
-    """
-
-    radius: Any
-    entrance_angle: Any
-    peak_angle: Any
-    leaving_angle: Any
+    radius: Any  # r_e [m]
+    entrance_angle: Any  # [rad]
+    peak_angle: Any  # [rad]
+    leaving_angle: Any  # [rad], negative behind the hub
 
     def drawbar_pull(self, torque: Any, normal_load: Any) -> Any:
         """Pull from torque and load, no soil parameter [N].
@@ -72,38 +64,19 @@ class EquivalentContact:
 
 
 def equivalent_contact(
-    wheel: Any,
-    sinkage: Any,
-    rear_height: Any,
-    peak_ratio: Any,
-    lug_sinkage: Any = 0.0,
-    lug_share: Any = 0.5,
+    wheel: Any,  # rim radius and lug height count
+    sinkage: Any,  # of the rim, as measured [m]
+    rear_height: Any,  # of the soil behind the wheel above the lowest point of the rim, z2 [m]
+    peak_ratio: Any,  # angle of greatest stress over entrance angle, c1 + c2 s [-]
+    lug_sinkage: Any = 0.0,  # part of the sinkage that lugs dug or saved, dz [m]
+    lug_share: Any = 0.5,  # of the lug height, lambda [-]
 ) -> EquivalentContact:
     """Return the contact on the circle of radius r + lug_share h.
 
     t1e = arccos(1 - (z - dz)/r_e), t2e = -arccos(1 - z2/r_e), tme = peak_ratio t1e.
-
-    Parameters
-    ----------
-    wheel : Wheel
-        Rim radius and lug height count.
-    sinkage : float or array_like
-        Of the rim, as measured [m].
-    rear_height : float or array_like
-        Height of the soil behind the wheel above the lowest point of the rim, z2 [m]; above the
-        sinkage where a mound stands there.
-    peak_ratio : float or array_like
-        Angle of greatest stress over entrance angle, c1 + c2 s [-].
-    lug_sinkage : float or array_like
-        Part of the sinkage that lugs dug or saved, dz [m].
-    lug_share : float or array_like
-        Share of the lug height, lambda [-].
-
-    Raises
-    ------
-    ValueError
-        If the sinkage less the lugs' part, or the rear height, is outside 0 to the radius, or the
-        peak outside the contact.
+    The rear height is above the sinkage where a mound stands there. Raises ValueError if the
+    sinkage less the lugs' part, or the rear height, is outside 0 to the radius, or the peak outside
+    the contact.
     """
     radius = wheel.radius + lug_share * np.asarray(wheel.lug_height)
     depth = np.asarray(sinkage, float) - lug_sinkage

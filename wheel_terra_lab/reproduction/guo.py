@@ -130,22 +130,14 @@ def _fit(model: Model, data: tuple[OperatingPoints, FloatArray], free: Sequence[
 def pull_from_torque(
     points: OperatingPoints,
     measured: FloatArray,
+    # c1, c2: the peak of the stress is at (c1 + c2 s) times the entrance angle
     peak: tuple[float, float] = (BASE.soil.peak_stress_ratio, 0.0),
-    friction: float = 0.0,
-    dug: FloatArray | float = 0.0,
+    friction: float = 0.0,  # torque that the drive itself takes [N m]
+    dug: FloatArray | float = 0.0,  # part of the sinkage that lugs dug or saved [m]
 ) -> FloatArray:
     """Return the pull [N] (N,) from measured sinkage, torque and load.
 
     Lugs share half of their height in the radius.
-
-    Parameters
-    ----------
-    peak : tuple of float
-        c1, c2: the peak of the stress is at (c1 + c2 s) times the entrance angle.
-    friction : float
-        Torque that the drive itself takes [N m].
-    dug : float or numpy.ndarray
-        Part of the sinkage that lugs dug or saved [m].
     """
     sinkage, _, torque = measured.T
     entrance = np.arccos(1.0 - (sinkage - dug) / points.wheel.radius)

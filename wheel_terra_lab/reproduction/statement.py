@@ -27,29 +27,15 @@ _ALLOWED = re.compile(r', [\d.]+(?: %)? (?:allowed|asked)')
 
 @dataclass(frozen=True)
 class Statement:
-    """One row of the page.
+    """One row of the page."""
 
-    Attributes
-    ----------
-    place : str
-        Where the paper has it: ``figure 3``, ``table 7``, ``text``, ``equation 12``.
-    what, paper, ours : str
-        The quantity with its unit, what the paper states, what we compute.
-    holds : bool or None
-        None: not computed, or an input that cannot fail.
-    why : str
-        Within what it is reproduced, or why it is not.
-    wheel : int
-        Of several wheels with the same quantity; 0: no such.
-    """
-
-    place: str
-    what: str
-    paper: str
-    ours: str
-    holds: bool | None
-    why: str = ''
-    wheel: int = 0
+    place: str  # where the paper has it: ``figure 3``, ``table 7``, ``text``, ``equation 12``
+    what: str  # the quantity with its unit
+    paper: str  # what the paper states
+    ours: str  # what we compute
+    holds: bool | None  # None: not computed, or an input that cannot fail
+    why: str = ''  # within what it is reproduced, or why it is not
+    wheel: int = 0  # of several wheels with the same quantity; 0: no such
 
     @property
     def verdict(self) -> str:

@@ -33,17 +33,9 @@ def keys() -> dict[str, tuple[str, str]]:
 def load(names: Sequence[str], overrides: Sequence[str] = ()) -> Case:
     """Return the case of several files, later ones win key by key, then NAME:=VALUE.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Paths, or bare names of files shipped in `CONFIG` (``wheel_2``, ``quick``).
-    overrides : sequence of str
-        NAME:=VALUE; the leading ``soilbin.`` may be left out.
-
-    Raises
-    ------
-    UserError
-        For an unknown file or key, or a value of the wrong type.
+    Names are paths, or bare names of files in `CONFIG` (``wheel_2``, ``quick``); in an override the
+    leading ``soilbin.`` may be left out. Raises UserError for an unknown file or key, or a wrong
+    type.
     """
     from wheel_terra_estimator.configuration import ros_yaml, shipped
 

@@ -170,20 +170,13 @@ def as_text(summary: Mapping[str, object], case: Case) -> str:
     return '\n'.join(f'{words}: {value}' for words, value in figures_of(summary, case).items())
 
 
-def write_report(folder: Path, series: np.ndarray, case: Case, figures: Mapping[str, str]) -> None:
-    """Write ``report.html`` into the folder of a run.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run; ``bed.png`` and ``film.gif`` in it are embedded where they are there.
-    series : numpy.ndarray
-        (k, columns of ``bookkeeping.SERIES``) samples over the travel.
-    case : Case
-        What was run.
-    figures : mapping
-        Words of a figure -> its value with unit.
-    """
+def write_report(
+    folder: Path,
+    series: np.ndarray,  # (k, columns of ``bookkeeping.SERIES``) over the travel
+    case: Case,
+    figures: Mapping[str, str],  # words of a figure -> its value with unit
+) -> None:
+    """Write ``report.html`` into the folder of a run, with ``bed.png`` and ``film.gif`` of it."""
     from wheel_terra_estimator.reporting.html import render
 
     def image(name: str) -> str:

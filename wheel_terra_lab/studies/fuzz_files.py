@@ -49,15 +49,7 @@ def main() -> int:
 
 
 def fuzz(first: int, count: int, kind: str | None = None) -> tuple[Counter[str], list[str]]:
-    """Run cases by number.
-
-    Returns
-    -------
-    done : Counter
-        Cases of each kind.
-    faults : list of str
-        One line for each case that went wrong; printed as they come.
-    """
+    """Run cases by number; return how many of each kind, and a line for each that went wrong."""
     done: Counter[str] = Counter()
     faults: list[str] = []
     kinds = [name for name, (_, share) in CASES.items() for _ in range(share)]

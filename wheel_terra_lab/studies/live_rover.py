@@ -59,22 +59,13 @@ class Process:
 
 
 class Rover(Node):
-    """Publishes joint states, IMU, sinkage and a reference; hears slip and diagnostics.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Wheel names.
-    rates : mapping of str to float
-        Topic -> messages per second.
-    send : callable
-        Takes topic and message and sends it, or does something worse.
-    """
+    """Publishes joint states, IMU, sinkage and a reference; hears slip and diagnostics."""
 
     def __init__(
         self,
         names: Sequence[str],
-        rates: dict[str, float],
+        rates: dict[str, float],  # topic -> messages per second
+        # Takes topic and message and sends it, or does something worse
         send: Callable[[str, Any, Callable[[Any], None]], None] | None = None,
         **options: Any,
     ) -> None:

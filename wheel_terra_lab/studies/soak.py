@@ -101,17 +101,7 @@ class FaultyLink:
 
 
 class Soak:
-    """One run: rover, node, faults, and what was seen.
-
-    Parameters
-    ----------
-    folder : Path
-        For the files of the node.
-    seconds : float
-        How long.
-    faults : sequence of str
-        Which come.
-    """
+    """One run: rover, node, faults, and what was seen; the node's files lie in `folder`."""
 
     def __init__(self, folder: Path, seconds: float, faults: Sequence[str] = FAULTS) -> None:
         configuration = reader.load(['generic_six_wheel'])

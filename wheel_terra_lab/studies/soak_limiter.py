@@ -66,17 +66,7 @@ FAULTS = (
 
 
 class DrivenRover(Rover):
-    """A rover that does what comes out of the limiter, an operator, and a monitor.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Wheel names.
-    radius : float
-        Of the wheels [m].
-    send : callable
-        See `Rover`.
-    """
+    """A rover that does what comes out of the limiter, an operator, and a monitor."""
 
     def __init__(self, names: Any, radius: float, send: Callable[..., None]) -> None:
         super().__init__(names, RATES, send)
@@ -192,13 +182,7 @@ class DrivenRover(Rover):
 
 
 class Soak:
-    """One run.
-
-    Parameters
-    ----------
-    folder : Path
-        For the files of the nodes.
-    """
+    """One run; the nodes' files lie in `folder`."""
 
     def __init__(self, folder: Path) -> None:
         configuration = reader.load(['generic_six_wheel'])

@@ -36,55 +36,29 @@ SLIP_STD = 0.02  # of a window of a drive
 
 @dataclass(frozen=True)
 class Plan:
-    """What kind of campaign to make.
+    """What kind of campaign to make."""
 
-    Attributes
-    ----------
-    hide : str
-        ``none``, ``one``, ``two`` or ``outside``.
-    soil_error : float
-        Standard deviations of the soil's error (1: as stated, 2.5: worse than stated).
-    other_formula : bool
-        Hide the same claims written with other formulas.
-    structure : float
-        Smooth structural error as a share of each output's range.
-    noise : str
-        ``gauss``, ``t`` (Student with 4 degrees of freedom) or ``mixed`` (drawn).
-    outliers : float
-        Share of the cells that are off by 6 to 12 standard deviations.
-    missing : float
-        Share of the cells that are empty.
-    drop : str
-        An output that was not measured at all; empty = none.
-    noise_given : bool
-        Whether the table has the columns ``*_std``.
-    drive : bool
-        Rows as from a drive: slip follows from the slope and is uncertain, pull is only known as
-        the mean over the wheels.
-    names : tuple of str
-        Hide these instead of some drawn by lot (``distance_left`` is then not measured).
-    least : float
-        Least d' that is asked for; 0: 2.5 for one effect, 4 for each of two.
-    forms : bool
-        Draw from all forms of all effects, not from the first form of some.
-    world : str
-        One of ``other_worlds.WORLDS``: a truth that shares no closure with the package; empty =
-        the independent quadrature.
-    """
-
-    hide: str = 'one'
-    soil_error: float = 1.0
-    other_formula: bool = False
-    structure: float = 0.0
-    noise: str = 'gauss'
-    outliers: float = 0.0
-    missing: float = 0.0
-    drop: str = ''
-    noise_given: bool = True
+    hide: str = 'one'  # ``none``, ``one``, ``two`` or ``outside``
+    soil_error: float = 1.0  # deviations of the soil's error; 2.5: worse than stated
+    other_formula: bool = False  # hide the same claims written with other formulas
+    structure: float = 0.0  # smooth structural error, share of each output's range
+    noise: str = 'gauss'  # ``gauss``, ``t`` (Student, 4 degrees of freedom) or ``mixed`` (drawn)
+    outliers: float = 0.0  # share of the cells that are off by 6 to 12 standard deviations
+    missing: float = 0.0  # share of the cells that are empty
+    drop: str = ''  # output that was not measured at all; empty = none
+    noise_given: bool = True  # whether the table has the columns ``*_std``
+    # Rows as from a drive: slip follows from the slope and is uncertain, pull is only known as the
+    # mean over the wheels
     drive: bool = False
+    # Hide these instead of some drawn by lot (``distance_left`` is then not measured)
     names: tuple[str, ...] = ()
-    least: float = field(default=0.0, repr=False)  # no part of the seed
+    # Below: no part of the seed. Least d' that is asked for; 0: 2.5 for one effect, 4 for each of
+    # two
+    least: float = field(default=0.0, repr=False)
+    # Draw from all forms of all effects, not from the first form of some
     forms: bool = field(default=False, repr=False)
+    # One of ``other_worlds.WORLDS``: a truth that shares no closure with the package; empty = the
+    # independent quadrature
     world: str = field(default='', repr=False)
 
 

@@ -60,16 +60,11 @@ class ResistiveSoil:
     exit_share: float
 
 
-def resistive_stress(beta: FloatArray, gamma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return horizontal and vertical stress per depth, at a scale of 1 [N/cm^3 in the source].
-
-    Parameters
-    ----------
-    beta : numpy.ndarray
-        Attitude of the plate from the horizontal, in -pi/2..pi/2 [rad].
-    gamma : numpy.ndarray
-        Direction of its motion, positive into the bed, in -pi/2..pi/2 [rad].
-    """
+def resistive_stress(
+    beta: FloatArray,  # attitude of the plate from the horizontal, in -pi/2..pi/2 [rad]
+    gamma: FloatArray,  # direction of its motion, positive into the bed, in -pi/2..pi/2 [rad]
+) -> tuple[FloatArray, FloatArray]:
+    """Return horizontal and vertical stress per depth, at a scale of 1 [N/cm^3 in the source]."""
 
     def phase(m: int, n: int) -> FloatArray:
         return 2.0 * np.pi * (m * beta / np.pi + n * gamma / (2.0 * np.pi))

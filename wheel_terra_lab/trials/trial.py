@@ -61,10 +61,7 @@ def names() -> tuple[str, ...]:
 def draw(seed: int, effect: str | None) -> Campaign:
     """Return the campaign of a seed; without an effect it is drawn by lot as well.
 
-    Raises
-    ------
-    UserError
-        For an effect that cannot be hidden.
+    Raises UserError for an effect that cannot be hidden.
     """
     rng = np.random.default_rng([seed, 19])
     lot = float(rng.random())

@@ -65,16 +65,9 @@ class RivalDrive:
 
 
 def simulate(kind: str, seed: int, duration: float | None = None) -> RivalDrive:
-    """Simulate a drive of a kind; the same seed gives the same drive.
+    """Simulate a drive of a kind of ``kinds.KINDS``; the same seed gives the same drive.
 
-    Parameters
-    ----------
-    kind : str
-        Key of ``kinds.KINDS``.
-    seed : int
-        Of all random draws, together with the kind.
-    duration : float, optional
-        Other length than that of the kind [s]; the plan is stretched to it.
+    The plan is stretched to a `duration` [s] other than that of the kind.
     """
     plan = KINDS[kind]
     length = plan.duration if duration is None else duration

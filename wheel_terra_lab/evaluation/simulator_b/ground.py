@@ -15,14 +15,7 @@ FloatArray = NDArray[np.float64]
 class RandomField:
     """A smooth random function of the place with mean 0: a sum of plane waves.
 
-    Parameters
-    ----------
-    generator : numpy.random.Generator
-        Where phases, directions and wave lengths come from.
-    deviation : float
-        Standard deviation over the ground.
-    length : float
-        Typical distance over which it changes [m].
+    `deviation` is that over the ground, `length` [m] the distance over which it typically changes.
     """
 
     _WAVES = 16

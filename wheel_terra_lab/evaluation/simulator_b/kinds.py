@@ -49,22 +49,14 @@ class Fault:
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of drive.
-
-    Attributes
-    ----------
-    description : str
-        In words.
-    slopes : tuple of (float, float)
-        Share of the way, slip that the slope should give (negative: downhill, braking).
-    commands : tuple of (float, float, float)
-        Share of the duration, forward speed, turn rate; linear in between. The turn rate counts
-        in nominal speed over half the track: 1 with speed 0 is a spin at full wheel speed.
-    """
+    """One kind of drive."""
 
     description: str
     rover: RoverClass = field(default_factory=RoverClass)
+    # Share of the way, slip that the slope should give (negative: downhill, braking)
     slopes: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    # Share of the duration, forward speed, turn rate; linear in between. The turn rate counts in
+    # nominal speed over half the track: 1 with speed 0 is a spin at full wheel speed
     commands: tuple[tuple[float, float, float], ...] = ((0.0, 1.0, 0.0),)
     patches: tuple[PatchPlan, ...] = ()
     faults: tuple[Fault, ...] = ()

@@ -103,13 +103,7 @@ class WheelCommand:
 
 
 class Plant:
-    """The rover on its ground.
-
-    Parameters
-    ----------
-    world : World
-        Rover, ground, soil.
-    """
+    """The rover on its ground."""
 
     def __init__(self, world: World) -> None:
         self.world = world

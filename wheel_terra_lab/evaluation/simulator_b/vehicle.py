@@ -59,18 +59,12 @@ class ChassisForce:
     up: float
 
 
-def wheel_loads(vehicle: Vehicle, force: ChassisForce, pull: FloatArray) -> FloatArray:
-    """Return the loads normal to the ground (n,) [N] in quasi-static balance.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Wheels, centre of gravity, suspension.
-    force : ChassisForce
-        What accelerometers in the centre of gravity would read.
-    pull : numpy.ndarray
-        (n,) longitudinal forces of the soil, which act at the ground [N].
-    """
+def wheel_loads(
+    vehicle: Vehicle,
+    force: ChassisForce,  # what accelerometers in the centre of gravity would read
+    pull: FloatArray,  # (n,) longitudinal forces of the soil, which act at the ground [N]
+) -> FloatArray:
+    """Return the loads normal to the ground (n,) [N] in quasi-static balance."""
     if vehicle.suspension is None:
         loads = _rigid(vehicle, force)
     else:

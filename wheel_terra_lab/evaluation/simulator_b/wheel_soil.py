@@ -59,38 +59,22 @@ class SoilHere:
 
 @dataclass(frozen=True)
 class ContactLaws:
-    """What the soil does beyond its parameters; neutral as it stands.
+    """What the soil does beyond its parameters; neutral as it stands."""
 
-    Attributes
-    ----------
-    peak_ratio, peak_shift : float
-        Angle of greatest stress over entrance angle: peak_ratio + peak_shift s (Wong, Reece 1967).
-    leaving_ratio : float
-        Leaving angle over entrance angle, zero or negative.
-    lug_share : float
-        Share of the lug height by which the shearing radius exceeds the rim (Ding et al. 2010).
-    exponent_slope : float
-        n1 of the exponent n0 + n1 abs(s) (Ding et al. 2010).
-    proportional_sinkage : bool
-        Sinkage grows as (1 + s)/(1 - s/2) (Lyasko 2010), by softer ground.
-    shear_pressure_exponent : float
-        K grows with the mean pressure to this power, reference `shear_pressure` [Pa].
-    bulldozing : float
-        Share of the passive earth pressure on the front of the wheel (Hegedus 1960).
-    lug_thrust : float
-        Share of the passive failure in front of the engaged lugs (Bekker 1969).
-    """
-
+    # Angle of greatest stress over entrance angle: peak_ratio + peak_shift s (Wong, Reece 1967)
     peak_ratio: float = 0.4
     peak_shift: float = 0.0
-    leaving_ratio: float = 0.0
+    leaving_ratio: float = 0.0  # leaving angle over entrance angle, zero or negative
+    # Share of the lug height by which the shearing radius exceeds the rim (Ding et al. 2010)
     lug_share: float = 0.0
-    exponent_slope: float = 0.0
+    exponent_slope: float = 0.0  # n1 of the exponent n0 + n1 abs(s) (Ding et al. 2010)
+    # Sinkage grows as (1 + s)/(1 - s/2) (Lyasko 2010), by softer ground
     proportional_sinkage: bool = False
+    # K grows with the mean pressure to this power, from its reference on
     shear_pressure_exponent: float = 0.0
-    shear_pressure: float = 5000.0
-    bulldozing: float = 0.0
-    lug_thrust: float = 0.0
+    shear_pressure: float = 5000.0  # [Pa]
+    bulldozing: float = 0.0  # share of the passive earth pressure on the front (Hegedus 1960)
+    lug_thrust: float = 0.0  # share of the passive failure before engaged lugs (Bekker 1969)
 
 
 @dataclass(frozen=True)
@@ -133,23 +117,11 @@ def soil_forces(
     soil: SoilHere,
     laws: ContactLaws,
     motion: Motion,
-    depth: FloatArray,
-    sinkage: FloatArray,
-    load: FloatArray,
+    depth: FloatArray,  # of contact [m]: what gives the entrance angle
+    sinkage: FloatArray,  # of the rim [m], with what the wheel dug out: what it must push
+    load: FloatArray,  # normal to the ground [N]
 ) -> SoilForces:
-    """Return the forces of the soil on the wheels.
-
-    Parameters
-    ----------
-    wheel, soil, laws, motion
-        Wheels, soil under them, its laws and the motion of the hubs.
-    depth : numpy.ndarray
-        Depth of contact [m]: what gives the entrance angle.
-    sinkage : numpy.ndarray
-        Depth of the rim below the surface [m], with what the wheel dug out: what it must push.
-    load : numpy.ndarray
-        Load normal to the ground [N].
-    """
+    """Return the forces of the soil on the wheels."""
     direction = np.where(
         np.abs(motion.rate) * wheel.radius > _CREEP_SPEED,
         np.sign(motion.rate),

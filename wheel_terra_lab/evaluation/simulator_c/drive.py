@@ -61,16 +61,9 @@ class SimulatedDrive:
 
 
 def simulate(kind: str, seed: int, duration: float | None = None) -> SimulatedDrive:
-    """Simulate a drive.
+    """Simulate a drive of a kind of `plans.KINDS`, no longer than a `duration` [s].
 
-    Parameters
-    ----------
-    kind : str
-        One of `plans.KINDS`.
-    seed : int
-        Draws rover, soil, land, sensors and rover file.
-    duration : float, optional
-        Greatest duration [s]; default: that of the kind.
+    The seed draws rover, soil, land, sensors and rover file.
     """
     if kind not in KINDS:
         raise UserError(f'simulator C has no kind of drive {kind!r}; it has {", ".join(KINDS)}')

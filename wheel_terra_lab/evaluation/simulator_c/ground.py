@@ -18,36 +18,20 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Ground:
-    """Properties of the ground; numbers, or (n,) arrays with one entry per wheel.
+    """Properties of the ground; numbers, or (n,) arrays with one entry per wheel."""
 
-    Attributes
-    ----------
-    cohesion : c [Pa]
-    friction : tangent of the angle of internal friction [-]
-    density : rho [kg/m^3]
-    bearing : f, bearing strength over that of general shear failure [-]
-    settling : d0, depth over which bearing strength is mobilised [m]
-    shear_length : K, sliding over which shear strength is mobilised [m]
-    residual : shear strength after long sliding over its peak [-]
-    softening : share of the bearing pressure that is lost where the soil has been sheared [-]
-    rebound : stiffness of unloading over the secant stiffness of loading [-]
-    digging : soil thrown out, as a share of what the lugs could carry off [-]
-    heave : soil heaped up behind the wheel, likewise [-]
-    ploughing : resistance of the soil ahead, as a share of passive earth pressure [-]
-    """
-
-    cohesion: FloatArray | float
-    friction: FloatArray | float
-    density: FloatArray | float
-    bearing: FloatArray | float
-    settling: FloatArray | float
-    shear_length: FloatArray | float
-    residual: FloatArray | float
-    softening: FloatArray | float
-    rebound: FloatArray | float
-    digging: FloatArray | float
-    heave: FloatArray | float
-    ploughing: FloatArray | float
+    cohesion: FloatArray | float  # c [Pa]
+    friction: FloatArray | float  # tangent of the angle of internal friction [-]
+    density: FloatArray | float  # rho [kg/m^3]
+    bearing: FloatArray | float  # f, bearing strength over that of general shear failure [-]
+    settling: FloatArray | float  # d0, depth over which bearing strength is mobilised [m]
+    shear_length: FloatArray | float  # K, sliding over which shear strength is mobilised [m]
+    residual: FloatArray | float  # shear strength after long sliding over its peak [-]
+    softening: FloatArray | float  # share of the bearing pressure lost in sheared soil [-]
+    rebound: FloatArray | float  # stiffness of unloading over the secant one of loading [-]
+    digging: FloatArray | float  # soil thrown out, as a share of what lugs could carry off [-]
+    heave: FloatArray | float  # soil heaped up behind the wheel, likewise [-]
+    ploughing: FloatArray | float  # resistance ahead, as a share of passive earth pressure [-]
 
     def logarithms(self) -> FloatArray:
         """Return the logarithms of all properties, in the order of the fields."""

@@ -225,14 +225,9 @@ def _spot_angles(rover: Rover) -> FloatArray:
 
 
 def slip_ratio(rim: FloatArray, speed: FloatArray, rest: float = 0.002) -> FloatArray:
-    """Return slip ratios as the estimator defines them, rest aside.
+    """Return slip ratios of rim and ground speeds [m/s], as the estimator defines them.
 
-    Parameters
-    ----------
-    rim, speed : numpy.ndarray
-        Rim and ground speed of the wheels [m/s].
-    rest : float
-        Rim speed up to which a wheel is held still [m/s].
+    Up to a rim speed of `rest` a wheel is held still.
     """
     greater = np.maximum(np.abs(rim), np.abs(speed))
     ratio = (np.abs(rim) - np.abs(speed)) / np.maximum(greater, 1e-12)

@@ -195,19 +195,12 @@ class Suspension:
         return np.diag(spring) - by_moment @ weighted.T, by_moment, inverse, weighted.T
 
     def loads(
-        self, heights: FloatArray, force: FloatArray, bogie_pull: FloatArray
+        self,
+        heights: FloatArray,  # (n,) of the bottoms of the wheels along the normal [m]
+        force: FloatArray,  # (3,) gravity and inertia at the centre of gravity: x, y, down [N]
+        bogie_pull: FloatArray,  # (2,) of the wheels of the left and right bogie [N]
     ) -> tuple[FloatArray, tuple[float, float]]:
-        """Return (n,) loads [N] and the sines of pitch (nose up) and roll (left side up).
-
-        Parameters
-        ----------
-        heights : numpy.ndarray
-            (n,) of the bottoms of the wheels along the normal [m].
-        force : numpy.ndarray
-            (3,) of gravity and inertia at the centre of gravity: x, y, and down [N].
-        bogie_pull : numpy.ndarray
-            (2,) pull of the wheels of the left and right bogie [N].
-        """
+        """Return (n,) loads [N] and the sines of pitch (nose up) and roll (left side up)."""
         moments = self._moments(force, bogie_pull)
         by_height, by_moment, inverse, transfer = self._solved
         loads = by_height @ heights + by_moment @ moments

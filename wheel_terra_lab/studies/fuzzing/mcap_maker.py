@@ -39,38 +39,19 @@ class Layout:
 
 @dataclass
 class Made:
-    """A file and what stands where in it.
-
-    Attributes
-    ----------
-    content : bytes
-        The file.
-    parts : list
-        Begin, end and messages of each chunk, or of each message outside of chunks.
-    definitions : list
-        For each copy of the schemas and channels the places on which it depends.
-    messages : list
-        Begin, end and message, for each: its record, or the packed bytes in which it stands.
-    """
+    """A file and what stands where in it."""
 
     content: bytes
+    # Begin, end and messages of each chunk, or of each message outside of chunks
     parts: list[tuple[int, int, list[Sample]]] = field(default_factory=list)
+    # For each copy of the schemas and channels the places on which it depends
     definitions: list[tuple[int, int]] = field(default_factory=list)
+    # Begin, end and message, for each: its record, or the packed bytes in which it stands
     messages: list[tuple[int, int, Sample]] = field(default_factory=list)
 
 
 def make(samples: Sequence[Sample], types: dict[str, str], layout: Layout) -> Made:
-    """Write messages as an MCAP file.
-
-    Parameters
-    ----------
-    samples : sequence of Sample
-        Messages in the order of their log times.
-    types : dict
-        Topic to message type.
-    layout : Layout
-        How.
-    """
+    """Write messages, in the order of their log times, as an MCAP file; `types` by topic."""
     made = Made(b'')
     topics = list(types)
     definitions = _definitions(types)

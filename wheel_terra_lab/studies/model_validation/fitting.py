@@ -60,20 +60,12 @@ PRIOR_WEIGHT = 0.3  # of an expected value against a row, at the scale of the pa
 
 def fit(
     model: Model,
-    data: Sequence[tuple[OperatingPoints, FloatArray]],
-    sigma: Sequence[float],
+    data: Sequence[tuple[OperatingPoints, FloatArray]],  # with what was measured (N, 3), or nan
+    sigma: Sequence[float],  # weight of an error in sinkage [m], pull [N], torque [N m]
     free: Sequence[Free],
     prior_weight: float = PRIOR_WEIGHT,
 ) -> tuple[Model, dict[str, float]]:
-    """Fit parameters to rows; a weak pull towards the expected values settles what rows do not.
-
-    Parameters
-    ----------
-    data : sequence of (points, measured)
-        ``measured`` is (N, 3), nan = not measured.
-    sigma : sequence of float
-        Weight of an error in sinkage [m], pull [N], torque [N m].
-    """
+    """Fit parameters to rows; a weak pull towards the expected values settles what rows do not."""
     names = [item.name for item in free]
     expected = np.array([item.expected for item in free])
     scale = np.array([item.scale for item in free])

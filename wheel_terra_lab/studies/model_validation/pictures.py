@@ -17,21 +17,13 @@ LABELS = (('sinkage [mm]', 1e3), ('drawbar pull [N]', 1.0), ('torque [N m]', 1.0
 
 def compare(
     path: Path,
+    # Label -> slip (N,), measured (N, 3); one colour each, in this order
     measured: Mapping[str, tuple[FloatArray, FloatArray]],
+    # Label, slip, predicted (N, 3), colour index; negative: dashed
     curves: Sequence[tuple[str, FloatArray, FloatArray, int]],
-    columns: Sequence[int] = (0, 1, 2),
+    columns: Sequence[int] = (0, 1, 2),  # of sinkage, pull, torque
 ) -> None:
-    """Draw points and curves over slip.
-
-    Parameters
-    ----------
-    measured : mapping
-        Label -> slip (N,), measured (N, 3); one colour each, in this order.
-    curves : sequence
-        (label, slip, predicted (N, 3), colour index; negative: dashed).
-    columns : sequence of int
-        Which of sinkage, pull, torque.
-    """
+    """Draw points and curves over slip."""
     from matplotlib.figure import Figure
 
     with picture_style():
