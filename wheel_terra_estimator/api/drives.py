@@ -243,15 +243,9 @@ def _estimated(
     estimator = smoother.estimator if smoother else None
     core = EstimatorCore(configuration, estimator, judged_by=InputJudge)
     recorder = HistoryRecorder(configuration.wheels.names)
-    take = smoother.keep if smoother else recorder.add
-    for measurement in measurements:
-        for estimates in core.add(measurement):
-            take(estimates)
-    for estimates in core.flush():
-        take(estimates)
-    if smoother:
-        for kept in smoother.sets():
-            recorder.add(kept.estimates)
+    sets = core.run(measurements)
+    for estimates in smoother.smoothed(sets) if smoother else sets:
+        recorder.add(estimates)
     return recorder.history(), core.taught()
 
 

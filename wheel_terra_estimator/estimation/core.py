@@ -12,7 +12,7 @@ the same numbers.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from math import isnan
@@ -105,6 +105,12 @@ class EstimatorCore:
         if checked is None:
             return []
         return self._follow(self._watch.judge(channel, checked, self._lags.present))
+
+    def run(self, measurements: Iterable[Measurement]) -> Iterator[EstimateSet]:
+        """Yield the estimates of a whole drive, whose measurements are in the order of arrival."""
+        for measurement in measurements:
+            yield from self.add(measurement)
+        yield from self.flush()
 
     def process_pending(self) -> None:
         """Compute pending steps in idle time, so that the next output has less to do.

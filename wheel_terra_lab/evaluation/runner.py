@@ -99,16 +99,8 @@ def run_estimator(
     smoother = DriveSmoother(configuration) if smooth else None
     estimator = smoother.estimator if smoother else None
     core = EstimatorCore(configuration, estimator, judged_by=InputJudge)
-    sets: list[EstimateSet] = []
-    take = smoother.keep if smoother else sets.append
-    for measurement in measurements:
-        for estimates in core.add(measurement):
-            take(estimates)
-    for estimates in core.flush():
-        take(estimates)
-    if smoother:
-        sets = [kept.estimates for kept in smoother.sets()]
-    return sets, core.health()
+    sets = core.run(measurements)
+    return list(smoother.smoothed(sets) if smoother else sets), core.health()
 
 
 def record(sets: Sequence[EstimateSet], health: dict[str, Any]) -> Record:

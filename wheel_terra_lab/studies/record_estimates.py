@@ -247,11 +247,7 @@ def bag(folder: Path, configuration: Configuration, remaps: dict[str, str]) -> I
 def estimates_of(recording: Recording) -> dict[str, np.ndarray]:
     """Return field -> values of every fifth set of estimates; words as texts."""
     core = EstimatorCore(recording.configuration)
-    sets: list[EstimateSet] = []
-    for measurement in recording.measurements:
-        sets += core.add(measurement)
-    sets += core.flush()
-    chosen = sets[::EVERY]
+    chosen = list(core.run(recording.measurements))[::EVERY]
     found = {
         f.name: np.array([getattr(s, f.name) for s in chosen])
         for f in fields(EstimateSet)

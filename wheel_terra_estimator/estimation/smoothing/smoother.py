@@ -16,7 +16,7 @@ pull is published, since the two err differently.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -104,6 +104,13 @@ class DriveSmoother:
     def keep(self, estimates: EstimateSet, companion: Any = None) -> None:
         """Keep a set of the filter; `companion` is returned with the smoothed one."""
         self._kept.append(Kept(estimates, companion))
+
+    def smoothed(self, sets: Iterable[EstimateSet]) -> Iterator[EstimateSet]:
+        """Yield the smoothed sets of a whole drive, once all of the filter have come."""
+        for estimates in sets:
+            self.keep(estimates)
+        for kept in self.sets():
+            yield kept.estimates
 
     def sets(self) -> Iterator[Kept]:
         """Yield the smoothed sets in the order of those that were kept, with their companions.
