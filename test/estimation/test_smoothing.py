@@ -15,11 +15,11 @@ from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
-from wheel_terra_estimator.estimation.smoothing.backward import smoothed_states
 from wheel_terra_estimator.estimation.smoothing.history_buffer import (
     DiskBuffer,
     Gaussian,
     HistoryBuffer,
+    smoothed_states,
 )
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 from wheel_terra_estimator.estimation.smoothing.window import Moment, centred

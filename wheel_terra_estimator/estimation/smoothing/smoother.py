@@ -38,12 +38,12 @@ from wheel_terra_estimator.estimation.output_guard import OutputGuard
 from wheel_terra_estimator.estimation.outputs import Outputs
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import known
-from wheel_terra_estimator.estimation.smoothing.backward import smoothed_states
 from wheel_terra_estimator.estimation.smoothing.history_buffer import (
     DiskBuffer,
     Gaussian,
     HistoryBuffer,
     packed,
+    smoothed_states,
     unpacked,
 )
 from wheel_terra_estimator.estimation.smoothing.window import Moment, centred
