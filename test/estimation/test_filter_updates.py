@@ -252,19 +252,6 @@ def test_a_rover_that_stands_has_no_speed_and_learns_the_zero_of_its_gyro(parts,
     assert turning.state.zero == (0.0, 0.0)
 
 
-def test_a_fast_rover_is_not_stopped_at_once(parts):
-    fast = parts.filter()
-    fast.set(SPEED, 1.0, 0.02**2)
-    rest(parts, fast, 0.3)
-    assert fast.x[SPEED] > 0.8
-    rest(parts, fast, 4.0)
-    assert abs(fast.x[SPEED]) < 0.01
-    slow = parts.filter()
-    slow.set(SPEED, 0.06, 0.002**2)
-    rest(parts, slow, 0.4)
-    assert abs(slow.x[SPEED]) < 0.01, 'locked wheels stop it in a twentieth of a second'
-
-
 # -- Sinkage ----------------------------------------------------------------------------------
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
-from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import GyroZero
 from wheel_terra_estimator.estimation.rover import Rover
@@ -20,10 +20,6 @@ from wheel_terra_estimator.estimation.scalars import NAN
 # Tuned on simulated drives, seeds 1000 to 1019.
 _SETTLING_TIME = 0.15  # [s] of standing wheels before the rover counts as standing
 _STD = 0.0005  # of a rover that stands [m/s]
-_COASTING = 0.1
-"""Deceleration of a rover that slides on after its wheels have stopped [g]; as long as that takes
-the update is gated."""
-_COASTING_GATE = 9.0  # greatest NIS of the update meanwhile [-]
 _MOST_YAW_RATE = 0.05  # of a rover at rest, by the zero of the gyro [rad/s]
 _MOST_CYCLES = 200.0  # in the running mean of the zero
 _KEPT_SHARE = 0.5  # weight of a zero kept in a new run, over that in the old one [-]
@@ -42,7 +38,6 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
 
     def __init__(self, rover: Rover) -> None:
         super().__init__(ZeroVelocityState())
-        self._coasting = _COASTING * rover.gravity  # [m/s^2]
         self._rest_time = rover.rest_time
 
     def keep_zero_of(self, old: ZeroVelocityState) -> None:
@@ -68,13 +63,9 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         settled = time - self.state.since
         if settled < _SETTLING_TIME:
             return
-        variance, speed = _STD**2, float(ekf.x[SPEED])
-        if settled < abs(speed) / self._coasting:
-            P = float(ekf.P[SPEED, SPEED])
-            variance += chi_square_gate(speed, P + variance, _COASTING_GATE)
         row = np.zeros(len(ekf.x))
         row[SPEED] = 1.0
-        ekf.fuse([Row(-speed, row, variance)])
+        ekf.fuse([Row(-float(ekf.x[SPEED]), row, _STD**2)])
         turning = abs(yaw_rate) >= _MOST_YAW_RATE
         if settled > self._rest_time and window.rate_readings and not turning:
             self._learn_zero(yaw_rate, window.pitch_rate / window.rate_readings)
