@@ -148,9 +148,9 @@ def test_a_rate_that_is_too_old_is_unknown(wheels):
 def test_fast_odometry_is_smoothed_and_slow_is_not(wheels):
     for i in range(100):
         wheels.update(0.01 * i, odometry([0.4 + (0.1 if i % 2 else -0.1)] * 6, [NAN] * 6))
-    assert wheels.state.rim_speed[0] / 0.4 == pytest.approx(RADIUS, rel=0.04)
+    assert wheels.state.rims[0].speed / 0.4 == pytest.approx(RADIUS, rel=0.04)
     wheels.update(1.09, odometry([0.8] * 6, [NAN] * 6))
-    assert wheels.state.rim_speed[0] == pytest.approx(0.8 * RADIUS)
+    assert wheels.state.rims[0].speed == pytest.approx(0.8 * RADIUS)
 
 
 def test_a_ramp_goes_on_to_the_stamp_of_a_reference_between_two_messages(wheels):
@@ -161,14 +161,14 @@ def test_a_ramp_goes_on_to_the_stamp_of_a_reference_between_two_messages(wheels)
     # A constant rate that scatters by its noise stays what it is.
     for i in range(10, 40):
         wheels.update(0.1 * i, odometry([0.9 + 0.002 * (-1) ** i] * 6, [NAN] * 6))
-    assert wheels.rim_speeds(3.95) == wheels.state.rim_speed
+    assert wheels.rim_speeds(3.95) == tuple(rim.speed for rim in wheels.state.rims)
 
 
 def test_smoothing_does_not_put_a_ramp_behind(wheels):
     """Odometry at 100 Hz is smoothed over 50 ms: 5 % of the speed a second after a start."""
     for i in range(101):
         wheels.update(0.01 * i, odometry([0.01 * i] * 6, [NAN] * 6))
-    assert wheels.state.rim_speed[0] < 0.97 * RADIUS
+    assert wheels.state.rims[0].speed < 0.97 * RADIUS
     assert wheels.rim_speeds(1.0)[0] == pytest.approx(RADIUS, rel=0.002)
 
 
@@ -180,7 +180,7 @@ def test_a_wheel_in_messages_of_its_own_is_smoothed_by_its_own_rate(wheels):
         wheels.update(time, odometry(rates, [NAN] * 6))
         if time == 0.95:
             np.testing.assert_allclose(wheels.rim_speeds(time), 0.95 * RADIUS, rtol=0.02)
-    np.testing.assert_allclose(wheels.state.rim_speed, RADIUS, rtol=0.03)
+    np.testing.assert_allclose([rim.speed for rim in wheels.state.rims], RADIUS, rtol=0.03)
 
 
 def test_sinkage_and_leaving_angle_are_kept_wheel_by_wheel():

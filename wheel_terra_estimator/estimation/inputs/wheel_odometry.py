@@ -27,18 +27,35 @@ _SLOPE_NOISE = 3.0  # deviations of the rates within which a rim speed counts as
 _TORQUE_AGE = 2.0  # up to which a torque counts as known [s]
 
 
+class Rim(NamedTuple):
+    """Memory of the speed of a rim."""
+
+    speed: float = NAN  # smoothed [m/s], nan = never known
+    time: float = -math.inf  # of the last reading [s]
+    slope: float = 0.0  # rate of change of the speed, smoothed [m/s^2]
+    lag: float = 0.0  # of the smoothed speed behind the readings [s]
+
+    def after(self, time: float, reading: float) -> Rim:
+        """Return the memory after a reading [m/s] at a time [s]."""
+        gap = time - self.time
+        keep = 0.0 if gap >= _LONGEST_SMOOTHED else math.exp(-gap / _SMOOTHING_TIME)
+        lag = keep * gap / (1.0 - keep) if 0.0 < keep < 1.0 else 0.0
+        speed = reading if isnan(self.speed) else keep * self.speed + (1.0 - keep) * reading
+        slope = 0.0
+        if 0.0 < gap < _LONGEST_GAP:
+            slope = self.slope + _SLOPE_GAIN * ((speed - self.speed) / gap - self.slope)
+        return Rim(speed, time, slope, lag)
+
+
 class WheelOdometryState(NamedTuple):
     """Memory of the wheel odometry; tuples have one entry per wheel."""
 
-    time: float  # of the last message [s], -inf = none yet
-    rim_speed: Floats  # [m/s], nan = never known
-    rate_time: Floats  # [s]
-    rim_slope: Floats  # rate of change of the rim speeds, smoothed [m/s^2]
-    lag: Floats  # of the smoothed rim speeds behind the readings [s]
-    torque_time: float  # of the last torque [s]
+    rims: tuple[Rim, ...]
     torque_sum: Floats  # since the last cycle [N m]
     torque_count: tuple[int, ...]
     torque: Floats  # mean of the last cycle that had one [N m], nan = never known
+    time: float = -math.inf  # of the last message [s], -inf = none yet
+    torque_time: float = -math.inf  # of the last torque [s]
 
 
 class WheelOdometryInput(Component[WheelOdometryState]):
@@ -46,19 +63,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
 
     def __init__(self, rover: Rover, sensors: SensorFigures) -> None:
         n = rover.wheel_count
-        never = -math.inf
-        start = WheelOdometryState(
-            never,
-            (NAN,) * n,
-            (never,) * n,
-            (0.0,) * n,
-            (0.0,) * n,
-            never,
-            (0.0,) * n,
-            (0,) * n,
-            (NAN,) * n,
-        )
-        super().__init__(start)
+        super().__init__(WheelOdometryState((Rim(),) * n, (0.0,) * n, (0,) * n, (NAN,) * n))
         self._radius = rover.slip_radius
         self._silence = rover.silence
         # Apparent rate of change of a constant rim speed by the scatter of its readings.
@@ -67,41 +72,22 @@ class WheelOdometryInput(Component[WheelOdometryState]):
 
     def update(self, time: float, odometry: WheelOdometry) -> None:
         """Take a message at a time [s]."""
-        state = self.state
-        if odometry.steering is not None and all(isnan(rate) for rate in odometry.rate.tolist()):
+        state, rates, torques = self.state, odometry.rate.tolist(), odometry.torque.tolist()
+        if odometry.steering is not None and all(map(isnan, rates)):
             return  # steering angles alone
-        rim_speed, rate_time = list(state.rim_speed), list(state.rate_time)
-        rim_slope, lag = list(state.rim_slope), list(state.lag)
-        for i, rate in enumerate(odometry.rate.tolist()):
-            if not isnan(rate):
-                rim, old = rate * self._radius[i], rim_speed[i]
-                gap = time - rate_time[i]
-                keep = 0.0 if gap >= _LONGEST_SMOOTHED else math.exp(-gap / _SMOOTHING_TIME)
-                lag[i] = keep * gap / (1.0 - keep) if 0.0 < keep < 1.0 else 0.0
-                rim_speed[i] = rim if isnan(old) else keep * old + (1.0 - keep) * rim
-                if 0.0 < gap < _LONGEST_GAP:
-                    slope = (rim_speed[i] - old) / gap
-                    rim_slope[i] += _SLOPE_GAIN * (slope - rim_slope[i])
-                else:
-                    rim_slope[i] = 0.0
-                rate_time[i] = time
-        torque_time = state.torque_time
-        torque_sum, torque_count = list(state.torque_sum), list(state.torque_count)
-        for i, torque in enumerate(odometry.torque.tolist()):
-            if not isnan(torque):
-                torque_sum[i] += torque
-                torque_count[i] += 1
-                torque_time = time
+        rims = [
+            rim if isnan(rate) else rim.after(time, rate * radius)
+            for rim, rate, radius in zip(state.rims, rates, self._radius, strict=True)
+        ]
+        read = [not isnan(torque) for torque in torques]
+        sums = zip(state.torque_sum, torques, read, strict=True)
         self.state = WheelOdometryState(
-            time=time,
-            rim_speed=tuple(rim_speed),
-            rate_time=tuple(rate_time),
-            rim_slope=tuple(rim_slope),
-            lag=tuple(lag),
-            torque_time=torque_time,
-            torque_sum=tuple(torque_sum),
-            torque_count=tuple(torque_count),
-            torque=state.torque,
+            tuple(rims),
+            tuple([total + torque if new else total for total, torque, new in sums]),
+            tuple([n + new for n, new in zip(state.torque_count, read, strict=True)]),
+            state.torque,
+            time,
+            time if any(read) else state.torque_time,
         )
 
     def take_torque(self) -> Floats:
@@ -126,10 +112,8 @@ class WheelOdometryInput(Component[WheelOdometryState]):
 
         A change is extrapolated over the age and the lag of smoothing.
         """
-        state, rims = self.state, []
-        for rim, slope, when, lag in zip(
-            state.rim_speed, state.rim_slope, state.rate_time, state.lag, strict=True
-        ):
+        rims = []
+        for rim, when, slope, lag in self.state.rims:
             age = time - when
             extrapolated = abs(slope) > self._least_slope and age + lag <= _LONGEST_EXTRAPOLATED
             now = rim + slope * (age + lag) if extrapolated else rim
@@ -138,7 +122,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
 
     def fastest(self) -> float:
         """Return the greatest known rim speed, whatever its direction or age [m/s]; 0 = none."""
-        return max((abs(rim) for rim in self.state.rim_speed if not isnan(rim)), default=0.0)
+        return max((abs(rim.speed) for rim in self.state.rims if not isnan(rim.speed)), default=0.0)
 
     def silent(self, time: float) -> bool:
         """Return whether no message came for longer than ``filter.silence``."""
