@@ -104,16 +104,12 @@ class Clock:
             f'values="{";".join([*values, values[-1]])}"/>'
         )
 
-    def appear(self, start: float, end: float | None = None) -> str:
+    def appear(self, start: float) -> str:
         """Return an animation that shows something from a time of the drive on."""
-        times, shown = [0.0, self.share(start)], ['hidden', 'visible']
-        if end is not None:
-            times.append(self.share(end))
-            shown.append('hidden')
-        keys = ';'.join(f'{t:.4f}' for t in times)
         return (
             f'<animate attributeName="visibility" dur="{LENGTH:g}s" repeatCount="indefinite" '
-            f'calcMode="discrete" keyTimes="{keys}" values="{";".join(shown)}"/>'
+            f'calcMode="discrete" keyTimes="0.0000;{self.share(start):.4f}" '
+            f'values="hidden;visible"/>'
         )
 
 

@@ -101,12 +101,10 @@ class _LowPass:
 class TwoStateFilter:
     """Offset and gain of the slip over a demand."""
 
-    def __init__(
-        self, configuration: Configuration, demand: Demand, tuning: TwoStateTuning | None = None
-    ) -> None:
+    def __init__(self, configuration: Configuration, demand: Demand) -> None:
         self._configuration = configuration
         self._demand = demand
-        self._tuning = tuning = tuning or TUNING[demand]
+        self._tuning = tuning = TUNING[demand]
         self._state = np.array([tuning.offset, tuning.gain])
         self._covariance = np.diag([tuning.offset_std**2, tuning.gain_std**2])
         self._fused_travel: float | None = None
@@ -223,8 +221,8 @@ class TwoStateFilter:
 class ThreeStateFilter(TwoStateFilter):
     """Offset, ln s0 and ln q_max of the traction curve; arguments as of `TwoStateFilter`."""
 
-    def __init__(self, configuration: Configuration, tuning: TwoStateTuning | None = None) -> None:
-        super().__init__(configuration, 'curve', tuning or TUNING['curve'])
+    def __init__(self, configuration: Configuration) -> None:
+        super().__init__(configuration, 'curve')
         self._state = np.array([0.0, np.log(_SLIP_SCALE), np.log(_LARGEST_DEMAND)])
         deviations = [self._tuning.offset_std, _SLIP_SCALE_STD, _LARGEST_DEMAND_STD]
         self._covariance = np.diag(np.square(deviations))
@@ -247,13 +245,11 @@ def slip_course(
     measurements: Iterable[Measurement],
     stamps: IntArray,
     demand: Demand,
-    tuning: TwoStateTuning | None = None,
 ) -> SlipCourse:
     """Return the slip that the filter had, in the order of arrival, when each stamp came."""
+    curved = demand == 'curve'
     two_states = (
-        ThreeStateFilter(configuration, tuning)
-        if demand == 'curve'
-        else TwoStateFilter(configuration, demand, tuning)
+        ThreeStateFilter(configuration) if curved else TwoStateFilter(configuration, demand)
     )
     times: list[int] = []
     rows: list[tuple[FloatArray, FloatArray]] = []

@@ -22,6 +22,8 @@ import numpy as np
 from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.closed_form import coefficients
 
+_LUG_SHARE = 0.5  # of the lug height in the radius, lambda [-]
+
 
 def decoupled_pull(
     torque: Any,
@@ -69,16 +71,15 @@ def equivalent_contact(
     rear_height: Any,  # of the soil behind the wheel above the lowest point of the rim, z2 [m]
     peak_ratio: Any,  # angle of greatest stress over entrance angle, c1 + c2 s [-]
     lug_sinkage: Any = 0.0,  # part of the sinkage that lugs dug or saved, dz [m]
-    lug_share: Any = 0.5,  # of the lug height, lambda [-]
 ) -> EquivalentContact:
-    """Return the contact on the circle of radius r + lug_share h.
+    """Return the contact on the circle of radius r + lambda h.
 
     t1e = arccos(1 - (z - dz)/r_e), t2e = -arccos(1 - z2/r_e), tme = peak_ratio t1e.
     The rear height is above the sinkage where a mound stands there. Raises ValueError if the
     sinkage less the lugs' part, or the rear height, is outside 0 to the radius, or the peak outside
     the contact.
     """
-    radius = wheel.radius + lug_share * np.asarray(wheel.lug_height)
+    radius = wheel.radius + _LUG_SHARE * np.asarray(wheel.lug_height)
     depth = np.asarray(sinkage, float) - lug_sinkage
     largest = float(np.min(radius))
     check_range('sinkage less lugs', depth, 0.0, largest, 'm', open_lower=True)
