@@ -379,6 +379,26 @@ def test_rows_are_the_derivatives_of_torque_and_pull(parts, here, name, step):
     assert torques == pytest.approx(here.torque)
 
 
+@pytest.mark.parametrize('std', [0.0005, 0.01])
+def test_the_noise_of_a_rim_speed_is_one_of_its_torque_and_pull_and_may_hide_the_soil(parts, std):
+    x = parts.filter().x
+    x[SPEED], x[parts.layout.sinkage] = 0.7 * 0.05, 0.03
+
+    def at(rim):
+        linearisation = Linearisation(parts.rover, parts.layout, parts.models, 0.05)
+        return linearisation.update(x, parts.cycle((rim,) * 6, rim_stds=(std,) * 6), (0.0,) * 6)
+
+    here, faster, slower = at(0.05), at(0.05 + 1e-5), at(0.05 - 1e-5)
+    for noise, more, less in (
+        (here.torque_noise, faster.torque, slower.torque),
+        (here.pull_noise, faster.pull, slower.pull),
+    ):
+        assert noise == pytest.approx(np.abs(more - less) / 2e-5 * std, rel=0.02)
+    loads = WheelLoads(parts.rover).state.load
+    relative = here.torque_noise / (np.array(loads) * parts.rover.shear_radius)
+    assert here.blurred is bool(np.median(relative) > 0.05) is (std > 0.001)
+
+
 def test_a_wheel_in_a_rut_has_the_contact_of_one_that_stands_so_much_higher(parts):
     in_rut = forces_at(parts, ruts=(0.02,) * 6)
     higher = forces_at(parts, ruts=(0.0,) * 6, sinkage=-0.5 * 0.02)

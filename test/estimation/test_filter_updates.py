@@ -17,6 +17,7 @@ from wheel_terra_estimator.estimation.filter.sinkage import FLOOR_VARIANCE, Sink
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.state import (
+    CENTROID,
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
@@ -619,7 +620,7 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
     layout = parts.layout
 
     def entries(**changes):
-        given = {'settled': True, 'opposes_rims': False, 'unread': []}
+        given = {'settled': True, 'opposes_rims': False, 'unread': [], 'blurred': False}
         return set(layout.considered(**(given | changes)))
 
     assert entries() == set()
@@ -627,6 +628,8 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
     one = entries(unread=[2])
     assert one == {layout.sinkage.start + 2, layout.stiffness.start + 2}
     assert SLIP_SINKAGE in entries(unread=list(range(6)))
+    errors = range(layout.size)[layout.shear_error]
+    assert entries(blurred=True) == {SHEAR_STRENGTH, SHEAR_MODULUS, CENTROID, *errors}
 
 
 def test_the_jacobian_of_a_settled_sinkage_is_its_derivative(parts, ekf):

@@ -118,14 +118,17 @@ def odometry(rate, torque):
     return WheelOdometry(0, np.array(rate), np.array(torque))
 
 
+NOISE = PARTS.sensors.wheel_rate_std
+
+
 @pytest.fixture
 def wheels():
     return WheelOdometryInput(PARTS.rover, PARTS.sensors)
 
 
 def test_torques_are_means_and_the_last_one_is_held(wheels):
-    wheels.update(0.0, odometry([0.4] * 6, [2.0] * 5 + [NAN]))
-    wheels.update(0.1, odometry([0.4] * 6, [4.0] * 5 + [NAN]))
+    wheels.update(0.0, odometry([0.4] * 6, [2.0] * 5 + [NAN]), NOISE)
+    wheels.update(0.1, odometry([0.4] * 6, [4.0] * 5 + [NAN]), NOISE)
     mean = wheels.take_torque()
     assert mean[:5] == pytest.approx([3.0] * 5)
     assert math.isnan(mean[5])
@@ -136,8 +139,8 @@ def test_torques_are_means_and_the_last_one_is_held(wheels):
 
 
 def test_a_rate_that_is_too_old_is_unknown(wheels):
-    wheels.update(0.0, odometry([0.4] * 6, [NAN] * 6))
-    wheels.update(0.4, odometry([0.4] * 3 + [NAN] * 3, [NAN] * 6))
+    wheels.update(0.0, odometry([0.4] * 6, [NAN] * 6), NOISE)
+    wheels.update(0.4, odometry([0.4] * 3 + [NAN] * 3, [NAN] * 6), NOISE)
     rims = wheels.rim_speeds(0.6)
     assert not any(math.isnan(rim) for rim in rims[:3])
     assert all(math.isnan(rim) for rim in rims[3:])
@@ -147,27 +150,51 @@ def test_a_rate_that_is_too_old_is_unknown(wheels):
 
 def test_fast_odometry_is_smoothed_and_slow_is_not(wheels):
     for i in range(100):
-        wheels.update(0.01 * i, odometry([0.4 + (0.1 if i % 2 else -0.1)] * 6, [NAN] * 6))
+        wheels.update(0.01 * i, odometry([0.4 + (0.1 if i % 2 else -0.1)] * 6, [NAN] * 6), NOISE)
     assert wheels.state.rims[0].speed / 0.4 == pytest.approx(RADIUS, rel=0.04)
-    wheels.update(1.09, odometry([0.8] * 6, [NAN] * 6))
+    wheels.update(1.09, odometry([0.8] * 6, [NAN] * 6), NOISE)
     assert wheels.state.rims[0].speed == pytest.approx(0.8 * RADIUS)
+
+
+@pytest.mark.parametrize(('rate', 'error'), [(0.5, 0.1 / math.sqrt(10.0)), (8.0, 0.1)])
+def test_noisy_rates_of_a_slow_wheel_are_means_over_a_second(wheels, rate, error):
+    """A noise of 0.1 rad/s: a fifth of a slow rate, and of no account at a fast one."""
+    rng, errors = np.random.default_rng(2), []
+    for i in range(2000):
+        wheels.update(0.1 * i, odometry(rng.normal(rate, 0.1, 6), [NAN] * 6), 0.1)
+        errors += [rim.speed / RADIUS - rate for rim in wheels.state.rims]
+    assert wheels.stds()[0] == pytest.approx(error * RADIUS)
+    assert np.std(errors) == pytest.approx(error, rel=0.1)
+    assert wheels.noise(0.1)[0] == pytest.approx(0.1 * RADIUS), 'ten cycles share an error'
+
+
+def test_a_change_beyond_the_noise_of_the_rates_begins_a_new_mean(wheels):
+    for i in range(30):
+        wheels.update(0.1 * i, odometry([0.5] * 6, [NAN] * 6), 0.1)
+    wheels.update(3.0, odometry([0.95] * 3 + [0.6] * 3, [NAN] * 6), 0.1)
+    assert wheels.state.rims[0].speed == pytest.approx(0.95 * RADIUS)
+    assert wheels.state.rims[5].speed < 0.52 * RADIUS
+    assert wheels.stds()[0] == pytest.approx(0.1 * RADIUS)
+    for rate in (0.0, 0.2, 0.1):  # it stands, starts, and is a mean again
+        wheels.update(4.0 + rate, odometry([rate] * 6, [NAN] * 6), 0.1)
+        assert (wheels.state.rims[0].speed == rate * RADIUS) is (rate != 0.1)
 
 
 def test_a_ramp_goes_on_to_the_stamp_of_a_reference_between_two_messages(wheels):
     """A reference velocity halfway through a ramp belongs to the rim speed of its own stamp."""
     for i in range(10):
-        wheels.update(0.1 * i, odometry([0.1 * i] * 6, [NAN] * 6))
+        wheels.update(0.1 * i, odometry([0.1 * i] * 6, [NAN] * 6), NOISE)
     assert wheels.rim_speeds(0.95)[0] == pytest.approx(0.95 * RADIUS, rel=0.01)
     # A constant rate that scatters by its noise stays what it is.
     for i in range(10, 40):
-        wheels.update(0.1 * i, odometry([0.9 + 0.002 * (-1) ** i] * 6, [NAN] * 6))
+        wheels.update(0.1 * i, odometry([0.9 + 0.002 * (-1) ** i] * 6, [NAN] * 6), NOISE)
     assert wheels.rim_speeds(3.95) == tuple(rim.speed for rim in wheels.state.rims)
 
 
 def test_smoothing_does_not_put_a_ramp_behind(wheels):
     """Odometry at 100 Hz is smoothed over 50 ms: 5 % of the speed a second after a start."""
     for i in range(101):
-        wheels.update(0.01 * i, odometry([0.01 * i] * 6, [NAN] * 6))
+        wheels.update(0.01 * i, odometry([0.01 * i] * 6, [NAN] * 6), NOISE)
     assert wheels.state.rims[0].speed < 0.97 * RADIUS
     assert wheels.rim_speeds(1.0)[0] == pytest.approx(RADIUS, rel=0.002)
 
@@ -177,7 +204,7 @@ def test_a_wheel_in_messages_of_its_own_is_smoothed_by_its_own_rate(wheels):
     for i in range(126):
         time, rates = i / 120, np.full(6, NAN)
         rates[i % 6] = min(time, 1.0)
-        wheels.update(time, odometry(rates, [NAN] * 6))
+        wheels.update(time, odometry(rates, [NAN] * 6), NOISE)
         if time == 0.95:
             np.testing.assert_allclose(wheels.rim_speeds(time), 0.95 * RADIUS, rtol=0.02)
     np.testing.assert_allclose([rim.speed for rim in wheels.state.rims], RADIUS, rtol=0.03)

@@ -436,3 +436,17 @@ def test_the_error_of_the_rear_camera_counts_where_it_measures(measured):
         assert deviations[1] > 1.1 * deviations[0]
     else:
         assert deviations[1] == deviations[0]
+
+
+def test_noisy_rates_of_slow_wheels_do_not_weaken_the_soil():
+    """Rates that scatter by 14 %: a strength fitted at those slips falls to a third of the true."""
+    drive = simulate(load('calibration_drive', rover='pathfinder'), 9, duration=40.0)
+    truth, estimator = drive.truth, WheelSoilEstimator(drive.configuration)
+    sets = estimate(drive, estimator=estimator)[200:]  # 5 s after the start
+    index = np.searchsorted(truth.stamp, [s.stamp for s in sets])
+    error = np.array([s.slip for s in sets]) - truth.slip[index]
+    std = np.array([s.slip_std for s in sets])
+    assert np.sqrt(np.mean(error**2)) < 0.1
+    assert np.mean(np.abs(error) < 1.96 * std) > 0.9
+    learned = estimator.learned()['soil.friction_angle_deg']
+    assert learned == pytest.approx(38.0, rel=0.3)  # that of the scenario

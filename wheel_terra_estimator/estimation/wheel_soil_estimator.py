@@ -170,7 +170,7 @@ class WheelSoilEstimator:
         self._torque = TorqueUpdate(configuration, rover, layout)
         self._balance = ForceBalance(configuration, rover, sensors, layout)
         # What it means.
-        self._slips = SlipJudge(rover, sensors)
+        self._slips = SlipJudge(rover)
         self._margin = PullMargin(rover.wheel_count, models)
         self._slopes = SlopeCurve()
         self._sideways = SidewaysMotion(rover)
@@ -256,7 +256,8 @@ class WheelSoilEstimator:
         if inputs.leaving_angle is not None:
             self._leaving_angles.update(time, inputs.leaving_angle)
         if inputs.wheel_odometry is not None:
-            self._wheels.update(time, inputs.wheel_odometry)
+            rate_std = math.sqrt(self._noise.variance('wheel_rate'))
+            self._wheels.update(time, inputs.wheel_odometry, rate_std)
             if inputs.wheel_odometry.steering is not None:
                 self._steering.update(inputs.wheel_odometry.steering)
 
@@ -308,6 +309,7 @@ class WheelSoilEstimator:
             settled=self._contact_age.settled,
             opposes_rims=cycle.yaw_compensated.oppose(float(ekf.x[SPEED])),
             unread=unread,
+            blurred=forces is not None and forces.blurred,
         )
         ekf.fuse(rows, considered)
 
@@ -392,6 +394,7 @@ class WheelSoilEstimator:
             dt=dt,
             window=window,
             rims=rims,
+            rim_stds=self._wheels.noise(dt),
             yaw_compensated=yaw_compensated,
             yaw_rate=turning.yaw_rate,
             lateral_motion=turning.lateral_motion,
@@ -549,6 +552,7 @@ class WheelSoilEstimator:
             self._steering.state.headings,
             motion.lateral_motion,
             stopped=self._zero_velocity.standing() and time >= self._reference.state.sliding_until,
+            rim_stds=self._wheels.stds(),
         )
         slips = self._slips.update(time, rims, body)
         ekf = self._ekf

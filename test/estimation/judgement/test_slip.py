@@ -97,9 +97,10 @@ def contradictions(sets, judged):
 
 def test_a_slip_is_known_to_a_thousandth_at_best_and_to_one_at_worst():
     parts = Parts(reader.load(SAND))
-    judge = SlipJudge(parts.rover, replace(parts.sensors, wheel_rate_std=0.0))
+    judge = SlipJudge(parts.rover)
     for speed_std, std in ((1e-9, 1e-3), (5.0, 1.0)):
-        body = BodyMotion(0.04, speed_std, 0.0, 0.0, straight_headings(parts.rover), 0.0, False)
+        headings = straight_headings(parts.rover)
+        body = BodyMotion(0.04, speed_std, 0.0, 0.0, headings, 0.0, False, (0.0,) * 6)
         assert {wheel.std for wheel in judge.update(1.0, (0.05,) * 6, body)} == {std}
 
 
@@ -210,13 +211,14 @@ def test_a_wheel_that_begins_to_turn_is_not_sure_to_spin():
     parts = Parts(reader.load(SAND))
     rest, n = parts.rover.rest_speed, parts.rover.wheel_count
     headings = straight_headings(parts.rover)
-    body = BodyMotion(0.7 * rest, 0.3 * rest, 0.0, 0.0, headings, 0.0, stopped=True)
+    noise = parts.sensors.wheel_rate_std * parts.rover.slip_radius[0]
+    body = BodyMotion(0.7 * rest, 0.3 * rest, 0.0, 0.0, headings, 0.0, True, (noise,) * n)
     rims = (1.05 * rest,) + (0.5 * rest,) * (n - 1)
-    turning, *standing = SlipJudge(parts.rover, parts.sensors).update(0.0, rims, body)
+    turning, *standing = SlipJudge(parts.rover).update(0.0, rims, body)
     assert turning.std > 0.25
     assert abs(turning.slip - (1.0 - 0.7 / 1.05)) < 2.0 * turning.std
     assert not any(wheel.judged for wheel in standing)
-    lost = SlipJudge(parts.rover, parts.sensors).update(0.0, rims, body._replace(speed_std=9.0))[0]
+    lost = SlipJudge(parts.rover).update(0.0, rims, body._replace(speed_std=9.0))[0]
     assert lost.std == 1.0, 'no slip is further off'
 
 
@@ -252,16 +254,15 @@ def test_the_deviation_of_a_slip_is_that_of_its_two_speeds(rim, v):
 
 def test_slip_and_slip_velocity_are_held_while_no_rate_is_known():
     parts = Parts(reader.load(SAND))
-    judge = SlipJudge(parts.rover, parts.sensors)
-    body = BodyMotion(0.04, 0.001, 0.0, 0.0, straight_headings(parts.rover), 0.0, False)
+    judge = SlipJudge(parts.rover)
+    headings = straight_headings(parts.rover)
+    body = BodyMotion(0.04, 0.001, 0.0, 0.0, headings, 0.0, False, (0.0005,) * 6)
     assert {wheel.velocity for wheel in judge.update(0.9, (float('nan'),) * 6, body)} == {0.0}
     known = judge.update(1.0, (0.05,) * 6, body)
     unknown = judge.update(1.1, (float('nan'),) * 6, body._replace(speed=0.01))
     assert [(w.slip, w.velocity) for w in unknown] == [(w.slip, w.velocity) for w in known]
     assert known[0].velocity == pytest.approx(0.01)
-    assert known[0].velocity_std == pytest.approx(
-        np.hypot(0.001, parts.sensors.wheel_rate_std * parts.rover.slip_radius[0])
-    )
+    assert known[0].velocity_std == pytest.approx(np.hypot(0.001, 0.0005))
     assert {wheel.velocity_std for wheel in unknown} == {1.0}
     standing = judge.update(1.2, (0.0,) * 6, body._replace(speed=0.0))
     assert {wheel.velocity for wheel in standing} == {0.0}

@@ -35,6 +35,10 @@ _SLOPE_KEEP = 0.9
 _NEW_CONTACT = 0.15
 """Change of d torque / d ln strength, over load times radius [-], beyond the noise of the state:
 the wheel has come free or has locked."""
+_MOST_BLUR = 0.05
+"""Noise of a torque by that of its rim speed, over load times radius [-], above which torques do
+not tell the soil: a strength fitted at slips that are mostly noise tends to zero (errors in
+variables, Fuller 1987)."""
 _LEAST_RIM_OVER_REST = 2.0
 """Rim speed over ``rest_speed`` above which a wheel turns."""
 
@@ -47,8 +51,10 @@ class ContactForces(NamedTuple):
     torque: FloatArray  # (n,) [N m]
     pull_rows: FloatArray  # (n, size) Jacobian
     torque_rows: FloatArray  # (n, size)
-    pull_noise: FloatArray  # (n,) deviation by the error of a measured leaving angle [N]
+    pull_noise: FloatArray  # (n,) deviation by errors of rim speed and leaving angle [N]
     torque_noise: FloatArray  # (n,) [N m]
+    blurred: bool
+    """Whether the noise of the rim speeds hides how the torque depends on soil."""
 
     def moved_to(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return pulls and torques at another state, to first order."""
@@ -87,7 +93,7 @@ class Linearisation(Component[FloatArray]):
         rows = np.zeros((2, n, layout.size))
         if not any(turns):
             nothing = np.zeros(n)
-            return ContactForces(x, nothing, nothing, rows[0], rows[1], nothing, nothing)
+            return ContactForces(x, nothing, nothing, rows[0], rows[1], nothing, nothing, False)
         turning = np.array(turns)
         rim, load, rut = np.where(turning, cycle.rims, 1.0), np.array(loads), np.array(ruts)
         direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
@@ -101,11 +107,15 @@ class Linearisation(Component[FloatArray]):
         )
         forces = self._models.forces(states)
         torque_noise, pull_noise = self._noise_of_angle(states, forces, turning)
-        self.state = self.smoothed(forces, load * np.array(self._rover.shear_radius), turning)
+        moment = load * np.array(self._rover.shear_radius)
+        self.state = self.smoothed(forces, moment, turning)
         by_ratio, by_depth, by_strength, by_modulus, by_centroid = self.state[::-1].transpose(
             1, 0, 2
         )
         wheels = np.arange(n)
+        by_rim = np.where(turning, by_ratio * (speed / rim**2 * cycle.rim_stds), 0.0)
+        pull_noise, torque_noise = np.hypot([pull_noise, torque_noise], by_rim)
+        blurred = bool(np.median(np.abs(by_rim[1, turning]) / moment[turning]) > _MOST_BLUR)
         # The ratio is that of the direction of rolling: the two signs cancel.
         rows[:, :, SPEED] = by_ratio * (np.array(headings.by_speed) / rim)
         by_sinkage = np.where(met < rut, 1.0 - rut_share, 1.0)
@@ -117,7 +127,7 @@ class Linearisation(Component[FloatArray]):
         rows[:, :, CENTROID] = by_centroid * direction
         rows[:, ~turning] = 0.0
         pull, torque = np.where(turning, direction * [forces.pull, forces.torque], 0.0)
-        return ContactForces(x, pull, torque, rows[0], rows[1], pull_noise, torque_noise)
+        return ContactForces(x, pull, torque, rows[0], rows[1], pull_noise, torque_noise, blurred)
 
     def _noise_of_angle(
         self, states: WheelStates, forces: WheelForces, turning: BoolArray

@@ -108,6 +108,8 @@ class Pulls(Component[PullState]):
             pull_by_strength = forces.pull_rows[:, SHEAR_STRENGTH].tolist()
             torque_by_strength = forces.torque_rows[:, SHEAR_STRENGTH].tolist()
             noises = forces.pull_noise.tolist()
+            # At the slip of a noisy rim speed the model is off by as much in each cycle anew.
+            gain = 1.0 if forces.blurred else _EXCESS_GAIN
         for i, load in enumerate(loads.load):
             if not cycle.turns[i]:
                 # Its torque gives the pull; else static friction carries its share of the slope.
@@ -119,7 +121,7 @@ class Pulls(Component[PullState]):
                 own[i] = std[i] ** 2
             else:
                 if not isnan(readings[i]):  # torque residual, smoothed
-                    excess[i] += _EXCESS_GAIN * (readings[i] - torques[i] - excess[i])
+                    excess[i] += gain * (readings[i] - torques[i] - excess[i])
                 beyond = self._believed(excess[i], readings[i])
                 if beyond and torque_by_strength[i]:
                     torques[i] += beyond

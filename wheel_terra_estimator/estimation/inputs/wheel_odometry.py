@@ -12,12 +12,16 @@ from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN
+from wheel_terra_estimator.estimation.scalars import NAN, TINY, clipped
 
 _SMOOTHING_TIME = 0.05
 """Time constant of the rim speeds [s], since fast odometry is noisy or quantised."""
 _LONGEST_SMOOTHED = 0.06
-"""Time between messages from which on rim speeds are not smoothed [s]."""
+"""Time between messages from which on rim speeds are not smoothed, unless they are noisy [s]."""
+_NOISE_SHARE = 0.02
+"""Noise over the rim speed down to which a noisy one is smoothed [-]: an error of the slip."""
+_MEAN_TIME = 1.0  # longest mean for that [s]
+_JUMP = 3.0  # deviations from that mean by which a reading begins a new one
 _SLOPE_GAIN = 0.5  # smoothing of the rim speeds' rate of change, per message [-]
 _LONGEST_EXTRAPOLATED = 0.15
 """Longest extrapolation of a rim speed [s]: over the lag of its smoothing, and to a stamp between
@@ -34,17 +38,33 @@ class Rim(NamedTuple):
     time: float = -math.inf  # of the last reading [s]
     slope: float = 0.0  # rate of change of the speed, smoothed [m/s^2]
     lag: float = 0.0  # of the smoothed speed behind the readings [s]
+    readings: float = 0.0  # in the mean of a noisy one
+    std: float = 0.0  # noise of the smoothed speed [m/s]
 
-    def after(self, time: float, reading: float) -> Rim:
-        """Return the memory after a reading [m/s] at a time [s]."""
+    def after(self, time: float, reading: float, noise: float) -> Rim:
+        """Return the memory after a reading [m/s] of such a noise [m/s] at a time [s]."""
         gap = time - self.time
-        keep = 0.0 if gap >= _LONGEST_SMOOTHED else math.exp(-gap / _SMOOTHING_TIME)
-        lag = keep * gap / (1.0 - keep) if 0.0 < keep < 1.0 else 0.0
-        speed = reading if isnan(self.speed) else keep * self.speed + (1.0 - keep) * reading
+        share = 1.0 - math.exp(-gap / _SMOOTHING_TIME) if gap < _LONGEST_SMOOTHED else 1.0
+        readings = self._readings(gap, reading, noise)
+        share = min(share, 1.0 / readings)
+        lag = gap * (1.0 / share - 1.0) if 0.0 < share < 1.0 else 0.0
+        speed = reading if isnan(self.speed) else self.speed + share * (reading - self.speed)
         slope = 0.0
         if 0.0 < gap < _LONGEST_GAP:
             slope = self.slope + _SLOPE_GAIN * ((speed - self.speed) / gap - self.slope)
-        return Rim(speed, time, slope, lag)
+        return Rim(speed, time, slope, lag, readings, noise / math.sqrt(readings))
+
+    def _readings(self, gap: float, reading: float, noise: float) -> float:
+        """Return the readings in the mean, `gap` after the last one [s]: until the noise is small.
+
+        A reading that differs by more than its noise is a mean of its own, as is the first one, and
+        one of 0 or after it: encoders show exactly whether a wheel stands.
+        """
+        if not (reading and self.speed and abs(reading - self.speed) <= _JUMP * noise):
+            return 1.0
+        enough = (noise / max(_NOISE_SHARE * abs(self.speed), TINY)) ** 2
+        longest = _MEAN_TIME / max(gap, TINY)
+        return clipped(min(enough, longest), 1.0, self.readings + 1.0)
 
 
 class WheelOdometryState(NamedTuple):
@@ -70,13 +90,13 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         noise = _SLOPE_NOISE * sensors.wheel_rate_std * max(rover.slip_radius)
         self._least_slope = noise / _SMOOTHING_TIME
 
-    def update(self, time: float, odometry: WheelOdometry) -> None:
-        """Take a message at a time [s]."""
+    def update(self, time: float, odometry: WheelOdometry, rate_std: float) -> None:
+        """Take a message at a time [s], its rates with a noise of `rate_std` [rad/s]."""
         state, rates, torques = self.state, odometry.rate.tolist(), odometry.torque.tolist()
         if odometry.steering is not None and all(map(isnan, rates)):
             return  # steering angles alone
         rims = [
-            rim if isnan(rate) else rim.after(time, rate * radius)
+            rim if isnan(rate) else rim.after(time, rate * radius, rate_std * radius)
             for rim, rate, radius in zip(state.rims, rates, self._radius, strict=True)
         ]
         read = [not isnan(torque) for torque in torques]
@@ -113,12 +133,23 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         A change is extrapolated over the age and the lag of smoothing.
         """
         rims = []
-        for rim, when, slope, lag in self.state.rims:
-            age = time - when
-            extrapolated = abs(slope) > self._least_slope and age + lag <= _LONGEST_EXTRAPOLATED
-            now = rim + slope * (age + lag) if extrapolated else rim
+        for rim in self.state.rims:
+            age = time - rim.time
+            lasts = abs(rim.slope) > self._least_slope and age + rim.lag <= _LONGEST_EXTRAPOLATED
+            now = rim.speed + rim.slope * (age + rim.lag) if lasts else rim.speed
             rims.append(now if age <= self._silence else NAN)
         return tuple(rims)
+
+    def noise(self, dt: float) -> Floats:
+        """Return the noise of the rim speeds as that of white noise in cycles `dt` [s] apart [m/s].
+
+        The error of a mean lasts for as many cycles as it is long.
+        """
+        return tuple(rim.std * math.sqrt(1.0 + rim.lag / max(dt, TINY)) for rim in self.state.rims)
+
+    def stds(self) -> Floats:
+        """Return the deviations of the rim speeds by the noise of their readings [m/s]."""
+        return tuple(rim.std for rim in self.state.rims)
 
     def fastest(self) -> float:
         """Return the greatest known rim speed, whatever its direction or age [m/s]; 0 = none."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
-from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.estimation.scalars import NAN, TIME_ROUNDING
 
 # Deviations of the slip beyond those of the filter.
@@ -33,6 +33,7 @@ class BodyMotion(NamedTuple):
     lateral_motion: float  # of the outer wheels over the fastest rim speed [-]
     stopped: bool
     """All wheels stand, and no reference velocity shows a slide on them."""
+    rim_stds: Floats  # noise of the rim speeds [m/s]
 
 
 class WheelSlip(NamedTuple):
@@ -50,10 +51,9 @@ class WheelSlip(NamedTuple):
 class SlipJudge(Component[tuple[WheelSlip, ...]]):
     """Computes slip, its deviation and rest of all wheels."""
 
-    def __init__(self, rover: Rover, sensors: SensorFigures) -> None:
+    def __init__(self, rover: Rover) -> None:
         super().__init__((WheelSlip(),) * rover.wheel_count)
         self._rover = rover
-        self._rim_std = tuple(sensors.wheel_rate_std * r for r in rover.slip_radius)
 
     def update(self, time: float, rims: Floats, body: BodyMotion) -> tuple[WheelSlip, ...]:
         """Judge all wheels at a time [s]; `rims` are their rim speeds [m/s], nan = unknown."""
@@ -85,7 +85,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
                 headings.by_yaw_rate[i] * body.yaw_rate_std,
                 _DRIFT * headings.across[i] * body.speed,
             )
-        velocity, velocity_std = rim - v, math.hypot(v_std, self._rim_std[i])
+        velocity, velocity_std = rim - v, math.hypot(v_std, body.rim_stds[i])
         if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
             # It stands: its slip holds its last value.
             since = time if isnan(before.rest_since) else before.rest_since
@@ -94,7 +94,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
             return WheelSlip(
                 before.slip, before.std, since, resting, judged, velocity, velocity_std
             )
-        slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)
+        slip, std = slip_and_deviation(rim, v, v_std, body.rim_stds[i], rest)
         std = min(max(std, _LEAST_STD), 1.0)
         return WheelSlip(slip, std, NAN, False, True, velocity, velocity_std)
 

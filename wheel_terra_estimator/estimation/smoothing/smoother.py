@@ -179,7 +179,7 @@ class _SmoothedOutputs:
         sensors = SensorFigures.from_configuration(configuration)
         self._layout = layout = layout_of(rover, sensors)
         self._most_std = float(configuration.filter.class_std)
-        self._slips = SlipJudge(rover, sensors)
+        self._slips = SlipJudge(rover)
         self._pulls = Pulls(rover, sensors, WheelLoads(rover).state.load)
         self._outputs = Outputs(configuration, rover, sensors, layout)
 
