@@ -147,6 +147,7 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     """Return the response of each torque to the force along the drive, and its level; or None.
 
     Starts and stops of the wheels show the forward direction of the IMU, else the mean torque does.
+    In a slight curve sides that run unlike drive one another, whatever the slope.
     """
     rows, sense = evidence.unturned, np.sign(evidence.common_rate)
     if evidence.force is None or not evidence.enough(rows):
@@ -156,7 +157,8 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
     if yaw is not None:
         along = along * math.cos(yaw.value) + across * math.sin(yaw.value)
-    design = np.column_stack([along, sense, np.ones(sense.size)])[rows]
+    way = np.column_stack([sense, np.ones(sense.size), curve(evidence, width)])
+    design = np.column_stack([along, way])[rows]
     size = np.nan_to_num(np.abs(evidence.rate), nan=evidence.working_rate)
     turns = [moving_mean(one, width) > evidence.rest_rate for one in size.T]
     own = np.where(np.column_stack(turns), evidence.torque, 0.0)  # one that stands takes no power
@@ -165,8 +167,7 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     rows = rows & (along * sense > UPHILL_ENOUGH * evidence.facts.gravity)
     if not evidence.enough(rows):
         return None
-    way = np.column_stack([sense, np.ones(sense.size)])[rows]
-    levels = [block_fit(way, column)[0] for column in table[rows].T]
+    levels = [block_fit(way[rows], column)[0] for column in table[rows].T]
     if yaw is not None:
         return list(zip(measured, levels, strict=True))
     shares = [one.value * level.value for one, level in zip(measured, levels, strict=True)]
@@ -175,6 +176,11 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     forward = math.copysign(1.0, sum(shares))
     measured = [Estimate(forward * response.value, response.std) for response in measured]
     return list(zip(measured, levels, strict=True))
+
+
+def curve(evidence: Evidence, width: int) -> FloatArray:
+    """Return by how much the right side runs faster (k,) [m/s], averaged over so many rows."""
+    return moving_mean(np.nan_to_num(evidence.side_difference), width)
 
 
 def thrust(evidence: Evidence) -> FloatArray:
@@ -341,7 +347,7 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     table = np.nan_to_num(evidence.torque[rows]) - load
     # Residual of slopes along both axes: the IMU may be turned about z.
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
-    design = np.column_stack([np.ones(sense.size), sense, slopes])
+    design = np.column_stack([np.ones(sense.size), sense, slopes, curve(evidence, width)[rows]])
     fits = [block_fit(design, column) for column in table.T]
     return [(fit[0], fit[1]) for fit in fits]
 
