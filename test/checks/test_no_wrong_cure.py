@@ -577,6 +577,20 @@ def test_wheels_that_fight_on_firm_ground_have_no_wrong_sign(torques, told):
     assert ('torque_sign' in faults(report)) == told
 
 
+def test_torques_of_a_slight_curve_have_no_wrong_sign_and_no_zero():
+    """The tighter the curve the more the inner wheels brake; here the steeper the slope too."""
+    time = np.arange(0.0, 100.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [2, 3, 48, 52, 97, 98], [0, 0.3, 0.3, -0.3, -0.3, 0])
+    yaw = np.sign(speed) * np.interp(time, [10, 45, 55, 90], [0, 0.08, 0.08, 0])
+    motion = rolling.Motion(time, speed, yaw, 0.8 * yaw)
+    whole = rolling.recording(motion)
+    scrub = 150.0 * np.outer(yaw, [-1.0, 1.0, -1.0, 1.0])
+    torque = whole.joints.torque + scrub
+    assert not faults(checked(whole=whole, joints={'torque': torque}))
+    flipped = checked(whole=whole, joints={'torque': torque * [1.0, -1.0, 1.0, 1.0]})
+    assert [(f.fault, f.wheel) for f in flipped.findings] == [('torque_sign', 'front_right')]
+
+
 def lagged(values, seconds, rate=rolling.RATE):
     """Readings (k, p) behind a filter of first order."""
     keep = math.exp(-1.0 / (rate * seconds))
