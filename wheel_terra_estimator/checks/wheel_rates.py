@@ -114,7 +114,9 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not dead:
         return [], evidence
     how = f'does not follow the others for up to {max(dead.values()):.1f} s of driving'
-    finding = evidence.found('rate_frozen', 0.97, wheel=', '.join(dead), how=how)
+    told = bool(np.isfinite(evidence.torque).any())  # else it may as well stand
+    how += '' if told else ', or it stands: no torque tells'
+    finding = evidence.found('rate_frozen', 0.97 if told else 0.5, wheel=', '.join(dead), how=how)
     return [finding], evidence.with_rate(rate)
 
 
