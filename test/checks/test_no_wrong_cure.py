@@ -594,6 +594,15 @@ def test_torques_of_a_slight_curve_have_no_wrong_sign_and_no_zero():
     assert [(f.fault, f.wheel) for f in flipped.findings] == [('torque_sign', 'front_right')]
 
 
+def test_wheels_that_spin_on_the_spot_do_not_lack_a_sign():
+    """What the reference of an entrapped rover goes back is its noise."""
+    drive = rolling.ten_minute_drive(turns=False)
+    whole = rolling.recording(replace(drive, speed=np.abs(drive.speed)))
+    noise = 0.03 * np.random.default_rng(3).standard_normal(whole.reference.stamp.size)
+    velocity = np.column_stack([noise, 0.0 * noise, 0.0 * noise])
+    assert not faults(checked(whole=whole, reference={'velocity': velocity}))
+
+
 def lagged(values, seconds, rate=rolling.RATE):
     """Readings (k, p) behind a filter of first order."""
     keep = math.exp(-1.0 / (rate * seconds))
