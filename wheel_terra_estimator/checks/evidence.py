@@ -221,12 +221,15 @@ class Evidence:
         return _shared(_row_means(speed[:, right]) - _row_means(speed[:, left]))
 
     @cached_property
+    def curve(self) -> FloatArray:
+        """By how much the right side runs faster for a while (k,) [m/s]; 0: not known."""
+        return _shared(moving_mean(np.nan_to_num(self.side_difference), self.rows_in(SETTLING)))
+
+    @cached_property
     def unturned(self) -> Mask:
         """Rows of driving without a turn, neither by the gyro nor by the wheels."""
-        rim, rows = np.abs(self.rim), self.moving.copy()
-        difference = self.side_difference
-        if np.isfinite(difference).any():
-            rows &= np.abs(moving_mean(difference, self.rows_in(SETTLING))) < STRAIGHT_SHARE * rim
+        rim = np.abs(self.rim)
+        rows = self.moving & (np.abs(self.curve) <= STRAIGHT_SHARE * rim)
         if self.gyro is not None and self.facts.known:
             yaw = np.abs(self.gyro[:, 2] - np.median(self.gyro[:, 2]))
             rows &= yaw * float(np.abs(self.facts.lateral).max()) < STRAIGHT_SHARE * rim

@@ -157,7 +157,7 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
     if yaw is not None:
         along = along * math.cos(yaw.value) + across * math.sin(yaw.value)
-    way = np.column_stack([sense, np.ones(sense.size), curve(evidence, width)])
+    way = np.column_stack([sense, np.ones(sense.size), evidence.curve])
     design = np.column_stack([along, way])[rows]
     size = np.nan_to_num(np.abs(evidence.rate), nan=evidence.working_rate)
     turns = [moving_mean(one, width) > evidence.rest_rate for one in size.T]
@@ -176,11 +176,6 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     forward = math.copysign(1.0, sum(shares))
     measured = [Estimate(forward * response.value, response.std) for response in measured]
     return list(zip(measured, levels, strict=True))
-
-
-def curve(evidence: Evidence, width: int) -> FloatArray:
-    """Return by how much the right side runs faster (k,) [m/s], averaged over so many rows."""
-    return moving_mean(np.nan_to_num(evidence.side_difference), width)
 
 
 def thrust(evidence: Evidence) -> FloatArray:
@@ -341,13 +336,14 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
         return None
     width, facts = evidence.rows_in(SLOPE_TIME), evidence.facts  # without vibration
-    calm = [moving_mean(column, width) for column in evidence.force[:, :2].T]
-    slopes = np.column_stack(calm)[rows]
+    motion = [*evidence.force[:, :2].T, evidence.curve]
+    calm = np.column_stack([moving_mean(column, width) for column in motion])[rows]
+    slopes, curve = calm[:, :2], calm[:, 2]
     load = np.nan_to_num(facts.mass * slopes[:, :1] * facts.radius / len(facts.names))
     table = np.nan_to_num(evidence.torque[rows]) - load
     # Residual of slopes along both axes: the IMU may be turned about z.
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
-    design = np.column_stack([np.ones(sense.size), sense, slopes, curve(evidence, width)[rows]])
+    design = np.column_stack([np.ones(sense.size), sense, slopes, curve])
     fits = [block_fit(design, column) for column in table.T]
     return [(fit[0], fit[1]) for fit in fits]
 
