@@ -590,8 +590,6 @@ def test_torques_of_a_slight_curve_have_no_wrong_sign_and_no_zero():
     scrub = 150.0 * np.outer(yaw, [-1.0, 1.0, -1.0, 1.0])
     torque = whole.joints.torque + scrub
     assert not faults(checked(whole=whole, joints={'torque': torque}))
-    flipped = checked(whole=whole, joints={'torque': torque * [1.0, -1.0, 1.0, 1.0]})
-    assert [(f.fault, f.wheel) for f in flipped.findings] == [('torque_sign', 'front_right')]
 
 
 def test_wheels_that_spin_on_the_spot_do_not_lack_a_sign():

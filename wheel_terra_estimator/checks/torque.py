@@ -147,7 +147,6 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     """Return the response of each torque to the force along the drive, and its level; or None.
 
     Starts and stops of the wheels show the forward direction of the IMU, else the mean torque does.
-    In a slight curve sides that run unlike drive one another, whatever the slope.
     """
     rows, sense = evidence.unturned, np.sign(evidence.common_rate)
     if evidence.force is None or not evidence.enough(rows):
@@ -157,17 +156,17 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
     if yaw is not None:
         along = along * math.cos(yaw.value) + across * math.sin(yaw.value)
-    way = np.column_stack([sense, np.ones(sense.size), evidence.curve])
-    design = np.column_stack([along, way])[rows]
+    design = np.column_stack([along, sense, np.ones(sense.size)])[rows]
     size = np.nan_to_num(np.abs(evidence.rate), nan=evidence.working_rate)
     turns = [moving_mean(one, width) > evidence.rest_rate for one in size.T]
     own = np.where(np.column_stack(turns), evidence.torque, 0.0)  # one that stands takes no power
     table = np.column_stack([moving_mean(np.nan_to_num(t), width) for t in own.T])
-    measured = [block_fit(design, column)[0] for column in table[rows].T]
+    measured = [_whatever_curve(design, evidence.curve[rows], one)[0] for one in table[rows].T]
     rows = rows & (along * sense > UPHILL_ENOUGH * evidence.facts.gravity)
     if not evidence.enough(rows):
         return None
-    levels = [block_fit(way[rows], column)[0] for column in table[rows].T]
+    way = np.column_stack([sense, np.ones(sense.size)])[rows]
+    levels = [_whatever_curve(way, evidence.curve[rows], one)[0] for one in table[rows].T]
     if yaw is not None:
         return list(zip(measured, levels, strict=True))
     shares = [one.value * level.value for one, level in zip(measured, levels, strict=True)]
@@ -176,6 +175,16 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     forward = math.copysign(1.0, sum(shares))
     measured = [Estimate(forward * response.value, response.std) for response in measured]
     return list(zip(measured, levels, strict=True))
+
+
+def _whatever_curve(design: FloatArray, curve: FloatArray, torque: FloatArray) -> list[Estimate]:
+    """Return a fit whose deviations hold what a slight curve may have made of it.
+
+    In a curve the sides drive one another, and it may tighten as a slope does.
+    """
+    plain, beside = (block_fit(d, torque) for d in (design, np.column_stack([design, curve])))
+    pairs = zip(plain, beside, strict=False)
+    return [Estimate(a.value, math.hypot(a.std, a.value - b.value)) for a, b in pairs]
 
 
 def thrust(evidence: Evidence) -> FloatArray:
@@ -343,8 +352,8 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     table = np.nan_to_num(evidence.torque[rows]) - load
     # Residual of slopes along both axes: the IMU may be turned about z.
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
-    design = np.column_stack([np.ones(sense.size), sense, slopes, curve])
-    fits = [block_fit(design, column) for column in table.T]
+    design = np.column_stack([np.ones(sense.size), sense, slopes])
+    fits = [_whatever_curve(design, curve, column) for column in table.T]
     return [(fit[0], fit[1]) for fit in fits]
 
 
