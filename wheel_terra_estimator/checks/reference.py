@@ -80,7 +80,7 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     reference, rim = there
     forward = reference.velocity[:, 0]
-    if hardly_moves(forward, np.abs(rim) > 0.4 * np.quantile(np.abs(rim), 0.9)):
+    if hardly_moves(forward, np.abs(rim) >= 0.4 * np.quantile(np.abs(rim), 0.9)):
         return [], evidence  # wheels that spin on the spot
     least = 0.4 * float(np.quantile(np.abs(forward), 0.9))
     both = min(np.mean(forward > least), np.mean(forward < -least)) > SELDOM_NEGATIVE
