@@ -592,6 +592,18 @@ def test_torques_of_a_slight_curve_have_no_wrong_sign_and_no_zero():
     assert not faults(checked(whole=whole, joints={'torque': torque}))
 
 
+@pytest.mark.parametrize('there', [True, False])
+def test_where_the_reference_takes_no_side_not_all_wheels_are_backwards_for_sure(
+    monkeypatch, there
+):
+    """One side is reversed, in turns through loose sand: starts are felt against their mean."""
+    monkeypatch.setattr(turning, '_chosen', lambda *_: turning._Chosen(np.ones(4), -2.1))
+    monkeypatch.setattr(turning, '_direction', lambda *_: (None, -0.96))
+    (told,) = checked(reference={} if there else None).findings[:1]
+    assert told.fault == 'backwards' and ('some of them' in told.words) == there
+    assert told.confidence == pytest.approx(0.5 if there else 0.99, abs=0.01)
+
+
 def test_wheels_that_spin_on_the_spot_do_not_lack_a_sign():
     """What the reference of an entrapped rover goes back is its noise."""
     drive = rolling.ten_minute_drive(turns=False)

@@ -69,6 +69,7 @@ UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
 CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
 SLIDE = ', or the rover slides back'
+SOME = ', or some of them do: drive straight'
 DEGREE, NEAR_DEGREES = math.radians(1.0), 0.15  # [rad]; error of a scale that few turns tell [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
@@ -352,8 +353,9 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     slides = agreement[0] is not None and agreement[0] < 0.0 and _climbs(evidence, rows)
     if blame == 'wheels':
         signs, turn = -signs, -turn
-        if slides:
-            trial = f'{chosen.trial}{SLIDE}'
+        mixed = agreement[0] is None and evidence.recording.reference is not None
+        if slides or mixed:
+            trial = f'{chosen.trial}{SLIDE if slides else SOME}'
             chosen = chosen._replace(sure=0.5 * chosen.sure, trial=trial)
     signs = np.where(np.isfinite(evidence.rate).any(axis=0), signs, 1.0)
     if (signs < 0.0).any():
