@@ -99,9 +99,11 @@ def test_a_zero_of_the_torques_is_no_radius(zero):
         assert 'radius' not in {f.kind for f in found}, [str(f) for f in found]
 
 
-@pytest.mark.parametrize(('since', 'until', 'moment'), [(-1.0, np.inf, 80.0), (20.0, 50.0, -1.0)])
+@pytest.mark.parametrize(
+    ('since', 'until', 'moment'), [(-1.0, np.inf, 80.0), (20.0, 50.0, -1.0), (20.0, 50.0, 0.1)]
+)
 def test_a_wheel_held_under_torque_is_not_frozen(since, until, moment):
-    """By more than the others pull, or, dragged by them, as much against them."""
+    """By more than the others pull; dragged by them, as much against them; or not driven."""
     whole = rolling.recording()
     rate, torque = whole.joints.rate.copy(), whole.joints.torque.copy()
     held = (whole.joints.seconds > since) & (whole.joints.seconds < until)

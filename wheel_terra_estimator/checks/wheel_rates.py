@@ -66,7 +66,7 @@ WILD_FACTOR, WILD_SIGMAS = 1.5, 6.0  # wild change over the greatest and usual v
 LEAST_WILD, MOST_WILD = 3, 0.1  # messages with, and share of, single wild values that are reported
 LONG_FROZEN_TIME = 10.0  # time that a coarse encoder does not repeat itself [s]
 HELD_TORQUE = 1.5  # torque of a held wheel over that of the others, at least [-]
-DRAGGED_TORQUE = 0.5  # the same against theirs, of one that the others drag [-]
+DRIVEN_TORQUE = 0.2  # the same in their sense, of one that is driven and not dragged [-]
 NOISE_FACTOR = 5.0
 LEAST_NOISE_SHARE = 0.08  # noise of a rate that matters, as a share of the working rate
 COUNTING_STD = 1.0 / math.sqrt(6.0)  # of a rate from two counts, in counts
@@ -154,7 +154,10 @@ def _stands(evidence: Evidence, index: int) -> float:
 
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:
-    """Return whether the torque says that a wheel stands: stalled, or dragged by the others."""
+    """Return whether the torque says that a wheel stands: stalled, or not driven.
+
+    A torque of exactly 0 says nothing.
+    """
     rate = np.delete(evidence.rate[rows], index, axis=1)
     drive = evidence.torque[rows] * np.sign(row_medians(rate))[:, None]
     own, others = drive[:, index], np.delete(drive, index, axis=1)
@@ -162,8 +165,8 @@ def _held(evidence: Evidence, index: int, rows: Any) -> bool:
         return False
     typical = max(float(np.nanmedian(np.abs(others))), 1e-9)
     stalled = np.nanmedian(np.abs(own)) > HELD_TORQUE * typical
-    dragged = np.nanmedian(own) * np.sign(np.nanmedian(others)) < -DRAGGED_TORQUE * typical
-    return bool(stalled or dragged)
+    driven = np.nanmedian(own) * np.sign(np.nanmedian(others)) > DRIVEN_TORQUE * typical
+    return bool(stalled or (not driven and own.any()))
 
 
 def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
