@@ -24,11 +24,15 @@ FIRST_PORT, PORTS = 7400, 250  # of domain 0, of each domain (DDSI-RTPS 2.5, 9.6
 LOOK = 0.02
 """Between two looks at a condition [s]: one that publishes keeps nobody busy."""
 SOON = {
-    'wheel_terra_estimator.messages.diagnostics:MEMORY': 10**9,
+    'wheel_terra_estimator.messages.diagnostics:MEMORY': 3 * 10**8,
+    'wheel_terra_estimator.messages.diagnostics:PERIOD': 10**8,
     'wheel_terra_estimator.ros.lifecycle_node:DISCOVERY': 1.5,
+    'wheel_terra_estimator.ros.lifecycle_node:DIAGNOSTICS_PERIOD': 0.1,
+    'wheel_terra_estimator.ros.lifecycle_node:NAMES_PERIOD': 0.2,
+    'wheel_terra_estimator.ros.limiter_node:DIAGNOSTICS_PERIOD': 0.1,
 }
-"""Constants of a node that tells sooner what it waits for (5 s), and for less time (10 s): how long
-faults are told is tested in messages."""
+"""Constants of a node that looks and tells more often than each second, and waits less before it
+does: how long faults are told is tested in messages."""
 HAS_ROS = importlib.util.find_spec('rclpy') is not None
 
 

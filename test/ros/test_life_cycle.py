@@ -57,12 +57,12 @@ def call(listener):
     return answer
 
 
-def test_life_cycle_services_and_live_parameters(start, parameters, listener, call, tmp_path):
+def test_life_cycle_services_and_live_parameters(start, parameters, listener, call, tmp_path, soon):
     names = reader.load(['pathfinder']).wheels.names
     node, until = listener
     soil = tmp_path / 'soil.yaml'
     options = ['-p', 'autostart:=false', '-p', f'soil_file:={soil}']
-    process = start('estimator_node', *ROVER, parameters, *options)
+    process = start('estimator_node', *ROVER, parameters, *options, **soon)
     slip = hear(node, ros.JointState, f'{NODE}/slip')
     stuck = hear(node, ros.Bool, f'{NODE}/stuck', latched())
     said = hear(node, ros.DiagnosticArray, '/diagnostics')

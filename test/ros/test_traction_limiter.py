@@ -177,7 +177,7 @@ def test_a_stop_waits_for_no_disk(listener, tmp_path, monkeypatch):
 
 
 def test_publishers_that_bypass_it_or_are_not_heard_are_told_in_diagnostics_and_log(
-    start, listener
+    start, listener, soon
 ):
     """Of a limiter of plain Twist."""
     node, until = listener
@@ -187,7 +187,7 @@ def test_publishers_that_bypass_it_or_are_not_heard_are_told_in_diagnostics_and_
     )
     wiring = ['cmd_vel_in:=/cmd_vel_checked', 'cmd_vel_out:=/cmd_vel', f'{STUCK}:=/est/stuck']
     arguments = ['--ros-args', '-p', 'stamped:=false', *(w for r in wiring for w in ('-r', r))]
-    process = start('traction_limiter_node', *arguments)
+    process = start('traction_limiter_node', *arguments, **soon)
     until(lambda: said)
     assert said[-1].level == b'\x00', said[-1].message
     best_effort = ros.QoSProfile(depth=1, reliability=ros.ReliabilityPolicy.BEST_EFFORT)

@@ -29,14 +29,14 @@ def heard(listener):
     return node, until, statuses
 
 
-def joint_states(node, stamp, *, topic='joint_states'):
-    """Return a function that publishes wheel rates with stamps a millisecond apart."""
+def joint_states(node, stamp, *, apart=1_000_000):
+    """Return a function that publishes wheel rates with stamps by so much ``apart`` [ns]."""
     names = list(reader.load(['pathfinder']).wheels.names)
-    publisher = node.create_publisher(ros.JointState, topic, 1000)
+    publisher = node.create_publisher(ros.JointState, 'joint_states', 1000)
     message = ros.JointState(name=names, velocity=[1.0] * len(names), effort=[2.0] * len(names))
 
     def send():
-        stamp[0] += 1_000_000
+        stamp[0] += apart
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp[0], 1_000_000_000)
         publisher.publish(message)
 
@@ -50,7 +50,7 @@ def test_what_is_wrong_around_a_node_is_told_until_it_ends(start, heard, paramet
     node, until, statuses = heard
     sets = []
     node.create_subscription(ros.JointState, f'{NODE}/slip', sets.append, 10)
-    publisher, send = joint_states(node, [100_000_000_000])
+    publisher, send = joint_states(node, [100_000_000_000], apart=50_000_000)
     nowhere = '/proc/s.yaml'
     given = ('-p', 'use_sim_time:=true', '-p', f'soil_file:={nowhere}')
     start('estimator_node', *ROVER, parameters, *given, **soon)

@@ -174,7 +174,7 @@ def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
         rolling = speed + rims[:, :, None] * lateral
         cost = UNTURNED * (1.0 - alike**2)
     middle = (lateral.size - 1) // 2, lateral.size // 2
-    median = np.sort(rolling, axis=2)[:, :, middle].mean(axis=2)
+    median = np.partition(rolling, middle, axis=2)[:, :, middle].mean(axis=2)
     spread = np.abs(rolling - median[:, :, None]).mean(axis=2)
     size = np.maximum(np.abs(speed).mean(axis=2), 1e-9)
     cost = cost + (spread / size).mean(axis=1)
