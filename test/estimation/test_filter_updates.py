@@ -176,6 +176,24 @@ def test_two_references_on_standing_wheels_say_that_the_rover_slides(parts, ekf)
         assert ekf.x[SPEED] == pytest.approx(0.03 if sliding else 0.0, abs=0.003)
 
 
+def test_two_unlike_references_on_standing_wheels_are_wild(parts, ekf):
+    update = reference_update(parts)
+    ekf.set(SPEED, 0.0, 0.0005**2)
+    for time, speed in ((0.0, 0.0), (1.0, 0.15), (2.0, -0.05), (3.0, 0.08)):
+        hear(parts, update, ekf, time, speed, still=True, fastest_rim=0.0)
+        assert update.state.sliding_until <= time
+        assert ekf.x[SPEED] == pytest.approx(0.0, abs=0.003)
+
+
+def test_the_first_reference_of_a_run_may_be_wild(parts):
+    """No gap is known yet: it is no seldom one that shows another slip."""
+    fresh = parts.filter()
+    fresh.set(SPEED, 0.045, 0.001**2)
+    update = reference_update(parts)
+    assert not hear(parts, update, fresh, 5.0, 0.01)
+    assert fresh.x[SPEED] > 0.04
+
+
 def test_neither_a_rejected_reference_nor_one_at_rest_tells_of_slip(parts, ekf):
     update = reference_update(parts)
     ekf.set(SPEED, 0.0, 0.0005**2)

@@ -322,11 +322,33 @@ def test_at_rest_the_accelerometer_tells_its_zero():
     window = InertialWindow(readings=1, speed_change=zero * dt, duration=dt)
     at_rest = parts.cycle((0.0,) * 6, still=True, window=window)
     for _ in range(cycles):
-        made.learn_bias(ekf, at_rest, made.by_wheels(dt, at_rest.yaw_compensated, 0.0))
+        wheels = made.by_wheels(dt, at_rest.yaw_compensated, 0.0)
+        made.learn_bias(ekf, at_rest, wheels, wheels)
     precision = cycles * dt**2 / (noise() ** 2 * dt)
     assert ekf.x[GRAVITY_BIAS] == pytest.approx(zero * precision / (precision + 1 / prior), 1e-3)
     assert ekf.P[GRAVITY_BIAS, GRAVITY_BIAS] == pytest.approx(1 / (precision + 1 / prior), 1e-3)
     assert abs(ekf.x[SPEED]) < 1e-6
+
+
+def test_noise_of_the_wheel_rates_does_not_stop_a_rover_in_the_filter():
+    """Its wheels seem to change speed each cycle, its accelerometer feels nothing."""
+    parts, dt = Parts(reader.load(SAND)), 0.1
+    ekf, rng = filter_at(0.045, 0.01), np.random.default_rng(3)
+    window = InertialWindow(readings=1, speed_change=0.0, duration=dt)
+    for rims in 0.05 + 0.005 * rng.standard_normal((200, 2)):
+        made = process([rims[0]] * 6)
+        cycle = parts.cycle((rims[1],) * 6, window=window)
+        wheels = made.by_wheels(dt, cycle.yaw_compensated, 0.0)
+        made.learn_bias(ekf, cycle, wheels, wheels)
+    assert ekf.x[SPEED] == pytest.approx(0.045, abs=0.002)
+    assert ekf.P[SPEED, SPEED] == pytest.approx(0.01**2, rel=0.1)
+
+
+def test_wheels_do_not_drive_a_rover_that_moves_against_them():
+    made = process([0.05] * 6)
+    made.state = made.state._replace(ratio=0.0)
+    speed_gain, _, constant, *_ = made.by_wheels(0.1, speeds([0.1] * 6), 0.0)
+    assert (speed_gain, constant) == (1.0, 0.0)
 
 
 def test_a_jolt_is_felt_at_once_and_an_accelerometer_that_jolts_for_long_is_doubted():
@@ -337,7 +359,7 @@ def test_a_jolt_is_felt_at_once_and_an_accelerometer_that_jolts_for_long_is_doub
         window = InertialWindow(readings=1, speed_change=change, duration=dt)
         cycle = parts.cycle((0.05,) * 6, window=window)
         wheels = made.by_wheels(dt, cycle.yaw_compensated, 0.0)
-        lacking = made.learn_bias(ekf, cycle, wheels)
+        lacking = made.learn_bias(ekf, cycle, wheels, wheels)
         wheels = wheels._replace(variance=wheels.variance + lacking)
         return made.combined(wheels, dt, window).wheel_weight
 

@@ -158,7 +158,7 @@ class WheelSoilEstimator:
         angle_std = sensors.leaving_angle_std * SMOOTHED_NOISE
         self._linearisation = Linearisation(rover, layout, models, angle_std)
         self._stationary = StationaryWheels(rover, sensors, layout, models)
-        self._pulls = Pulls(rover, sensors, level)
+        self._pulls = Pulls(rover, sensors, layout, level)
         # The filter: process and measurements.
         self._ekf = initial_filter(configuration, rover, sensors, layout, models, level)
         self._speed = SpeedProcess(configuration, rover, sensors)
@@ -447,7 +447,7 @@ class WheelSoilEstimator:
             expected = speed.towards_equilibrium_slip(
                 by_wheels, cycle, direction, length, buried=buried
             )
-        lacking = speed.learn_bias(self._ekf, cycle, expected)
+        lacking = speed.learn_bias(self._ekf, cycle, expected, by_wheels)
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
         x = self._ekf.x
         prediction = Prediction.unchanged(x)

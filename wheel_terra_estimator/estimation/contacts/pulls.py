@@ -23,7 +23,7 @@ from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import MOST_DRAG
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
-from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH
+from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH, StateLayout
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import TINY, clipped
 from wheel_terra_estimator.estimation.sideways import Sideways
@@ -79,10 +79,12 @@ class Pulls(Component[PullState]):
     The `loads` on level ground [N] are the deviations of the pulls before anything is known.
     """
 
-    def __init__(self, rover: Rover, sensors: SensorFigures, loads: Floats) -> None:
+    def __init__(
+        self, rover: Rover, sensors: SensorFigures, layout: StateLayout, loads: Floats
+    ) -> None:
         zero = (0.0,) * rover.wheel_count
         super().__init__(PullState(zero, loads, zero, zero, zero))
-        self._rover, self._sensors = rover, sensors
+        self._rover, self._sensors, self._sinkage = rover, sensors, layout.sinkage
         self._load_std = rover.load_std * sum(loads) / rover.wheel_count  # [N]
 
     def update(
@@ -108,6 +110,7 @@ class Pulls(Component[PullState]):
             pull_by_strength = forces.pull_rows[:, SHEAR_STRENGTH].tolist()
             torque_by_strength = forces.torque_rows[:, SHEAR_STRENGTH].tolist()
             noises = forces.pull_noise.tolist()
+            zeros = self._pull_of_sinkage_zero(forces)
             # At the slip of a noisy rim speed the model is off by as much in each cycle anew.
             gain = 1.0 if forces.blurred else _EXCESS_GAIN
         for i, load in enumerate(loads.load):
@@ -133,7 +136,7 @@ class Pulls(Component[PullState]):
                 own[i] = self._own_variance(
                     i, pull[i], torque[i], load, level=not loads.force_known
                 )
-                own[i] += noises[i] ** 2
+                own[i] += noises[i] ** 2 + zeros[i] ** 2
                 all_variances = max(shared[i], 0.0) + own[i] + scrub[i] + (tilt_std * load) ** 2
                 std[i] = math.sqrt(all_variances)
         model_pull = tuple(pull)
@@ -178,6 +181,18 @@ class Pulls(Component[PullState]):
             + (_MODEL_STD * load) ** 2
             + (_LEVEL_STD * load if level else 0.0) ** 2
         )
+
+    def _pull_of_sinkage_zero(self, forces: ContactForces) -> list[float]:
+        """Return the deviations of the pulls by the zeros of sinkage sensors [N].
+
+        The torque is measured: strength makes up for what a wrong sinkage does to it.
+        """
+        by_torque = forces.pull_rows[:, SHEAR_STRENGTH] / np.where(
+            forces.torque_rows[:, SHEAR_STRENGTH], forces.torque_rows[:, SHEAR_STRENGTH], np.inf
+        )
+        rows = forces.pull_rows - by_torque[:, None] * forces.torque_rows
+        by_sinkage: list[float] = rows[:, self._sinkage].diagonal().tolist()
+        return [self._sensors.sinkage_zero_std * slope for slope in by_sinkage]
 
     def _believed(self, excess: float, reading: float) -> float:
         """Return the part of the excess that the sensor's errors do not explain [N m]."""

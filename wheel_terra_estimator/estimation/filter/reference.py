@@ -174,7 +174,7 @@ class ReferenceUpdate(Component[ReferenceState]):
             possible = abs(reference.forward) < fastest + _MOVING_STD * math.sqrt(variance)
             # Where readings are seldom, the slip has more often changed than one is wild: it is
             # believed at once, unless the rover would be faster than its wheels or against them.
-            alone = min(gap, gap_before) > _LASTING and possible and not still
+            alone = _LASTING < min(gap, gap_before) < math.inf and possible and not still
             inflated = alone or (same and believed and state.rejected_in_a_row > 0)
             if alone:
                 # The models did not foresee it, and would draw the speed back until the next one.
@@ -208,13 +208,15 @@ class ReferenceUpdate(Component[ReferenceState]):
     def _note_slide(self, ekf: GatedFilter, time: float, forward: float, variance: float) -> None:
         """With all wheels at rest, decide between standstill and a slide on locked wheels.
 
-        A single reference that shows motion may be an outlier; two in a row are a slide.
+        A single reference that shows motion may be an outlier; two alike in a row are a slide.
         """
         noise = _MOVING_STD * math.sqrt(variance)
         until = time
         moves = abs(forward) > max(noise, _MOVING_REST * self._rover.rest_speed)
-        if moves and (self.state.rejected_in_a_row or time < self.state.sliding_until):
-            gap = time - self.state.time
+        gap = time - self.state.time
+        alike = abs(forward - self.state.forward) < noise + _UNSEEN_ACCELERATION * gap
+        slides = time < self.state.sliding_until or (self.state.rejected_in_a_row and alike)
+        if moves and slides:
             until += clipped(_SLIDE_GAPS * gap, _SHORTEST_SLIDE, _LONGEST_SLIDE)
             ekf.inflate(SPEED, forward**2)
         self.state = self.state._replace(sliding_until=until)

@@ -60,7 +60,7 @@ _REVERSED_SLIP_SHARE = 0.5
 Tuned on stops and reversals in simulators A and B, seeds 1000 to 1005."""
 _FIRST_SPEED_SHARE = 0.3
 """Deviation of the speed over the rim speed when wheel rates first arrive [-]."""
-_LEAST_RATIO = -0.5  # remembered v / rim speed
+_LEAST_RATIO = 0.0  # remembered v / rim speed: no wheel drives a rover that moves against it
 _MOST_RATIO = 2.0
 _LEAST_RATIO_STD = 0.1
 _MOST_RATIO_STD = 0.5
@@ -298,7 +298,7 @@ class SpeedProcess(Component[SpeedState]):
         variance += (_RIM_CHANGE * change) ** 2 + _FLOOR_WALK * dt
         disagreement = self.disagreement(rims)
         variance += _INFLATION_RATE * inflation * inflation * dt + disagreement * disagreement
-        if state.settled and state.rims.along(self._rover.low_rim):
+        if state.settled and state.ratio > 0.0 and state.rims.along(self._rover.low_rim):
             return SpeedStep(now / before, 0.0, 0.0, variance)
         # At a start: the ratio v / rim speed of slow wheels is noise, so the kept one is used.
         variance += state.ratio_std**2 * max(now * now - before * before, 0.0)
@@ -318,14 +318,17 @@ class SpeedProcess(Component[SpeedState]):
         # Gaps of the IMU are filled with the mean acceleration of the step.
         return window.speed_change * dt / covered, noise * dt
 
-    def learn_bias(self, ekf: GatedFilter, cycle: Cycle, step: SpeedStep) -> float:
+    def learn_bias(
+        self, ekf: GatedFilter, cycle: Cycle, step: SpeedStep, by_wheels: SpeedStep
+    ) -> float:
         """Fuse the pseudo-measurement that wheels and accelerometer give the same change of speed.
 
-        Their difference observes speed and bias, best at rest, where the wheels are exact. `step`
-        is the prediction without accelerometer. Return the variance [(m/s)^2] to be added to it
-        where the difference exceeds the gate: soil that fails suddenly is no random walk, and wheel
-        rates do not show it. If the difference lasts, the accelerometer noise grows with the
-        running NIS: the attitude is probably wrong.
+        Their difference shows the bias, best at rest, where the wheels are exact. `step` is the
+        prediction without accelerometer. Of the speed only what sets it apart from `by_wheels` is
+        seen: noise of the wheel rates would look like wheels that the rover does not follow. Return
+        the variance [(m/s)^2] to be added to it where the difference exceeds the gate: soil that
+        fails suddenly is no random walk, and wheel rates do not show it. If the difference lasts,
+        the accelerometer noise grows with the running NIS: the attitude is probably wrong.
         """
         increment = self.velocity_increment(cycle.dt, cycle.window)
         if (
@@ -335,8 +338,9 @@ class SpeedProcess(Component[SpeedState]):
         ):
             return 0.0
         row = np.zeros(len(ekf.x))
-        row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - 1.0, cycle.dt
-        residual = increment[0] - step.constant - float(row @ ekf.x)
+        row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - by_wheels.speed_gain, cycle.dt
+        change = (step.speed_gain - 1.0) * float(ekf.x[SPEED]) + step.constant
+        residual = increment[0] - change - cycle.dt * float(ekf.x[GRAVITY_BIAS])
         variance = step.variance + increment[1]
         expected = float(row @ ekf.P @ row) + variance
         lacking = chi_square_gate(residual, expected, self._gate)

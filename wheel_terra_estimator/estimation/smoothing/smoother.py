@@ -180,7 +180,7 @@ class _SmoothedOutputs:
         self._layout = layout = layout_of(rover, sensors)
         self._most_std = float(configuration.filter.class_std)
         self._slips = SlipJudge(rover)
-        self._pulls = Pulls(rover, sensors, WheelLoads(rover).state.load)
+        self._pulls = Pulls(rover, sensors, layout, WheelLoads(rover).state.load)
         self._outputs = Outputs(configuration, rover, sensors, layout)
 
     def follow_pulls(self, evidence: PullEvidence, filtered: FloatArray, now: Gaussian) -> None:
