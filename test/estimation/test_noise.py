@@ -99,6 +99,15 @@ def test_what_nobody_stated_is_known_after_the_first_seconds():
     assert silent.observed('torque') == pytest.approx(0.02, rel=0.1)
 
 
+def test_wheels_that_stand_tell_nothing_of_the_noise_of_their_rates():
+    rng, seen = np.random.default_rng(9), ObservedNoise(sensors(), given=())
+    for i in range(400):
+        rate = rng.normal(0.5, 0.08, 6) * (i >= 60)
+        odometry = WheelOdometry(0, np.append(rate[:5], 0.0), np.full(6, nan))
+        seen.update(0.1 * i, StepInputs(wheel_odometry=odometry))
+    assert seen.observed('wheel_rate') == pytest.approx(0.08, rel=0.15)
+
+
 def test_steps_and_gaps_are_no_noise(noise):
     times = 0.1 * np.arange(400)
     std = noise.stated['sinkage']

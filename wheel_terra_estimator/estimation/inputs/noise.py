@@ -18,7 +18,7 @@ from wheel_terra_estimator.arrays import Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import InertialVariance, StepInputs
 from wheel_terra_estimator.estimation.rover import SensorFigures
-from wheel_terra_estimator.estimation.scalars import clipped
+from wheel_terra_estimator.estimation.scalars import NAN, clipped
 
 _Range = tuple[float, float]
 
@@ -156,7 +156,8 @@ class ObservedNoise(Component[ObservedNoiseState]):
             found['accelerometer'] = (float(inputs.inertial.specific_force[0]),)
             found['gyro'] = (float(inputs.inertial.angular_rate[2]),)
         if inputs.wheel_odometry is not None:
-            found['wheel_rate'] = tuple(inputs.wheel_odometry.rate.tolist())
+            # Encoders read exactly 0 on wheels that stand, which says nothing of their noise.
+            found['wheel_rate'] = tuple(rate or NAN for rate in inputs.wheel_odometry.rate.tolist())
             found['torque'] = tuple(inputs.wheel_odometry.torque.tolist())
         if inputs.sinkage is not None:
             found['sinkage'] = tuple(inputs.sinkage.sinkage.tolist())
