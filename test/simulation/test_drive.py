@@ -238,3 +238,26 @@ def test_scenarios_do_what_they_say(name):
         assert all(0.55 < greatest < 0.88 for _, greatest in found)
     if name == 'firm_drive':
         assert all(greatest < 0.6 for _, greatest in found)
+
+
+def test_a_rover_that_starts_again_on_firm_ground_goes_straight():
+    """The shear curve is steep there: the solver must not step to and fro across it."""
+    firm = {'frictional_modulus': 5e7, 'cohesion': 2e4, 'shear_modulus': 0.002}
+    scenario = load(
+        {
+            'configuration': ['generic_six_wheel', 'test_sand'],
+            'parameters': [f'soil.{key}:={value}' for key, value in firm.items()],
+            'duration': 6.0,
+            'drive.time': [0.0, 2.0, 2.0, 4.0, 4.0, 6.0],
+            'drive.forward': [0.06, 0.06, 0.0, 0.0, 0.072, 0.072],
+            'drive.turn_rate': [0.0] * 6,
+            'drive.acceleration': 0.3,
+            'slope.position': [0.0],
+            'slope.angle_deg': [2.0],
+        }
+    )
+    truth = simulate(scenario, 1).truth
+    seconds = 1e-9 * (truth.stamp - truth.stamp[0])
+    first, again = (truth.slip[(seconds > t) & (seconds < t + 0.5)] for t in (1.2, 5.2))
+    np.testing.assert_allclose(again.mean(axis=0), first.mean(axis=0), atol=0.01)
+    assert np.abs(truth.lateral_force).max() < 1.0

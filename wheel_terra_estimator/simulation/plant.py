@@ -28,7 +28,9 @@ LONGEST_STEP = 0.05  # [s]
 LOAD_TIME = 0.1  # [s]; the suspension settles
 TINY = 1e-6  # [m/s]; step of the numerical derivatives
 TOLERANCE = 1e-4  # [m/s]; a smaller step of Newton's method is the last: the model is linear there
-MOST_ITERATIONS = 12
+MOST_ITERATIONS = 40  # most steps take one or two
+FARTHEST = 0.1
+"""Bound of a move of Newton's method [m/s]; above a speed of 1 m/s, over it [-]."""
 
 
 @dataclass
@@ -212,10 +214,16 @@ class RoverPlant:
         commanded = self._steering.along_wheels(hubs)[0] / wheels.slip_radius
         self._drives.command(commanded * self.faults.rate_factor, self.faults.torque_factor, dt)
         speeds, rate = self._speeds, self._rate
+        # Far from the solution the linear model is poor: a move is bounded, and more so after each
+        # that goes back, else it could go to and fro across the steep part of a shear curve.
+        farthest, before = FARTHEST, np.zeros(3 * len(rate))
         for _ in range(MOST_ITERATIONS):
-            speeds, rate, forces, change = self._newton_step(speeds, rate, dt)
-            if change < TOLERANCE:
+            speeds, rate, forces, move = self._newton_step(speeds, rate, dt, farthest)
+            if np.abs(move).max() < TOLERANCE:
                 break
+            if move @ before < 0.0:
+                farthest *= 0.5
+            before = move
         self._forces = forces
         hub_speed = np.einsum('ijn,j->in', self._lever, speeds)
         forward, lateral = hub_speed
@@ -228,9 +236,13 @@ class RoverPlant:
         self.time += dt
 
     def _newton_step(
-        self, speeds: FloatArray, rate: FloatArray, dt: float
-    ) -> tuple[FloatArray, FloatArray, WheelForces, float]:
-        """Return better speeds and rates for the end of the step, forces there, largest change."""
+        self, speeds: FloatArray, rate: FloatArray, dt: float, farthest: float
+    ) -> tuple[FloatArray, FloatArray, WheelForces, FloatArray]:
+        """Return better speeds and rates for the end of the step, and forces there.
+
+        Beside them, the changes of hub and rim speeds [m/s] that the linear model asks for; no
+        further than ``farthest`` is gone.
+        """
         radius = self._wheels.slip_radius
         hub_speed = np.einsum('ijn,j->in', self._lever, speeds)
         # The forces here, and with one more step in hub speed along, across, and wheel rate.
@@ -267,9 +279,9 @@ class RoverPlant:
         change = np.linalg.solve(np.diag(self._inertias / dt) - by_speed, -residual)
         hub_change = np.einsum('ijn,j->in', self._lever, change)
         rate_change = free + (follow * hub_change).sum(axis=0)
-        largest = max(float(np.abs(hub_change).max()), float(np.abs(rate_change * radius).max()))
-        # Far from the solution the linear model is poor: bound the move.
-        part = min(1.0, 0.1 * max(1.0, abs(float(forward))) / max(largest, 1e-12))
+        move = np.append(hub_change, rate_change * radius)
+        bound = farthest * max(1.0, abs(float(forward)))
+        part = min(1.0, bound / max(float(np.abs(move).max()), 1e-12))
         next_rate = self._drives.next_trial(rate, rate + part * rate_change)
         moved = np.concatenate([part * hub_change, (next_rate - rate)[None]])
         end = WheelForces(
@@ -278,7 +290,7 @@ class RoverPlant:
             torque=torque + (torque_by_hub * moved[:2]).sum(axis=0) + torque_by_rate * moved[2],
             soil=forces.soil.first(),
         )
-        return speeds + part * change, next_rate, end, largest
+        return speeds + part * change, next_rate, end, move
 
     def _move(self, dt: float) -> None:
         forward, lateral, turning = self._speeds
