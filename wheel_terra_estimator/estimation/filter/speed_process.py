@@ -84,7 +84,7 @@ _INFLATION_RATE = 2.0
 """Process noise of an expected change of speed, over its square [1/s]: it takes half a second."""
 _INFLATION_TIME = 0.3  # with which the inflation decays [s]
 _RATE_NOISE = 3.0
-"""Deviations of the wheel rates within which the wheels do not disagree [-]."""
+"""Deviations of the wheel rates within which wheels do not disagree or change their speed [-]."""
 _SIDE_TIME = 1.0  # time constant of the rim speeds that sides are compared with [s]
 _SIDE_CHANGE = 1.0  # change of speed over the change of one side against the other [-]
 _LEAST_COVERED = 0.5  # of a step by the IMU, to use it
@@ -324,11 +324,12 @@ class SpeedProcess(Component[SpeedState]):
         """Fuse the pseudo-measurement that wheels and accelerometer give the same change of speed.
 
         Their difference shows the bias, best at rest, where the wheels are exact. `step` is the
-        prediction without accelerometer. Of the speed only what sets it apart from `by_wheels` is
-        seen: noise of the wheel rates would look like wheels that the rover does not follow. Return
-        the variance [(m/s)^2] to be added to it where the difference exceeds the gate: soil that
-        fails suddenly is no random walk, and wheel rates do not show it. If the difference lasts,
-        the accelerometer noise grows with the running NIS: the attitude is probably wrong.
+        prediction without accelerometer. Changes of the wheel rates within their noise would look
+        like wheels that the rover does not follow: of the speed only what sets `step` apart from
+        `by_wheels` is then seen. Return the variance [(m/s)^2] to be added to it where the
+        difference exceeds the gate: soil that fails suddenly is no random walk, and wheel rates do
+        not show it. If the difference lasts, the accelerometer noise grows with the running NIS:
+        the attitude is probably wrong.
         """
         increment = self.velocity_increment(cycle.dt, cycle.window)
         if (
@@ -338,7 +339,9 @@ class SpeedProcess(Component[SpeedState]):
         ):
             return 0.0
         row = np.zeros(len(ekf.x))
-        row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - by_wheels.speed_gain, cycle.dt
+        spun = abs(cycle.yaw_compensated.typical - self.state.rims.typical)
+        known_gain = 1.0 if spun > _RATE_NOISE * median(cycle.rim_stds) else by_wheels.speed_gain
+        row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - known_gain, cycle.dt
         change = (step.speed_gain - 1.0) * float(ekf.x[SPEED]) + step.constant
         residual = increment[0] - change - cycle.dt * float(ekf.x[GRAVITY_BIAS])
         variance = step.variance + increment[1]
