@@ -168,7 +168,7 @@ def told(estimates):
     return {key: words for key, words in estimates.faults.items() if key.startswith('check of ')}
 
 
-QUICK = FAULTS.keys() - {'thousand', 'torques', 'g'}  # as rpm, one_torque, no_gravity are
+QUICK = FAULTS.keys() - {'thousand', 'torques'}  # as rpm and one_torque are
 
 
 @pytest.mark.parametrize(

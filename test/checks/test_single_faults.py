@@ -67,7 +67,7 @@ def one_number(*numbers):
     return lambda values: np.tile(numbers, (len(values), 1))
 
 
-RPM, COUNTS, G = 30.0 / math.pi, 4096 / (2.0 * math.pi), rolling.GRAVITY
+RPM, DEGREES, COUNTS, G = 30.0 / math.pi, 180.0 / math.pi, 4096 / (2.0 * math.pi), rolling.GRAVITY
 EXCHANGED = 'wheels.names: [front_right, front_left, rear_left, rear_right]'
 RENAMED = 'wheels.names: [fl_wheel, front_right, rear_left, rear_right]'
 THREE = {**both(lambda v: v[:, :3]), 'names': lambda names: names[:3]}
@@ -83,6 +83,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, both(by([-1, 1, -1, 1])), 'backwards', f'{FL}, {RL}', None, '[-1, 1, -1, 1]'),
     (JOINTS, both(lambda v: v[:, [1, 0, 2, 3]]), 'exchanged', f'{FL}, {FR}', None, EXCHANGED),
     (JOINTS, {'rate': by(RPM)}, 'rate_unit', None, approx(1.0 / RPM), ''),
+    (JOINTS, {'rate': by(DEGREES)}, 'rate_unit', None, approx(1.0 / DEGREES), ''),
     (JOINTS, {'rate': by(COUNTS)}, 'rate_counts', None, approx(1.0 / COUNTS, rel=0.05), 'counts'),
     (JOINTS, {'rate': by(4.0)}, 'rate_unit', None, approx(0.25, rel=0.03), 'before a gear'),
     (JOINTS, {'rate': by([RPM, 1, RPM, 1])}, 'rate_unit', f'{FL}, {RL}', approx(1.0 / RPM),
@@ -92,6 +93,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, {'rate': in_steps}, 'rate_steps', None, None, 'steps of'),
     (JOINTS, {'rate': lambda v: np.clip(v, -MOST, MOST)}, 'rate_limit', ALL, None, f'{MOST:.4g}'),
     (JOINTS, {'rate': lambda v: v[:, [0, 1, 0, 3]]}, 'copied', f'{FL}, {RL}', None, 'a copy'),
+    (JOINTS, {'rate': lambda v: v[:, [0, 1, 2, 0]]}, 'copied', f'{FL}, {RR}', None, 'a copy'),
     (JOINTS, {'torque': lambda v: v[:, [0, 1, 2, 0]]}, 'copied', f'{FL}, {RR}', None, 'effort'),
     (JOINTS, {'rate': lambda v: np.where([1, 0, 0, 0], np.abs(v), v)}, 'rates_unsigned', FL, None,
      'other wheels'),
@@ -122,6 +124,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (IMU, {'force': np.negative}, 'force_reversed', None, None, 'linear_acceleration'),
     (IMU, {'rate': np.degrees}, 'gyro_degrees', None, approx(math.radians(1.0)), ''),
     (IMU, {'rate': by(0.0)}, 'force_zero', None, None, ''),
+    (IMU, {'force': by(math.nan)}, 'imu_nan', None, None, 'linear_acceleration'),
     (IMU, {'rate': by(math.nan)}, 'imu_nan', None, None, 'angular_velocity'),
     (IMU, {'force': by([math.nan, 1, 1])}, 'imu_nan', None, None, 'linear_acceleration'),
     (REFERENCE, {'velocity': by(math.nan)}, 'reference_nan', None, None, 'NaN'),
@@ -134,6 +137,7 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
      'sensor_frozen', None, None, ''),  # far from what gravity is, but that is not told
     (IMU, {'force': lambda v: 0.0 * v + v[0]}, 'sensor_frozen', None, None, 'in every message'),
     (*stays(IMU, 'force'), 'sensor_frozen', None, None, FROZEN),
+    (*stays(IMU, 'rate'), 'sensor_frozen', None, None, FROZEN),
     (REFERENCE, {'velocity': np.negative}, 'reference_reversed', None, None, ''),
     (REFERENCE, {'velocity': np.abs}, 'reference_unsigned', None, None, ''),
     (REFERENCE, {'velocity': by(0.0)}, 'reference_zero', None, None, ''),

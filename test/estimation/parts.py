@@ -64,7 +64,7 @@ class Parts:
             'dt': 0.1,
             'window': InertialWindow(),
             'rims': rims,
-            'rim_stds': (0.0,) * n,
+            'rim_noise': (0.0,) * n,
             'yaw_compensated': RimSpeeds.of(rims, 0.0, straight_headings(self.rover)),
             'yaw_rate': 0.0,
             'lateral_motion': 0.0,

@@ -165,7 +165,7 @@ def test_noisy_rates_of_a_slow_wheel_are_means_over_a_second(wheels, rate, error
         errors += [rim.speed / RADIUS - rate for rim in wheels.state.rims]
     assert wheels.stds()[0] == pytest.approx(error * RADIUS)
     assert np.std(errors) == pytest.approx(error, rel=0.1)
-    assert wheels.noise(0.1)[0] == pytest.approx(0.1 * RADIUS), 'ten cycles share an error'
+    assert wheels.white_noise(0.1)[0] == pytest.approx(0.1 * RADIUS), 'ten cycles share an error'
 
 
 def test_a_change_beyond_the_noise_of_the_rates_begins_a_new_mean(wheels):

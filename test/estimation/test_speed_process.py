@@ -337,7 +337,7 @@ def test_noise_of_the_wheel_rates_does_not_stop_a_rover_in_the_filter():
     window = InertialWindow(readings=1, speed_change=0.0, duration=dt)
     for rims in 0.05 + noise * np.clip(rng.standard_normal((200, 2)), -1.4, 1.4):
         made = process([rims[0]] * 6)
-        cycle = parts.cycle((rims[1],) * 6, window=window, rim_stds=(noise,) * 6)
+        cycle = parts.cycle((rims[1],) * 6, window=window, rim_noise=(noise,) * 6)
         wheels = made.by_wheels(dt, cycle.yaw_compensated, 0.0)
         made.learn_bias(ekf, cycle, wheels, wheels)
     assert ekf.x[SPEED] == pytest.approx(0.045, abs=0.002)

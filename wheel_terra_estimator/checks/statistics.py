@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.arrays import MAD_TO_STD, BoolArray, FloatArray
 
 HUBER = 2.0  # residuals beyond this many deviations count less in a robust fit
-ROUNDS = 8  # reweighted fits, at most
-SETTLED = 1e-5  # change of the coefficients, as a share of them, that ends the rounds
+ROUNDS = 8  # reweighted fits
 BLOCKS = 12
 """Number of blocks of time that a standard deviation is estimated from: residuals of a drive are
 correlated over seconds, rows are not independent."""
@@ -115,13 +114,11 @@ def _huber(
     weight: FloatArray = np.ones(target.shape)
     coefficients: FloatArray = np.zeros(design.shape[1])
     for _ in range(ROUNDS):
-        weighted, before = instruments * weight[:, None], coefficients
+        weighted = instruments * weight[:, None]
         coefficients = _solve(weighted.T @ design, weighted.T @ target)
         residual = target - design @ coefficients
         scale = max(robust_std(residual), 1e-12)
         weight = 1.0 / np.maximum(np.abs(residual) / (HUBER * scale), 1.0)
-        if (np.abs(coefficients - before) <= SETTLED * np.abs(coefficients)).all():
-            break
     return coefficients, weight
 
 

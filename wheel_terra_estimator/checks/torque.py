@@ -161,12 +161,14 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     turns = [moving_mean(one, width) > evidence.rest_rate for one in size.T]
     own = np.where(np.column_stack(turns), evidence.torque, 0.0)  # one that stands takes no power
     table = np.column_stack([moving_mean(np.nan_to_num(t), width) for t in own.T])
-    measured = [_whatever_curve(design, evidence.curve[rows], one)[0] for one in table[rows].T]
+    measured = [
+        _fit_allowing_for_curve(design, evidence.curve[rows], one)[0] for one in table[rows].T
+    ]
     rows = rows & (along * sense > UPHILL_ENOUGH * evidence.facts.gravity)
     if not evidence.enough(rows):
         return None
     way = np.column_stack([sense, np.ones(sense.size)])[rows]
-    levels = [_whatever_curve(way, evidence.curve[rows], one)[0] for one in table[rows].T]
+    levels = [_fit_allowing_for_curve(way, evidence.curve[rows], one)[0] for one in table[rows].T]
     if yaw is not None:
         return list(zip(measured, levels, strict=True))
     shares = [one.value * level.value for one, level in zip(measured, levels, strict=True)]
@@ -177,7 +179,9 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     return list(zip(measured, levels, strict=True))
 
 
-def _whatever_curve(design: FloatArray, curve: FloatArray, torque: FloatArray) -> list[Estimate]:
+def _fit_allowing_for_curve(
+    design: FloatArray, curve: FloatArray, torque: FloatArray
+) -> list[Estimate]:
     """Return a fit whose deviations hold what a slight curve may have made of it.
 
     In a curve the sides drive one another, and it may tighten as a slope does.
@@ -353,7 +357,7 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     # Residual of slopes along both axes: the IMU may be turned about z.
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
     design = np.column_stack([np.ones(sense.size), sense, slopes])
-    fits = [_whatever_curve(design, curve, column) for column in table.T]
+    fits = [_fit_allowing_for_curve(design, curve, column) for column in table.T]
     return [(fit[0], fit[1]) for fit in fits]
 
 

@@ -394,7 +394,7 @@ class WheelSoilEstimator:
             dt=dt,
             window=window,
             rims=rims,
-            rim_stds=self._wheels.noise(dt),
+            rim_noise=self._wheels.white_noise(dt),
             yaw_compensated=yaw_compensated,
             yaw_rate=turning.yaw_rate,
             lateral_motion=turning.lateral_motion,

@@ -60,7 +60,7 @@ class Cycle(NamedTuple):
     dt: float
     window: InertialWindow
     rims: Floats  # [m/s], nan = unknown
-    rim_stds: Floats  # their noise, as white noise [m/s]
+    rim_noise: Floats  # deviation of each as white noise from cycle to cycle [m/s]
     yaw_compensated: RimSpeeds
     yaw_rate: float  # [rad/s]
     lateral_motion: float  # of the outer wheels over the fastest rim speed [-]

@@ -113,7 +113,8 @@ class Linearisation(Component[FloatArray]):
             1, 0, 2
         )
         wheels = np.arange(n)
-        by_rim = np.where(turning, by_ratio * (speed / rim**2 * cycle.rim_stds), 0.0)
+        # Changes of pull and torque by one deviation of the rim speed, at the same ground speed.
+        by_rim = np.where(turning, by_ratio * (speed / rim**2 * cycle.rim_noise), 0.0)
         pull_noise, torque_noise = np.hypot([pull_noise, torque_noise], by_rim)
         blurred = bool(np.median(np.abs(by_rim[1, turning]) / moment[turning]) > _MOST_BLUR)
         # The ratio is that of the direction of rolling: the two signs cancel.

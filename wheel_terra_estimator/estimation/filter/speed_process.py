@@ -340,7 +340,7 @@ class SpeedProcess(Component[SpeedState]):
             return 0.0
         row = np.zeros(len(ekf.x))
         spun = abs(cycle.yaw_compensated.typical - self.state.rims.typical)
-        known_gain = 1.0 if spun > _RATE_NOISE * median(cycle.rim_stds) else by_wheels.speed_gain
+        known_gain = 1.0 if spun > _RATE_NOISE * median(cycle.rim_noise) else by_wheels.speed_gain
         row[SPEED], row[GRAVITY_BIAS] = step.speed_gain - known_gain, cycle.dt
         change = (step.speed_gain - 1.0) * float(ekf.x[SPEED]) + step.constant
         residual = increment[0] - change - cycle.dt * float(ekf.x[GRAVITY_BIAS])

@@ -140,8 +140,8 @@ class WheelOdometryInput(Component[WheelOdometryState]):
             rims.append(now if age <= self._silence else NAN)
         return tuple(rims)
 
-    def noise(self, dt: float) -> Floats:
-        """Return the noise of the rim speeds as that of white noise in cycles `dt` [s] apart [m/s].
+    def white_noise(self, dt: float) -> Floats:
+        """Return the deviations of the rim speeds as white noise in cycles `dt` [s] apart [m/s].
 
         The error of a mean lasts for as many cycles as it is long.
         """
