@@ -39,6 +39,7 @@ from wheel_terra_estimator.checks.statistics import (
     UNIFORM_STD,
     Estimate,
     block_fit,
+    block_fits,
     confidence,
     correlation,
     in_parts,
@@ -411,7 +412,7 @@ def _is_mounting(tilt: FloatArray, floor: float, turns: FloatArray, gyro: FloatA
     A body that turns on a plane turns about its own axis: of an IMU that is tilted (2,) [rad] the
     gyro (k, 2) has as much of the turns (k, 1) on x and y, apart from zeros none of them.
     """
-    fits = [block_fit(turns, column)[0] for column in gyro.T]
+    fits = [fit[0] for fit in block_fits(turns, gyro)]
     var = max(fit.std for fit in fits) ** 2 + CROSS_AXIS**2 + floor**2
     seen = np.array([fit.value for fit in fits])
     odds = float(tilt @ (seen - 0.5 * tilt)) / var

@@ -64,15 +64,15 @@ def robust_std(values: FloatArray) -> float:
     values = values if known.all() else values[known]
     if not values.size:
         return math.nan
-    return MAD_TO_STD * _median(np.abs(values - _median(values)))
+    return float(MAD_TO_STD * _median(np.abs(values - _median(values))))
 
 
-def _median(values: FloatArray) -> float:
-    """Return what numpy's does, for few values ten times as fast."""
-    half = values.size // 2
-    ordered = np.partition(values, half)
-    low = ordered[half] if values.size % 2 else ordered[:half].max()
-    return 0.5 * float(low + ordered[half])
+def _median(values: FloatArray) -> Any:
+    """Return what numpy's does along the first axis, for few values ten times as fast."""
+    half = len(values) // 2
+    ordered = np.partition(values, half, axis=0)
+    low = ordered[half] if len(values) % 2 else ordered[:half].max(axis=0)
+    return 0.5 * (low + ordered[half])
 
 
 def in_parts(values: FloatArray, count: int) -> list[FloatArray]:
@@ -95,29 +95,40 @@ def block_fit(
     Noise of a column makes its coefficient too small, unless ``instruments`` has in its place
     another reading of the same (Wald 1940).
     """
+    return block_fits(design, target[:, None], instruments)[0]
+
+
+def block_fits(
+    design: FloatArray, targets: FloatArray, instruments: FloatArray | None = None
+) -> list[list[Estimate]]:
+    """Return what `block_fit` does for each column of the targets (k, n)."""
     instruments = design if instruments is None else instruments
-    whole, weight = _huber(design, target, instruments)
-    weighted = instruments * weight[:, None]
-    edges = np.linspace(0, target.size, BLOCKS + 1).astype(int)[:-1]
-    normals = np.add.reduceat(weighted[:, :, None] * design[:, None, :], edges, axis=0)
-    rights = np.add.reduceat(weighted * target[:, None], edges, axis=0)
+    whole, weight = _huber(design, targets, instruments)
+    weighted = instruments[:, None] * weight[..., None]
+    edges = np.linspace(0, len(targets), BLOCKS + 1).astype(int)[:-1]
+    normals = np.add.reduceat(weighted[..., None] * design[:, None, None, :], edges, axis=0)
+    rights = np.add.reduceat(weighted * targets[..., None], edges, axis=0)
     left_out = _solve(normals.sum(axis=0) - normals, rights.sum(axis=0) - rights)
     spread = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
     std = np.sqrt((BLOCKS - 1) / BLOCKS * spread)
-    return [Estimate(float(v), float(s)) for v, s in zip(whole, std, strict=True)]
+    return [
+        [Estimate(float(v), float(s)) for v, s in zip(*fit, strict=True)]
+        for fit in zip(whole, std, strict=True)
+    ]
 
 
 def _huber(
-    design: FloatArray, target: FloatArray, instruments: FloatArray
+    design: FloatArray, targets: FloatArray, instruments: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return coefficients and the weights of the rows."""
-    weight: FloatArray = np.ones(target.shape)
-    coefficients: FloatArray = np.zeros(design.shape[1])
+    """Return coefficients (n, p) and the weights of the rows (k, n)."""
+    weight: FloatArray = np.ones(targets.shape)
+    coefficients: FloatArray = np.zeros((targets.shape[1], design.shape[1]))
     for _ in range(ROUNDS):
-        weighted = instruments * weight[:, None]
-        coefficients = _solve(weighted.T @ design, weighted.T @ target)
-        residual = target - design @ coefficients
-        scale = max(robust_std(residual), 1e-12)
+        weighted = instruments.T * weight.T[:, None, :]
+        coefficients = _solve(weighted @ design, (weighted @ targets.T[..., None])[..., 0])
+        residual = targets - design @ coefficients.T
+        size = np.abs(residual - _median(residual))
+        scale = np.maximum(MAD_TO_STD * _median(size), 1e-12)
         weight = 1.0 / np.maximum(np.abs(residual) / (HUBER * scale), 1.0)
     return coefficients, weight
 

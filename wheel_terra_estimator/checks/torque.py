@@ -24,6 +24,7 @@ from wheel_terra_estimator.checks.statistics import (
     Estimate,
     Trial,
     block_fit,
+    block_fits,
     confidence,
     moving_mean,
     tried,
@@ -162,13 +163,13 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     own = np.where(np.column_stack(turns), evidence.torque, 0.0)  # one that stands takes no power
     table = np.column_stack([moving_mean(np.nan_to_num(t), width) for t in own.T])
     measured = [
-        _fit_allowing_for_curve(design, evidence.curve[rows], one)[0] for one in table[rows].T
+        fit[0] for fit in _fits_allowing_for_curve(design, evidence.curve[rows], table[rows])
     ]
     rows = rows & (along * sense > UPHILL_ENOUGH * evidence.facts.gravity)
     if not evidence.enough(rows):
         return None
     way = np.column_stack([sense, np.ones(sense.size)])[rows]
-    levels = [_fit_allowing_for_curve(way, evidence.curve[rows], one)[0] for one in table[rows].T]
+    levels = [fit[0] for fit in _fits_allowing_for_curve(way, evidence.curve[rows], table[rows])]
     if yaw is not None:
         return list(zip(measured, levels, strict=True))
     shares = [one.value * level.value for one, level in zip(measured, levels, strict=True)]
@@ -179,16 +180,21 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     return list(zip(measured, levels, strict=True))
 
 
-def _fit_allowing_for_curve(
-    design: FloatArray, curve: FloatArray, torque: FloatArray
-) -> list[Estimate]:
-    """Return a fit whose deviations hold what a slight curve may have made of it.
+def _fits_allowing_for_curve(
+    design: FloatArray, curve: FloatArray, torques: FloatArray
+) -> list[list[Estimate]]:
+    """Return fits to torques (k, n), whose deviations hold what a slight curve may have made.
 
     In a curve the sides drive one another, and it may tighten as a slope does.
     """
-    plain, beside = (block_fit(d, torque) for d in (design, np.column_stack([design, curve])))
-    pairs = zip(plain, beside, strict=False)
-    return [Estimate(a.value, math.hypot(a.std, a.value - b.value)) for a, b in pairs]
+    plain, beside = (block_fits(d, torques) for d in (design, np.column_stack([design, curve])))
+    return [
+        [
+            Estimate(a.value, math.hypot(a.std, a.value - b.value))
+            for a, b in zip(*fits, strict=False)
+        ]
+        for fits in zip(plain, beside, strict=True)
+    ]
 
 
 def thrust(evidence: Evidence) -> FloatArray:
@@ -357,8 +363,7 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     # Residual of slopes along both axes: the IMU may be turned about z.
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
     design = np.column_stack([np.ones(sense.size), sense, slopes])
-    fits = [_fit_allowing_for_curve(design, curve, column) for column in table.T]
-    return [(fit[0], fit[1]) for fit in fits]
+    return [(fit[0], fit[1]) for fit in _fits_allowing_for_curve(design, curve, table)]
 
 
 def _unsigned(evidence: Evidence) -> list[Outcome]:

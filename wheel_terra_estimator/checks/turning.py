@@ -44,6 +44,7 @@ from wheel_terra_estimator.checks.statistics import (
     LEAST_FALL,
     Trial,
     block_fit,
+    block_fits,
     confidence,
     correlation,
     halves,
@@ -587,7 +588,7 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         # Noise of either flattens the fit to it; a tilted one has a part of the turns on x and y.
         one = np.ones(seen.size)
         cure, both = block_fit(np.column_stack([gyro, one]), seen)[0], np.column_stack([seen, one])
-        parts = [block_fit(both, turns)[0].value for turns in (aside, across, gyro)]
+        parts = [fit[0].value for fit in block_fits(both, np.column_stack([aside, across, gyro]))]
         off = min((cure.value - 1.0, 1.0 / math.hypot(*parts) - 1.0), key=abs)
         if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
             details = {'times': 1.0 / cure.value, 'against': name}
