@@ -15,11 +15,12 @@ nodes on each side replace the centroid.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
-from wheel_terra_estimator.terramechanics import stresses
+from wheel_terra_estimator.terramechanics import quadrature, stresses
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms
 
@@ -27,10 +28,8 @@ from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms
 # which they do [-]; below the first, one place per side is within 1.3 % of the load.
 _BLEND_FROM, _BLEND = 0.07, 0.1
 _SIDEWAYS_BLEND = 0.03  # lateral speed v_y/(w R) over which they do [-]
-_NO_DISPLACEMENT = 1e-300  # over K [-]; keeps the direction of none finite
-_RULE = stresses.gauss_rule(4)
-# Nodes and weights on (0, 1), squared towards 0, where the stress starts like v^N.
-_NODES = tuple((place * place, 2.0 * weight * place) for place, weight in _RULE)
+_NODES = 4  # of the quadrature, on each side of the peak
+_NO_TERMS = Terms({})
 
 
 def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Quantity, Quantity, Quantity]:
@@ -60,11 +59,10 @@ class BranchForces:
 
     __slots__ = (
         '_arc_front', '_arc_rear', '_bearing_modulus', '_cohesion_front', '_cohesion_rear',
-        '_drift', '_edge_front', '_edge_rear', '_exponent', '_friction_front', '_friction_rear',
-        '_further', '_half', '_middle_front', '_middle_rear', '_modulus', '_nearer',
+        '_contact', '_edge_front', '_edge_rear', '_exponent', '_friction_front', '_friction_rear',
+        '_further', '_half', '_leaving_share', '_middle_front', '_middle_rear', '_nearer',
         '_normal_front', '_normal_rear', '_place_front', '_place_rear', '_rim_front', '_rim_rear',
-        '_roll', '_shape', '_share', '_shear_radius', '_sideways', '_skid', '_skidding', '_turn',
-        '_turns_back', '_width',
+        '_roll', '_share', '_shear_radius', '_skid', '_skidding', '_turn', '_turns_back', '_width',
     )  # fmt: skip
 
     def __init__(self, contact: Contact, peak_share: Quantity, leaving_share: Quantity) -> None:
@@ -76,22 +74,23 @@ class BranchForces:
         self._middle_front = 0.5 * (1.0 + peak_share)
         self._middle_rear = 0.5 * (peak_share + leaving_share)
         self._half = 0.5 * front
+        self._leaving_share = leaving_share
         r, R = contact.radius, contact.shear_radius
-        self._modulus = contact.shear_modulus
         self._shear_radius, self._width = R, contact.width
-        self._sideways = not contact.straight
-        self._drift = contact.lateral_ratio / self._modulus
-        self._roll = contact.velocity_ratio / self._modulus
-        self._turn = turn = R / self._modulus
+        self._roll = contact.velocity_ratio / contact.shear_modulus
+        self._turn = turn = R / contact.shear_modulus
         skid = contact.velocity_ratio / R - 1.0
         self._turns_back = np.count_nonzero(skid > 0.0) > 0
         # Weight of the nodes against the centroids.
         share = np.maximum((skid - _BLEND_FROM) / _BLEND, 0.0)
-        if self._sideways:
+        if not contact.straight:
             share = share + np.abs(contact.lateral_ratio / R) / _SIDEWAYS_BLEND
         share = np.minimum(share, 1.0)
         self._skidding = np.count_nonzero(share > 0.0) > 0
         self._skid = share * share * (3.0 - 2.0 * share)
+        if self._skidding:
+            self._contact = copy(contact)  # for the nodes, per bearing modulus
+            self._contact.bearing_modulus = 1.0
         self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
         square_front, square_rear = front * front, rear * rear
         # On an arc the resultant is a little smaller than the sum of the stresses.
@@ -103,8 +102,7 @@ class BranchForces:
         self._nearer = 0.125 / centroid
         self._further = (place_rear - self._middle_rear) / (1.0 - place_rear)
         self._bearing_modulus = contact.bearing_modulus
-        self._shape = (2.0 * r / contact.reference_depth) ** n  # of the stress, per bearing modulus
-        self._share = area * self._shape
+        self._share = area * (2.0 * r / contact.reference_depth) ** n  # per bearing modulus
         self._normal_front, self._normal_rear = r * front, r * rear
         friction, cohesion = R * contact.tan_friction, R * contact.cohesion
         self._friction_front, self._friction_rear = friction * front, friction * rear
@@ -135,11 +133,6 @@ class BranchForces:
         modulus = (load - lift_c * cosine - push_c * sine) / (lift * cosine + push * sine)
         pull = modulus * (push * cosine - lift * sine) + push_c * cosine - lift_c * sine
         return pull, modulus * turn + turn_c
-
-    def lateral_force(self, angle: Quantity) -> Quantity:
-        """Force of the soil under the rim at an entrance angle, positive left [N]."""
-        stressed, sticking = self._node_parts(angle)
-        return self._bearing_modulus * stressed[3] + sticking[3]
 
     def _parts(self, angle: Quantity) -> tuple[Sequence[Quantity], Sequence[Quantity]]:
         """Load, pull, torque per bearing modulus of stress and friction; those of cohesion."""
@@ -228,57 +221,27 @@ class BranchForces:
         return share_front, share_rear, even_front, even_rear
 
     def _node_parts(self, angle: Quantity) -> tuple[Sequence[Quantity], Sequence[Quantity]]:
-        """`_parts`, and the lateral force [N], from nodes on either side of the peak."""
-        sin = np.sin
-        R, roll = self._shear_radius, self._roll
-        front, top = 2.0 * self._half, sin(angle)
-        leaving = 2.0 * self._middle_rear - (1.0 - front)
-        rear = 1.0 - front - leaving
-        stressed: list[Quantity] = [0.0] * 4
-        sticking: list[Quantity] = [0.0] * 4
-        for place, weight in _NODES:
-            ahead = 1.0 - front * place
-            depth = sin(0.5 * (1.0 + ahead) * angle) * sin(0.5 * front * place * angle)
-            stress = self._shape * depth**self._exponent
-            for at, normal, friction, cohesion in (
-                (ahead, self._normal_front, self._friction_front, self._cohesion_front),
-                (
-                    leaving + rear * place,
-                    self._normal_rear,
-                    self._friction_rear,
-                    self._cohesion_rear,
-                ),
-            ):
-                sine = sin(at * angle)
-                cosine = np.sqrt(1.0 - sine * sine)
-                x = R / self._modulus * (1.0 - at) * angle - roll * (top - sine)
-                along, across = self._node_shares(x, self._drift * (1.0 - at) * angle)
-                pressed = weight * normal * stress
-                for sums, strength in (
-                    (stressed, weight * friction * stress),
-                    (sticking, weight * cohesion),
-                ):
-                    sheared = strength * along
-                    sums[0] = sums[0] + sheared * sine
-                    sums[1] = sums[1] + sheared * cosine
-                    sums[2] = sums[2] + sheared
-                    sums[3] = sums[3] - strength * across
-                stressed[0] = stressed[0] + pressed * cosine
-                stressed[1] = stressed[1] - pressed * sine
-        size = self._width * angle
-        factors = size, size, size * R, size
+        """`_parts` from nodes on either side of the peak, those of the quadrature."""
+        contact = copy(self._contact)
+        contact.entrance_angle = angle
+        contact.peak_angle = (1.0 - 2.0 * self._half) * angle
+        contact.leaving_angle = self._leaving_share * angle
+        weight, cosine, sine = quadrature.stressed(contact, _NO_TERMS, _NODES)
+        weight = self._width * weight
+        mobilised, _ = stresses.mobilised_shares(contact, contact.angle, sine)
+        mobilised = weight * contact.shear_radius * mobilised
+        pressed = weight * contact.radius * contact.normal_stress
+        rubbed = mobilised * contact.tan_friction * contact.normal_stress
+        stuck = mobilised * contact.cohesion
+        total = np.add.reduce
         return (
-            [factor * part for factor, part in zip(factors, stressed, strict=True)],
-            [factor * part for factor, part in zip(factors, sticking, strict=True)],
+            (
+                total(pressed * cosine + rubbed * sine),
+                total(rubbed * cosine - pressed * sine),
+                contact.shear_radius * total(rubbed),
+            ),
+            (total(stuck * sine), total(stuck * cosine), contact.shear_radius * total(stuck)),
         )
-
-    def _node_shares(self, x: Quantity, y: Quantity) -> tuple[Quantity, Quantity]:
-        """Mobilised shares along and across the rim [-], for displacements over K."""
-        if not self._sideways:
-            return np.copysign(-np.expm1(-np.abs(x)), x), 0.0
-        length = np.maximum(np.sqrt(x * x + y * y), _NO_DISPLACEMENT)
-        share = -np.expm1(-length) / length
-        return share * x, share * y
 
     def small_angle(self, load: Quantity) -> Quantity:
         """Entrance angle at which the normal stress alone carries a load, for small angles [rad].
@@ -317,26 +280,27 @@ def peak_stresses(contact: Contact, terms: Terms) -> tuple[Quantity, Quantity]:
 
 
 def forces(contact: Contact, terms: Terms) -> tuple[Quantity, Quantity, Quantity]:
-    """Load [N], pull [N] and torque [N m] from branch moments, angles given."""
+    """Load [N], pull [N] and torque [N m] from branch moments, angles given.
+
+    What effects add to the normal stress is that of the quadrature.
+    """
     t1 = contact.entrance_angle
-    form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1)
-    load, pull, torque = form.forces(t1)
+    load, pull, torque = BranchForces(
+        contact, contact.peak_angle / t1, contact.leaving_angle / t1
+    ).forces(t1)
     if terms.stages['on_normal_stress']:
-        added = _added_stress_forces(contact, terms)
-        load, pull, torque = load + added[0], pull + added[1], torque + added[2]
+        plain, with_them = (quadrature.forces(contact, t) for t in (_NO_TERMS, terms))
+        load, pull, torque = (
+            own + (more - less)
+            for own, more, less in zip((load, pull, torque), with_them, plain, strict=True)
+        )
     return load, pull, torque
 
 
 def lateral_force(contact: Contact, terms: Terms) -> Quantity:
     """Force of the soil under the rim on the wheel, positive left [N], angles given."""
-    t1 = contact.entrance_angle
-    if contact.straight:
-        return 0.0 * t1
-    form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1)
-    force = form.lateral_force(t1)
-    if terms.stages['on_normal_stress']:
-        force = force + _added_stress_forces(contact, terms)[3]
-    return force
+    nodes = None if terms.stages['on_normal_stress'] else _NODES
+    return quadrature.lateral_force(contact, terms, nodes)
 
 
 def proportional_forces(contact: Contact) -> BranchForces:
@@ -348,32 +312,3 @@ def proportional_forces(contact: Contact) -> BranchForces:
     margin = PEAK_MARGIN * (1.0 - leaving)
     peak = np.minimum(np.maximum(contact.peak_ratio, leaving + margin), 1.0 - margin)
     return BranchForces(contact, peak, leaving)
-
-
-def _added_stress_forces(contact: Contact, terms: Terms) -> tuple[Quantity, ...]:
-    """Load, pull, torque, lateral force of what effects add to the normal stress, friction too."""
-    t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
-    R = contact.shear_radius
-    load: Quantity = 0.0
-    pull: Quantity = 0.0
-    torque: Quantity = 0.0
-    lateral: Quantity = 0.0
-    for low, high, behind in ((tm, t1, False), (t2, tm, True)):
-        for point, weight in _RULE:
-            angle = low + (high - low) * point
-            mirror = t1 - (t1 - tm) * (point if behind else 1.0 - point)
-            stress = stresses.front_stress(contact, mirror)
-            contact.angle, contact.normal_stress = angle, stress
-            terms.apply('on_normal_stress', contact)
-            normal = (contact.normal_stress - stress) * weight * (high - low)
-            along, across = stresses.mobilised_shares(contact, angle)
-            friction = normal * contact.tan_friction * R
-            shear = friction * along
-            normal = normal * contact.radius
-            cosine, sine = np.cos(angle), np.sin(angle)
-            load = load + normal * cosine + shear * sine
-            pull = pull + shear * cosine - normal * sine
-            torque = torque + shear
-            lateral = lateral + friction * across
-    width = contact.width
-    return width * load, width * pull, width * R * torque, width * lateral

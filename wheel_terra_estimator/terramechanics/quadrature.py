@@ -49,14 +49,15 @@ def forces(
     return load, pull, width * contact.shear_radius * np.add.reduce(shear)
 
 
-def lateral_force(contact: Contact, terms: Terms) -> Quantity:
+def lateral_force(contact: Contact, terms: Terms, nodes: int | None = None) -> Quantity:
     """Force of the soil under the rim on the wheel, positive left [N], angles given.
 
-    Ishigami et al. 2007 (doi 10.1002/rob.20187), without the flank: F_y = b R Int tau_y.
+    Ishigami et al. 2007 (doi 10.1002/rob.20187), without the flank: F_y = b R Int tau_y;
+    ``nodes``: other than `NODES`.
     """
     if contact.straight:
         return 0.0 * contact.entrance_angle
-    weight, _, sine = stressed(contact, terms)
+    weight, _, sine = stressed(contact, terms, nodes)
     strength = contact.cohesion + contact.normal_stress * contact.tan_friction
     across = strength * stresses.mobilised_shares(contact, contact.angle, sine=sine)[1]
     return contact.width * contact.shear_radius * np.add.reduce(across * weight)
