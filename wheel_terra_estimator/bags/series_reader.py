@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray, IndexArray
+from wheel_terra_estimator.arrays import IndexArray
 from wheel_terra_estimator.bags.salvage import limits
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.topic_choice import choose_topics, other_references, other_rovers
@@ -23,11 +23,10 @@ from wheel_terra_estimator.checks.series import (
     VelocitySeries,
 )
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
-from wheel_terra_estimator.messages.unpack import DamagedMessageError, Layout, layout_of
+from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
 
 MOST_MESSAGES = 400_000
 """Messages of a topic up to which a recording is read: all topics end at the same time."""
-MOST_BYTES = 4_000_000  # of messages that are not read yet
 MOST_JOINTS = 64  # joints of a topic that are kept
 
 
@@ -96,40 +95,6 @@ def credible(values: Any) -> Any:
         return np.where(np.abs(values) < LARGEST, values, math.nan)
 
 
-class _Alike:
-    """The messages of a topic that are laid out alike, as bytes until some have come together."""
-
-    def __init__(self, layout: Layout, columns: IndexArray | slice) -> None:
-        self.layout, self._columns = layout, columns
-        self.places: list[int] = []  # among those of the topic
-        self._raw = bytearray()
-        # Columns are those of the first list, the only one then.
-        self._fields = layout.lists if isinstance(columns, slice) else layout.lists[:1]
-        self._lists: tuple[list[FloatArray], ...] = tuple([] for _ in self._fields)
-
-    def add(self, place: int, data: bytes) -> None:
-        """Take one more message."""
-        self.places.append(place)
-        self._raw += data
-        if len(self._raw) > MOST_BYTES:
-            self._read()
-
-    def _read(self) -> None:
-        """Read the numbers out of the bytes."""
-        table = np.frombuffer(self._raw, np.uint8).reshape(-1, self.layout.size)
-        for (at, count), kept in zip(self._fields, self._lists, strict=True):
-            values = np.ascontiguousarray(table[:, at : at + 8 * count])
-            numbers = values.view(self.layout.order.number).astype(np.float64)
-            kept.append(numbers[:, self._columns])
-        self._raw = bytearray()
-
-    def numbers(self, field: int) -> FloatArray:
-        """Return one of the lists of numbers of all these messages."""
-        if self._raw:
-            self._read()
-        return np.vstack(self._lists[field])
-
-
 class _Collector:
     """Numbers of one topic."""
 
@@ -140,20 +105,21 @@ class _Collector:
         self.arrivals: list[int] = []
         self.stamps: list[int] = []  # of the messages that could be read, and their log times
         self._log_times: list[int] = []
-        self._alike: dict[Layout, _Alike] = {}
-        self._latest: _Alike | None = None
+        # Names, and lengths of the lists -> places among the messages, and the numbers as bytes
+        self._alike: dict[Any, tuple[list[int], list[bytearray]]] = {}
 
     def add(self, log_time: int, data: bytes) -> None:
         self.arrivals.append(log_time)
         try:
-            layout = layout_of(self._kind, data)
+            stamp, names, lists = unpack(self._kind, data)
         except DamagedMessageError:
             return
-        alike = self._latest
-        if alike is None or alike.layout is not layout:
-            alike = self._latest = self._alike.setdefault(layout, _Alike(layout, self.columns))
-        alike.add(len(self.stamps), data)
-        self.stamps.append(layout.stamp(data))
+        key = names, *map(len, lists)
+        places, kept = self._alike.setdefault(key, ([], [bytearray() for _ in lists]))
+        places.append(len(self.stamps))
+        for numbers, raw in zip(lists if names else lists[:1], kept, strict=False):
+            raw += numbers[self.columns].tobytes()
+        self.stamps.append(stamp)
         self._log_times.append(log_time)
 
     def series(self) -> Any:
@@ -167,8 +133,9 @@ class _Collector:
     def table(self, field: int, columns: int) -> Any:
         """Return a list of numbers of all messages, (messages, columns)."""
         values = np.full((len(self.stamps), columns), math.nan)
-        for layout, alike in self._alike.items():
-            self.fill(values, alike.places, layout.names, alike.numbers(field))
+        for (names, *_), (places, kept) in self._alike.items():
+            numbers = np.frombuffer(kept[field]).reshape(len(places), -1)
+            self.fill(values, places, names, numbers)
         return credible(values)
 
     def fill(self, values: Any, places: list[int], names: tuple[str, ...], numbers: Any) -> None:
@@ -181,7 +148,7 @@ class _Joints(_Collector):
     @property
     def names(self) -> tuple[str, ...]:
         """The first joints that were named."""
-        named = dict.fromkeys(name for layout in self._alike for name in layout.names)
+        named = dict.fromkeys(name for names, *_ in self._alike for name in names)
         return tuple(named)[:MOST_JOINTS]
 
     def fill(self, values: Any, places: list[int], names: tuple[str, ...], numbers: Any) -> None:
