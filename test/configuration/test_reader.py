@@ -75,7 +75,7 @@ def test_a_retired_key_is_left_out_and_said(tmp_path):
 
 def test_contact_laws_are_those_of_the_physics():
     key = 'rover.contact_law'
-    assert next(p for p in DECLARED if p.key == key).choices == LAWS
+    assert tuple(next(p for p in DECLARED if p.key == key).choices) == LAWS
     law, effect = f'{key}:=resistive_force', 'effects.stress_peak_shift.enabled:=true'
     with pytest.warns(ConfigurationWarning, match=f'{key}: .* left out: stress_peak_shift'):
         reader.load([], [law, effect], complete=False)

@@ -49,7 +49,7 @@ def test_tools_are_told_the_range_of_each_bounded_parameter():
     }
     assert sum(map(bool, ranges.values())) > 5
     for key, parameter in declared().items():
-        bounds = (parameter.lower, parameter.upper)
+        bounds = (parameter.lower, parameter.at_most)
         assert ranges[key] in ([], [bounds]), key
         if not np.isfinite(bounds).all():
             assert ranges[key] == []

@@ -9,7 +9,7 @@ to ``retired``, with its replacement. ``tools/document_parameters.py`` documents
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -24,34 +24,36 @@ Kind: TypeAlias = Literal['number', 'integer', 'flag', 'text']
 
 @dataclass(frozen=True)
 class Parameter:
-    """One declared parameter."""
+    """One declared parameter: canonical dotted key, and an entry as `parameters.yaml` has it."""
 
-    key: str  # canonical dotted key
-    kind: Kind  # ``number`` (an integer will do), ``integer``, ``flag`` or ``text``
-    # Value where no file states one; a scalar default of a per-wheel key counts for each wheel
+    key: str
+    type: Kind
     default: Value
-    unit: str  # unit of the value in files
-    meaning: str  # one sentence for the documentation and the node's descriptor
-    # Per-wheel list, list of that length (0: any length), or a scalar
+    meaning: str
+    unit: str = ''
     size: int | Literal['wheels'] | None = None
-    # ``lower``, ``upper``: allowed range of each number
-    lower: float = -inf
-    upper: float = inf
-    open_lower: bool = False  # whether the lower bound itself is excluded
-    choices: tuple[str, ...] = ()  # allowed texts, if not any
-    aliases: tuple[str, ...] = ()  # other spellings that are accepted
-    required: bool = False  # whether a complete configuration must state it
-    one_for_all: bool = False  # whether a per-wheel list of one entry counts for all wheels
+    above: float | None = None
+    at_least: float = -inf
+    at_most: float = inf
+    choices: Collection[str] = ()
+    aliases: Sequence[str] = ()
+    required: bool = False
+    one_for_all: bool = False
+
+    @property
+    def lower(self) -> float:
+        """Lower bound of each number, itself excluded where it is stated as ``above``."""
+        return self.at_least if self.above is None else self.above
 
     @property
     def allowed(self) -> str:
         """What a value must be, in words, for messages and documentation."""
         noun = {'number': 'number', 'integer': 'integer', 'flag': 'true/false', 'text': 'text'}
-        words = noun[self.kind]
+        words = noun[self.type]
         if self.choices:
             words = 'one of ' + ', '.join(self.choices)
         if self.size is not None:
-            plural = words if self.kind in ('flag', 'text') else f'{words}s'
+            plural = words if self.type in ('flag', 'text') else f'{words}s'
             words = f'list of {plural}'
             if self.size == 'wheels':
                 words += ', one per wheel' + (', or one for all' if self.one_for_all else '')
@@ -59,9 +61,9 @@ class Parameter:
                 words = f'list of {self.size} {plural}'
         limits = []
         if self.lower > -inf:
-            limits.append(f'{"above" if self.open_lower else "at least"} {self.lower:g}')
-        if self.upper < inf:
-            limits.append(f'at most {self.upper:g}')
+            limits.append(f'{"at least" if self.above is None else "above"} {self.lower:g}')
+        if self.at_most < inf:
+            limits.append(f'at most {self.at_most:g}')
         if limits:
             words += f' ({" and ".join(limits)})'
         return words
@@ -85,39 +87,10 @@ def read_table(path: Path) -> tuple[tuple[Parameter, ...], dict[str, str]]:
     found = []
     for name, entry in table.items():
         inside = {name: entry} if 'type' in entry else {f'{name}.{k}': e for k, e in entry.items()}
-        found += [parameter(key, **fields) for key, fields in inside.items()]
+        for key, fields in inside.items():
+            unit = '-' if fields['type'] in ('number', 'integer') else ''
+            found.append(Parameter(key, **{'unit': unit, **fields}))
     return tuple(found), retired
-
-
-def parameter(
-    key: str,
-    type: Kind,
-    default: Value,
-    meaning: str,
-    *,
-    unit: str | None = None,
-    above: float | None = None,
-    at_least: float = -inf,
-    at_most: float = inf,
-    choices: Iterable[str] = (),
-    aliases: Iterable[str] = (),
-    **others: Any,
-) -> Parameter:
-    """Declare a parameter in the words of the table; ``others`` are fields of ``Parameter``."""
-    measured = type in ('number', 'integer')
-    return Parameter(
-        key,
-        type,
-        default,
-        ('-' if measured else '') if unit is None else unit,
-        meaning,
-        lower=at_least if above is None else above,
-        upper=at_most,
-        open_lower=above is not None,
-        choices=tuple(choices),
-        aliases=tuple(aliases),
-        **others,
-    )
 
 
 DECLARED, RETIRED = read_table(Path(__file__).with_name('parameters.yaml'))
@@ -131,18 +104,18 @@ def declared() -> dict[str, Parameter]:
     table = {item.key: item for item in DECLARED}
     for name, effect in catalogue().items():
         prefix = f'effects.{name}'
-        table[f'{prefix}.enabled'] = parameter(f'{prefix}.enabled', 'flag', False, effect.claim)
+        table[f'{prefix}.enabled'] = Parameter(f'{prefix}.enabled', 'flag', False, effect.claim)
         if len(effect.forms) > 1:
             names = tuple(variant.form for variant in effect.forms)
             laws = '; '.join(f'{variant.form}: {variant.symbol}' for variant in effect.forms)
             key = f'{prefix}.form'
-            table[key] = parameter(key, 'text', names[0], laws, choices=names)
+            table[key] = Parameter(key, 'text', names[0], laws, choices=names)
         if effect.sparse:
             table.update(_lists(prefix))
             continue
         for item in effect.all_parameters:
             key = f'{prefix}.{item.name}'
-            table[key] = parameter(
+            table[key] = Parameter(
                 key,
                 'number',
                 float(item.default),
@@ -151,7 +124,7 @@ def declared() -> dict[str, Parameter]:
                 at_least=float(item.lower),
                 at_most=float(item.upper),
             )
-            table[f'{key}_std'] = parameter(
+            table[f'{key}_std'] = Parameter(
                 f'{key}_std',
                 'number',
                 0.0,
@@ -167,14 +140,14 @@ def _lists(prefix: str) -> dict[str, Parameter]:
     from wheel_terra_estimator.terramechanics.effects import learned_closure as law
 
     items = (
-        parameter(f'{prefix}.targets', 'text', ['torque'], 'what each term changes', size=0,
+        Parameter(f'{prefix}.targets', 'text', ['torque'], 'what each term changes', size=0,
                   choices=law.TARGETS),
-        parameter(f'{prefix}.features', 'text', ['one'], 'with what it changes', size=0,
+        Parameter(f'{prefix}.features', 'text', ['one'], 'with what it changes', size=0,
                   choices=law.FEATURES),
-        parameter(f'{prefix}.coefficients', 'number', [0.0], 'by how much', size=0),
-        parameter(f'{prefix}.coefficients_std', 'number', [0.0],
-                  'standard deviations of the coefficients as fitted; 0 = not stated', size=0,
-                  at_least=0.0),
+        Parameter(f'{prefix}.coefficients', 'number', [0.0], 'by how much', '-', size=0),
+        Parameter(f'{prefix}.coefficients_std', 'number', [0.0],
+                  'standard deviations of the coefficients as fitted; 0 = not stated', '-',
+                  size=0, at_least=0.0),
     )  # fmt: skip
     return {item.key: item for item in items}
 

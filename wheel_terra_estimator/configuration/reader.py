@@ -264,7 +264,7 @@ def checked_value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:
 
 
 def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]) -> Any:
-    kind = parameter.kind
+    kind = parameter.type
     if hasattr(value, 'item'):
         value = value.item()
     if kind == 'flag':
@@ -290,10 +290,10 @@ def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]
         value = float(value)
     if value and not LEAST <= abs(value) <= MOST:
         raise refuse(f'{value!r} is not a plausible value ({LEAST} to {MOST})')
-    too_low = value <= parameter.lower if parameter.open_lower else value < parameter.lower
-    if too_low or value > parameter.upper:
+    too_low = value < parameter.lower or value == parameter.above
+    if too_low or value > parameter.at_most:
         unit = parameter.unit
-        small = _SMALLER_UNITS.get(unit) if abs(value) > parameter.upper else None
+        small = _SMALLER_UNITS.get(unit) if abs(value) > parameter.at_most else None
         asked = f' (in {small}, not {unit}?)' if small else ''
         raise refuse(f'{value!r} is out of range{asked}')
     return value

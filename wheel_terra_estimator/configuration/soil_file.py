@@ -68,7 +68,7 @@ def write_values(soil_file: Path, learned: Mapping[str, Any], overwrite: bool = 
         key: value
         for key, value in learned.items()
         if key in table
-        if all(table[key].lower <= v <= table[key].upper for v in np.ravel(value).tolist())
+        if all(table[key].lower <= v <= table[key].at_most for v in np.ravel(value).tolist())
     }
     with new_file(soil_file, overwrite, foreign=why_foreign) as path:
         ros_yaml.write(path, values, _COMMENT)

@@ -30,7 +30,6 @@ from wheel_terra_estimator.configuration.parameters import (
     by_spelling,
     declared,
     nearest,
-    parameter,
 )
 from wheel_terra_estimator.configuration.reader import STANDARD_PREFIXES, checked_value
 from wheel_terra_estimator.errors import UserError
@@ -57,9 +56,9 @@ class TractionLimiter(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__('traction_limiter', **options)
         self._tuning = LimiterTuning(**{f.name: self._number(f) for f in fields(LimiterTuning)})
-        self._stamped = self._take(parameter('stamped', 'flag', True, 'TwistStamped, not Twist'))
+        self._stamped = self._take(Parameter('stamped', 'flag', True, 'TwistStamped, not Twist'))
         words = 'file that keeps a stop across a restart of this node; empty: none'
-        name = self._take(parameter('state_file', 'text', '', words))
+        name = self._take(Parameter('state_file', 'text', '', words))
         self._refuse_unknown()
         self._file = Path(name).expanduser() if name else None
         self._unkept = ''  # why the state is not in its file
@@ -301,9 +300,7 @@ class TractionLimiter(Node):
         given, default = field.metadata, float(field.default)  # type: ignore[arg-type]
         bounds = {'at_least': given['lower'], 'at_most': given['upper']}
         return float(
-            self._take(
-                parameter(field.name, 'number', default, given['meaning'], unit='', **bounds)
-            )
+            self._take(Parameter(field.name, 'number', default, given['meaning'], **bounds))
         )
 
     def _now(self) -> float:

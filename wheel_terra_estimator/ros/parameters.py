@@ -112,17 +112,17 @@ def descriptor(parameter: Parameter) -> ParameterDescriptor:
         description=f'{parameter.meaning}{unit}',
         additional_constraints=f'{parameter.allowed}{when}',
         # An integer will do where a number is wanted; the validator knows.
-        dynamic_typing=parameter.kind == 'number',
+        dynamic_typing=parameter.type == 'number',
     )
-    finite = parameter.lower > float('-inf') and parameter.upper < float('inf')
-    if finite and parameter.kind == 'number' and not tuning:
+    finite = parameter.lower > float('-inf') and parameter.at_most < float('inf')
+    if finite and parameter.type == 'number' and not tuning:
         found.floating_point_range = [
             FloatingPointRange(
-                from_value=float(parameter.lower), to_value=float(parameter.upper), step=0.0
+                from_value=float(parameter.lower), to_value=float(parameter.at_most), step=0.0
             )
         ]
-    elif finite and parameter.kind == 'integer':
+    elif finite and parameter.type == 'integer':
         found.integer_range = [
-            IntegerRange(from_value=int(parameter.lower), to_value=int(parameter.upper), step=1)
+            IntegerRange(from_value=int(parameter.lower), to_value=int(parameter.at_most), step=1)
         ]
     return found
