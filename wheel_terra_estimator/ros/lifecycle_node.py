@@ -16,7 +16,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
-from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,19 +42,13 @@ from wheel_terra_estimator.messages.unpack import DamagedMessageError, unpack
 from wheel_terra_estimator.ros import parameters, qos
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
-from wheel_terra_estimator.ros.outputs import EstimatePublisher
+from wheel_terra_estimator.ros.outputs import EstimatePublisher, message_class
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.ros.live_views import LiveViews
 
 
-def _message_class(name: str) -> Any:
-    """Return the class of a message, such as ``nav_msgs/msg/Odometry``."""
-    module, _, kind = name.replace('/', '.').rpartition('.')
-    return getattr(import_module(module), kind)
-
-
-MESSAGE_TYPES = {topic: _message_class(name) for topic, name in INPUT_TYPES.items()}
+MESSAGE_TYPES = {topic: message_class(name) for topic, name in INPUT_TYPES.items()}
 
 WATCH_PERIOD = 0.25  # [s]
 BEHIND = 500_000_000  # [ns] that a message waited, from which on this process is behind

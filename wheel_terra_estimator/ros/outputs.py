@@ -5,28 +5,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import TwistWithCovarianceStamped
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Int8, UInt8MultiArray
+from std_msgs.msg import Bool, Int8
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages import pack
 from wheel_terra_estimator.messages.diagnostics import Status
-from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, output_profile
 
-SET_MESSAGES = {
-    **dict.fromkeys(JOINT_OUTPUTS, JointState),
-    'slip_class': UInt8MultiArray,
-    'twist': TwistWithCovarianceStamped,
-}
+
+def message_class(name: str) -> Any:
+    """Return the class of a message, such as ``nav_msgs/msg/Odometry``."""
+    module, _, kind = name.replace('/', '.').rpartition('.')
+    return getattr(import_module(module), kind)
+
+
+SET_MESSAGES = {topic: message_class(pack.OUTPUT_TYPES[topic]) for topic in pack.SET_TOPICS}
 """Private topic -> class of the message that it has of each set."""
 
 
