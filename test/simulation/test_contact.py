@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forces at a given depth against the reference model, which solves for the depth."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from wheel_terra_estimator.simulation.contact import (
     SunkWheels,
     contact_of,
 )
+from wheel_terra_estimator.simulation.contact_memory import digging_rate
 from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES
 from wheel_terra_estimator.terramechanics.contact_law import LAWS, contact_law
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -122,3 +124,26 @@ def test_the_ground_of_each_contact_law_is_that_law(law):
     assert (sideways.side_force > 0.0).all()
     firm = answer(ground, steady.sinkage, slip, load, stiffness=2.0)
     np.testing.assert_allclose(firm.support_ratio, 0.5 * forces.support_ratio, rtol=0.05)
+
+
+LUGGED = Wheel(0.1574, 0.165, 0.010, 30)
+
+
+def test_digging_starts_near_stuck_and_grows_with_the_lugs():
+    whole = digging_rate(1.0, LUGGED, 1.0, 0.05)
+    assert digging_rate(0.85, LUGGED, 1.0, 0.05) == 0.0
+    assert digging_rate(0.925, LUGGED, 1.0, 0.05) == pytest.approx(0.5 * whole)
+    assert digging_rate(-0.98, LUGGED, 1.0, 0.05) == 0.0
+    smooth, low, high = (
+        digging_rate(0.98, replace(LUGGED, lug_height=h), 1.0, 0.05) for h in (0.0, 0.005, 0.015)
+    )
+    assert high == pytest.approx(3.0 * low)
+    assert smooth > 0.0
+    assert digging_rate(1.0, LUGGED, -2.0, 0.05) == pytest.approx(2.0 * whole)
+
+
+def test_a_spinning_wheel_throws_out_the_layer_of_its_lugs_once_per_lug():
+    """Thirty lugs of 10 mm pass in a turn; with all of it thrown out it is 300 mm deeper."""
+    a_turn_a_second = 2.0 * np.pi
+    assert digging_rate(1.0, LUGGED, a_turn_a_second, 1.0) == pytest.approx(0.300)
+    assert digging_rate(1.0, LUGGED, a_turn_a_second, 0.05) == pytest.approx(0.05 * 0.300)

@@ -9,7 +9,6 @@ import pytest
 from terra_tools import SAND, WHEEL, points
 
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
-from wheel_terra_estimator.terramechanics.entrapment import digging_per_turn
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
@@ -56,7 +55,6 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
             ),
             r'cohesion with the effects on is -2750 Pa; allowed is \[0, inf\) Pa',
         ),
-        (lambda: digging_per_turn(WHEEL, 1.5), r'efficiency is 1.5; allowed is \[0, 1\]'),
         (lambda: ConditionedForces(WHEEL, SAND, gravity=-1.0), r'gravity is -1 m/s\^2'),
         (
             lambda: ConditionedForces(WHEEL, replace(SAND, cohesion=np.ones(2))),

@@ -16,9 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, Quantity
 from wheel_terra_estimator.simulation.contact import SoilForces
-from wheel_terra_estimator.terramechanics.entrapment import digging_rate
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 START_DEPTH, START_LENGTH = 0.05, 0.3  # of a contact before it settles, over the radius [-]
@@ -35,6 +34,26 @@ SLIP_SINKING = 0.3
 DEPTH_RANGE = (1e-3, 0.9)
 """Least and greatest depth as a share of the radius; beyond, the chassis lies on the ground."""
 LEAST_SPEED = 1e-6  # [m/s]; keeps ratios of speeds finite
+DIGGING_SLIP = (0.85, 1.0)
+"""Up to the first nothing is dug beyond the steady sinkage, at the second all of it [-]."""
+SMOOTH_BAND = 0.02
+"""Soil that a smooth rim throws out per turn, a band of a few grains, as a share of its radius."""
+
+
+def digging_rate(
+    slip: Quantity, wheel: Wheel, angular_velocity: Quantity, efficiency: float
+) -> Quantity:
+    """Rate at which a driving wheel digs itself in, beyond its steady sinkage [m/s].
+
+    Every lug that passes throws out a share of a layer of its height, per turn efficiency h n, or a
+    thin band for a smooth rim; a braking wheel does not dig itself in. ``angular_velocity``: of
+    either sign [rad/s].
+    """
+    start, full = DIGGING_SLIP
+    share = np.clip((np.asarray(slip) - start) / (full - start), 0.0, 1.0)
+    lugs = np.multiply(wheel.lug_height, wheel.lug_count)
+    per_turn = efficiency * np.maximum(lugs, np.multiply(SMOOTH_BAND, wheel.radius))
+    return per_turn * (np.abs(angular_velocity) / (2.0 * np.pi)) * share
 
 
 class Shear(NamedTuple):

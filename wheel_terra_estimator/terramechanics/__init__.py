@@ -8,5 +8,4 @@
 - Forces at given angles: ``quadrature``, ``closed_form``.
 - Load to sinkage, pull, torque: ``model`` (by ``load_balance``); sinkage to torque and pull:
   ``conditioned`` (for the filter).
-- Questions: ``entrapment``.
 """
