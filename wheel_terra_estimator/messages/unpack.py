@@ -67,7 +67,7 @@ class Message(NamedTuple):
     numbers: tuple[FloatArray, ...]
 
 
-class Layout(NamedTuple):
+class _Layout(NamedTuple):
     """Layout common to the messages of a topic: names, and positions of the numbers.
 
     ``lists``: first byte and length of each list of numbers, as in `Message`.
@@ -77,41 +77,12 @@ class Layout(NamedTuple):
     names: tuple[str, ...]
     lists: tuple[tuple[int, int], ...]
     fixed: tuple[tuple[int, bytes], ...]  # where what lies around stamp and numbers begins
-    size: int  # [byte]
-
-    def stamp(self, data: bytes) -> int:
-        """Return the stamp of a message [ns]."""
-        seconds, nanoseconds = self.order.stamp.unpack_from(data, _BODY)
-        return int(seconds * 1_000_000_000 + nanoseconds)
-
-    def fits(self, data: bytes) -> bool:
-        """Whether another message of the type is laid out so."""
-        for at, part in self.fixed:
-            if not data.startswith(part, at):
-                return False
-        return len(data) == self.size
 
 
-_SEEN: dict[tuple[str, int], Layout] = {}  # latest one of a type and size
+_SEEN: dict[tuple[str, int], _Layout] = {}  # latest one of a type and size
 
 
-def layout_of(kind: str, data: bytes) -> Layout:
-    """Return how a message of one of the four types is laid out, mostly as one before it was.
-
-    Raises DamagedMessageError where the bytes are none.
-    """
-    seen = _SEEN.get((kind, len(data)))
-    if seen is not None and seen.fits(data):
-        return seen
-    layout = _read_layout(kind, data)
-    if layout.size <= LARGEST_SEEN:
-        if len(_SEEN) == MOST_SEEN:
-            _SEEN.clear()
-        _SEEN[kind, layout.size] = layout
-    return layout
-
-
-def _read_layout(kind: str, data: bytes) -> Layout:
+def _read_layout(kind: str, data: bytes) -> _Layout:
     try:
         order = _ORDERS[data[:2]]
         order.stamp.unpack_from(data, _BODY)
@@ -138,19 +109,26 @@ def _read_layout(kind: str, data: bytes) -> Layout:
             raise ValueError('other bytes than fields')
     except (struct.error, KeyError, ValueError) as error:
         raise DamagedMessageError(str(error)) from None
-    return Layout(order, tuple(names), tuple(lists), tuple(fixed), len(data))
+    return _Layout(order, tuple(names), tuple(lists), tuple(fixed))
 
 
 def unpack(kind: str, data: bytes) -> Message:
-    """Return a message of one of the four types.
+    """Return a message of one of the four types, laid out mostly as one before it was.
 
     Raises DamagedMessageError where the bytes are none.
     """
-    layout = layout_of(kind, data)
-    number = layout.order.number
-    values = [np.frombuffer(data, number, count, at) for at, count in layout.lists]
-    numbers = values if number.isnative else [v.astype(np.float64) for v in values]
-    return Message(layout.stamp(data), layout.names, tuple(numbers))
+    layout = _SEEN.get((kind, len(data)))
+    if layout is None or not all(data.startswith(part, at) for at, part in layout.fixed):
+        layout = _read_layout(kind, data)
+        if len(data) <= LARGEST_SEEN:
+            if len(_SEEN) == MOST_SEEN:
+                _SEEN.clear()
+            _SEEN[kind, len(data)] = layout
+    order, names, lists, _ = layout
+    seconds, nanoseconds = order.stamp.unpack_from(data, _BODY)
+    values = [np.frombuffer(data, order.number, count, at) for at, count in lists]
+    numbers = values if order.number.isnative else [v.astype(np.float64) for v in values]
+    return Message(seconds * 1_000_000_000 + nanoseconds, names, tuple(numbers))
 
 
 def _count(data: bytes, at: int, order: _Order) -> tuple[int, int]:
