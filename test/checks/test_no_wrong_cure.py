@@ -16,7 +16,7 @@ from wheel_terra_estimator.checks.calibration import calibrate
 from wheel_terra_estimator.checks.evidence import gather
 from wheel_terra_estimator.checks.rover_facts import from_configuration
 from wheel_terra_estimator.checks.series import VelocitySeries, rows_of
-from wheel_terra_estimator.checks.statistics import block_fit
+from wheel_terra_estimator.checks.statistics import block_fit, block_fits
 
 WHOLE = rolling.recording()
 
@@ -102,6 +102,20 @@ def test_noise_of_a_regressor_does_not_flatten_the_slope():
     flat, whole = block_fit(columns[0], target)[1], block_fit(*columns[:1], target, columns[1])[1]
     assert flat.value == pytest.approx(-0.5 / 3.0, abs=0.03)  # m varies by half of 0.1 squared
     assert abs(whole.value + 0.5) < 2.0 * whole.std < 0.1
+
+
+def test_outliers_of_one_target_leave_the_fits_to_the_others_alone():
+    random = np.random.default_rng(5)
+    design = np.column_stack([random.normal(size=900), np.ones(900)])
+    truth = np.array([[2.0, -1.0, 0.5], [0.3, 0.0, -4.0]])
+    targets = design @ truth + random.normal(0.0, 0.1, (900, 3))
+    least_squares = np.linalg.lstsq(design, targets, rcond=None)[0]
+    targets[::7, 1] += 50.0
+    targets[::14, 1] -= 100.0
+    for k, fit in enumerate(block_fits(design, targets)):
+        for one, true, plain in zip(fit, truth[:, k], least_squares[:, k], strict=True):
+            assert abs(one.value - true) < 4.0 * one.std < 0.1
+            assert one.value == pytest.approx(plain, abs=0.03)
 
 
 def test_to_and_fro_over_the_same_cross_slope_turns_no_imu():
