@@ -212,6 +212,13 @@ def _shear_by_pressure(size: float, secondary: float, rows: Rows, soil: TrueSoil
     return Change('shear_deformation', prepare)
 
 
+def _shear_by_slip(size: float, secondary: float, rows: Rows, soil: TrueSoil) -> Hidden:
+    def prepare(setup: Setup, rows: Rows) -> None:
+        setup.shear_modulus = setup.shear_modulus * np.exp(size * np.abs(rows['slip']))
+
+    return Change('shear_deformation', prepare)
+
+
 def _friction_unit(rows: Rows, soil: TrueSoil) -> float:
     """Damping that takes 4 % of load times radius at the mean rate."""
     return 0.04 * mean_load(rows) * mean_radius(rows) / float(np.mean(rows['angular_velocity']))
@@ -257,4 +264,5 @@ FORMS = {
     'shear_deformation:pressure': Kind(
         _shear_by_pressure, fixed(0.4), 3.5, signed=True, needs=('normal_load',)
     ),
+    'shear_deformation:slip': Kind(_shear_by_slip, fixed(1.0), 4, signed=True),
 }

@@ -20,7 +20,7 @@ from wheel_terra_estimator.terramechanics.effects.base import (
 
 
 def _cohesion(contact: Contact, p: SimpleNamespace) -> None:
-    contact.cohesion = contact.cohesion + p.delta
+    contact.cohesion = np.maximum(contact.cohesion + p.delta, 0.0)
 
 
 COHESION = Effect(
@@ -35,7 +35,7 @@ COHESION = Effect(
         'grouser_thrust': 'other lugs or none; a load series',
         'rim_friction': 'a load series; rows with higher lugs',
     },
-    validity='c + delta not below zero',
+    validity='c + delta below zero counts as zero',
     source='Mohr-Coulomb strength in Janosi and Hanamoto 1961 (proceedings, no DOI); '
     'Ding et al. 2010 eq. 18 (doi 10.1007/s11771-010-0021-7)',
     on_inputs=_cohesion,
@@ -114,6 +114,10 @@ def _with_pressure(contact: Contact, p: SimpleNamespace) -> None:
     contact.shear_modulus = contact.shear_modulus * growth
 
 
+def _with_slip(contact: Contact, p: SimpleNamespace) -> None:
+    contact.shear_modulus = contact.shear_modulus * np.exp(p.by_slip * np.abs(contact.slip))
+
+
 SHEAR_DEFORMATION = Effect(
     name='shear_deformation',
     claim='more or less shear deformation modulus K than configured',
@@ -144,6 +148,18 @@ SHEAR_DEFORMATION = Effect(
             source='Wong, Theory of Ground Vehicles (book, no DOI): K of some soils rises with '
             'normal pressure; power law assumed',
             on_inputs=_with_pressure,
+        ),
+        Form(
+            name='slip',
+            claim='the shear deformation modulus K changes with slip',
+            symbol='K *= exp(by_slip |s|)',
+            parameters=(
+                signed('by_slip', '-', 1.0, -4.0, 6.0, 1.0, 'growth of ln K with slip or skid'),
+            ),
+            candidate=True,
+            validity='slip to 0.8',
+            source='own form',
+            on_inputs=_with_slip,
         ),
     ),
 )
