@@ -30,6 +30,7 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.studies.campaigns.scoring import diagnose as diagnose_campaign
 from wheel_terra_lab.trials.campaign import Plan, make_campaign
+from wheel_terra_lab.trials.truth import solve
 
 QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
 SHARE = 0.06  # of load times radius per decade of rim speed
@@ -172,6 +173,24 @@ def test_a_torque_sensor_that_bends_is_a_law_of_its_own_reading():
     assert bent == pytest.approx(plain + lever * bound * x / (bound + np.abs(x)), rel=1e-9)
 
 
+def test_what_one_channel_picks_up_of_another_is_a_law_and_no_gain():
+    """A torque reading that holds F r/4 beside its own."""
+    table, values, soil, rows = make('full56')
+    pull = solve(rows, soil)['drawbar_pull']
+    table['torque'] = table['torque'] + 0.25 * pull * rows['wheel_radius']
+    gains = Options(effects=('torque_gain', 'pull_gain', 'drivetrain_friction'))
+    found = run(table, values, options=gains)
+    law = found.proposal
+    assert (found.verdict, found.effects) == ('unexplained', ())
+    assert (law.targets, law.features) == (('torque',), ('pull',))
+    pulls = law.coefficients[0] * pull / rows['normal_load']
+    bound = TARGETS['torque'].bound
+    change = bound * pulls / (bound + np.abs(pulls))
+    assert change == pytest.approx(
+        0.25 * pull / rows['normal_load'], abs=0.025
+    )  # it bends towards its bound
+
+
 def _points(**changes):
     wheel = Wheel(0.15, 0.15, 0.01, 20)
     given = {'slip': np.array([0.1, 0.3, 0.6]), 'normal_load': np.full(3, 80.0), 'wheel': wheel}
@@ -185,6 +204,8 @@ LAW = {
     'torque_by_rim_speed': 0.03,
     'drawbar_pull_by_depth': -0.4,
     'torque_by_torque_squared': -0.2,
+    'torque_by_pull': 0.1,
+    'drawbar_pull_by_torque': -0.1,
 }
 
 

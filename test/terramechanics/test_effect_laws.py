@@ -210,6 +210,8 @@ BY_HAND = {
     'load_times_lug': 0.05,
     'load_times_rim_speed': 1.0,
     'load_times_pass': 2.0,
+    'pull': 0.2,  # as it would be forward
+    'torque': -0.3,
     'torque_squared': -0.9,  # against the way: 0.3^2 of W r, ten times as heavy as rho g b r^2
 }
 

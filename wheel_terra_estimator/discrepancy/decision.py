@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,13 @@ from wheel_terra_estimator.discrepancy.assessment.held_out import (
     slip_groups,
 )
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.proposal import Gap, equivalent_effects, propose
+from wheel_terra_estimator.discrepancy.proposal import (
+    Gap,
+    Rival,
+    equivalent_effects,
+    propose,
+    rivals,
+)
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection.readings import units_apart
 from wheel_terra_estimator.discrepancy.selection.search import Findings
@@ -48,6 +55,7 @@ _AT_NOISE = 1.2  # times the noise: a quantity that was never off
 # of an independent simulation): the radius alone is measured on a hard floor.
 _SAME_ERROR = 'the same error of all slips (reference speed, or readings that lag behind a sweep)'
 _SAME_ERROR_ODDS = 0.5  # how frequent it is assumed to be beside a wrong radius [-]
+_NOTABLE = 0.2  # odds beside a name from which something without one is told
 _SURE = 2.0  # deviations within which a bias of the radius is the height of the lugs
 _RARE = 3.0  # deviations of its prior, beyond which a gain may as well be something else
 _MOST_TRIED = 3  # doubtful names, after which none is given
@@ -130,6 +138,7 @@ class Decider:
     allowed_error: float  # model error that is no reason for doubt [share of the range]
     misread: Mapping[str, float | str] = field(default_factory=dict)  # as in the decision
     beds_differ: bool = False  # unseen rows may be off by more than noise
+    beside: tuple[Rival, ...] = ()  # an effect that is on and should not be
     # Best law beside each floor, soil held or not: it competes with names, or is proposed
     laws: dict[tuple[float, bool], Proposal | None] = field(default_factory=dict)
 
@@ -147,11 +156,18 @@ class Decider:
             if verdict.status != 'named':
                 return self._left_open(replace(decision, doubtful=doubtful))
             tried.append(verdict.index)
-            names, likely = self._against_law(decision, _names(self.table, decision))
+            named = _names(self.table, decision, self._rivals)
+            names, likely = self._against_law(decision, named)
             if likely and any(item.after < item.refit for item in decision.gap.values()):
                 share = _OF_SEVERAL if len(names) >= _SEVERAL else 1.0
                 return replace(decision, names=_as_sure(names, share))
             doubtful = doubtful or names
+
+    @cached_property
+    def _rivals(self) -> tuple[Rival, ...]:
+        """What has no name, and competes with names."""
+        laws = LAW not in self.findings.setting.forward.base_effects
+        return (*self.beside, *(rivals(self.table, self.findings) if laws else ()))
 
     def _law(self, decision: Decision, hold_soil: bool = False) -> Proposal | None:
         """Return the law for what a decision's refit of the soil leaves."""
@@ -245,15 +261,18 @@ def _as_sure(names: tuple[Naming, ...], share: float) -> tuple[Naming, ...]:
 
 def _least(names: tuple[Naming, ...], odds: float = 1.0) -> float:
     """Return the confidence of the least likely set of names, among what was tried."""
-    return min(confidence(name.features, odds=odds).of_set for name in names)
+    every = ((name.features, name.features['nameless']) for name in names)
+    return min(confidence(values, nameless, odds).of_set for values, nameless in every)
 
 
-def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
+def _names(table: SteadyTable, decision: Decision, beside: tuple[Rival, ...]) -> tuple[Naming, ...]:
     """Return the named effects with their confidence; first the one that alone explains more."""
     findings, fitted, known = decision.findings, decision.after, catalogue()
     selection = findings.selection
     shown = _what_rows_show(findings, fitted, decision.gap)
     found = []
+    total, own = selection.totals[decision.verdict.index], set(map(effect_of, fitted.names))
+    nameless = {r.words: r.odds(total) for r in beside if r.like not in own}
     for place, key in enumerate(fitted.names):
         values = features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
@@ -264,6 +283,9 @@ def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
         if 'wheel_radius_bias' in (key, *competitors) and not table.true_rows.any():
             alike = (_SAME_ERROR, *alike)
             values['alike'] += _SAME_ERROR_ODDS
+        values['nameless'] = sum(nameless.values())
+        values['alike'] += values['nameless']
+        alike = (*alike, *(words for words, odds in nameless.items() if odds > _NOTABLE))
         alone = float(selection.totals[selection.index((key,))])
         sure = confidence(values, values['alike'])
         found.append((alone, Naming(key, competitors, sure, values, alike)))

@@ -27,11 +27,15 @@ from wheel_terra_estimator.discrepancy.assessment.held_out import (
 )
 from wheel_terra_estimator.discrepancy.fitting.coordinates import narrowed
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, with_unit
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, plain, with_unit
 from wheel_terra_estimator.discrepancy.result import LeftOut, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
-from wheel_terra_estimator.discrepancy.selection.verdict import LARGEST_Z_SCORE, largest_z_score
+from wheel_terra_estimator.discrepancy.selection.verdict import (
+    LARGEST_Z_SCORE,
+    TEMPERATURE,
+    largest_z_score,
+)
 from wheel_terra_estimator.discrepancy.selection.weights import (
     Explanation,
     Setting,
@@ -66,6 +70,8 @@ _WORSE = 1.1  # times the soil refit: an error of one quantity that no law may r
 _FINE = 1.35  # ... unless it is no more than so many times the noise, ...
 _PAYS = 5.0  # ... or so many times as much (in squared noise deviations) goes from the others
 _HOLDS = (2.5, 5.0, 10.0, 20.0, 40.0)  # times narrower: until the refitted soil is plausible
+_PRIOR_OF_LAW = 0.1  # probability of a law of one term beside the names: about that of a misfit
+_MOST_ODDS = 10.0  # nats
 _ALIKE = 0.8  # cosine of two signatures from which one resembles the other
 _RESEMBLING = 3
 # Terms equivalent to a named effect, in one of its forms or another.
@@ -78,6 +84,8 @@ _SAME = {
     'drawbar_pull_by_one': 'pull_zero',
     'sinkage_by_one': 'sinkage_offset',
     'shear_modulus_by_load': 'shear_deformation',
+    'shear_modulus_by_slip': 'shear_deformation',
+    'shear_modulus_by_slip_squared': 'shear_deformation',
     'bearing_pressure_by_pass': 'multipass',
     'bearing_pressure_by_rim_speed': 'rate_dependence',
 }
@@ -214,6 +222,34 @@ def equivalent_effects(law: Proposal) -> frozenset[str]:
     return frozenset(_SAME[term] for term in terms) if set(terms) <= set(_SAME) else frozenset()
 
 
+@dataclass(frozen=True)
+class Rival:
+    """What explains rows and has no name in the catalogue: names compete with it."""
+
+    total: float  # log of prior times evidence
+    words: str
+    like: str = ''  # effect that comes near it, or is the same
+
+    def odds(self, total: float) -> float:
+        """Return the odds of it against an explanation of that total, tempered."""
+        return math.exp(min((self.total - total) / TEMPERATURE, _MOST_ODDS))
+
+
+def rivals(table: SteadyTable, findings: Findings) -> tuple[Rival, ...]:
+    """Return the laws of one term that come nearest to the rows."""
+    terms = _terms(table)
+    setting = replace(findings.setting, effects=terms)
+    starts = linear_starts(setting, findings.nothing, tuple(terms))
+    nearest = sorted(starts, key=lambda s: -s[0])[:_TRIED]
+    prior = math.log(_PRIOR_OF_LAW / max(len(terms), 1))
+    return tuple(
+        Rival(
+            law.log_evidence + prior, f'a law ({plain(law.names[0])})', _LIKE.get(law.names[0], '')
+        )
+        for law in explained(setting, [start for _, start in nearest])
+    )
+
+
 def _can_be_believed(fitted: Fit) -> bool:
     return largest_z_score(fitted) < LARGEST_Z_SCORE
 
@@ -339,6 +375,8 @@ _PER = {
     'pass': ('per earlier pass', 1.0),
     'slope': ('per 10 degrees of slope', math.radians(10.0)),
     'depth': ('per 0.01 r of sinkage', 0.01),
+    'pull': ('per 0.1 W of drawbar pull', 0.1),
+    'torque': ('per 0.1 W r of torque', 0.1),
     'torque_squared': (
         'with the square of the torque, where T^2 is 0.1 W r times rho g b r^3',
         0.1,

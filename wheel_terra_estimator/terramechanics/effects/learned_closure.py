@@ -126,6 +126,24 @@ BENT_READING: Mapping[str, Feature] = {
     )
 }
 
+# What one channel of a load cell picks up of another.
+CROSS_TALK: Mapping[str, Feature] = {
+    'pull': Feature(
+        lambda c: c.drawbar_pull * c.direction / np.maximum(c.stated_load, _LEAST),
+        0.3,
+        ('slip', 'normal_load'),
+        'F/W',
+        ('torque',),
+    ),
+    'torque': Feature(
+        lambda c: c.torque * c.direction / np.maximum(c.stated_load * c.radius, _LEAST),
+        0.4,
+        ('slip', 'normal_load'),
+        'T/(W r)',
+        ('drawbar_pull',),
+    ),
+}
+
 _SINGLE: Mapping[str, Feature] = {
     'one': Feature(lambda c: 1.0 + 0.0 * c.slip, 1.0, (), 'everywhere alike'),
     'slip': Feature(lambda c: np.abs(c.slip), 0.5, ('slip',), '|s|'),
@@ -150,6 +168,7 @@ _SINGLE: Mapping[str, Feature] = {
         _AFTER_CONTACT,
     ),
     **BENT_READING,
+    **CROSS_TALK,
 }
 
 
