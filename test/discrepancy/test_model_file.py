@@ -106,6 +106,16 @@ def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
     assert_errors(predicted(table, found.configuration, tmp_path), table, found.gap, 'before')
 
 
+def test_an_effect_that_is_on_for_nothing_gets_no_other_name():
+    """Nothing is missing from these rows; the engineer believes that wheels stiffen the soil."""
+    table, values, *_ = make('full56')
+    values |= {'effects.multipass.enabled': True, 'effects.multipass.stiffening': 0.25}
+    few = Options(effects=('hard_layer', 'rate_dependence', 'bulldozing', 'sinkage_offset'))
+    found = run(table, values, options=few)
+    assert (found.verdict, found.effects) == ('unexplained', ())
+    assert 'multipass is on, and these rows fit better without it' in found.notes[0]
+
+
 def test_the_written_soil_is_that_of_the_table_where_a_reference_has_another_bed(tmp_path):
     table, values, soil, rows = make('sweep40')
     softer = replace(

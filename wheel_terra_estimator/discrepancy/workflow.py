@@ -21,8 +21,9 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     soil_coordinates,
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
+from wheel_terra_estimator.discrepancy.proposal import Rival
 from wheel_terra_estimator.discrepancy.render import render
-from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
+from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.discrepancy.selection.readings import Columns
 from wheel_terra_estimator.discrepancy.selection.search import apart, search
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
@@ -43,6 +44,7 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 _MOST_ODDS = 10.0  # nats
 _UNLIKELY = 0.05  # odds of different beds below which they are not reported
+_WRONGLY_ON = 0.05  # prior probability of an effect that is on and should not be; assumed
 _BEDS_DIFFER = 0.2  # prior probability, where rows may be on several; assumed
 
 
@@ -134,25 +136,30 @@ def diagnose(
             other = Decider(table, both, parted, chosen.allowed_error, beds_differ=True).decision()
             decision = decision.unless(other, odds / (1.0 + odds), ground)
     notes: tuple[str, ...] = ()
-    if decision.verdict.status in OPEN and reference is None and not misread:
-        for name, forms in _other_forms(forward, chosen).items():
-            not_tried[name] += '; its other forms, in its place, were tried'
+    if decision.verdict.status != 'agrees' and reference is None and not misread:
+        for name, forms in _in_place_of_what_is_on(forward, chosen).items():
+            if len(forms) > 1:
+                not_tried[name] += '; its other forms, in its place, were tried'
             rest = tuple(c for c in nuisance if effect_of(c.owner) != name)
             without = forward.without(name)
-            alone = search(both, without, rest, forms, floors)
-            if set(alone.selection.explanations[0].names) <= forward.base_effects.keys():
-                continue  # no other form fits better than its own, or than none
-            findings = search(both, without, rest, {**effects, **forms}, floors)
-            again = Decider(table, both, findings, chosen.allowed_error).decision()
-            new = [naming.key for naming in again.names if naming.key not in forward.base_effects]
-            # Its own form, free as well, is a competitor: what both explain is no other form.
-            if len(again.names) == 1 and new and effect_of(new[0]) == name:
-                notes = (f'{name} is on in another form; the form named here takes its place',)
-                before = {q: decision.gap[q].before for q in again.gap}  # as configured
-                gap = {q: replace(g, before=before[q]) for q, g in again.gap.items()}
-                curves = replace(again.curves, before=decision.curves.before)
-                decision = replace(again, gap=gap, curves=curves)
-                break
+            alone = search(both, without, rest, forms, floors).selection
+            best, total = alone.explanations[0].names, alone.best + math.log(_WRONGLY_ON)
+            if total < findings.selection.best or set(best) & forward.base_effects.keys():
+                continue  # as it is, with what else is missing, or with other numbers
+            if best:
+                swapped = search(both, without, rest, {**effects, **forms}, floors)
+                again = Decider(table, both, swapped, chosen.allowed_error).decision()
+                if [effect_of(naming.key) for naming in again.names] == [name]:
+                    notes = (f'{name} is on in another form; the form named here takes its place',)
+                    before = {q: decision.gap[q].before for q in again.gap}  # as configured
+                    gap = {q: replace(g, before=before[q]) for q, g in again.gap.items()}
+                    curves = replace(again.curves, before=decision.curves.before)
+                    decision = replace(again, gap=gap, curves=curves)
+                    break
+            notes = (f'{name} is on, and these rows fit better without it: look for it first',)
+            wrong = (Rival(total, f'{name}, which is on, where it is not'),)
+            decider = Decider(table, both, findings, chosen.allowed_error, beside=wrong)
+            decision = decider.decision()
     diagnosis = render(table, both, configuration, decision)
     seconds = time.perf_counter() - started
     notes, said = (*notes, *diagnosis.notes), f'{misread_in}{diagnosis.sentence}'
@@ -191,24 +198,21 @@ def _effects_to_try(
     return tried, not_tried
 
 
-def _other_forms(forward: Forward, options: Options) -> dict[str, dict[str, Effect]]:
-    """Return each effect that is on with its forms, where others of them may be named.
+def _in_place_of_what_is_on(forward: Forward, options: Options) -> dict[str, dict[str, Effect]]:
+    """Return each effect that is on with its forms, others of them where they may be named.
 
     A form that has all parameters of the one that is on extends it: what it explains better may be
     anything.
     """
     found = {}
-    for key in forward.base_effects:
+    for key, own in ((key, forward.catalogue[key]) for key in forward.base_effects):
         name = effect_of(key)
-        own = forward.catalogue[key]
         held = {p.name for p in own.parameters if p.free}
-        forms = {key: own}
-        for form in forward.catalogue[name].forms:
+        found[name] = {key: own}
+        for form in forward.catalogue[name].forms if name in (options.effects or (name,)) else ():
             if form.candidate and not held <= {p.name for p in form.parameters}:
-                forms[form.name] = form
-        if len(forms) > 1 and name in (options.effects or (name,)):
-            found[name] = forms
-    return found
+                found[name][form.name] = form
+    return {name: forms for name, forms in found.items() if not forward.catalogue[name].sparse}
 
 
 def _check_soil_carries(table: SteadyTable, forward: Forward) -> FloatArray:
