@@ -13,7 +13,7 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration, Readings
-from wheel_terra_estimator.discrepancy.decision import Decider
+from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     BED,
     base_coordinates,
@@ -126,7 +126,8 @@ def diagnose(
         for quantity, times in found[1].items()
     ):  # a load, slip or mere size may be an error that both share
         misread_in, misread = f'{" and ".join(asked)}: ', found[1]
-    decision = Decider(table, both, findings, chosen.allowed_error, misread).decision()
+    decider = Decider(table, both, findings, chosen.allowed_error, misread)
+    decision = decider.decision()
     grounds = table.grounds() if reference is None and not misread else {}
     if grounds and decision.verdict.status != 'agrees':
         ground, parted = apart(findings, grounds)
@@ -137,29 +138,11 @@ def diagnose(
             decision = decision.unless(other, odds / (1.0 + odds), ground)
     notes: tuple[str, ...] = ()
     if decision.verdict.status != 'agrees' and reference is None and not misread:
-        for name, forms in _in_place_of_what_is_on(forward, chosen).items():
+        on = _forms_of_what_is_on(forward, chosen)
+        for name, forms in on.items():
             if len(forms) > 1:
                 not_tried[name] += '; its other forms, in its place, were tried'
-            rest = tuple(c for c in nuisance if effect_of(c.owner) != name)
-            without = forward.without(name)
-            alone = search(both, without, rest, forms, floors).selection
-            best, total = alone.explanations[0].names, alone.best + math.log(_WRONGLY_ON)
-            if total < findings.selection.best or set(best) & forward.base_effects.keys():
-                continue  # as it is, with what else is missing, or with other numbers
-            if best:
-                swapped = search(both, without, rest, {**effects, **forms}, floors)
-                again = Decider(table, both, swapped, chosen.allowed_error).decision()
-                if [effect_of(naming.key) for naming in again.names] == [name]:
-                    notes = (f'{name} is on in another form; the form named here takes its place',)
-                    before = {q: decision.gap[q].before for q in again.gap}  # as configured
-                    gap = {q: replace(g, before=before[q]) for q, g in again.gap.items()}
-                    curves = replace(again.curves, before=decision.curves.before)
-                    decision = replace(again, gap=gap, curves=curves)
-                    break
-            notes = (f'{name} is on, and these rows fit better without it: look for it first',)
-            wrong = (Rival(total, f'{name}, which is on, where it is not'),)
-            decider = Decider(table, both, findings, chosen.allowed_error, beside=wrong)
-            decision = decider.decision()
+        decision, notes = _in_doubt_of_what_is_on(decision, decider, forward, effects, on)
     diagnosis = render(table, both, configuration, decision)
     seconds = time.perf_counter() - started
     notes, said = (*notes, *diagnosis.notes), f'{misread_in}{diagnosis.sentence}'
@@ -198,8 +181,43 @@ def _effects_to_try(
     return tried, not_tried
 
 
-def _in_place_of_what_is_on(forward: Forward, options: Options) -> dict[str, dict[str, Effect]]:
-    """Return each effect that is on with its forms, others of them where they may be named.
+def _in_doubt_of_what_is_on(
+    decision: Decision,
+    decider: Decider,
+    forward: Forward,
+    effects: Mapping[str, Effect],
+    on: Mapping[str, Mapping[str, Effect]],  # each effect that is on -> forms to be tried
+) -> tuple[Decision, tuple[str, ...]]:
+    """Let each effect that is on compete with its other forms and with its absence.
+
+    Return the decision then, and a note where the rows fit better without one.
+    """
+    findings, setting, notes = decider.findings, decider.findings.setting, tuple[str, ...]()
+    for name, forms in on.items():
+        rest = tuple(c for c in setting.nuisance if effect_of(c.owner) != name)
+        given = decider.table, forward.without(name), rest
+        alone = search(*given, forms, setting.floors).selection
+        best, total = alone.explanations[0].names, alone.best + math.log(_WRONGLY_ON)
+        if total < findings.selection.best or set(best) & forward.base_effects.keys():
+            continue  # as it is, with what else is missing, or with other numbers
+        if best:
+            found = search(*given, {**effects, **forms}, setting.floors)
+            again = replace(decider, findings=found, laws={}, beside=()).decision()
+            if [effect_of(naming.key) for naming in again.names] == [name]:
+                before = {q: decision.gap[q].before for q in again.gap}  # as configured
+                gap = {q: replace(g, before=before[q]) for q, g in again.gap.items()}
+                curves = replace(again.curves, before=decision.curves.before)
+                note = f'{name} is on in another form; the form named here takes its place'
+                return replace(again, gap=gap, curves=curves), (note,)
+        notes += (f'{name} is on, and these rows fit better without it: look for it first',)
+        wrong = Rival(total, f'{name}, which is on, where it is not')
+        decider = replace(decider, beside=(*decider.beside, wrong))
+        decision = decider.decision()
+    return decision, notes
+
+
+def _forms_of_what_is_on(forward: Forward, options: Options) -> dict[str, dict[str, Effect]]:
+    """Return each effect that is on with its form, and others where they may be named.
 
     A form that has all parameters of the one that is on extends it: what it explains better may be
     anything.
@@ -207,12 +225,13 @@ def _in_place_of_what_is_on(forward: Forward, options: Options) -> dict[str, dic
     found = {}
     for key, own in ((key, forward.catalogue[key]) for key in forward.base_effects):
         name = effect_of(key)
-        held = {p.name for p in own.parameters if p.free}
-        found[name] = {key: own}
+        if own.sparse:
+            continue
+        held, found[name] = {p.name for p in own.parameters if p.free}, {key: own}
         for form in forward.catalogue[name].forms if name in (options.effects or (name,)) else ():
             if form.candidate and not held <= {p.name for p in form.parameters}:
                 found[name][form.name] = form
-    return {name: forms for name, forms in found.items() if not forward.catalogue[name].sparse}
+    return found
 
 
 def _check_soil_carries(table: SteadyTable, forward: Forward) -> FloatArray:

@@ -112,38 +112,6 @@ def _torque_squared(contact: Contact) -> Quantity:
     return square / (lever * _weight(contact) * contact.radius)
 
 
-BANDS: Mapping[str, Feature] = {
-    'slip_near_02': Feature(_near(0.2), 0.5, ('slip',), 'a band of |s| around 0.2', _IN_A_BAND),
-    'slip_near_04': Feature(_near(0.4), 0.5, ('slip',), 'a band of |s| around 0.4', _IN_A_BAND),
-    'slip_near_06': Feature(_near(0.6), 0.5, ('slip',), 'a band of |s| around 0.6', _IN_A_BAND),
-}
-
-# The curve of a torque sensor that bends: the first term beyond a gain (the reading changes with
-# the square of the reading, whatever the load), odd so that both ways are alike.
-BENT_READING: Mapping[str, Feature] = {
-    'torque_squared': Feature(
-        _torque_squared, 0.15, ('slip', 'normal_load'), 'T |T| / (W r * rho g b r^3)', ('torque',)
-    )
-}
-
-# What one channel of a load cell picks up of another.
-CROSS_TALK: Mapping[str, Feature] = {
-    'pull': Feature(
-        lambda c: c.drawbar_pull * c.direction / np.maximum(c.stated_load, _LEAST),
-        0.3,
-        ('slip', 'normal_load'),
-        'F/W',
-        ('torque',),
-    ),
-    'torque': Feature(
-        lambda c: c.torque * c.direction / np.maximum(c.stated_load * c.radius, _LEAST),
-        0.4,
-        ('slip', 'normal_load'),
-        'T/(W r)',
-        ('drawbar_pull',),
-    ),
-}
-
 _SINGLE: Mapping[str, Feature] = {
     'one': Feature(lambda c: 1.0 + 0.0 * c.slip, 1.0, (), 'everywhere alike'),
     'slip': Feature(lambda c: np.abs(c.slip), 0.5, ('slip',), '|s|'),
@@ -151,7 +119,9 @@ _SINGLE: Mapping[str, Feature] = {
     'slip_over_02': Feature(_over(0.2), 0.35, ('slip',), '|s| beyond 0.2'),
     'slip_over_04': Feature(_over(0.4), 0.25, ('slip',), '|s| beyond 0.4'),
     'slip_over_06': Feature(_over(0.6), 0.15, ('slip',), '|s| beyond 0.6'),
-    **BANDS,
+    'slip_near_02': Feature(_near(0.2), 0.5, ('slip',), 'a band of |s| around 0.2', _IN_A_BAND),
+    'slip_near_04': Feature(_near(0.4), 0.5, ('slip',), 'a band of |s| around 0.4', _IN_A_BAND),
+    'slip_near_06': Feature(_near(0.6), 0.5, ('slip',), 'a band of |s| around 0.6', _IN_A_BAND),
     'load': Feature(_load, 0.3, ('normal_load',), 'log10 of W/(rho g b r^2)'),
     'lug': Feature(lambda c: c.lug_height / c.radius, 0.06, ('lug_height',), 'h/r'),
     'width': Feature(lambda c: c.width / c.radius, 0.3, ('wheel_width', 'wheel_radius'), 'b/r'),
@@ -167,8 +137,26 @@ _SINGLE: Mapping[str, Feature] = {
         'z/r',
         _AFTER_CONTACT,
     ),
-    **BENT_READING,
-    **CROSS_TALK,
+    # The curve of a torque sensor that bends: the first term beyond a gain (the reading changes
+    # with its square, whatever the load), odd so that both ways are alike.
+    'torque_squared': Feature(
+        _torque_squared, 0.15, ('slip', 'normal_load'), 'T |T| / (W r * rho g b r^3)', ('torque',)
+    ),
+    # What one channel of a load cell picks up of another.
+    'pull': Feature(
+        lambda c: c.drawbar_pull * c.direction / np.maximum(c.stated_load, _LEAST),
+        0.3,
+        ('slip', 'normal_load'),
+        'F/W',
+        ('torque',),
+    ),
+    'torque': Feature(
+        lambda c: c.torque * c.direction / np.maximum(c.stated_load * c.radius, _LEAST),
+        0.4,
+        ('slip', 'normal_load'),
+        'T/(W r)',
+        ('drawbar_pull',),
+    ),
 }
 
 
