@@ -64,6 +64,15 @@ def forward():
     return Forward(points, SOIL, {}, catalogue())
 
 
+def test_less_cohesion_than_none_is_none(forward):
+    """A fit may look there; the wheel on soil without cohesion is what it sees."""
+    cohesion = effect_coordinates(catalogue()['cohesion'])
+    less = np.array([cohesion[0].coordinate(-2.0 * SOIL.cohesion)])
+    found = forward.solve([cohesion], [less], jacobian=False).outputs[0]
+    loose = WheelSoilModel(replace(SOIL, cohesion=0.0), {}).steady_state(forward.points)
+    assert found[:, 1] == pytest.approx(loose.drawbar_pull, rel=1e-4)
+
+
 @pytest.fixture(scope='module')
 def setting(forward):
     """Truth, inputs and noise of a table on these points."""

@@ -129,7 +129,9 @@ class Forward:
                     for p, values in settings[name].items()
                 }
         terms = Terms(settings)
-        return build_contact(self.points, soil, self.soil.pressure_law, terms), terms
+        contact = build_contact(self.points, soil, self.soil.pressure_law, terms)
+        contact.cohesion = np.maximum(contact.cohesion, 0.0)  # below it is no soil
+        return contact, terms
 
     def _response(
         self, contact: Contact, terms: Terms, angle: FloatArray

@@ -20,7 +20,7 @@ from wheel_terra_estimator.terramechanics.effects.base import (
 
 
 def _cohesion(contact: Contact, p: SimpleNamespace) -> None:
-    contact.cohesion = np.maximum(contact.cohesion + p.delta, 0.0)
+    contact.cohesion = contact.cohesion + p.delta
 
 
 COHESION = Effect(
@@ -35,7 +35,7 @@ COHESION = Effect(
         'grouser_thrust': 'other lugs or none; a load series',
         'rim_friction': 'a load series; rows with higher lugs',
     },
-    validity='c + delta below zero counts as zero',
+    validity='c + delta not below zero',
     source='Mohr-Coulomb strength in Janosi and Hanamoto 1961 (proceedings, no DOI); '
     'Ding et al. 2010 eq. 18 (doi 10.1007/s11771-010-0021-7)',
     on_inputs=_cohesion,
