@@ -255,5 +255,26 @@ def test_a_file_whose_section_is_for_another_name_is_told(executor, tmp_path, ot
         with pytest.raises(UserError, match=re.escape(words)):
             EstimatorNode(context=executor.context, cli_args=arguments)
         path.write_text(path.read_text().replace('estimator:', 'estimater:'))
-        with pytest.raises(UserError, match="sections there: 'wheel_terra_estimater'; use"):
+        with pytest.raises(UserError, match="sections there: 'wheel_terra_estimater:'; none"):
             EstimatorNode(context=executor.context, cli_args=arguments)
+
+
+@pytest.mark.parametrize('section', ['', 'other', '/**', '/*', '/a/*', '/a/**', '/**/it', 'a/it'])
+@pytest.mark.parametrize('namespace', ['', '/a', '/a/b'])
+def test_a_file_is_told_where_ros_leaves_out_all_of_it(executor, tmp_path, section, namespace):
+    from rclpy.node import Node
+
+    from wheel_terra_estimator.ros import parameters
+
+    path = tmp_path / 'named.yaml'
+    path.write_text(f'{section}:\n  ros__parameters:\n    mass: 5.0\n' if section else '# none')
+    node = Node(
+        'it',
+        namespace=namespace,
+        context=executor.context,
+        cli_args=[*ROVER, str(path)],
+        automatically_declare_parameters_from_overrides=True,
+    )
+    given = node.has_parameter('mass')
+    assert bool(parameters.unread([path], node)) is not given
+    node.destroy_node()

@@ -186,8 +186,11 @@ def read(path: Path) -> dict[str, Value]:
 
 
 def sections(path: Path) -> list[str]:
-    """Return the names of the sections of a parameter file, as their nodes are called."""
-    return [name for name, _ in _sections(_loaded(read_text(path), path), '', path)]
+    """Return the names of the sections of a parameter file, as their nodes are called.
+
+    Raises UserError if the file cannot be read, or is no parameter file of ROS.
+    """
+    return [name for name, _ in _sections(_loaded(read_text(path), path) or {}, '', path)]
 
 
 def flatten(parameters: Mapping[str, Any], source: str, prefix: str = '') -> dict[str, Value]:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -47,21 +48,24 @@ def files(arguments: Sequence[str]) -> list[Path]:
 
 
 def unread(files: Iterable[Path], node: Node) -> str:
-    """Return which of the parameter files has sections, but none for this node."""
-    refused = ''
+    """Return which of the parameter files has no section for this node; empty where all have."""
+    name = node.get_fully_qualified_name()
     for path in files:
-        try:
-            keys = ros_yaml.read(path).keys() - set(reader.STANDARD_PARAMETERS)
-        except UserError as error:  # has sections of other nodes only, or a wrong name
-            refused = refused or str(error)
-            continue
-        if keys and not any(map(node.has_parameter, keys)):
-            there = ', '.join(f"'{section}:'" for section in ros_yaml.sections(path))
+        sections = ros_yaml.sections(path)
+        if not any(_applies(section, name) for section in sections):
+            there = ', '.join(f"'{section}:'" for section in sections) or 'none'
             return (
-                f'{path}: sections there: {there}; none applies to node '
-                f"{node.get_fully_qualified_name()}, so nothing of it counts; use '/**:'"
+                f'{path}: sections there: {there}; none applies to node {name}, '
+                "so nothing of it counts; use '/**:'"
             )
-    return '' if node.has_parameter('wheels.names') else refused
+    return ''
+
+
+def _applies(section: str, name: str) -> bool:
+    """Whether ROS gives a section of a parameter file to a node: '*' is one name, '**' any."""
+    pattern = re.escape(f'/{section.lstrip("/")}')
+    pattern = pattern.replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
+    return re.fullmatch(pattern, name) is not None
 
 
 def configuration(given: Mapping[str, Any], warn: Callable[[str], Any]) -> Configuration:
