@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import atexit
 import math
 import os
 import random
@@ -33,6 +34,7 @@ class Process:
 
     def __init__(self, arguments: Sequence[str]) -> None:
         self._popen = subprocess.Popen([sys.executable, *arguments])
+        atexit.register(self._popen.kill)  # if it still runs then: this program was interrupted
 
     def seconds(self) -> float:
         """Return the processor time so far [s]."""

@@ -96,7 +96,7 @@ def run(
         result['lost_share'] = 100.0 * result['lost'] / max(rover.count['joint_states'], 1)
     process.end(signal.SIGKILL)
     rover.destroy_node()
-    rclpy.shutdown()
+    rclpy.try_shutdown()
     return result
 
 

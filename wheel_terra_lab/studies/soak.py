@@ -240,7 +240,7 @@ def main() -> int:
         finally:
             print(soak.report())
             soak.rover.destroy_node()
-            rclpy.shutdown()
+            rclpy.try_shutdown()
     return 1 if soak.problems else 0
 
 
