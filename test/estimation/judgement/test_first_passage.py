@@ -154,6 +154,19 @@ def test_the_travel_left_ends_where_a_wheel_is_in_too_deep_to_climb_out():
     assert wheel.time == pytest.approx(wheel.travel / RIM)
 
 
+def test_no_travel_is_left_to_wheels_too_deep_unless_a_measured_speed_shows_that_they_climb():
+    def left(speed_known):
+        motions = [motion(0.35, 0.0015 * 0.1 * i) for i in range(401)]
+        there = followed([each._replace(speed_known=speed_known) for each in motions])
+        (wheel, *_), *_ = outlook(there, DEFAULTS)
+        return wheel.travel, wheel.time, passage_probability([0.35], [0.03], there.digging)[0]
+
+    assert left(speed_known=False)[:2] == (0.0, 0.0)
+    travel, _, course = left(speed_known=True)
+    assert travel > 1.0  # of the slips alone
+    assert np.interp(travel, TRAVELS, course) == pytest.approx(0.5, abs=0.04)
+
+
 @pytest.mark.parametrize(('rim', 'share'), [(0.05, 0.75), (-0.05, -0.75)])
 def test_a_torque_against_the_way_is_a_drag(rim, share):
     assert driving_share(30.0, 40.0, rim) == share

@@ -211,14 +211,16 @@ class Situation:
     def travel_until_too_deep(self) -> tuple[float, ...]:
         """Rim travel after which each wheel is too deep to climb out [m].
 
-        Extrapolated from its sinkage over the last travel; infinite where it does not dig in.
+        Extrapolated from its sinkage over the last travel; infinite where it does not dig in, or is
+        deeper already and a measured speed shows that the rover moves on.
         """
-        return tuple(
-            max(_DEEP * wheel.radius - wheel.sinkage, 0.0) / growth
-            if self.settled and wheel.known and growth > _DIGS and wheel.slip > _DIGS_AT
-            else math.inf
-            for wheel, growth in zip(self.motion.wheels, self.growths, strict=True)
-        )
+        found = []
+        for wheel, growth in zip(self.motion.wheels, self.growths, strict=True):
+            digs = self.settled and wheel.known and growth > _DIGS and wheel.slip > _DIGS_AT
+            room = _DEEP * wheel.radius - wheel.sinkage
+            climbs = room < 0.0 and self.motion.speed_known
+            found.append(max(room, 0.0) / growth if digs and not climbs else math.inf)
+        return tuple(found)
 
     @cached_property
     def torque_share(self) -> float:
