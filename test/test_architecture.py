@@ -108,8 +108,8 @@ def rules(table):
 # What modules of a folder may import, at the top or inside a function: folders of the package, *
 # for all but ros, and libraries beyond the standard one. A new folder needs a line here.
 MAY_USE = rules("""
-every folder: arrays errors csv_file frames glossary input_file output_folder scheduler \
-    __version__
+every folder: arrays end_signals errors csv_file frames glossary input_file output_folder \
+    scheduler __version__
 terramechanics: | numpy
 configuration: terramechanics | numpy yaml
 # filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.

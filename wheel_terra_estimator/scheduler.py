@@ -20,6 +20,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for_one
 from typing import Any, TypeVar
 
+from wheel_terra_estimator.end_signals import terminations
 from wheel_terra_estimator.errors import UserError
 
 Task = TypeVar('Task')
@@ -122,7 +123,8 @@ def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
 def _watch(receiver: Connection) -> None:
     """End a worker with its parent or at its request; Ctrl-C is handled by the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for number in terminations():
+        signal.signal(number, signal.SIG_DFL)
     parent = multiprocessing.parent_process()
     watched: list[Any] = [receiver] if parent is None else [receiver, parent.sentinel]
 

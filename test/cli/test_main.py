@@ -5,6 +5,7 @@
 import errno
 import io
 import shlex
+import signal
 import subprocess
 import sys
 import types
@@ -17,7 +18,7 @@ from hypothesis import strategies as st
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import main
-from wheel_terra_estimator.cli.terminal import PrintableStream
+from wheel_terra_estimator.cli.terminal import PrintableStream, termination_as_interrupt
 from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.scheduler import worker_pool
 
@@ -117,6 +118,21 @@ def test_completion_in_bash(line, wanted):
 def test_the_page_of_commands_is_that_of_the_parsers():
     page = document_commands.PAGE.read_text(encoding='utf-8')
     assert page == document_commands.page(), 'run python tools/document_commands.py'
+
+
+@pytest.mark.parametrize('usual', [signal.SIG_DFL, signal.SIG_IGN])
+def test_a_lost_terminal_is_an_interrupt_unless_nohup_has_it_ignored(usual):
+    before = signal.signal(signal.SIGHUP, usual)
+    try:
+        with termination_as_interrupt():
+            if usual == signal.SIG_DFL:
+                with pytest.raises(KeyboardInterrupt):
+                    signal.raise_signal(signal.SIGHUP)
+            else:
+                signal.raise_signal(signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) == usual
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_ctrl_c_while_the_commands_are_loaded_is_an_interrupt(monkeypatch, capsys):

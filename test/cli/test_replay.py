@@ -241,15 +241,18 @@ def test_what_was_learned_is_a_further_config_of_every_command(
     assert read_values(kept)['sensors.torque_zero'] == [0.0, 0.0]
 
 
-def test_interrupted_replay_leaves_a_readable_bag(make_bag, config, tmp_path, capsys, monkeypatch):
-    """Ctrl-C in the midst of a drive (of a process: test_several_bags)."""
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_interrupted_replay_leaves_a_readable_bag(
+    make_bag, config, tmp_path, capsys, monkeypatch, number
+):
+    """Ctrl-C, or a lost terminal, in the midst of a drive (of a process: test_several_bags)."""
     bag, out = make_bag(), tmp_path / 'out'
     write, count = BagFile.write, itertools.count()
 
     def interrupted(*arguments: Any) -> None:
         write(*arguments)
         if next(count) == 250:
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
 
     monkeypatch.setattr(BagFile, 'write', interrupted)
     assert main(['replay', str(bag), *config, '-o', str(out)]) == 130

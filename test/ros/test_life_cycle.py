@@ -247,7 +247,7 @@ def test_a_closing_that_hangs_is_cut_short(monkeypatch):
     monkeypatch.setattr(process, 'LONGEST_END', 0.05)
     ended, status = threading.Event(), []
     monkeypatch.setattr(process.os, '_exit', lambda number: (status.append(number), ended.set()))
-    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
         signals = process._Signals()
         signals.serving = True

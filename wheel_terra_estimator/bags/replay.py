@@ -22,6 +22,7 @@ from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.track import Track, TrackRecorder
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.end_signals import terminations
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
@@ -281,7 +282,7 @@ def _tuning(line: str, arrival: Path) -> dict[str, Any]:
 
 @contextmanager
 def _until_interrupted() -> Iterator[threading.Event]:
-    """Turn the first Ctrl-C or SIGTERM into a flag, so that no message is written by half."""
+    """Turn the first Ctrl-C or termination into a flag, so that no message is written by half."""
     flag = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield flag
@@ -292,7 +293,8 @@ def _until_interrupted() -> Iterator[threading.Event]:
             raise KeyboardInterrupt
         flag.set()
 
-    kept = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    asked = [signal.SIGINT, *terminations()]
+    kept = {number: signal.signal(number, on_signal) for number in asked}
     try:
         yield flag
     finally:

@@ -16,6 +16,8 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import IO, Any, NoReturn
 
+from wheel_terra_estimator.end_signals import terminations
+
 LONGEST_LINE = 2000
 """Characters of an error line that are shown; the middle of a longer one is left out."""
 
@@ -68,7 +70,7 @@ class PrintableStream:
 
 @contextmanager
 def termination_as_interrupt() -> Iterator[None]:
-    """Treat SIGTERM within the block as Ctrl-C, so that what was begun is cleaned up or kept."""
+    """Treat terminations within the block as Ctrl-C: what was begun is cleaned up or kept."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -76,11 +78,12 @@ def termination_as_interrupt() -> Iterator[None]:
     def on_signal(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    earlier = signal.signal(signal.SIGTERM, on_signal)
+    earlier = {number: signal.signal(number, on_signal) for number in terminations()}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, earlier)
+        for number, handler in earlier.items():
+            signal.signal(number, handler)
 
 
 UNUSABLE_INPUT = 2

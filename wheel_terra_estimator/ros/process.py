@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The process of a node: it ends in order at SIGINT and SIGTERM, at any moment, also twice.
+"""The process of a node: it ends in order at Ctrl-C and terminations, at any moment, also twice.
 
 Imports nothing heavy, so that the handlers stand before rclpy and numpy are loaded.
 """
@@ -17,6 +17,8 @@ from importlib import import_module
 from types import FrameType
 from typing import Any
 
+from wheel_terra_estimator.end_signals import terminations
+
 LONGEST_END = 0.8  # [s] for saving and closing, then the process ends anyway
 LOOK_UP = 0.1  # [s] between two looks at the signals
 
@@ -30,7 +32,7 @@ class _Signals:
     def __init__(self) -> None:
         self.stopped = False
         self.serving = False
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, *terminations()):
             signal.signal(number, self._on_signal)
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
