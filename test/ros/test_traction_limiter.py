@@ -150,6 +150,18 @@ def test_a_stop_by_its_topics_outlives_the_limiter(start, listener, tmp_path):
     assert status == 0 and 'Traceback' not in words, words
 
 
+def test_a_file_of_another_node_does_not_tune_it_without_a_word(executor, tmp_path, capfd):
+    from wheel_terra_estimator.ros.limiter_node import TractionLimiter
+
+    path = tmp_path / 'limiter.yaml'
+    path.write_text('traction_limitr:\n  ros__parameters:\n    creep_scale: 0.1\n')
+    node = TractionLimiter(context=executor.context, cli_args=[*ROVER, str(path)])
+    assert node.get_parameter('creep_scale').value == 0.3
+    node.destroy_node()
+    words = f"{path}: sections there: 'traction_limitr:'; none applies to node /traction_limiter"
+    assert words in capfd.readouterr().err
+
+
 def test_a_stop_waits_for_no_disk(listener, tmp_path, monkeypatch):
     """The state is kept with a sync of the disk."""
     from rclpy.parameter import Parameter

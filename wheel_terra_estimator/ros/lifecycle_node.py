@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -103,7 +102,7 @@ class EstimatorNode(LifecycleNode):
                 'leave it out'
             ) from None
         self._given = parameters.overrides(self)
-        self._files = parameters.files([*sys.argv, *(options.get('cli_args') or ())])
+        self._files = parameters.files(options.get('cli_args'))
         self._known = declared()
         self._full_name = self.get_fully_qualified_name().lstrip('/')
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)

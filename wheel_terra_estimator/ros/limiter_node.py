@@ -40,8 +40,7 @@ from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN, Status
 from wheel_terra_estimator.messages.pack import diagnostic_array
 from wheel_terra_estimator.output_folder import cannot_write, check_file
-from wheel_terra_estimator.ros import qos
-from wheel_terra_estimator.ros.parameters import descriptor
+from wheel_terra_estimator.ros import parameters, qos
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
 AS_THE_SOIL_GIVES = {'slowed', 'command passes'}
@@ -60,6 +59,8 @@ class TractionLimiter(Node):
         words = 'file that keeps a stop across a restart of this node; empty: none'
         name = self._take(Parameter('state_file', 'text', '', words))
         self._refuse_unknown()
+        if unread := parameters.unread(parameters.files(options.get('cli_args')), self):
+            self.get_logger().warning(unread)
         self._file = Path(name).expanduser() if name else None
         self._unkept = ''  # why the state is not in its file
         self._logged_faults: list[str] = []  # faults of the wiring that stand in the log
@@ -276,7 +277,7 @@ class TractionLimiter(Node):
         given = self._parameter_overrides.get(declared.key)  # private in rclpy
         stated = {} if given is None else {declared.key: (given.value, 'parameters')}
         value = checked_value(declared, stated, 0)
-        described = descriptor(declared)
+        described = parameters.descriptor(declared)
         described.read_only = True
         self.declare_parameter(declared.key, value, described, ignore_override=True)
         return value

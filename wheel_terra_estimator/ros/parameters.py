@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -40,11 +41,10 @@ def overrides(node: Node) -> dict[str, Any]:
     }
 
 
-def files(arguments: Sequence[str]) -> list[Path]:
-    """Return the parameter files that a command line names."""
-    return [
-        Path(arguments[i + 1]) for i, word in enumerate(arguments[:-1]) if word == '--params-file'
-    ]
+def files(arguments: Sequence[str] | None) -> list[Path]:
+    """Return the parameter files of the command line, and of arguments given to a node."""
+    words = [*sys.argv, *(arguments or ())]
+    return [Path(words[i + 1]) for i, word in enumerate(words[:-1]) if word == '--params-file']
 
 
 def unread(files: Iterable[Path], node: Node) -> str:
