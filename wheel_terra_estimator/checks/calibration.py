@@ -159,7 +159,10 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
     figures = dict(SEEN)
     if report.figures.get('reference.stated_std_m_s') == 0.0:  # the messages state none
         figures['sensors.reference_std'] = 'reference.noise_m_s'
+    doubtful = {f.parameter for f in report.findings if f.confidence <= LEAST_SURE}
     for key, figure in figures.items():
+        if key in doubtful:
+            continue
         seen, stated = report.figures.get(figure), changes.number(key)
         if not seen or not math.isfinite(seen):
             continue

@@ -189,9 +189,11 @@ def _late_channels(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
 def _by_arrival(evidence: Evidence, name: str, lag: Lag) -> bool:
     """Return whether the wheels' stamps lie off their arrival, not those of another channel."""
     own, others, late = _late(evidence, 'joints'), _late(evidence, name), lag.value
-    # It would come before it was measured.
-    if others > 0.0 and others + late < FUTURE - math.hypot(lag.std, LEAST_STD[lag.by]):
-        return True
+    # One of them would come before it was measured.
+    least = FUTURE - math.hypot(lag.std, LEAST_STD[lag.by])
+    impossible = others > 0.0 and others + late < least, own > 0.0 and own - late < least
+    if any(impossible):
+        return impossible[0]
     if name == 'reference':  # its age is real; that of wheels is not, nor are future stamps
         return abs(own - late) < abs(own) - 0.5 * abs(late) or own < FUTURE < others
     return abs(others) + abs(own - late) < abs(own) + abs(others + late)

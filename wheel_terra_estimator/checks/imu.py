@@ -557,7 +557,7 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
     imu, facts = evidence.recording.imu, evidence.facts
     if imu is None or not facts.known or evidence.gyro is None or evidence.force is None:
         return []
-    outcomes, sensors = list[Outcome](), facts.sensors
+    outcomes, sensors, known = list[Outcome](), facts.sensors, gyro_unit_known(evidence)
     for values, key, unit in (
         (imu.force, 'specific_force_std', 'm/s^2'),
         (imu.rate, 'angular_rate_std', 'rad/s'),
@@ -572,7 +572,8 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         if noise > NOISE_FACTOR * stated:
             details: dict[str, Any] = {'noise': noise, 'stated': stated, 'unit': unit}
             details |= {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}'}
-            outcomes.append(evidence.found('imu_noise', confidence(noise / stated), **details))
+            sure = confidence(noise / stated) * (1.0 if known or values is imu.force else 0.5)
+            outcomes.append(evidence.found('imu_noise', sure, **details))
     seen = gyro_bias(evidence)
     if seen is None:
         return [*outcomes, not_checked('zero', 'no_rest', least=LEAST_STANDSTILL)]
@@ -585,7 +586,6 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         whole = bias + sensors.angular_rate_bias
         details = {'axis': 'xyz'[worst], 'bias': float(bias[worst]), 'biases': listed(whole, '.5f')}
         details |= {'value': float(f'{whole[worst]:.4g}'), 'std': float(std[worst])}
-        known = gyro_unit_known(evidence)
         details['alternative'] = '' if known else ', or it is in degrees per second: drive a circle'
         outcomes.append(evidence.found('gyro_bias', 0.99 if known else 0.5, **details))
     return outcomes

@@ -23,6 +23,7 @@ from wheel_terra_estimator.checks.finding import Outcome, not_checked
 from wheel_terra_estimator.checks.series import VelocitySeries, nearest
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,
+    correlation,
     integrated,
     moving_mean,
     robust_std,
@@ -256,17 +257,29 @@ def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[Flo
     return rim, rows & np.isfinite(series.velocity[:, :2]).all(axis=1)
 
 
+def speed_ratio(evidence: Evidence) -> float | None:
+    """Return the upper end of reference speed over rim speed: that of the least slip."""
+    reference = evidence.recording.reference
+    if reference is None:
+        return None
+    rim, rows = ahead(evidence, reference, 0.4)
+    speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
+    if rows.sum() < LEAST_ROWS:
+        return None
+    if hardly_moves(speed, rows):
+        return None  # stuck, not another unit
+    if correlation(np.nan_to_num(rim), np.nan_to_num(speed)) < 0.8:
+        return None
+    return float(np.quantile(speed[rows] / rim[rows], 0.8))
+
+
 def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     reference = evidence.recording.reference
     assert reference is not None
     if not evidence.facts.known or ASIDE in evidence.figures:
         return [], evidence
-    rim, rows = ahead(evidence, reference, 0.4)
-    if rows.sum() < LEAST_ROWS or hardly_moves(reference.velocity[:, 0], rows):
-        return [], evidence
-    sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim))
-    ratio = float(np.median(sense * reference.velocity[rows, 0] / rim[rows]))
-    if ratio < LEAST_UNIT_RATIO:
+    ratio = speed_ratio(evidence)
+    if ratio is None or ratio < LEAST_UNIT_RATIO:
         return [], evidence
     fitting = units_of_reference(ratio, (MOST_SLIPPING, 1.25))
     if any(abs(ratio * one['value'] - 1.0) < WITHOUT_SLIP for one in fitting.values()):
@@ -278,8 +291,8 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if len(findings) != 1:  # the slip hides which of several it is
         return findings, evidence
     (one,) = fitting.values()
-    velocity, variance = reference.velocity * one['value'], reference.variance * one['value'] ** 2
-    return findings, evidence.with_channel('reference', velocity=velocity, variance=variance)
+    velocity = reference.velocity * one['value']  # its variance may be right
+    return findings, evidence.with_channel('reference', velocity=velocity)
 
 
 def units_of_reference(ratio: float, band: tuple[float, float]) -> dict[str, dict[str, Any]]:

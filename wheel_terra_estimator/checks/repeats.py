@@ -18,7 +18,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.series import SinkageSeries, rows_of
-from wheel_terra_estimator.checks.statistics import runs
+from wheel_terra_estimator.checks.statistics import runs, step_of
 
 LEAST_TIME = 5.0  # time of driving in which a reading that stays is frozen [s]
 ZERO_TIME = 20.0  # the same of a vector of zeros [s]
@@ -170,12 +170,15 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         noisy = beside.size > LEAST_BESIDE and np.mean(beside) < SELDOM
         live = not readings[first].any() and bool(readings.any())
         live = live and not (noisy and values.shape[1] > 1 and lasts > ZERO_TIME)
-        if live or lasts < LEAST_TIME or (rounded and steady and not noisy):
+        if live or lasts < LEAST_TIME:
             continue
         if np.interp(at[first:last], evidence.time, evidence.exactly_even).mean() > AT_ONCE:
             continue
         usual = _usual(beside)
         others = np.delete(readings, np.s_[first : last + 1], axis=0)
+        # A speed that stays within a step of the sensor shows no change.
+        if steady and not noisy and (rounded or any(step_of(column) for column in others.T)):
+            continue
         coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
             FINE, len(others) // 2
         )

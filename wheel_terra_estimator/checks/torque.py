@@ -21,6 +21,7 @@ from wheel_terra_estimator.checks.evidence import (
 )
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome, listed, not_checked
 from wheel_terra_estimator.checks.statistics import (
+    LEAST_MARGIN,
     Estimate,
     Trial,
     block_fit,
@@ -54,6 +55,8 @@ LEAST_GAIN_ERROR = 0.15
 GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
 ZERO_SIGMAS = 5.0
+SIGN_ROUNDS = 4  # fits of torques without a sign, each with the signs by the one before
+LEVEL_SHARE = 1.0 / 3.0  # of the driving, with the least slopes, that shows the resistance [-]
 ALIKE_ZEROS = 0.6  # scatter of zeros over their mean within which they are one [-]
 
 
@@ -345,9 +348,34 @@ def like_a_pitch(evidence: Evidence, zeros: list[Estimate]) -> bool:
     return not known and float(np.ptp(seen)) < ALIKE_ZEROS * abs(float(np.mean(seen)))
 
 
+class _Ways(NamedTuple):
+    """Straight driving both ways (k,): sense, loads by slopes and torques (k, n) [N m], design."""
+
+    sense: FloatArray
+    load: FloatArray
+    torque: FloatArray
+    design: FloatArray
+    curve: FloatArray
+
+    def left(self, signed: bool) -> float:
+        """Return what zeros, resistance and slopes leave of the torques [N^2 m^2].
+
+        Of those without a sign each has that of the torque that is due: a rover may brake.
+        """
+        size = np.abs(self.load[:, 0])
+        level = np.median(np.abs(self.torque)[size <= np.quantile(size, LEVEL_SHARE)], axis=0)
+        sign = 1.0 if signed else np.sign(self.load + self.sense[:, None] * level)
+        for _ in range(1 if signed else SIGN_ROUNDS):
+            table = self.torque * sign - self.load
+            fitted = self.design @ np.linalg.lstsq(self.design, table, rcond=None)[0]
+            left = float(np.mean((table - fitted) ** 2))
+            sign = np.sign(fitted + self.load)
+        return left
+
+
 @once
-def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
-    """Return zero and resistance of each torque on a straight; None unless driven both ways."""
+def _ways(evidence: Evidence) -> _Ways | None:
+    """Return the straight driving; None unless both ways."""
     assert evidence.force is not None
     smooth = moving_mean(evidence.common_rate, evidence.rows_in(SETTLING))
     rows = evidence.straight & (np.abs(smooth) > 0.5 * evidence.working_rate)
@@ -359,26 +387,40 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     calm = np.column_stack([moving_mean(column, width) for column in motion])[rows]
     slopes, curve = calm[:, :2], calm[:, 2]
     load = np.nan_to_num(facts.mass * slopes[:, :1] * facts.radius / len(facts.names))
-    table = np.nan_to_num(evidence.torque[rows]) - load
     # Residual of slopes along both axes: the IMU may be turned about z.
     slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
     design = np.column_stack([np.ones(sense.size), sense, slopes])
-    return [(fit[0], fit[1]) for fit in _fits_allowing_for_curve(design, curve, table)]
+    return _Ways(sense, load, np.nan_to_num(evidence.torque[rows]), design, curve)
+
+
+@once
+def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
+    """Return zero and resistance of each torque on a straight; None unless driven both ways."""
+    ways = _ways(evidence)
+    if ways is None:
+        return None
+    fits = _fits_allowing_for_curve(ways.design, ways.curve, ways.torque - ways.load)
+    return [(fit[0], fit[1]) for fit in fits]
 
 
 def _unsigned(evidence: Evidence) -> list[Outcome]:
     """Return torques that are never negative although all wheels drive both ways.
 
-    Where a rover backs down a slope they are positive: it brakes.
+    Where a rover backs down a slope they are positive: it brakes. Zeros that are larger than the
+    torques make them positive as well: on slopes these then change alike both ways.
     """
     lowest = np.nanquantile(evidence.torque[evidence.moving], 0.02, axis=0)
-    if not (lowest >= 0.0).all() or both_ways(evidence) is None:
+    ways = _ways(evidence)
+    if not (lowest >= 0.0).all() or ways is None:
         return []
+    zero, unsigned = (ways.left(signed) for signed in (True, False))
+    if unsigned < LEAST_MARGIN * zero:
+        return [evidence.found('torque_unsigned', 0.9)]
     assert evidence.force is not None
     uphill = evidence.force[:, 0] * np.sign(evidence.rim) > UPHILL_ENOUGH * evidence.facts.gravity
-    if (evidence.moving & uphill & (evidence.rim < 0.0)).sum() < LEAST_MOVING_ROWS:
-        return []
-    return [evidence.found('torque_unsigned', 0.9)]
+    drives_back = (evidence.moving & uphill & (evidence.rim < 0.0)).sum() >= LEAST_MOVING_ROWS
+    either = drives_back and LEAST_MARGIN * unsigned <= zero
+    return [evidence.found('torque_unsigned', 0.5)] if either else []
 
 
 def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:

@@ -316,6 +316,11 @@ def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     return gain, zero
 
 
+def _steered_against(evidence: Evidence) -> bool:
+    """Return whether wheels are steered to the right where the rover turns left."""
+    return bool((_steered_as_turned(evidence)[0] < -AS_TURNED).any())
+
+
 def check_axes(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return x and y in each other's place by the sides in the names, and the evidence mended."""
     facts, wheels = evidence.facts, evidence.facts.configuration.wheels
@@ -481,7 +486,7 @@ def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     order = _sides_exchanged(facts)
     if np.isfinite(evidence.steering).any():  # steering joints are named as before, or with it
         both = mended, replace(mended, steering=mended.steering[:, order])
-        mended = min(both, key=left_in_turns)
+        mended = min(both, key=lambda one: (_steered_against(one), left_in_turns(one)))
     sides = evidence.found(
         'swapped_sides',
         0.97 if sense else 0.5,

@@ -22,15 +22,12 @@ from wheel_terra_estimator.checks.evidence import (
 )
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, not_checked
 from wheel_terra_estimator.checks.reference import (
-    LEAST_ROWS,
     NO_SCALE,
-    ahead,
-    hardly_moves,
+    speed_ratio,
     units_of_reference,
 )
 from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import (
-    correlation,
     moving_mean,
     robust_std,
     runs,
@@ -324,7 +321,7 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts = evidence.facts
     if not facts.known:
         return [not_checked('unit', 'no_radius')], evidence
-    ratio, how = _speed_ratio(evidence), 'speed of the reference'
+    ratio, how = speed_ratio(evidence), 'speed of the reference'
     track = turning.track_ratio(evidence)
     if ratio is None and track is None:
         return [not_checked('unit', 'no_speed')], evidence
@@ -389,22 +386,6 @@ def _unit_findings(
     ]
     factor = math.nan if len(units) != 1 else next(iter(units.values()))
     return findings, evidence.with_rate(evidence.rate * factor)
-
-
-def _speed_ratio(evidence: Evidence) -> float | None:
-    """Return the upper end of reference speed over rim speed: that of the least slip."""
-    reference = evidence.recording.reference
-    if reference is None:
-        return None
-    rim, rows = ahead(evidence, reference, 0.4)
-    speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
-    if rows.sum() < LEAST_ROWS:
-        return None
-    if hardly_moves(speed, rows):
-        return None  # stuck, not another unit
-    if correlation(np.nan_to_num(rim), np.nan_to_num(speed)) < 0.8:
-        return None
-    return float(np.quantile(speed[rows] / rim[rows], 0.8))
 
 
 # Noise -------------------------------------------------------------------------------------------
