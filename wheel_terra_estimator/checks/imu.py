@@ -41,7 +41,6 @@ from wheel_terra_estimator.checks.statistics import (
     block_fit,
     block_fits,
     confidence,
-    correlation,
     in_parts,
     moving_mean,
     probability,
@@ -54,6 +53,7 @@ from wheel_terra_estimator.checks.turning import (
     gyro_unit_known,
     ordinary_track,
     track_ratio,
+    turns_upright,
 )
 from wheel_terra_estimator.estimation.timing.input_checks import OUTLIER_FORCE, OUTLIER_RATE
 
@@ -86,7 +86,6 @@ BIAS_SIGMAS = 5.0
 TILT_IS_MOUNTING = 0.7  # probability that a tilt in circles is the mounting, not a zero [-]
 CROSS_AXIS = 0.01  # gyro against accelerometer in one housing [rad]; data sheets of MEMS
 UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
-LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_OUTLIERS = 3
 OUTLIER_SIGMAS = 10.0  # of the usual change of a reading, which another unit makes large
@@ -422,7 +421,7 @@ def _is_mounting(tilt: FloatArray, floor: float, turns: FloatArray, gyro: FloatA
 def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return an IMU whose x axis does not point forward, and the evidence with that mended."""
     starts, curves = accelerometer_signs(evidence)
-    if starts * curves < 0 and _turns_upright(evidence) > CLEAR_AGREEMENT:
+    if starts * curves < 0 and turns_upright(evidence) > CLEAR_AGREEMENT:
         return [evidence.found('force_axes', 0.95)], replace(evidence, force=None)
     seen, quick = mounting_yaw(evidence), mounting_yaw(evidence, 0.5 * DRIFT)
     if seen is None or quick is None:
@@ -440,7 +439,7 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sure, aside = 0.97, math.sin(seen.value)
     curves = accelerometer_signs(mended)[1]  # turned round or exchanged, starts feel the same
     exchanged = abs(aside) > ALONG_AXIS and curves < 0
-    if exchanged and _turns_upright(evidence) > CLEAR_AGREEMENT:
+    if exchanged and turns_upright(evidence) > CLEAR_AGREEMENT:
         return [evidence.found('force_axes', 0.95)], replace(evidence, force=None)
     if (curves == 0 or exchanged) and max(abs(aside), -math.cos(seen.value)) > ALONG_AXIS:
         alternative = ' and y are exchanged' if abs(aside) > ALONG_AXIS else ' has the wrong sign'
@@ -467,7 +466,7 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words: dict[str, Any] = {'force': force}
     sure = 0.999
     if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
-        upright = _turns_upright(evidence)
+        upright = turns_upright(evidence)
         if upright > CLEAR_AGREEMENT:
             reversed_force = replace(evidence, force=-evidence.force)
             starts = mounting_yaw(reversed_force)
@@ -483,14 +482,6 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         words['alternative'] += '; which way its x axis points is open: drive brisk starts'
     std = math.degrees(STEEPEST_MEAN) / 3.0
     return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended
-
-
-def _turns_upright(evidence: Evidence) -> float:
-    """Return how well gyro and wheels agree in turns: 1 upright, -1 upside down, 0 no turns [-]."""
-    rows = evidence.turning & np.isfinite(evidence.side_difference)
-    if evidence.gyro is None or rows.sum() * evidence.period < LEAST_TURNING:
-        return 0.0
-    return correlation(evidence.gyro[rows, 2], evidence.side_difference[rows])
 
 
 def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

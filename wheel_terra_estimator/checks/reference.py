@@ -291,8 +291,8 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if len(findings) != 1:  # the slip hides which of several it is
         return findings, evidence
     (one,) = fitting.values()
-    velocity = reference.velocity * one['value']  # its variance may be right
-    return findings, evidence.with_channel('reference', velocity=velocity)
+    velocity, variance = reference.velocity * one['value'], reference.variance * one['value'] ** 2
+    return findings, evidence.with_channel('reference', velocity=velocity, variance=variance)
 
 
 def units_of_reference(ratio: float, band: tuple[float, float]) -> dict[str, dict[str, Any]]:

@@ -76,6 +76,7 @@ SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
 LEAST_TURNED = 0.1  # turn in that time, which no rolling of a pitched body is [rad]
+LEAST_TURNING = 10.0  # time of turning in which no wheels agree with a gyro by chance [s]
 LEAST_CORRELATION = 0.7  # of gyro and wheels, for turns to tell the sides [-]
 TIE = 1e-3  # residuals [-] that differ by less are the same
 NOISE_FLOOR = 0.02  # residual [-] by which hypotheses must differ at least
@@ -409,6 +410,26 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     trial += '' if best.trial.passes else ', or others do: drive straight'
     exchanged = tuple((int(there[a]), int(there[b])) for a, b in best.fix.exchanged)
     return _Chosen(signs, turn, exchanged, trial, 0.99 if best.trial.passes else 0.5)
+
+
+def turns_upright(evidence: Evidence) -> float:
+    """Return how well gyro and wheels agree in turns: 1 upright, -1 upside down, 0 unknown [-].
+
+    Whatever wheels are exchanged or count backwards: where half do, the reference tells which.
+    """
+    there, rows = _known(evidence)
+    if evidence.gyro is None or rows.sum() < LEAST_MOVING_ROWS:
+        return 0.0
+    chosen = _chosen(evidence, there, rows)
+    signs = chosen.signs
+    if not signs.sum():
+        signs = signs * np.sign(_direction(evidence, signs)[0] or 0.0)
+    order = Fix((), chosen.exchanged).order(signs.size)
+    difference = evidence.with_rate(evidence.rate[:, order] * signs).side_difference
+    rows = evidence.turning & np.isfinite(difference)
+    if rows.sum() * evidence.period < LEAST_TURNING:
+        return 0.0
+    return correlation(evidence.gyro[rows, 2], difference[rows])
 
 
 _Agreement: TypeAlias = 'tuple[float | None, float | None]'
