@@ -186,7 +186,7 @@ def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evide
         source = f'straight, steady, firm stretches against {evidence.recording.reference.topic}'
         if open_yet:  # nothing is mended by it yet
             rolling = rolling * figures['rover.radius_ratio']
-            source += ' (or its scale is off: slip is the same)'
+            source += ' (or its scale is off: drive ten metres along a tape)'
     if np.allclose(rolling, configuration.wheels.slip_radius):
         return evidence
     lugs = configuration.wheels.slip_radius - configuration.wheels.radius

@@ -429,17 +429,26 @@ def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None
     return motion, seen
 
 
+@once
+def acceleration_fits(evidence: Evidence) -> tuple[Estimate, Estimate] | None:
+    """Return measured over expected accelerations of starts (x) and curves (y); None: no IMU."""
+    both = _motions(evidence, DRIFT)
+    if both is None:
+        return None
+    motion, seen = both
+    pairs = (motion.real, seen.real), (motion.imag, seen.imag)
+    along, across = (block_fit(wheels[:, None], measured)[0] for wheels, measured in pairs)
+    return along, across
+
+
 def accelerometer_signs(evidence: Evidence) -> list[int]:
     """Return the signs of accelerations along x and y: 1 as by wheels and gyro, -1 opposite.
 
     0 is not clear. A rotated IMU measures both alike; no rotation reverses one of them.
     """
-    both = _motions(evidence, DRIFT)
-    if both is None:
+    fits = acceleration_fits(evidence)
+    if fits is None:
         return [0, 0]
-    motion, seen = both
-    pairs = (motion.real, seen.real), (motion.imag, seen.imag)
-    fits = [block_fit(wheels[:, None], measured)[0] for wheels, measured in pairs]
     clear = [RATIOS[0] < abs(f.value) < RATIOS[1] and f.sigmas_from(0.0) > YAW_SIGMAS for f in fits]
     return [int(np.sign(f.value)) * there for f, there in zip(fits, clear, strict=True)]
 

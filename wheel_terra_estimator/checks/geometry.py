@@ -13,7 +13,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.clocks import SMOOTHED_BY
-from wheel_terra_estimator.checks.evidence import Evidence, Mask, once
+from wheel_terra_estimator.checks.evidence import Evidence, Mask, acceleration_fits, once
 from wheel_terra_estimator.checks.finding import (
     LEAST_TURN_RATE,
     SKID_TRACKS,
@@ -43,6 +43,8 @@ LEAST_UNLIKE = 0.05  # difference of wheels that slip makes none, on one side [-
 OUTRUN_STD = 0.01  # slip that is left open where a rover outruns its wheels [-]
 PRIOR_OF_RADIUS = 0.85  # probability that it is the radius, not the scale of the reference [-]
 SURE = 0.97  # probability beside its alternative from which a fault is named alone [-]
+START_SLIP = Estimate(0.06, 0.06)  # of the acceleration of rims in starts, with their lags [-]
+SAME_SIGMAS, STARTS_SIGMAS = 1.0, 2.0  # up to which a scale agrees with one of both causes
 TRACK_STD = 0.02  # deviation that slip leaves in a scale of speed by turns, at least [-]
 RESISTANCE = Estimate(0.08, 0.05)  # of firm ground over the weight [-]
 UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)  # where no torque shows it [-]
@@ -321,20 +323,24 @@ def _unlike(evidence: Evidence) -> tuple[float, float]:
 def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
     """Return the probability that a ratio of speeds is the radius, not the scale of the reference.
 
-    Where the rover need not skid to turn, the gyro knows the scale of the rims.
+    Where the rover need not skid to turn, the gyro knows the scale of the rims; the accelerometer
+    knows it by brisk starts.
     """
     odds = math.log(PRIOR_OF_RADIUS / (1.0 - PRIOR_OF_RADIUS))
     gain, off = (evidence.figures.get(f'torque.gain{end}', math.nan) for end in ('', '_std'))
     # The torque over the radius is what slopes ask for; a track of the rims is what they turn by.
-    pairs = [(Estimate(gain, off), ratio.value)]
+    pairs = [(Estimate(gain, off), ratio.value, SAME_SIGMAS)]
     turns = None if turning.skids(evidence) else measured_track(evidence)
     if isinstance(turns, TriedRatio):
         std = math.hypot(turns.ratio.std, TRACK_STD, ratio.std)
         rolling = 1.0 / evidence.figures['rover.speed_over_rim_speed']
-        pairs.append((Estimate(turns.ratio.value, std), rolling))
-    for seen, by_radius in pairs:
+        pairs.append((Estimate(turns.ratio.value, std), rolling, SAME_SIGMAS))
+    if fits := acceleration_fits(evidence):
+        usual, std = 1.0 - START_SLIP.value, math.hypot(fits[0].std, START_SLIP.std)
+        pairs.append((Estimate(fits[0].value / usual, std / usual), ratio.value, STARTS_SIGMAS))
+    for seen, by_radius, near in pairs:
         of_scale, of_radius = seen.sigmas_from(1.0), seen.sigmas_from(by_radius)
-        if min(of_scale, of_radius) < 1.0:  # else it is off as well
+        if min(of_scale, of_radius) < near:  # else it is off as well
             odds += 0.5 * (of_scale**2 - of_radius**2)
     return probability(odds)
 
