@@ -43,8 +43,8 @@ LEAST_UNLIKE = 0.05  # difference of wheels that slip makes none, on one side [-
 OUTRUN_STD = 0.01  # slip that is left open where a rover outruns its wheels [-]
 PRIOR_OF_RADIUS = 0.85  # probability that it is the radius, not the scale of the reference [-]
 SURE = 0.97  # probability beside its alternative from which a fault is named alone [-]
-START_SLIP = Estimate(0.06, 0.06)  # of the acceleration of rims in starts, with their lags [-]
-SAME_SIGMAS, STARTS_SIGMAS = 1.0, 2.0  # up to which a scale agrees with one of both causes
+START_SLIP = 0.15  # part of the accelerations of rims that slip and lags take, one deviation [-]
+START_STD = 0.03  # of them by the model, at least [-]
 TRACK_STD = 0.02  # deviation that slip leaves in a scale of speed by turns, at least [-]
 RESISTANCE = Estimate(0.08, 0.05)  # of firm ground over the weight [-]
 UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)  # where no torque shows it [-]
@@ -329,20 +329,28 @@ def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
     odds = math.log(PRIOR_OF_RADIUS / (1.0 - PRIOR_OF_RADIUS))
     gain, off = (evidence.figures.get(f'torque.gain{end}', math.nan) for end in ('', '_std'))
     # The torque over the radius is what slopes ask for; a track of the rims is what they turn by.
-    pairs = [(Estimate(gain, off), ratio.value, SAME_SIGMAS)]
+    pairs = [(Estimate(gain, off), ratio.value)]
     turns = None if turning.skids(evidence) else measured_track(evidence)
     if isinstance(turns, TriedRatio):
         std = math.hypot(turns.ratio.std, TRACK_STD, ratio.std)
         rolling = 1.0 / evidence.figures['rover.speed_over_rim_speed']
-        pairs.append((Estimate(turns.ratio.value, std), rolling, SAME_SIGMAS))
+        pairs.append((Estimate(turns.ratio.value, std), rolling))
+    apart = [(seen.sigmas_from(1.0), seen.sigmas_from(by_radius)) for seen, by_radius in pairs]
     if fits := acceleration_fits(evidence):
-        usual, std = 1.0 - START_SLIP.value, math.hypot(fits[0].std, START_SLIP.std)
-        pairs.append((Estimate(fits[0].value / usual, std / usual), ratio.value, STARTS_SIGMAS))
-    for seen, by_radius, near in pairs:
-        of_scale, of_radius = seen.sigmas_from(1.0), seen.sigmas_from(by_radius)
-        if min(of_scale, of_radius) < near:  # else it is off as well
+        apart.append((_of_starts(fits[0], 1.0), _of_starts(fits[0], ratio.value)))
+    for of_scale, of_radius in apart:
+        if min(of_scale, of_radius) < 1.0:  # else it is off as well
             odds += 0.5 * (of_scale**2 - of_radius**2)
     return probability(odds)
+
+
+def _of_starts(seen: Estimate, scale: float) -> float:
+    """Return how far accelerations, over those of the rims, are from a scale of these [sigmas].
+
+    Rims that slip in starts and stops take a part of it; a rover never outruns them so far.
+    """
+    slip = 1.0 - seen.value / scale
+    return abs(slip) / (START_SLIP if slip > 0.0 else math.hypot(seen.std / scale, START_STD))
 
 
 def stated_track(evidence: Evidence) -> float:
