@@ -72,7 +72,7 @@ def test_slopes_tell_whether_wheels_or_reference_run_backwards(what):
 
 @pytest.mark.parametrize('factor', [0.9, pytest.param(1.12, marks=pytest.mark.slow)])
 def test_a_scale_of_the_reference_is_no_radius(factor):
-    """Where the rover turns without skid the gyro tells them apart; else starts do, or both are named."""
+    """Where the rover turns without skid the gyro tells; else starts do, or both are named."""
     whole = rolling.recording()
     scaled = replace(whole.reference, velocity=factor * whole.reference.velocity)
     recording = replace(whole, reference=scaled)

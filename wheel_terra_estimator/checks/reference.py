@@ -52,7 +52,10 @@ FAR_ASIDE = math.radians(12.0)  # direction in which 2 % of a speed along x are 
 MOST_SLIPPING, USUAL_SLIP = 1.0 / 3.0, (0.75, 1.1)
 """Speed over that without slip of a rover that slips much, and of one that slips as usual."""
 WITHOUT_SLIP = 0.06  # error of the ratio without slip, beside which no unit asks for much [-]
-LEAST_UNIT_RATIO = 1.3  # speed over rim speed below which it may be the radius, not the unit [-]
+LEAST_SLIP = 0.8  # share of the ratios of speeds that are below that of the least slip [-]
+LEAST_UNIT_RATIO = (
+    1.3  # usual speed over rim speed below which it may be the radius, not the unit [-]
+)
 NO_SCALE = 30.0  # speed over rim speed that is a unit, however much the rover slips [-]
 MOSTLY = 0.4  # mean over median rim speed of wheels most of which turn one way [-]
 CLEAR_SPEED = 5.0  # speed over the noise of the reference that a ratio of speeds needs [-]
@@ -257,8 +260,8 @@ def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[Flo
     return rim, rows & np.isfinite(series.velocity[:, :2]).all(axis=1)
 
 
-def speed_ratio(evidence: Evidence) -> float | None:
-    """Return the upper end of reference speed over rim speed: that of the least slip."""
+def speed_ratio(evidence: Evidence, share: float = LEAST_SLIP) -> float | None:
+    """Return reference speed over rim speed, by default that of the least slip."""
     reference = evidence.recording.reference
     if reference is None:
         return None
@@ -270,7 +273,7 @@ def speed_ratio(evidence: Evidence) -> float | None:
         return None  # stuck, not another unit
     if correlation(np.nan_to_num(rim), np.nan_to_num(speed)) < 0.8:
         return None
-    return float(np.quantile(speed[rows] / rim[rows], 0.8))
+    return float(np.quantile(speed[rows] / rim[rows], share))
 
 
 def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -279,7 +282,7 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not evidence.facts.known or ASIDE in evidence.figures:
         return [], evidence
     ratio = speed_ratio(evidence)
-    if ratio is None or ratio < LEAST_UNIT_RATIO:
+    if ratio is None or (speed_ratio(evidence, 0.5) or 0.0) < LEAST_UNIT_RATIO:
         return [], evidence
     fitting = units_of_reference(ratio, (MOST_SLIPPING, 1.25))
     if any(abs(ratio * one['value'] - 1.0) < WITHOUT_SLIP for one in fitting.values()):

@@ -18,7 +18,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.series import SinkageSeries, rows_of
-from wheel_terra_estimator.checks.statistics import runs, step_of
+from wheel_terra_estimator.checks.statistics import runs
 
 LEAST_TIME = 5.0  # time of driving in which a reading that stays is frozen [s]
 ZERO_TIME = 20.0  # the same of a vector of zeros [s]
@@ -30,6 +30,7 @@ MOST_REPEATED = 0.5  # share of rates that repeat themselves: more are rounded, 
 LEAST_BESIDE = 30  # other readings from which a sensor is seen to have noise
 SELDOM = 0.1  # share of readings that repeat the one before of a sensor with noise [-]
 CHANGES = 0.5  # change of the rates over the working rate that all else then changes with [-]
+CALM = 0.02  # the same that is less than the steps of a reading may hide [-]
 AT_ONCE = 0.9  # share of a stretch in which no rate without noise changes, at least [-]
 LEAST_CHANGES = 30  # changes of rates from which their rhythm is found
 CLEAR_SINKAGE = 0.005  # of the other wheels, beside which none reads 0 all the time [m]
@@ -166,7 +167,6 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         share = float(driving[first:last].mean())
         lasts = share * (last - first) * period  # a gap is none
         beside = np.delete(same, np.s_[first:last])
-        steady = np.ptp(speed[first:last]) < CHANGES * evidence.working_rate
         noisy = beside.size > LEAST_BESIDE and np.mean(beside) < SELDOM
         live = not readings[first].any() and bool(readings.any())
         live = live and not (noisy and values.shape[1] > 1 and lasts > ZERO_TIME)
@@ -176,8 +176,10 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
             continue
         usual = _usual(beside)
         others = np.delete(readings, np.s_[first : last + 1], axis=0)
-        # A speed that stays within a step of the sensor shows no change.
-        if steady and not noisy and (rounded or any(step_of(column) for column in others.T)):
+        # One with steps shows no change of a speed that hardly changes.
+        steps = beside.size > LEAST_BESIDE and not noisy
+        varies = float(np.ptp(speed[first:last])) / evidence.working_rate
+        if (steps and varies < CALM) or (rounded and varies < CHANGES and not noisy):
             continue
         coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
             FINE, len(others) // 2

@@ -1,0 +1,81 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Faults that imitate one another: the one that the evidence speaks for is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+
+WHOLE = rolling.recording()
+
+
+def faults(**channels):
+    return {f.fault: f for f in rolling.checked(whole=WHOLE, **channels).findings}
+
+
+@pytest.mark.parametrize('channel', ['imu', 'joints'])
+def test_stamps_at_arrival_are_late_and_no_others_early(channel):
+    """What is stamped 0.8 s late, when it arrives; the other would arrive before it is measured."""
+    late, way = 800_000_000, {'imu': 1_000_000, 'joints': 5_000_000}  # [ns]
+    whole = replace(WHOLE, reference=None)
+    for name, age in way.items():
+        series = getattr(WHOLE, name)
+        stamp = series.stamp + late * (name == channel)
+        whole = replace(whole, **{name: replace(series, stamp=stamp, log_time=stamp + age)})
+    told = {f.fault: f for f in rolling.checked(whole=whole).findings}
+    name = 'imu' if channel == 'imu' else 'wheel_odometry'
+    finding = told[f'{name}_offset']
+    assert finding.value == pytest.approx(0.8, abs=0.05)
+    assert {key for key in told if key.endswith('_offset')} == {f'{name}_offset'}
+
+
+@pytest.mark.parametrize('zero', [20.0, 60.0])
+def test_large_zeros_are_no_torques_without_a_sign(zero):
+    assert np.abs(WHOLE.joints.torque).max() > 0.0
+    told = faults(joints={'torque': WHOLE.joints.torque + zero})
+    assert 'torque_unsigned' not in told
+    assert told['torque_zero'].value == pytest.approx(zero, rel=0.1)
+
+
+def test_torques_without_a_sign_are_no_zeros():
+    told = faults(joints={'torque': np.abs(WHOLE.joints.torque)})
+    assert 'torque_zero' not in told and told['torque_unsigned'].confidence == 0.9
+
+
+@pytest.mark.parametrize('backwards', [[-1, 1, 1, 1], [1, -1, 1, -1]])
+def test_an_accelerometer_reversed_beside_wheels_that_count_backwards(backwards):
+    """The gyro is upright: neither are the sides swapped nor does the reference run backwards."""
+    joints = {name: getattr(WHOLE.joints, name) * backwards for name in ('rate', 'torque')}
+    told = faults(joints=joints, imu={'force': -WHOLE.imu.force})
+    assert {*told} == {'force_reversed', 'backwards'}
+    assert told['backwards'].wheel == ', '.join(
+        name for name, sign in zip(rolling.NAMES, backwards, strict=True) if sign < 0
+    )
+
+
+def test_fine_steps_of_a_rate_at_a_constant_speed_are_not_frozen():
+    """A rate that noise moves by a step now and then, and on a long straight hardly ever."""
+    random = np.random.default_rng(2)
+    time = np.arange(0.0, 90.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [2, 6, 40, 44], [0.0, 0.15, 0.15, 0.3])
+    whole = rolling.recording(rolling.Motion(time, speed, 0.0 * time, 0.0 * time))
+    step = 2e-4  # [rad/s]
+    exact = np.repeat(speed[:, None], 4, axis=1) / rolling.RADIUS
+    scatter = np.array([0.05, 0.9, 0.9, 0.9]) * step
+    exact += scatter * random.standard_normal(exact.shape)
+    rate = step * np.round(exact / step)
+    rate[(time > 6.0) & (time < 14.0), 0] = step * round(0.15 / rolling.RADIUS / step)
+    joints = replace(whole.joints, rate=rate)
+    told = rolling.checked(whole=replace(whole, joints=joints)).findings
+    assert 'frozen' not in {f.kind for f in told}
+
+
+def test_a_speed_in_kilometres_per_hour_where_the_wheels_slip():
+    """Most of the drive at a slip of 0.38, which would make miles of them."""
+    at = WHOLE.reference.seconds
+    slips = np.where((at % 100.0) < 70.0, 0.62, 1.0)[:, None]
+    told = faults(reference={'velocity': 3.6 * slips * WHOLE.reference.velocity})
+    assert told['reference_unit'].value == pytest.approx(1.0 / 3.6)
+    assert told['reference_unit'].confidence == 0.9
