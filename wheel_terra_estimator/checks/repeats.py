@@ -26,11 +26,9 @@ LEAST_MESSAGES = 10  # messages in which it stays, at least
 LEAST_NOISY = 4  # the same of a reading with noise
 LONGER = 10.0  # so many times longer than a reading usually stays [-]
 FINE = 50  # different readings of a sensor whose steps are not what makes it stay
-MOST_REPEATED = 0.5  # share of rates that repeat themselves: more are rounded, or noiseless
 LEAST_BESIDE = 30  # other readings from which a sensor is seen to have noise
 SELDOM = 0.1  # share of readings that repeat the one before of a sensor with noise [-]
-CHANGES = 0.5  # change of the rates over the working rate that all else then changes with [-]
-CALM = 0.02  # the same that is less than the steps of a reading may hide [-]
+CALM = 0.02  # change of the rates over the working rate that steps of a reading may hide [-]
 AT_ONCE = 0.9  # share of a stretch in which no rate without noise changes, at least [-]
 LEAST_CHANGES = 30  # changes of rates from which their rhythm is found
 CLEAR_SINKAGE = 0.005  # of the other wheels, beside which none reads 0 all the time [m]
@@ -157,8 +155,6 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         return None
     at, readings = time[known], values[known]
     driving = np.interp(at, evidence.time, evidence.moving)
-    change = np.diff(evidence.rate[evidence.moving], axis=0)
-    rounded = change.size > 0 and np.mean(change == 0.0) > MOST_REPEATED
     speed = np.interp(at, evidence.time, np.abs(evidence.common_rate))
     same = (np.diff(readings, axis=0) == 0.0).all(axis=1)
     rows, longest, value = np.zeros(time.size, dtype=bool), 0.0, 0.0
@@ -179,7 +175,7 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         # One with steps shows no change of a speed that hardly changes.
         steps = beside.size > LEAST_BESIDE and not noisy
         varies = float(np.ptp(speed[first:last])) / evidence.working_rate
-        if (steps and varies < CALM) or (rounded and varies < CHANGES and not noisy):
+        if steps and varies < CALM:
             continue
         coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
             FINE, len(others) // 2
