@@ -53,9 +53,7 @@ MOST_SLIPPING, USUAL_SLIP = 1.0 / 3.0, (0.75, 1.1)
 """Speed over that without slip of a rover that slips much, and of one that slips as usual."""
 WITHOUT_SLIP = 0.06  # error of the ratio without slip, beside which no unit asks for much [-]
 LEAST_SLIP = 0.8  # share of the ratios of speeds that are below that of the least slip [-]
-LEAST_UNIT_RATIO = (
-    1.3  # usual speed over rim speed below which it may be the radius, not the unit [-]
-)
+LEAST_UNIT_RATIO = 1.3  # usual speed over rim speed; below, it may be the radius, not the unit [-]
 NO_SCALE = 30.0  # speed over rim speed that is a unit, however much the rover slips [-]
 MOSTLY = 0.4  # mean over median rim speed of wheels most of which turn one way [-]
 CLEAR_SPEED = 5.0  # speed over the noise of the reference that a ratio of speeds needs [-]
