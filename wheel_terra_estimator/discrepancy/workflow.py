@@ -192,7 +192,7 @@ def _in_doubt_of_what_is_on(
 
     Return the decision then, and a note where the rows fit better without one.
     """
-    findings, setting, notes = decider.findings, decider.findings.setting, tuple[str, ...]()
+    findings, setting, wrong = decider.findings, decider.findings.setting, dict[str, Rival]()
     for name, forms in on.items():
         rest = tuple(c for c in setting.nuisance if effect_of(c.owner) != name)
         given = decider.table, forward.without(name), rest
@@ -202,18 +202,18 @@ def _in_doubt_of_what_is_on(
             continue  # as it is, with what else is missing, or with other numbers
         if best:
             found = search(*given, {**effects, **forms}, setting.floors)
-            again = replace(decider, findings=found, laws={}, beside=()).decision()
+            again = replace(decider, findings=found, laws={}).decision()
             if [effect_of(naming.key) for naming in again.names] == [name]:
                 before = {q: decision.gap[q].before for q in again.gap}  # as configured
                 gap = {q: replace(g, before=before[q]) for q, g in again.gap.items()}
                 curves = replace(again.curves, before=decision.curves.before)
                 note = f'{name} is on in another form; the form named here takes its place'
                 return replace(again, gap=gap, curves=curves), (note,)
-        notes += (f'{name} is on, and these rows fit better without it: look for it first',)
-        wrong = Rival(total, f'{name}, which is on, where it is not')
-        decider = replace(decider, beside=(*decider.beside, wrong))
-        decision = decider.decision()
-    return decision, notes
+        wrong[name] = Rival(total, f'{name}, which is on, where it is not')
+    if wrong:
+        decision = replace(decider, beside=tuple(wrong.values())).decision()
+    words = 'is on, and these rows fit better without it: look for it first'
+    return decision, tuple(f'{name} {words}' for name in wrong)
 
 
 def _forms_of_what_is_on(forward: Forward, options: Options) -> dict[str, dict[str, Effect]]:
@@ -223,12 +223,15 @@ def _forms_of_what_is_on(forward: Forward, options: Options) -> dict[str, dict[s
     anything.
     """
     found = {}
-    for key, own in ((key, forward.catalogue[key]) for key in forward.base_effects):
-        name = effect_of(key)
+    for key in forward.base_effects:
+        name, own = effect_of(key), forward.catalogue[key]
         if own.sparse:
             continue
-        held, found[name] = {p.name for p in own.parameters if p.free}, {key: own}
-        for form in forward.catalogue[name].forms if name in (options.effects or (name,)) else ():
+        found[name] = {key: own}
+        if options.effects and name not in options.effects:
+            continue
+        held = {p.name for p in own.parameters if p.free}
+        for form in forward.catalogue[name].forms:
             if form.candidate and not held <= {p.name for p in form.parameters}:
                 found[name][form.name] = form
     return found
