@@ -258,8 +258,8 @@ def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[Flo
     return rim, rows & np.isfinite(series.velocity[:, :2]).all(axis=1)
 
 
-def speed_ratio(evidence: Evidence, share: float = LEAST_SLIP) -> float | None:
-    """Return reference speed over rim speed, by default that of the least slip."""
+def speed_ratios(evidence: Evidence) -> FloatArray | None:
+    """Return reference speeds over rim speeds; None where they tell no unit."""
     reference = evidence.recording.reference
     if reference is None:
         return None
@@ -271,7 +271,7 @@ def speed_ratio(evidence: Evidence, share: float = LEAST_SLIP) -> float | None:
         return None  # stuck, not another unit
     if correlation(np.nan_to_num(rim), np.nan_to_num(speed)) < 0.8:
         return None
-    return float(np.quantile(speed[rows] / rim[rows], share))
+    return np.asarray(speed[rows] / rim[rows])
 
 
 def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -279,9 +279,10 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     assert reference is not None
     if not evidence.facts.known or ASIDE in evidence.figures:
         return [], evidence
-    ratio = speed_ratio(evidence)
-    if ratio is None or (speed_ratio(evidence, 0.5) or 0.0) < LEAST_UNIT_RATIO:
+    ratios = speed_ratios(evidence)
+    if ratios is None or np.median(ratios) < LEAST_UNIT_RATIO:
         return [], evidence
+    ratio = float(np.quantile(ratios, LEAST_SLIP))
     fitting = units_of_reference(ratio, (MOST_SLIPPING, 1.25))
     if any(abs(ratio * one['value'] - 1.0) < WITHOUT_SLIP for one in fitting.values()):
         least, most = USUAL_SLIP

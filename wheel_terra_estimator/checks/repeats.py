@@ -170,13 +170,12 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
             continue
         if np.interp(at[first:last], evidence.time, evidence.exactly_even).mean() > AT_ONCE:
             continue
-        usual = _usual(beside)
-        others = np.delete(readings, np.s_[first : last + 1], axis=0)
         # One with steps shows no change of a speed that hardly changes.
         steps = beside.size > LEAST_BESIDE and not noisy
-        varies = float(np.ptp(speed[first:last])) / evidence.working_rate
-        if steps and varies < CALM:
+        if steps and np.ptp(speed[first:last]) < CALM * evidence.working_rate:
             continue
+        usual = _usual(beside)
+        others = np.delete(readings, np.s_[first : last + 1], axis=0)
         coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
             FINE, len(others) // 2
         )

@@ -64,7 +64,12 @@ def robust_std(values: FloatArray) -> float:
     values = values if known.all() else values[known]
     if not values.size:
         return math.nan
-    return float(MAD_TO_STD * _median(np.abs(values - _median(values))))
+    return float(_spread(values))
+
+
+def _spread(values: FloatArray) -> Any:
+    """Return the deviation of known values along the first axis, as `robust_std` does."""
+    return MAD_TO_STD * _median(np.abs(values - _median(values)))
 
 
 def _median(values: FloatArray) -> Any:
@@ -127,8 +132,7 @@ def _huber(
         weighted = instruments.T * weight.T[:, None, :]
         coefficients = _solve(weighted @ design, (weighted @ targets.T[..., None])[..., 0])
         residual = targets - design @ coefficients.T
-        size = np.abs(residual - _median(residual))
-        scale = np.maximum(MAD_TO_STD * _median(size), 1e-12)
+        scale = np.maximum(_spread(residual), 1e-12)
         weight = 1.0 / np.maximum(np.abs(residual) / (HUBER * scale), 1.0)
     return coefficients, weight
 

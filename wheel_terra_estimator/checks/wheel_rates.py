@@ -22,8 +22,9 @@ from wheel_terra_estimator.checks.evidence import (
 )
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, not_checked
 from wheel_terra_estimator.checks.reference import (
+    LEAST_SLIP,
     NO_SCALE,
-    speed_ratio,
+    speed_ratios,
     units_of_reference,
 )
 from wheel_terra_estimator.checks.series import rows_of
@@ -321,7 +322,8 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts = evidence.facts
     if not facts.known:
         return [not_checked('unit', 'no_radius')], evidence
-    ratio, how = speed_ratio(evidence), 'speed of the reference'
+    ratios, how = speed_ratios(evidence), 'speed of the reference'
+    ratio = None if ratios is None else float(np.quantile(ratios, LEAST_SLIP))
     track = turning.track_ratio(evidence)
     if ratio is None and track is None:
         return [not_checked('unit', 'no_speed')], evidence
