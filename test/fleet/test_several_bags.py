@@ -68,16 +68,31 @@ def test_a_restart_passes_over_what_is_done_by_content(bags, config, tmp_path, p
     Path(good[0]).rename(renamed)
     (tmp_path / 'other').mkdir()
     third = Path(good[2]).rename(tmp_path / 'other' / 'drive3')
-    given = [str(renamed), good[1], str(third)]
-    told = json.loads(printed(['replay', *given, *config, '-o', str(out), '--json']))
-    assert [drive['folder'] for drive in told['drives']] == ['drive3', 'drive2', 'drive3_2']
-    assert [drive['bag'] for drive in told['drives']] == given
-    then = written()
-    assert set(then) == {'drive3', 'drive2', 'drive3_2'}
-    assert {name: then[name] for name in first} == first
-    other = ['-p', 'rover.mass:=41.0']  # another configuration: nothing is done
-    assert main(['replay', good[1], str(renamed), *config, *other, '-o', str(out)]) == 0
-    assert written()['drive3'] == first['drive3'] and written()['drive2'] != first['drive2']
+    for given, folders in (
+        ([str(third), good[1]], ['drive3_2', 'drive2']),
+        ([str(renamed), good[1], str(third)], ['drive3', 'drive2', 'drive3_2']),
+    ):
+        told = json.loads(printed(['replay', *given, *config, '-o', str(out), '--json']))
+        assert [drive['folder'] for drive in told['drives']] == folders
+        assert [drive['bag'] for drive in told['drives']] == given
+        then = written()
+        assert set(then) == {'drive3', 'drive2', 'drive3_2'}
+        assert {name: then[name] for name in first} == first
+
+
+def test_other_settings_are_no_continuation(bags, config, tmp_path, refused):
+    """As for one recording, outputs of other parameters are replaced with --overwrite alone."""
+    out = tmp_path / 'out'
+    again = ['replay', *bags[2:], *config, '-o', str(out)]
+    assert main(again) == 0
+    before = {name: estimates(out / name) for name in ('drive1', 'drive2')}
+    summary = (out / 'summary.csv').read_bytes()
+    for other in (['-p', 'rover.mass:=41.0'], ['--smooth'], ['--table', 't.csv']):
+        refused([*again, *other], 'drive1: made with other parameters or options')
+    assert {name: estimates(out / name) for name in before} == before
+    assert (out / 'summary.csv').read_bytes() == summary
+    assert main([*again, '-p', 'rover.mass:=41.0', '--overwrite']) == 0
+    assert estimates(out / 'drive1') != before['drive1']
 
 
 def test_an_output_that_has_lost_a_file_is_made_anew(bags, config, tmp_path, undrawn):

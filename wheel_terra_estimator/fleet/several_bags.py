@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many recordings side by side: a folder each, a summary of all, resumable after an end.
 
-The marker of a folder holds a digest of all that its content follows from: a later run passes over
-recordings whose digest is there already, whatever their names.
+The marker of a folder holds a digest of its recording and one of the settings: a later run passes
+over recordings that are there already, whatever their names, and refuses other settings.
 """
 
 from __future__ import annotations
@@ -103,18 +103,23 @@ def _tasks(
     settings: Settings, paths: Sequence[Path], rows: dict[int, DriveRow]
 ) -> dict[int, _Task]:
     """Return the recordings left to do, by number; results of the others go to `rows`."""
-    output, done = settings.output, {}
+    output, done, own = settings.output, {}, _digest_of_settings(settings)
     for folder in sorted(output.iterdir()):
         facts = facts_of(folder) if folder.is_dir() else {}
         if isinstance(facts.get('digest'), str) and isinstance(facts.get('row'), dict):
+            if facts.get('settings') != own:
+                raise UserError(
+                    f'{folder}: made with other parameters or options, or by another version, so '
+                    'this is no continuation; choose another path or give --overwrite'
+                )
             done[facts['digest']] = replace(DriveRow.from_json(facts['row']), folder=folder.name)
     digests = {}
     for i, path in enumerate(paths):
         try:
-            digests[i] = _digest(settings, path)
+            digests[i] = _digest(path)
         except UserError as error:
             rows[i] = DriveRow(str(path), error=_words(error, path))
-    taken = {done[digest].folder for digest in digests.values() if digest in done}
+    taken = {row.folder for row in done.values()}
     tasks = {}
     for i, digest in digests.items():
         if digest in done:
@@ -137,8 +142,8 @@ def _free_name(path: Path, taken: set[str]) -> str:
     return name
 
 
-def _digest(settings: Settings, path: Path) -> str:
-    """Return the digest of all that the output of a recording follows from, but its name."""
+def _digest_of_settings(settings: Settings) -> str:
+    """Return the digest of all that outputs follow from, but the recordings."""
     configuration = settings.configuration
     values = configuration.flat()
     stated = {
@@ -151,12 +156,19 @@ def _digest(settings: Settings, path: Path) -> str:
     }
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     digest.update(json.dumps(stated, sort_keys=True, default=str).encode())
-    files = [Path(str(values['effect_file']))] if values.get('effect_file') else []
+    if values['effect_file']:
+        digest.update(Path(str(values['effect_file'])).read_bytes())
+    return digest.hexdigest()
+
+
+def _digest(path: Path) -> str:
+    """Return the digest of the content of a recording, whatever its name."""
+    digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     try:
         if path.is_dir():
-            files += sorted(p for p in path.iterdir() if p.is_file())
+            files = sorted(p for p in path.iterdir() if p.is_file())
         else:
-            files += [path, *(p for p in [path.with_name(f'{path.name}-wal')] if p.is_file())]
+            files = [path, *(p for p in [path.with_name(f'{path.name}-wal')] if p.is_file())]
         for file in files:
             if not file.is_file():
                 raise UserError(f'{file}: there is no such recording')
@@ -180,7 +192,8 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
     drive.write({kind: output / name for kind, name in settings.files.items()}, overwrite=True)
     row = DriveRow.from_drive(str(task.path), drive.summary, drive.checked)
     row = replace(row, folder=task.folder)
-    mark(output, [], {'digest': task.digest, 'row': asdict(row)})
+    made_with = _digest_of_settings(settings)
+    mark(output, [], {'digest': task.digest, 'settings': made_with, 'row': asdict(row)})
     return row
 
 
