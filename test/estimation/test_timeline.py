@@ -460,10 +460,11 @@ def test_wheel_odometry_that_comes_late_in_a_burst_ends_no_run():
 
 def test_the_reference_is_thinned_by_stamps():
     core, _ = make_core(reference_odom_max_rate=1.0)
-    stream = [odometry(0.1 * i) for i in range(100)]
+    stream = [odometry(0.1 * i) for i in range(101)]
     stream += [reference(0.1 * i + 0.001 * (-1) ** i + 0.05) for i in range(100)]
     sets = play(core, sorted(stream, key=lambda m: m.stamp))
     assert sets[-1].yaw_rate == 10.0  # the fake counts the references that it was given
+    assert core.health()['reference_odom_used'] == 10
 
 
 @settings(max_examples=settings.default.max_examples // 5, deadline=None)
@@ -476,6 +477,8 @@ def test_thinning_does_not_depend_on_the_order_of_arrival(order):
     stream.sort(key=lambda m: m.stamp)
     expected = play(ordered, [odometry(0.0), *stream, odometry(1.1)])
     assert essence(sets)[-1] == essence(expected)[-1]
+    used = [each.health()['reference_odom_used'] for each in (core, ordered)]
+    assert used == [sets[-1].yaw_rate] * 2  # whatever was run again
 
 
 # -- Whatever comes -------------------------------------------------------------------------------

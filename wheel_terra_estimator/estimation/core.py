@@ -38,6 +38,7 @@ from wheel_terra_estimator.estimation.timing.clock_watch import (
 from wheel_terra_estimator.estimation.timing.input_checks import (
     CHANNELS,
     INERTIAL,
+    REFERENCE,
     WHEEL_ODOMETRY,
     InputChecks,
 )
@@ -183,7 +184,8 @@ class EstimatorCore:
         result: dict[str, Any] = {}
         checks, log = self._checks, self._log
         for channel, name in enumerate(checks.names):
-            result[f'{name}_used'] = self._received[channel] - checks.refused[channel]
+            unused = checks.refused[channel] + (log.thinned if channel == REFERENCE else 0)
+            result[f'{name}_used'] = self._received[channel] - unused
             if self._late[channel]:
                 result[f'{name}_late'] = self._late[channel]
             if log.repeated[channel]:

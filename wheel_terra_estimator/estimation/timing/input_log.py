@@ -86,13 +86,14 @@ class _LastRun(NamedTuple):
 class Entry:
     """All inputs of one stamp."""
 
-    __slots__ = ('kept', 'parts', 'stamp')
+    __slots__ = ('kept', 'parts', 'stamp', 'thinned')
 
     def __init__(self, stamp: int, channel: int, measurement: Measurement) -> None:
         self.stamp = stamp
         self.parts: list[Any] = [None] * len(CHANNELS)
         self.parts[channel] = measurement
         self.kept: tuple[tuple[Any, ...], _Progress] | None = None  # after this entry
+        self.thinned = False  # its reference velocity was not used
 
 
 class InputLog:
@@ -110,6 +111,7 @@ class InputLog:
         # Per channel: inputs whose stamp it had given before, and those with other numbers.
         self.repeated = [0] * len(CHANNELS)
         self.contradicted = [0] * len(CHANNELS)
+        self.thinned = 0  # reference velocities that were not used
         self._reference_period = settings.reference_period
         self._pristine = self._snapshot()
         self._last_run: _LastRun
@@ -272,6 +274,8 @@ class InputLog:
         if parts[REFERENCE] is not None:
             # Thinned here, by stamps, so that the order of arrival has no effect.
             due = self._next_reference(stamp)
+            self.thinned += (due is None) - entry.thinned
+            entry.thinned = due is None
             if due is None:
                 parts = [*parts[:REFERENCE], None, *parts[REFERENCE + 1 :]]
                 ends = ends and any(part is not None for part in parts)
