@@ -313,7 +313,6 @@ def test_shipped_files_of_an_installation(tmp_path, monkeypatch):
     package = tmp_path / 'install/lib/python3/site-packages/wheel_terra_estimator/configuration'
     package.mkdir(parents=True)
     monkeypatch.setattr(shipped, '__file__', str(package / 'shipped.py'))
-    monkeypatch.setattr(shipped.importlib.metadata, 'files', lambda name: [])
     monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
     assert 'not found' in complaint(shipped.configuration_folder)
     overlay = tmp_path / 'overlay/share/wheel_terra_estimator/config'

@@ -17,7 +17,7 @@ from zlib import crc32
 from wheel_terra_estimator.bags.salvage import mcap_records as mcap
 from wheel_terra_estimator.bags.salvage.compression import unpack
 from wheel_terra_estimator.bags.storage import jazzy_types
-from wheel_terra_estimator.output_folder import check_folder, new_folder
+from wheel_terra_estimator.output_folder import new_folder
 
 Self = TypeVar('Self', bound='BagFile')
 
@@ -46,7 +46,6 @@ class BagFile:
         self._overwrite = overwrite
         self._inputs = tuple(inputs)
         self._stack = ExitStack()
-        check_folder(path, overwrite, self._inputs)
 
     def __enter__(self: Self) -> Self:
         from rosbags.rosbag2 import StoragePlugin, Writer
@@ -101,8 +100,7 @@ def add_checksums(path: Path) -> None:
         with mmap.mmap(place, 0, access=mmap.ACCESS_READ) as content:
             end = len(content) - len(mcap.MAGIC)
             for item in mcap.records(content, len(mcap.MAGIC), end, mcap.Possible()):
-                if isinstance(item, mcap.Gap):
-                    continue
+                assert isinstance(item, mcap.Record)
                 if item.opcode == mcap.CHUNK:
                     head = mcap.chunk_head(content, item.begin - mcap.HEAD, end)
                     assert head is not None

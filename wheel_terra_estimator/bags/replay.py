@@ -22,7 +22,7 @@ from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.track import Track, TrackRecorder
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.end_signals import terminations
+from wheel_terra_estimator.end_signals import handled, terminations
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
@@ -284,19 +284,11 @@ def _tuning(line: str, arrival: Path) -> dict[str, Any]:
 def _until_interrupted() -> Iterator[threading.Event]:
     """Turn the first Ctrl-C or termination into a flag, so that no message is written by half."""
     flag = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield flag
-        return
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         if flag.is_set():
             raise KeyboardInterrupt
         flag.set()
 
-    asked = [signal.SIGINT, *terminations()]
-    kept = {number: signal.signal(number, on_signal) for number in asked}
-    try:
+    with handled([signal.SIGINT, *terminations()], on_signal):
         yield flag
-    finally:
-        for number, handler in kept.items():
-            signal.signal(number, handler)

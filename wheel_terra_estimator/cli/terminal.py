@@ -8,15 +8,13 @@ import argparse
 import difflib
 import os
 import re
-import signal
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import IO, Any, NoReturn
 
-from wheel_terra_estimator.end_signals import terminations
+from wheel_terra_estimator.end_signals import handled, terminations
 
 LONGEST_LINE = 2000
 """Characters of an error line that are shown; the middle of a longer one is left out."""
@@ -71,19 +69,12 @@ class PrintableStream:
 @contextmanager
 def termination_as_interrupt() -> Iterator[None]:
     """Treat terminations within the block as Ctrl-C: what was begun is cleaned up or kept."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    earlier = {number: signal.signal(number, on_signal) for number in terminations()}
-    try:
+    with handled(terminations(), on_signal):
         yield
-    finally:
-        for number, handler in earlier.items():
-            signal.signal(number, handler)
 
 
 UNUSABLE_INPUT = 2

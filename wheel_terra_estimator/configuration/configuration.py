@@ -48,9 +48,6 @@ class Section:
         # Reached only for names that the table does not declare.
         raise AttributeError(f'no such parameter: {name}')
 
-    def __repr__(self) -> str:
-        return f'{type(self).__name__}({self.__dict__})'
-
 
 class Wheels(Section):
     """Wheels of the rover; every array is (n,) in the order of ``names``."""

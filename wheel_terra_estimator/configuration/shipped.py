@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import difflib
 import functools
-import importlib.metadata
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,8 +20,7 @@ def configuration_folder() -> Path:
     """Return the folder that holds ``rovers``, ``soils``, ``scenarios`` and so on.
 
     A source tree or editable install has it beside the package; pip and colcon put it below
-    ``share`` of a prefix above the package, or of another one that the installer's record or
-    ``AMENT_PREFIX_PATH`` names.
+    ``share`` of a prefix above the package, or of another one in ``AMENT_PREFIX_PATH``.
     """
     return _shipped_folder('config')
 
@@ -49,16 +47,6 @@ def _candidates(top: str) -> Iterator[Path]:
     below = Path('share') / PACKAGE / top
     for prefix in package.parents:
         yield prefix / below
-    try:
-        recorded = importlib.metadata.files(PACKAGE) or []
-    except importlib.metadata.PackageNotFoundError:
-        recorded = []
-    marker = below.as_posix() + '/'
-    for entry in recorded:
-        if marker in entry.as_posix():
-            located = Path(str(entry.locate())).resolve()
-            yield next(p for p in located.parents if p.name == top)
-            break
     for prefix_text in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
         if prefix_text:
             yield Path(prefix_text) / below

@@ -24,8 +24,9 @@ from wheel_terra_estimator.configuration.rover_template import (
     RoverSketch,
 )
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import read_text
 
-LARGEST_FILE = 20_000_000  # [byte]
+LARGEST_FILE = 20 * 2**20  # [byte]
 DEEPEST_CHAIN = 1000
 BASE_LINKS = ('base_link', 'base_footprint')
 
@@ -122,16 +123,10 @@ def read_urdf(
 
 
 def _parse(path: Path, data: bytes | None) -> ElementTree.Element:
-    try:
-        data = path.read_bytes() if data is None else data
-    except OSError as error:
-        raise UserError(f'{path}: cannot be read: {error.strerror}') from None
-    if len(data) > LARGEST_FILE:
-        raise UserError(f'{path}: larger than {LARGEST_FILE // 1_000_000} MB: not a URDF')
-    try:
-        text = data.decode('utf-8')
-    except UnicodeDecodeError:
-        raise UserError(f'{path}: not a UTF-8 text') from None
+    if data is None:
+        text = read_text(path, LARGEST_FILE)
+    else:
+        text = data[:LARGEST_FILE].decode(errors='replace')
     if re.search(r'<!(DOCTYPE|ENTITY)', text, re.IGNORECASE):
         raise UserError(f'{path}: holds a DTD or entities, which a URDF does not need; remove them')
     try:

@@ -39,7 +39,7 @@ from wheel_terra_estimator.estimation.traction_limiter import Interlock, Limiter
 from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN, Status
 from wheel_terra_estimator.messages.pack import diagnostic_array
-from wheel_terra_estimator.output_folder import cannot_write, check_file
+from wheel_terra_estimator.output_folder import check_file
 from wheel_terra_estimator.ros import parameters, qos
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
@@ -246,10 +246,6 @@ class TractionLimiter(Node):
         if kept.stuck:
             self.get_logger().error(f'stopped before the restart: {kept.reason}')
             state = limiter.after_event(state, limiter.Event.STOP, kept.direction, kept.reason)
-        try:
-            self._file.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise cannot_write(self._file, error) from None
         check_file(self._file, overwrite=True)  # says at once where it cannot be written
         self._keep(kept)
         return state

@@ -125,8 +125,6 @@ class SteeringDrives:
 
     def follow(self, command: Command, dt: float) -> None:
         """Steer towards the directions in which the hubs are to move, over ``dt`` [s]."""
-        if not self.any:
-            return
         along, across = self.commanded_hubs(command)
         # Backwards the wheel turns backwards: an angle is no more than a quarter turn.
         angle = np.arctan(across / np.where(np.abs(along) > LEAST_COMMAND, along, LEAST_COMMAND))
