@@ -75,6 +75,8 @@ def test_a_folder_without_our_list_is_never_overwritten(tmp_path, foreign):
     with pytest.raises(UserError, match='not overwritten'):
         write(out, overwrite=True)
     with pytest.raises(UserError, match='not overwritten'):
+        check_folder(out, True)
+    with pytest.raises(UserError, match='not overwritten'):
         working_folder(out, True, False, ['summary.json']).__enter__()
     assert (out / foreign).exists()
 
@@ -217,22 +219,3 @@ def test_a_working_folder_goes_on_or_starts_anew(tmp_path):
     with pytest.raises(UserError, match=r'notes\.md'):
         fill(True, False)
     assert set(contents(run)) == {'.work/frames/1.npz', 'notes.md'}
-
-
-def test_commands_refuse_folders_of_others(tmp_path, refused):
-    """Of every command a folder with files of the kinds that it writes, but not by it."""
-    z = tmp_path / 'z'
-    z.mkdir()
-    for name in ('notes.md', 'summary.json', 'report.json', 'holiday.png', 'x.mcap'):
-        (z / name).write_text('mine')
-    table = tmp_path / 't.csv'
-    table.write_text('slip,normal_load,sinkage\n0.1,100,0.01\n')
-    for command in (
-        ['soilbin', 'rows', '--sweep', 'pull'],
-        ['soilbin', 'run', 'quick'],
-        ['diagnose', str(table)],
-        ['simulate', '--duration', '1'],
-    ):
-        said = refused([*command, '-o', str(z), '--overwrite'])
-        assert 'is not overwritten' in said
-    assert len(contents(z)) == 5

@@ -158,18 +158,6 @@ def test_a_bag_of_some_outputs_gives_those(bag, monkeypatch):
     assert all(d.rms == 0.0 for d in differences)
 
 
-def test_a_reset_clears_the_stuck_warning(tmp_path):
-    path = tmp_path / 'reset'
-    stuck = next(estimates for estimates in sets() if estimates.stuck)
-    with EstimateBagWriter(path, NAMES) as writer:
-        for estimates in (stuck, stuck):
-            writer.write_stuck(False, 0, STAMP)
-            writer.add(estimates, STAMP)
-        writer.write_stuck(False, 0, STAMP)
-    said = [message.data for _, topic, message in messages(path) if topic.endswith('/stuck')]
-    assert said == [False, True, False, True, False]
-
-
 def test_chunks_carry_checksums(make_bag):
     """A bit is turned round. Of the summary: test_a_sound_file_is_read_by_its_index."""
     (file,) = make_bag().glob('*.mcap')

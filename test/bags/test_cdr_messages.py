@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from estimate_sets import some_estimates
 from message_factory import MessageFactory, serialised
 
 from wheel_terra_estimator.messages import pack
@@ -19,7 +18,6 @@ from wheel_terra_estimator.messages.unpack import (
     IMU,
     JOINT_STATE,
     ODOMETRY,
-    TWIST,
     DamagedMessageError,
     Message,
     unpack,
@@ -139,13 +137,6 @@ def test_messages_that_rclpy_serialised_are_read(lists):
             assert numbers.tolist() == (values if name in lists else [])
 
 
-def test_a_stamped_twist(factory):
-    twist = factory.twist_with_covariance(0.3, -0.1, [float(i) for i in range(36)])
-    message = factory.make(TWIST, header=factory.header(START), twist=twist)
-    data = bytes(factory.store.serialize_cdr(message, TWIST))
-    assert shown(unpack(TWIST, data)) == shown(with_rosbags(factory.store, TWIST, data))
-
-
 @pytest.mark.parametrize('names', [(), ('left', 'right'), ('a', 'ab', 'abc', 'abcd', 'ü')])
 def test_packed_messages_are_the_bytes_of_rosbags(names, factory):
     dice = random.Random(7)
@@ -188,16 +179,3 @@ def test_warnings_and_diagnostics_are_packed_as_rosbags_packs_them(factory):
     for some in ([], statuses[:1], statuses):
         theirs = factory.diagnostic_array(factory.header(START), some)
         assert pack.diagnostic_array(START, some) == serialised(theirs)
-
-
-def test_a_set_is_packed_for_the_topics_that_are_wanted(factory):
-    estimates, names = some_estimates(), ('left', 'right')
-    whole = dict(pack.pack(estimates, names))
-    assert whole.keys() == {*pack.SET_TOPICS} - {'slip_on_slope'}  # not due
-    assert list(whole)[:2] == ['slip', 'slip_class']
-    some = {'twist', 'slip_class', 'mobility', 'slip_on_slope'}
-    assert dict(pack.pack(estimates, names, some)) == {t: whole[t] for t in some & whole.keys()}
-    read = factory.store.deserialize_cdr(whole['slip_class'], 'std_msgs/msg/UInt8MultiArray')
-    assert read.data.tolist() == estimates.slip_class.tolist()
-    (twist,) = unpack(TWIST, whole['twist']).numbers
-    assert (twist[0], twist[5]) == (estimates.forward_velocity, estimates.yaw_rate)

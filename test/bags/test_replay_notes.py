@@ -4,7 +4,6 @@
 
 import csv
 import json
-import tracemalloc
 from collections import Counter
 from dataclasses import replace
 from typing import Any
@@ -183,11 +182,6 @@ def test_true_slip_of_steered_wheels_is_along_their_headings(make_bag, rover, dr
     np.testing.assert_allclose(truth.slip.value, np.full((40, 2), expected), atol=1e-12)
 
 
-def test_no_truth_in_a_bag_without(make_bag, rover):
-    with open_bag(make_bag()) as bag:
-        assert read_truth(bag, {}, rover) is None
-
-
 @pytest.mark.shared
 def test_true_slip_of_a_measured_drive_is_that_of_its_table(shared):
     """The table has wheel speeds and the speed of each side, of the author's own making."""
@@ -261,16 +255,3 @@ def test_figures_of_a_thinned_drive_are_those_of_all_sets():
         assert wheel.max_sinkage == sinkages[:, i].max()
         assert wheel.mean_pull == pytest.approx(pulls[known, i].mean())
         assert wheel.seconds['high'] == pytest.approx(0.05 * (classes[:-1, i] == 2).sum())
-
-
-def test_memory_of_a_recorder_does_not_grow():
-    names = tuple(f'w{i}' for i in range(estimate_set().slip.size))
-    recorder = HistoryRecorder(names, 25)
-    sizes = []
-    tracemalloc.start()
-    for number, each in enumerate(sets(300), start=1):
-        recorder.add(each)
-        if number in (50, 300):
-            sizes.append(tracemalloc.get_traced_memory()[0])
-    tracemalloc.stop()
-    assert sizes[1] < sizes[0] + 50_000

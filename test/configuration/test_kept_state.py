@@ -17,12 +17,6 @@ def read(folder, text):
     return soil_file.read_state(path)
 
 
-def test_what_was_written_comes_back(tmp_path):
-    state = StuckState(True, 'wheels dig in', 1_700_000_000_123_456_789, -1)
-    soil_file.write_state(tmp_path / 'soil.yaml', state)
-    assert soil_file.read_state(tmp_path / 'soil.yaml') == state
-
-
 @pytest.mark.parametrize('direction', ['1', 'Infinity', '7', '{}', None])
 def test_a_warning_stands_though_its_stamp_or_direction_is_none(tmp_path, direction):
     more = '' if direction is None else f', "direction": {direction}'

@@ -5,7 +5,6 @@
 import copy
 import math
 import pickle
-import re
 import warnings
 from array import array
 from pathlib import Path
@@ -438,10 +437,3 @@ def test_the_bogie_pivot_lies_between_its_wheels(end, pivot, words):
 def test_the_page_is_current():
     page = documentation.PAGE.read_text(encoding='utf-8')
     assert page == documentation.page(), 'run python tools/document_parameters.py'
-
-
-def test_every_parameter_is_on_the_page_once():
-    rows = re.findall(r'^- ((?:`[\w.]+`(?:, )?)+) \(', documentation.page(), re.MULTILINE)
-    told = [key for row in rows for key in re.findall(r'`([\w.]+)`', row)]
-    # Those of effects have a page of their own.
-    assert sorted(told) == sorted(key for key in declared() if not key.startswith('effects.'))

@@ -179,14 +179,6 @@ def test_a_fault_seen_again_is_one_fault_with_its_latest_count():
         assert bool(diagnostics.new_faults) is (i == 0)
 
 
-def test_two_faults_of_a_topic_are_both_told():
-    both = [('odom', 'no message for 2.1 s'), ('odom', f'7 {LOST}')]
-    assert (
-        Diagnostics(NAMES, faults=once(both)).due(at(0.0))[0].message
-        == f'odom: no message for 2.1 s; odom: 7 {LOST}'
-    )
-
-
 TOPIC = 'joint_states'
 
 

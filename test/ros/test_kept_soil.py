@@ -15,7 +15,7 @@ from wheel_terra_estimator import output_folder
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import HEADER, KeptSoil, StuckState, write_values
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.ros.arrival_log import ArrivalLog, why_no_arrival_log
+from wheel_terra_estimator.ros.arrival_log import ArrivalLog
 
 LEARNED = {'soil.cohesion': 400.0, 'soil.cohesion_std': 100.0}
 STUCK = StuckState(True, 'wheels dig in', 90, 1)
@@ -172,9 +172,10 @@ def test_a_node_writes_to_no_file_that_it_reads(listener, parameters, name):
 
 def test_an_arrival_log_replaces_nothing_but_an_arrival_log(tmp_path):
     log = write(tmp_path / 'arrival.txt', 'imu/data 1700000000000000000\nreset\n')
-    assert not why_no_arrival_log(log)
+    ArrivalLog(str(log), (), print).close()
     for content in ('years of work\n', 'imu/data\n', b'\xff' * 1000):
-        assert why_no_arrival_log(write(log, content))
+        with pytest.raises(UserError, match='is no arrival log'):
+            ArrivalLog(str(write(log, content)), (), print)
 
 
 def test_a_full_disk_ends_the_arrival_log_alone(tmp_path):

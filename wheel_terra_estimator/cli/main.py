@@ -70,7 +70,7 @@ DEBUG_HELP = 'show the traceback of an error'
 
 def sub_parsers() -> dict[str, Parser]:
     """Return sub-command -> its parser."""
-    return _parsers(_commands_here())[1]
+    return _parsers(COMMANDS)[1]
 
 
 def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, Parser]]:
@@ -128,17 +128,6 @@ def _laboratory() -> dict[str, Any]:
     from importlib.metadata import entry_points  # 30 ms that most commands do without
 
     return {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
-
-
-def _commands_here() -> Container[str]:
-    """Return the sub-commands whose modules are installed."""
-    here = set(COMMANDS)
-    for name in LABORATORY:
-        try:
-            command_module(name)
-        except UserError:
-            here.discard(name)
-    return here
 
 
 def main(argv: Sequence[str] | None = None) -> int:

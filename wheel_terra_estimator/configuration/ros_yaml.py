@@ -235,13 +235,7 @@ def format_value(value: Value) -> str:
     if isinstance(value, str):
         escaped = ''.join(_ESCAPES.get(character, character) for character in value)
         return f'"{escaped}"'
-    if isinstance(value, int):
-        return str(value)
-    if math.isnan(value):
-        return '.nan'
-    if math.isinf(value):
-        return '.inf' if value > 0.0 else '-.inf'
-    return repr(float(value))
+    return str(value) if isinstance(value, int) else repr(float(value))
 
 
 _ESCAPES = {'\\': '\\\\', '"': '\\"', '\n': '\\n', '\t': '\\t', '\r': '\\r'}
