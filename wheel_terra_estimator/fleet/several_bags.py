@@ -55,7 +55,7 @@ class Settings:
 @dataclass(frozen=True)
 class _Task:
     path: Path
-    digest: str
+    digests: Mapping[str, str]  # of the recording and of the settings, as the marker has them
     folder: str
 
 
@@ -127,7 +127,7 @@ def _tasks(
             continue
         name = _free_name(paths[i], taken)
         taken.add(name)
-        tasks[i] = _Task(paths[i], digest, name)
+        tasks[i] = _Task(paths[i], {'digest': digest, 'settings': own}, name)
     mark(output, [f'{task.folder}/' for task in tasks.values()])
     return tasks
 
@@ -192,8 +192,7 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
     drive.write({kind: output / name for kind, name in settings.files.items()}, overwrite=True)
     row = DriveRow.from_drive(str(task.path), drive.summary, drive.checked)
     row = replace(row, folder=task.folder)
-    made_with = _digest_of_settings(settings)
-    mark(output, [], {'digest': task.digest, 'settings': made_with, 'row': asdict(row)})
+    mark(output, [], {**task.digests, 'row': asdict(row)})
     return row
 
 

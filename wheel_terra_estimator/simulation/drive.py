@@ -13,14 +13,12 @@ import numpy as np
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.simulation.drives import Command, Drives
-from wheel_terra_estimator.simulation.plant import RoverPlant
+from wheel_terra_estimator.simulation.plant import LONGEST_STEP, RoverPlant
 from wheel_terra_estimator.simulation.scenario import SENSOR_FAULTS, WHEEL_FAULTS, Fault, Scenario
 from wheel_terra_estimator.simulation.sensors import START, Arrival, SensorSuite
 from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Ground, Patch, Terrain
 from wheel_terra_estimator.simulation.truth import Truth, TruthTable
 
-LONGEST_STEP = 0.05
-"""Longest step of a drive [s]; it divides the period of the wheel odometry."""
 DEFAULT_TORQUE_RATIO = 1.5
 """Torque limit over mean load times radius, where neither rover nor scenario states one."""
 
