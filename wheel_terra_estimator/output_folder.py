@@ -104,12 +104,12 @@ def try_to_write(path: Path) -> None:
 
 
 @contextmanager
-def new_folder(path: Path, overwrite: bool = False, inputs: Iterable[Path] = ()) -> Iterator[Path]:
+def new_folder(path: Path, overwrite: bool = False) -> Iterator[Path]:
     """Yield an empty folder to be filled; at the end of the block it is at ``path``.
 
     Raises UserError as `check_target`, and where the disk is full or fails.
     """
-    check_target(path, overwrite, inputs, folder=True)
+    check_target(path, overwrite, folder=True)
     path = _absolute(path)
     try:
         with _beside(path) as beside:
@@ -161,11 +161,7 @@ def _beside(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def working_folder(
-    path: Path,
-    overwrite: bool,
-    resume: bool,
-    entries: Iterable[str],
-    inputs: Iterable[Path] = (),
+    path: Path, overwrite: bool, resume: bool, entries: Iterable[str]
 ) -> Iterator[None]:
     """Make a folder that a command fills in place in the block, so that it can be resumed.
 
@@ -180,7 +176,7 @@ def working_folder(
     if earlier:
         _remove_leftovers(path)
     if resume and path.exists():
-        _refuse_place(path, inputs)
+        _refuse_place(path)
         if not earlier and not (path.is_dir() and not any(path.iterdir())):
             raise UserError(
                 f'{path}: exists and holds nothing that this command can resume; choose '
@@ -189,7 +185,7 @@ def working_folder(
     elif path.exists() and not overwrite:
         raise UserError(f'{path}: exists already; --resume continues it, --overwrite replaces it')
     else:
-        check_folder(path, overwrite, inputs)
+        check_folder(path, overwrite)
     path = _absolute(path)
     try:
         if path.exists() and not resume:
@@ -299,7 +295,7 @@ def _resolved(path: Path) -> Path:
         raise UserError(f'{path}: cannot be followed ({error}); choose another path') from None
 
 
-def _refuse_place(path: Path, inputs: Iterable[Path]) -> None:
+def _refuse_place(path: Path, inputs: Iterable[Path] = ()) -> None:
     """Refuse places that no command may replace, whatever they hold."""
     if path.is_symlink():
         raise UserError(f'{path}: is a link; name what it leads to, or choose another path')

@@ -7,7 +7,7 @@ from __future__ import annotations
 import mmap
 import os
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
@@ -36,21 +36,18 @@ class BagFile:
         # Topics offered as transient local with depth 1; all others are volatile with depth 10
         latched: Collection[str] = (),
         overwrite: bool = False,
-        # The recording that is read meanwhile: the bag is never written into it or over it
-        inputs: Iterable[Path] = (),
     ) -> None:
         self.path = path
         self.counts: Counter[str] = Counter()  # messages written, by topic
         self._topics = dict(topics)
         self._latched = latched
         self._overwrite = overwrite
-        self._inputs = tuple(inputs)
         self._stack = ExitStack()
 
     def __enter__(self: Self) -> Self:
         from rosbags.rosbag2 import StoragePlugin, Writer
 
-        folder = self._stack.enter_context(new_folder(self.path, self._overwrite, self._inputs))
+        folder = self._stack.enter_context(new_folder(self.path, self._overwrite))
         folder.rmdir()  # the library makes it
         self._writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
         self._writer.open()

@@ -113,11 +113,8 @@ def replay(
     with ExitStack() as stack:
         writer = None
         if output is not None:
-            inputs = (bag.path, *([arrival] if arrival else []))
             writer = stack.enter_context(
-                EstimateBagWriter(
-                    output, pipeline.names, options.overwrite, pipeline.diagnostics, inputs
-                )
+                EstimateBagWriter(output, pipeline.names, options.overwrite, pipeline.diagnostics)
             )
             writer.state_origin(configuration, bag.path.resolve().name)
         interrupted = stack.enter_context(_until_interrupted())

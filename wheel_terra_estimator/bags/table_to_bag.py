@@ -85,7 +85,7 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
         used = [name for name, those in zip(_TOPICS, there, strict=True) if those]
         topics = {f'/{name}': INPUT_TYPES[name] for name in used}
         held = _held(table, layout)
-        with BagFile(output, topics, overwrite=overwrite, inputs=[table, columns]) as bag:
+        with BagFile(output, topics, overwrite=overwrite) as bag:
             sender = _Sender(bag, layout, file, held)
             for line, row in file.rows:
                 sender.send(line, row)

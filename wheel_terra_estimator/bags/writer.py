@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from wheel_terra_estimator import __version__
@@ -34,8 +34,8 @@ _VERSION, _SETTINGS, _RECORDING = (
 class EstimateBagWriter(BagFile):
     """Writes estimates as the node would publish them; a context manager that always closes.
 
-    ``statuses``: knows the counters and faults behind the estimates. ``inputs``: see `BagFile`.
-    Raises UserError where the path is taken or cannot be written.
+    ``statuses``: knows the counters and faults behind the estimates. Raises UserError where the
+    path is taken or cannot be written.
     """
 
     def __init__(
@@ -44,9 +44,8 @@ class EstimateBagWriter(BagFile):
         names: tuple[str, ...],
         overwrite: bool = False,
         statuses: diagnostics.Diagnostics | None = None,
-        inputs: Iterable[Path] = (),
     ) -> None:
-        super().__init__(path, TOPICS, latched=LATCHED, overwrite=overwrite, inputs=inputs)
+        super().__init__(path, TOPICS, latched=LATCHED, overwrite=overwrite)
         self._names = names
         self._diagnostics = statuses or diagnostics.Diagnostics(names)
         self._stuck: tuple[bool, int] | None = None

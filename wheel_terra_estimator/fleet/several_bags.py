@@ -70,7 +70,7 @@ def replay_bags(
     error.
     """
     entries = SUMMARY_TABLE, SUMMARY_PAGE
-    with working_folder(settings.output, overwrite, not overwrite, entries, bags):
+    with working_folder(settings.output, overwrite, not overwrite, entries):
         settings = replace(settings, output=settings.output.absolute())
         return _replay_into(settings, bags, jobs, scheduler)
 
