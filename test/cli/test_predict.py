@@ -99,6 +99,7 @@ def test_picture_and_the_refusal_to_overwrite(tmp_path, refused):
         (['--noise', '0.001'], '--noise'),
         (['--noise', '0.001,1'], '--noise'),
         (['--noise=0.001,-1,0.1'], '--noise'),
+        (['--noise', 'nan,1,0.1'], '--noise'),
         (['--noise', 'a,b,c'], '--noise'),
     ],
 )

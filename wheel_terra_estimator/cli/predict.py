@@ -191,7 +191,8 @@ def _measured(columns: dict[str, FloatArray], text: str, seed: int) -> dict[str,
     """Return the columns with noise, and the standard deviation of each reading."""
     deviations = _numbers('--noise', text)
     names = [name for name in (*OUTPUTS, SIDEWAYS) if name in columns][: deviations.size]
-    if len(names) not in (3, 4) or len(names) != deviations.size or (deviations < 0.0).any():
+    sound = ((deviations >= 0.0) & (deviations < np.inf)).all()
+    if len(names) not in (3, 4) or len(names) != deviations.size or not sound:
         raise UserError(
             f'--noise {text}: give three standard deviations, none below 0: sinkage [m], drawbar '
             'pull [N], torque [N m]; with slip angles also lateral force [N]'
