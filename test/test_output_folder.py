@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Output folders are whole or not there, and nobody else's file is ever removed."""
 
-import errno
-import json
 from pathlib import Path
 
 import pytest
@@ -32,16 +30,6 @@ def contents(folder: Path) -> dict[str, str]:
         for p in folder.rglob('*')
         if p.is_file() and p.name != MARKER
     }
-
-
-def test_folder_is_there_when_it_is_whole_and_lists_what_it_holds(tmp_path):
-    out = tmp_path / 'new' / 'out'
-    with new_folder(out) as folder:
-        (folder / 'a.txt').write_text('a')
-        assert not out.exists()
-        assert folder.name == 'out'
-    assert json.loads((out / MARKER).read_text())['files'] == ['a.txt']
-    assert [p.name for p in out.parent.iterdir()] == ['out']
 
 
 def test_overwrite_replaces_what_was_listed_and_nothing_else(tmp_path):
@@ -128,18 +116,6 @@ def test_places_that_no_command_replaces(tmp_path, monkeypatch):
             assert '\n' not in str(caught.value)
 
 
-def test_an_error_leaves_the_earlier_output_and_nothing_beside_it(tmp_path):
-    out = tmp_path / 'out'
-    write(out, content='old')
-    for error, seen in ((OSError(errno.ENOSPC, 'No space left on device'), UserError),
-                        (KeyboardInterrupt(), KeyboardInterrupt)):  # fmt: skip
-        with pytest.raises(seen), new_folder(out, True) as folder:
-            (folder / 'half').write_text('half')
-            raise error
-        assert contents(out) == {'report.json': 'old', 'below/picture.png': 'old'}
-        assert [p.name for p in tmp_path.iterdir()] == ['out']
-
-
 def test_a_file_is_replaced_only_when_told_so(tmp_path):
     report = tmp_path / 'r.html'
     report.write_text('old')
@@ -163,15 +139,6 @@ def test_a_file_is_replaced_only_when_told_so(tmp_path):
         with pytest.raises(UserError, match=words):
             check_file(path, True, [report])
     assert [p.name for p in sorted(tmp_path.iterdir())] == ['link.html', 'r.html']
-
-
-def test_a_report_in_an_output_folder_is_listed(tmp_path):
-    out = tmp_path / 'out'
-    write(out)
-    with new_file(out / 'r.html') as path:
-        path.write_text('page')
-    write(out, overwrite=True)
-    assert set(contents(out)) == {'report.json', 'below/picture.png'}
 
 
 def test_only_leftovers_of_what_a_folder_lists_are_removed(tmp_path):

@@ -5,7 +5,6 @@
 import random
 import shutil
 import sqlite3
-import struct
 from collections import Counter
 from pathlib import Path
 
@@ -53,17 +52,6 @@ def executed(path: Path, *statements: str) -> None:
         for statement in statements:
             connection.execute(statement)
     connection.close()
-
-
-def test_rows_behind_damaged_pages_are_read(tmp_path):
-    path, whole = big(tmp_path)
-    assert contents(path) == (whole, [])
-    zeroed(path, path.read_bytes().index(struct.pack('<Q', 2000) * 8) // PAGE * PAGE, 2 * PAGE)
-    found, notes = contents(path)
-    assert not Counter(found) - Counter(whole)
-    assert len(found) > len(whole) - 200
-    assert 'is damaged' in notes[0]
-    assert 'from 19.' in notes[0] or 'from 20.' in notes[0]
 
 
 def test_a_damaged_row_number_hides_no_row_behind(tmp_path):
