@@ -76,7 +76,7 @@ def test_steering_angles_and_orientation_of_the_example_reach_the_measurements(
         complete=False,
     )
     with open_bag(tmp_path / 'bag') as bag:
-        measured = [m for _, m in MeasurementReader(bag, {}, rover).measurements()]
+        measured = list(MeasurementReader(bag, {}, rover).measurements())
     odometry = [m for m in measured if isinstance(m, WheelOdometry)]
     assert odometry[0].steering[0] == pytest.approx(math.radians(-30.0))
     assert math.isnan(odometry[0].steering[1])

@@ -80,12 +80,12 @@ class MeasurementReader:
         """Number of messages on the used topics."""
         return sum(self.bag.topics[topic].message_count for topic in self.topics.values())
 
-    def measurements(self) -> Iterator[tuple[int, Measurement]]:
-        """Yield (log time [ns], measurement) in the order of log times."""
-        for log_time, name, message in self.messages():
+    def measurements(self) -> Iterator[Measurement]:
+        """Yield the measurements in the order of log times."""
+        for _, name, message in self.messages():
             measurement = self.converter.convert(name, message)
             if measurement is not None:
-                yield log_time, measurement
+                yield measurement
 
     def messages(self) -> Iterator[tuple[int, str, Message]]:
         """Yield (log time [ns], estimator's topic, message); what cannot be unpacked is counted."""

@@ -123,7 +123,7 @@ def _slip_from_velocity(
 ) -> WheelTruth:
     wheels = configuration.wheels
     rates, yaw_rates, angles = ThinnedRows(), ThinnedRows(), ThinnedRows()
-    for _, measurement in reader.measurements():
+    for measurement in reader.measurements():
         if isinstance(measurement, WheelOdometry):
             rates.add(measurement.stamp, measurement.rate)
             if measurement.steering is not None:

@@ -188,8 +188,7 @@ def measurements_of(
     from wheel_terra_estimator.bags.storage import open_bag
 
     with open_bag(bag) as opened:
-        for _, measurement in MeasurementReader(opened, remaps, configuration).measurements():
-            yield measurement
+        yield from MeasurementReader(opened, remaps, configuration).measurements()
 
 
 def pathfinder_record(bag: Path, reference_rate: float) -> Record:

@@ -125,8 +125,7 @@ def rows_from_bag(
     from wheel_terra_estimator.bags.storage import open_bag
 
     with open_bag(path) as bag:
-        read = MeasurementReader(bag, remaps or {}, configuration).measurements()
-        heard = (item for _, item in read)
+        heard = MeasurementReader(bag, remaps or {}, configuration).measurements()
         rows = rows_from_measurements(heard, configuration, str(path), smooth=smooth)
         return replace(rows, notes=(*bag.notes, *rows.notes))
 
