@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import quad
 from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, state
 
-from wheel_terra_estimator.terramechanics import closed_form, quadrature
+from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.closed_form import branch_moments
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
 from wheel_terra_estimator.terramechanics.load_balance import balance, solve_entrance_angle
@@ -24,20 +24,6 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.reproduction.equivalent_contact import decoupled_pull
 
 MOUND = {**EFFECTS, 'soil_mound': {'kappa': 1.5, 'onset': 0.2}}
-
-
-@pytest.mark.parametrize('angles', [(0.5, 0.25, -0.1), (0.9, 0.3, -0.6), (0.3, 0.15, 0.0)])
-def test_coefficients_are_the_integrals_of_a_triangle(angles):
-    t1, tm, t2 = angles
-
-    def triangle(t: float) -> float:
-        return (t1 - t) / (t1 - tm) if t >= tm else (t - t2) / (tm - t2)
-
-    for ours, weight in zip(
-        closed_form.coefficients(t1, tm, t2), (math.cos, math.sin, lambda t: 1.0), strict=True
-    ):
-        truth = quad(lambda t, w=weight: triangle(t) * w(t), t2, t1, points=[tm])[0]
-        assert ours == pytest.approx(truth, abs=1e-11)
 
 
 def test_decoupled_pull_is_exact_for_triangles():

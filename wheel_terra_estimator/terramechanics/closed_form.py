@@ -254,31 +254,6 @@ class BranchForces:
         return (load / unit) ** (1.0 / (2.0 * n + 1.0))
 
 
-def coefficients(
-    entrance_angle: Quantity, peak_angle: Quantity, leaving_angle: Quantity
-) -> tuple[Quantity, Quantity, Quantity]:
-    """Integrals A, B, C of a unit triangle times cos t, sin t and 1 over the contact.
-
-    A = (cos tm - cos t2)/(tm - t2) + (cos tm - cos t1)/(t1 - tm), B the same with sines,
-    C = (t1 - t2)/2; by parts, exact.
-    """
-    front, rear = entrance_angle - peak_angle, peak_angle - leaving_angle
-    cos_m, sin_m = np.cos(peak_angle), np.sin(peak_angle)
-    a = (cos_m - np.cos(leaving_angle)) / rear + (cos_m - np.cos(entrance_angle)) / front
-    b = (sin_m - np.sin(leaving_angle)) / rear + (sin_m - np.sin(entrance_angle)) / front
-    return a, b, 0.5 * (entrance_angle - leaving_angle)
-
-
-def peak_stresses(contact: Contact, terms: Terms) -> tuple[Quantity, Quantity]:
-    """Normal and shear stress at the peak angle, effects included [Pa]."""
-    peak = contact.peak_angle
-    contact.angle = peak
-    contact.normal_stress = stresses.front_stress(contact, peak)
-    terms.apply('on_normal_stress', contact)
-    sigma = contact.normal_stress
-    return sigma, stresses.shear_stress(contact, peak, sigma)
-
-
 def forces(contact: Contact, terms: Terms) -> tuple[Quantity, Quantity, Quantity]:
     """Load [N], pull [N] and torque [N m] from branch moments, angles given.
 

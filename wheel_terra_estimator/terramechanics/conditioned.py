@@ -1,10 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Torque and pull of wheels whose sinkage is known: what the on-board filter evaluates.
+"""Forces of wheels whose sinkage is known: what the on-board filter evaluates.
 
-With the sinkage given, the load balance fixes the stresses, and no bearing parameter is needed;
-this holds also while the sinkage still settles. All wheels of a rover, and all finite steps that a
-derivative takes, are one call.
+With the sinkage given, the load balance fixes the stresses that torque and pull follow from, and no
+bearing parameter is needed; this holds also while the sinkage still settles. The bearing law says
+which load the soil would carry there. All wheels of a rover, and all finite steps that a derivative
+takes, are one call.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, Quantity
+from wheel_terra_estimator.terramechanics import closed_form
 from wheel_terra_estimator.terramechanics.checks import check_range
-from wheel_terra_estimator.terramechanics.closed_form import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, check_settings
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
@@ -66,8 +67,15 @@ class ConditionedInputs(NamedTuple):
     direction: Quantity = 1.0  # +1 or -1
 
 
+class Bearing(NamedTuple):
+    """Result of the bearing law at a sinkage, (..., n) each."""
+
+    load: FloatArray  # that the soil carries [N]; not positive where the shear lifts the wheel out
+    exponent: FloatArray  # N
+
+
 class ConditionedForces:
-    """Torque and pull given slip, sinkage and load."""
+    """Torque and pull given slip, sinkage and load; load given slip and sinkage."""
 
     def __init__(
         self,
@@ -114,17 +122,36 @@ class ConditionedForces:
     def forces(self, inputs: ConditionedInputs) -> tuple[FloatArray, FloatArray]:
         """Return torque [N m] and pull [N] of all wheels, positive forward, (..., n) each."""
         inputs = _within_the_model(inputs)
-        contact, angle = self._contact(inputs)
-        set_angles(contact, angle, inputs.leaving_angle, self._terms)
-        form = BranchForces(contact, contact.peak_angle / angle, contact.leaving_angle / angle)
+        contact = self._contact(inputs, self._as_built)
+        angle = contact.entrance_angle
+        form = closed_form.BranchForces(
+            contact, contact.peak_angle / angle, contact.leaving_angle / angle
+        )
         pull, torque = form.balanced(angle, contact.normal_load, inputs.centroid_shift)
         contact.torque, contact.drawbar_pull = contact.direction * torque, contact.direction * pull
         self._on_forces.apply('on_outputs', contact)
         return np.asarray(contact.torque), np.asarray(contact.drawbar_pull)
 
-    def _contact(self, inputs: ConditionedInputs) -> tuple[Contact, FloatArray]:
-        """Return the contacts with the terms on inputs done, and their entrance angles [rad]."""
-        contact = copy(self._as_built)
+    def bearing(
+        self,
+        inputs: ConditionedInputs,
+        modulus_factor: Quantity = 1.0,  # on the bearing modulus [-]
+        exponent_change: Quantity = 0.0,  # added to the sinkage exponent [-]
+    ) -> Bearing:
+        """Return the load that the bearing law carries at the sinkages, whatever the load is.
+
+        The centroid shift has no part in it.
+        """
+        as_built = copy(self._as_built)
+        as_built.bearing_modulus = as_built.bearing_modulus * modulus_factor
+        as_built.sinkage_exponent = as_built.sinkage_exponent + exponent_change
+        contact = self._contact(_within_the_model(inputs), as_built)
+        load, _, _ = closed_form.forces(contact, self._terms)
+        return Bearing(np.asarray(load), np.asarray(contact.sinkage_exponent))
+
+    def _contact(self, inputs: ConditionedInputs, as_built: Contact) -> Contact:
+        """Return the contacts with the terms on inputs done and their angles known."""
+        contact = copy(as_built)
         contact.slip = slip_of_speed_ratio(inputs.speed_ratio)
         contact.velocity_ratio = inputs.speed_ratio * self._slip_radius
         contact.normal_load = contact.stated_load = inputs.normal_load
@@ -137,7 +164,8 @@ class ConditionedForces:
         self._on_sinkage.apply('on_outputs', contact)
         depth = (inputs.sinkage - contact.sinkage) * self._depth_of_reading
         cosine = np.maximum(np.minimum(1.0 - depth / contact.radius, _LARGEST_COSINE), 0.0)
-        return contact, np.arccos(cosine)
+        set_angles(contact, np.arccos(cosine), inputs.leaving_angle, self._terms)
+        return contact
 
 
 def _within_the_model(inputs: ConditionedInputs) -> ConditionedInputs:

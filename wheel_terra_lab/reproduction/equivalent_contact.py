@@ -9,7 +9,7 @@ is higher than the ground) the form holds up to a slip of 0.9, where angles with
 Guo, Ding et al., High-slip wheel-terrain contact modelling for grouser-wheeled planetary rovers
 traversing on sandy terrains, Mech. Mach. Theory: equivalent radius, angles and the three
 coefficients k1, k2, k3. Their formulas are not public; these are derived here from the words of the
-paper, with A, B, C of ``closed_form.coefficients`` for the three coefficients.
+paper, with `coefficients` for the three coefficients.
 """
 
 from __future__ import annotations
@@ -20,9 +20,21 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.checks import check_range
-from wheel_terra_estimator.terramechanics.closed_form import coefficients
 
 _LUG_SHARE = 0.5  # of the lug height in the radius, lambda [-]
+
+
+def coefficients(entrance_angle: Any, peak_angle: Any, leaving_angle: Any) -> tuple[Any, Any, Any]:
+    """Integrals A, B, C of a unit triangle times cos t, sin t and 1 over the contact.
+
+    A = (cos tm - cos t2)/(tm - t2) + (cos tm - cos t1)/(t1 - tm), B the same with sines,
+    C = (t1 - t2)/2; by parts, exact.
+    """
+    front, rear = entrance_angle - peak_angle, peak_angle - leaving_angle
+    cos_m, sin_m = np.cos(peak_angle), np.sin(peak_angle)
+    a = (cos_m - np.cos(leaving_angle)) / rear + (cos_m - np.cos(entrance_angle)) / front
+    b = (sin_m - np.sin(leaving_angle)) / rear + (sin_m - np.sin(entrance_angle)) / front
+    return a, b, 0.5 * (entrance_angle - leaving_angle)
 
 
 def decoupled_pull(

@@ -21,11 +21,10 @@ from wheel_terra_estimator.estimation.contacts.wheel_models import (
     LEAST_BEARING,
     LEAST_SINKAGE,
     MOST_RATIO,
-    Bearing,
     WheelModels,
     WheelStates,
 )
-from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE
+from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE, Bearing
 from wheel_terra_estimator.terramechanics.contact_law import (
     PER_CUBIC_METRE,
     RESISTIVE_FORCE,
@@ -126,7 +125,7 @@ class ResistiveForceModels(WheelModels):
         softer = states.slip_sinkage * np.abs(slip_of_speed_ratio(states.speed_ratio))
         # As in a law with the exponent 1, to which slip adds.
         factor = self._unit * np.exp(states.stiffness) * depth**softer
-        return Bearing(factor * rim.lift, *np.broadcast_arrays(1.0 + softer, np.log(depth)))
+        return Bearing(factor * rim.lift, 1.0 + softer)
 
     def _rim_forces(self, states: WheelStates) -> RimForces:
         within = np.minimum(np.maximum(states.speed_ratio, 0.0), MOST_RATIO)

@@ -12,38 +12,31 @@
 from __future__ import annotations
 
 import math
-from copy import copy
 from typing import NamedTuple, cast
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, Quantity
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.terramechanics.closed_form import coefficients, peak_stresses
 from wheel_terra_estimator.terramechanics.conditioned import (
-    SMALLEST_ANGLE,
+    Bearing,
     ConditionedForces,
     ConditionedInputs,
-    contacts_as_built,
 )
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 
 # Effects of a table or of an instrument that the filter must not apply: loads are terrain-normal
 # already, and the pull comes from specific force, not from an attitude.
 _NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias', 'pull_zero', 'pull_gain'})
-LEAST_BEARING = 0.05  # vertical force over that of the normal stress alone, at least [-]
+LEAST_BEARING = 0.05  # load that the soil carries over that of the wheel, at least [-]
 MOST_RATIO = 3.0
 """v/(r w) beyond which the shear is saturated, so that torque and pull stay the same [-]."""
 LEAST_SINKAGE = 1e-4  # [m]
-_MOST_SINKAGE = 0.95  # of the radius: the bearing law ends at the hub
-_LEAST_DEPTH = 1e-6  # at the angle of greatest stress [m]
 _USUAL_MOUND = 0.05
 """Rearward shift of the stresses at slip 1 by soil that piles up behind a wheel, where no effect
 states it, over the entrance angle [-]; tuned on simulated drives, seeds 1000 to 1019."""
-_LEAST_MODULUS = 1.0  # bearing modulus [N/m^(n+2)]
 
 
 class WheelStates(NamedTuple):
@@ -87,14 +80,6 @@ STRENGTH = STEPPED.index('strength')
 """Row of the strength in the derivatives."""
 
 
-class Bearing(NamedTuple):
-    """Result of the bearing law at a sinkage, (..., n) each."""
-
-    load: FloatArray  # that it carries [N]
-    exponent: FloatArray  # N
-    log_depth: FloatArray  # ln of the depth at the peak stress over the reference depth
-
-
 class WheelModels:
     """Contact models of all wheels of a rover on a soil, with the effects of `contact_models`."""
 
@@ -105,7 +90,6 @@ class WheelModels:
         self._forces = ConditionedForces(
             wheels.wheel, soil, effects, configuration.slip_radius, gravity
         )
-        self._terms = Terms(effects)
         self._cohesion = float(soil.cohesion)
         self._tan_friction = math.tan(float(soil.friction_angle))
         self._shear_modulus = float(soil.shear_modulus)
@@ -115,9 +99,6 @@ class WheelModels:
         self._passes = np.array(wheels.passes, float)
         self._slip_radius = np.array(wheels.slip_radius, float)
         self._radius = np.array(wheels.radius, float)
-        self._contacts = contacts_as_built(wheels.wheel, soil, gravity)
-        self._contacts.pass_number, self._contacts.direction = self._passes, 1.0
-        self._modulus = np.maximum(self._contacts.bearing_modulus, _LEAST_MODULUS)
 
     def forces(self, states: WheelStates) -> WheelForces:
         """Return torque and pull of all wheels with their derivatives, at states of (n,) entries.
@@ -139,22 +120,23 @@ class WheelModels:
     def torque_and_pull(self, states: WheelStates) -> tuple[FloatArray, FloatArray]:
         """Return torques [N m] and pulls [N] alone, (..., n) each."""
         ratio = np.minimum(np.maximum(states.speed_ratio, 0.0), MOST_RATIO)
+        return self._forces.forces(self._inputs(states, self._shift(states, ratio)))
+
+    def _inputs(self, states: WheelStates, shift: Quantity) -> ConditionedInputs:
+        """Return what the models take; `shift` is that of the stress centroid [rad]."""
         factor = np.exp(states.strength)
-        torque, pull = self._forces.forces(
-            ConditionedInputs(
-                ratio,
-                states.sinkage,
-                states.load,
-                self._cohesion * factor,
-                self._tan_friction * factor,
-                self._shear_modulus * np.exp(states.shear_modulus),
-                self._shift(states, ratio),
-                leaving_angle=states.leaving_angle,
-                rim_speed=states.rim_speed,
-                pass_number=self._passes,
-            )
+        return ConditionedInputs(
+            np.minimum(states.speed_ratio, MOST_RATIO),
+            states.sinkage,
+            states.load,
+            self._cohesion * factor,
+            self._tan_friction * factor,
+            self._shear_modulus * np.exp(states.shear_modulus),
+            shift,
+            leaving_angle=states.leaving_angle,
+            rim_speed=states.rim_speed,
+            pass_number=self._passes,
         )
-        return torque, pull
 
     def _shift(self, states: WheelStates, ratio: FloatArray) -> FloatArray:
         """Return the rotation of the stresses by centroid and mound [rad]."""
@@ -172,27 +154,10 @@ class WheelModels:
 
         Centroid and rim speed have no part in it.
         """
-        c, factor = copy(self._contacts), np.exp(states.strength)
-        c.slip = slip = slip_of_speed_ratio(states.speed_ratio)
-        ratio = np.minimum(np.maximum(states.speed_ratio, 0.0), MOST_RATIO)
-        c.velocity_ratio = ratio * self._slip_radius
-        c.normal_load = c.stated_load = states.load
-        c.rim_speed = math.nan
-        c.sinkage_exponent = c.sinkage_exponent + states.slip_sinkage * np.abs(slip)
-        c.bearing_modulus = self._modulus * np.exp(states.stiffness)
-        c.cohesion, c.tan_friction = self._cohesion * factor, self._tan_friction * factor
-        c.shear_modulus = self._shear_modulus * np.exp(states.shear_modulus)
-        self._terms.apply('on_inputs', c)
-        c.sinkage = c.drawbar_pull = c.torque = c.entrance_angle = 0.0 * slip
-        self._terms.apply('on_outputs', c)
-        depth = np.minimum(np.maximum(states.sinkage - c.sinkage, 0.0), _MOST_SINKAGE * c.radius)
-        entrance = np.maximum(np.arccos(1.0 - depth / c.radius), 10.0 * SMALLEST_ANGLE)
-        set_angles(c, entrance, states.leaving_angle, self._terms)
-        a, b, _ = coefficients(c.entrance_angle, c.peak_angle, c.leaving_angle)
-        sigma, tau = peak_stresses(c, self._terms)
-        peak_depth = c.radius * (np.cos(c.peak_angle) - np.cos(c.entrance_angle))
-        log_depth = np.log(np.maximum(peak_depth, _LEAST_DEPTH) / c.reference_depth)
-        normal = c.width * c.radius * a * sigma
-        carried = normal + c.width * c.shear_radius * b * tau
-        carried = np.maximum(carried, LEAST_BEARING * normal)
-        return Bearing(carried, c.sinkage_exponent, log_depth)
+        slip = slip_of_speed_ratio(states.speed_ratio)
+        bearing = self._forces.bearing(
+            self._inputs(states._replace(rim_speed=math.nan), shift=0.0),
+            np.exp(states.stiffness),
+            states.slip_sinkage * np.abs(slip),
+        )
+        return bearing._replace(load=np.maximum(bearing.load, LEAST_BEARING * states.load))

@@ -36,7 +36,9 @@ _SPIN_TRAVEL = 0.1  # share of the slip velocity that counts as travel over new 
 _SPIN_RELAXATION = 0.3  # share of it that counts for the relaxation [-]
 _LEAST_CONTACT = 0.02  # length of a contact [m]
 _LEAST_SINKAGE = 5e-4  # [m], for contact length and the step on log sinkage
-_RATIO_STEP = 0.02  # of v / rim speed, for the derivative of the bearing law
+_STEP = -0.02
+"""Finite step of v / rim speed and of n1, for the derivatives of the bearing law [-]."""
+_STEPS = _STEP * np.eye(2, 3, 1)[:, :, None]
 _PRESSURE_POWER = 0.5
 """Load goes with z^(N + 1/2): pressure with z^N, length of the contact with its root."""
 _LONGEST_STEP = 0.7  # change of ln sinkage in one cycle [-]
@@ -128,9 +130,11 @@ class SinkageProcess(Component[SinkageState]):
         length = np.maximum(np.sqrt(2.0 * radius * floored), _LEAST_CONTACT)
         travel = (np.abs(speed) + _SPIN_RELAXATION * np.abs(rim - speed)) * dt
         alpha = -np.expm1(-travel / length)
-        slower = np.array([0.0, _RATIO_STEP])[:, None]
-        carried, exponents, log_depths = self._models.bearing(
-            states._replace(speed_ratio=states.speed_ratio - slower)
+        carried, exponents = self._models.bearing(
+            states._replace(
+                speed_ratio=states.speed_ratio + _STEPS[0],
+                slip_sinkage=states.slip_sinkage + _STEPS[1],
+            )
         )
         # One bounded Newton step on ln load over ln sinkage; the relaxation follows it anyway.
         power = exponents[0] + _PRESSURE_POWER
@@ -138,9 +142,7 @@ class SinkageProcess(Component[SinkageState]):
         growth = np.minimum(np.maximum(growth, -_LONGEST_STEP), _LONGEST_STEP)
         target = floored * np.exp(growth)
         sensitivity = alpha * target / power
-        raw = np.array(
-            [np.log(carried[0] / carried[1]) / _RATIO_STEP, np.abs(slip) * log_depths[0]]
-        )
+        raw = np.log(carried[1:] / carried[0]) / _STEP
         slopes = smoothed_slopes(self.state.slopes, raw)
         spun = np.maximum(slip, 0.0) ** 2 * rim * dt
         unmodelled_std = (self.state.unmodelled_std + _UNMODELLED_DIGGING * spun) * np.exp(
