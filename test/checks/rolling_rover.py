@@ -76,11 +76,21 @@ def ten_minute_drive(turns=True, until=220.0):
 
 def starts_and_curves():
     """Starts and stops for half a minute, then curves, on the level."""
-    time = np.arange(0.0, 70.0, 1.0 / RATE)
     knots = [2, 3, 8, 9, 11, 12, 18, 19, 21, 22, 70]
-    speed = np.interp(time, knots, [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0, 0, 0.3, 0.3])
-    yaw = np.interp(time, [35, 36, 52, 53, 54, 69], [0, 0.3, 0.3, 0, -0.3, -0.3])
-    return Motion(time, speed, yaw, 0.0 * time)
+    speed = knots, [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0, 0, 0.3, 0.3]
+    return motion(70.0, speed, yaw=([35, 36, 52, 53, 54, 69], [0, 0.3, 0.3, 0, -0.3, -0.3]))
+
+
+def motion(until, speed, yaw=0.0, slope=0.0, rate=RATE):
+    """A drive of so many seconds: numbers, (times, numbers between them), or functions of time."""
+    time = np.arange(0.0, until, 1.0 / rate)
+
+    def over(given):
+        if callable(given):
+            return given(time)
+        return np.interp(time, *given) if isinstance(given, tuple) else np.full(time.size, given)
+
+    return Motion(time, over(speed), over(yaw), over(slope))
 
 
 @functools.cache
@@ -91,6 +101,11 @@ def _usual_recording(seed):
 def recording(motion=None, seed=0):
     """All channels of a drive, with honest noise."""
     return _usual_recording(seed) if motion is None else _recorded(motion, seed)
+
+
+def driven(until, speed, **more):
+    """All channels of a drive as `motion` has it."""
+    return recording(motion(until, speed, **more))
 
 
 def changed(whole=None, **channels):

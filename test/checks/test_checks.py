@@ -43,12 +43,9 @@ def test_nothing_is_found_where_nothing_is_wrong(seed):
 @pytest.mark.parametrize('seconds', [0.35, 0.6, 1.5, 3.9, 5.5, 9.0])
 @pytest.mark.parametrize('side', [1.0, -1.0])
 def test_short_recordings_at_100_hz_are_checked_as_far_as_they_go(seconds, side):
-    time = np.arange(0.0, seconds, 0.01)
-    speed = 0.3 * np.minimum(time, 1.0)
-    yaw = np.where(time > 0.5 * seconds, 0.2, 0.0)
-    whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
-    joints = whole.joints
-    joints = replace(joints, rate=side * joints.rate, torque=side * joints.torque)
+    yaw = lambda time: np.where(time > 0.5 * seconds, 0.2, 0.0)  # noqa: E731
+    whole = rolling.driven(seconds, ([0.0, 1.0], [0.0, 0.3]), yaw=yaw, rate=100.0)
+    joints = {'rate': side * whole.joints.rate, 'torque': side * whole.joints.torque}
     report = checked(whole=whole, joints=joints)
     assert report.not_checked
     assert side < 0.0 or not report.findings, [str(f) for f in report.findings]

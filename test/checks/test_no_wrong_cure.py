@@ -48,7 +48,7 @@ def test_turns_are_not_taken_across_a_gap():
     """Nothing tells how a rover turned while its IMU was dead: that is no scale of the gyro."""
     alive = (WHOLE.imu.seconds < 140.0) | (WHOLE.imu.seconds > 160.0)
     recording = replace(WHOLE, imu=rows_of(WHOLE.imu, alive))
-    evidence = gather(recording, from_configuration(rolling.rover()), np.eye(3), {})
+    evidence = gather(recording, from_configuration(rolling.rover()), {})
     turns = turning._turns(evidence, evidence.time)
     assert turns == pytest.approx(turning.HEADING_TIME, rel=0.1)
     assert turns.size < evidence.time.size - evidence.rows_in(turning.HEADING_TIME)
@@ -120,12 +120,10 @@ def test_outliers_of_one_target_leave_the_fits_to_the_others_alone():
 
 def test_to_and_fro_over_the_same_cross_slope_turns_no_imu():
     """Starts forward are all at one place and starts back at another, which leans to the left."""
-    time = np.arange(0.0, 240.0, 1.0 / rolling.RATE)
-    phase = time % 20.0
-    speed = np.interp(phase, [0, 1, 8, 9, 10, 11, 18, 19, 20], [0, 1, 1, 0, 0, -1, -1, 0, 0]) * 0.15
-    motion = rolling.Motion(time, speed, 0.0 * time, 0.0 * time)
+    knots = [0, 1, 8, 9, 10, 11, 18, 19, 20], np.array([0, 1, 1, 0, 0, -1, -1, 0, 0]) * 0.15
+    motion = rolling.motion(240.0, lambda time: np.interp(time % 20.0, *knots))
     whole = rolling.recording(motion)
-    way = np.interp(whole.imu.seconds, time, np.cumsum(speed) / rolling.RATE)
+    way = np.interp(whole.imu.seconds, motion.time, np.cumsum(motion.speed) / rolling.RATE)
     lean = np.column_stack([0.0 * way, 0.35 * way, 0.0 * way])
     assert faults(checked(whole=whole)) == []
     assert faults(checked(whole=whole, imu={'force': whole.imu.force + lean})) == []
@@ -172,14 +170,15 @@ def test_a_circle_with_a_gap_of_the_imu_tells_no_tilt():
 def test_turns_over_hills_tell_no_tilt():
     """Slopes of up to 0.1 change along the way: in these turns they lean the rover by 5 degrees."""
     random = np.random.default_rng(37)
-    time = np.arange(0.0, 80.0, 0.1)
-    yaw = np.interp(time, np.arange(0.0, 90.0, 8.0), random.uniform(-0.25, 0.25, 12)) * (time > 4.0)
-    speed = np.interp(time, [4.0, 5.0], [0.0, 0.3])
-    hills = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
-    heading = np.exp(1j * np.cumsum(yaw) / rolling.RATE)
-    place = np.cumsum(speed * heading) / rolling.RATE
+    curves = np.arange(0.0, 90.0, 8.0), random.uniform(-0.25, 0.25, 12)
+    motion = rolling.motion(
+        80.0, ([4.0, 5.0], [0.0, 0.3]), yaw=lambda time: np.interp(time, *curves) * (time > 4.0)
+    )
+    hills = rolling.recording(motion)
+    heading = np.exp(1j * np.cumsum(motion.yaw_rate) / rolling.RATE)
+    place = np.cumsum(motion.speed * heading) / rolling.RATE
     uphill = np.sin(place.real / 1.4) + 1j * np.sin(place.imag / 1.4 + random.uniform(0.0, 6.0))
-    felt = np.interp(hills.imu.seconds, time, 0.1 * rolling.GRAVITY * uphill / heading)
+    felt = np.interp(hills.imu.seconds, motion.time, 0.1 * rolling.GRAVITY * uphill / heading)
     lean = np.column_stack([felt.real, felt.imag, 0.0 * felt.real])
     report = checked(whole=hills, imu={'force': hills.imu.force + lean})
     assert not {'imu_tilt', 'force_bias'} & {*faults(report)}
@@ -187,10 +186,9 @@ def test_turns_over_hills_tell_no_tilt():
 
 def test_a_second_between_turns_tells_no_sign_of_a_torque():
     """At 50 Hz that is 50 rows; the left side, inside or outside, is dragged by the right one."""
-    time = np.arange(0.0, 60.0, 0.02)
-    speed = np.interp(time, [4.0, 5.0], [0.0, 0.3]) + 0.03 * np.sin(4.0 * time) * (time > 5.0)
-    yaw = np.interp(time, [4, 5, 18, 20, 32, 34, 46, 48], [0, 1, 1, -1, -1, 1, 1, -1]) * 0.4
-    weaves = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    yaw = [4, 5, 18, 20, 32, 34, 46, 48], np.array([0, 1, 1, -1, -1, 1, 1, -1]) * 0.4
+    speed = lambda t: np.interp(t, [4, 5], [0, 0.3]) + 0.03 * np.sin(4.0 * t) * (t > 5.0)  # noqa: E731
+    weaves = rolling.driven(60.0, speed, yaw=yaw, rate=50.0)
     torque = weaves.joints.torque * [-1.0, 1.0, -1.0, 1.0]
     report = checked(whole=weaves, joints={'torque': torque})
     assert 'torque_sign' not in faults(report)
@@ -298,7 +296,7 @@ def test_exchanged_wheels_are_no_gyro_in_degrees(degrees):
     joints = replace(WHOLE.joints, rate=rate if degrees else rate[:, [1, 0, 2, 3]])
     imu = replace(WHOLE.imu, rate=WHOLE.imu.rate * (180.0 / np.pi if degrees else 1.0))
     whole, facts = replace(WHOLE, joints=joints, imu=imu), from_configuration(rolling.rover())
-    evidence = gather(whole, facts, np.eye(3), {})
+    evidence = gather(whole, facts, {})
     assert 0.004 < abs(turning.track_ratio(evidence)) < 0.07
     told, _ = turning.check_gyro_unit(evidence)
     assert [finding.fault for finding in told] == ['gyro_degrees'] * degrees
@@ -309,16 +307,14 @@ def test_sides_that_slip_apart_are_no_gyro_in_degrees():
     drive = rolling.ten_minute_drive()
     whole = rolling.recording(replace(drive, yaw_rate=drive.yaw_rate / 22.0))
     whole = replace(whole, imu=replace(whole.imu, rate=whole.imu.rate * [1.0, 1.0, 22.0]))
-    evidence = gather(whole, from_configuration(rolling.rover()), np.eye(3), {})
+    evidence = gather(whole, from_configuration(rolling.rover()), {})
     assert 0.004 < abs(turning.track_ratio(evidence)) < 0.07
     assert turning.check_gyro_unit(evidence)[0] == []
 
 
 def test_a_gyro_that_no_rest_tells_the_zero_of_exchanges_no_wheels():
     """Turns of 0.2 rad/s with a zero of a third of that, and never a standstill."""
-    time = np.arange(0.0, 60.0, 0.1)
-    yaw = 0.2 * np.sin(0.3 * time)
-    turns = rolling.recording(rolling.Motion(time, 0.3 + 0.0 * time, yaw, 0.0 * time))
+    turns = rolling.driven(60.0, 0.3, yaw=lambda time: 0.2 * np.sin(0.3 * time))
     told = faults(checked(whole=turns, imu={'rate': turns.imu.rate + 0.07 * np.eye(3)[2]}))
     assert not {'exchanged', 'backwards', 'swapped_sides'} & {*told}
 
@@ -348,12 +344,12 @@ def test_a_specific_force_a_little_off_gravity_is_reported():
 
 def test_a_turn_on_the_spot_reverses_no_axis_of_the_accelerometer():
     """What the ground does to y in it is far more than a curve of next to no speed."""
-    time = np.arange(0.0, 40.0, 1.0 / rolling.RATE)
-    speed = np.interp(time, [2, 3, 8, 9, 30, 31, 36, 37], [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0])
-    yaw = np.interp(time, [10, 11, 19, 20, 28, 29], [0, 0.3, 0.3, 0.1, 0.3, 0])
-    whole = rolling.recording(rolling.Motion(time, speed + 0.03 * (yaw > 0), yaw, 0.0 * time))
+    speed = [2, 3, 8, 9, 30, 31, 36, 37], [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0]
+    motion = rolling.motion(40.0, speed, yaw=([10, 11, 19, 20, 28, 29], [0, 0.3, 0.3, 0.1, 0.3, 0]))
+    motion = replace(motion, speed=motion.speed + 0.03 * (motion.yaw_rate > 0))
+    whole = rolling.recording(motion)
     force = whole.imu.force.copy()
-    force[:, 1] -= 8.0 * 0.03 * np.interp(whole.imu.seconds, time, yaw)
+    force[:, 1] -= 8.0 * 0.03 * np.interp(whole.imu.seconds, motion.time, motion.yaw_rate)
     assert 'force_axes' not in faults(checked(whole=whole, imu={'force': force}))
 
 
@@ -585,8 +581,7 @@ def test_a_simulation_without_noise_and_slip_has_no_reference_of_its_wheels(nois
     ],
 )
 def test_wheels_that_fight_on_firm_ground_have_no_wrong_sign(torques, told):
-    time = np.arange(0.0, 60.0, 1.0 / rolling.RATE)
-    motion = rolling.Motion(time, np.interp(time, [3.0, 6.0], [0.0, 0.3]), 0.0 * time, 0.0 * time)
+    motion = rolling.motion(60.0, ([3.0, 6.0], [0.0, 0.3]))
     whole = rolling.recording(motion)
     noise = 0.02 * np.random.default_rng(1).standard_normal(whole.joints.torque.shape)
     torque = np.outer(motion.speed / motion.speed.max(), torques) + noise
@@ -596,13 +591,11 @@ def test_wheels_that_fight_on_firm_ground_have_no_wrong_sign(torques, told):
 
 def test_torques_of_a_slight_curve_have_no_wrong_sign_and_no_zero():
     """The tighter the curve the more the inner wheels brake; here the steeper the slope too."""
-    time = np.arange(0.0, 100.0, 1.0 / rolling.RATE)
-    speed = np.interp(time, [2, 3, 48, 52, 97, 98], [0, 0.3, 0.3, -0.3, -0.3, 0])
-    yaw = np.sign(speed) * np.interp(time, [10, 45, 55, 90], [0, 0.08, 0.08, 0])
-    motion = rolling.Motion(time, speed, yaw, 0.8 * yaw)
-    whole = rolling.recording(motion)
-    scrub = 150.0 * np.outer(yaw, [-1.0, 1.0, -1.0, 1.0])
-    torque = whole.joints.torque + scrub
+    speed = [2, 3, 48, 52, 97, 98], [0, 0.3, 0.3, -0.3, -0.3, 0]
+    drive = rolling.motion(100.0, speed, yaw=([10, 45, 55, 90], [0, 0.08, 0.08, 0]))
+    yaw = np.sign(drive.speed) * drive.yaw_rate
+    whole = rolling.recording(replace(drive, yaw_rate=yaw, slope=0.8 * yaw))
+    torque = whole.joints.torque + 150.0 * np.outer(yaw, [-1.0, 1.0, -1.0, 1.0])
     assert not faults(checked(whole=whole, joints={'torque': torque}))
 
 
@@ -729,10 +722,9 @@ def test_a_reference_that_is_lost_twice_has_no_second_publisher():
 
 
 def test_torques_that_break_wheels_away_are_not_wild():
-    time = np.arange(0.0, 100.0, 0.05)
-    speed = np.where(time % 20.0 < 10.0, 0.0, 0.3)
-    whole = rolling.recording(rolling.Motion(time, speed, 0.0 * time, 0.0 * time))
-    starts = np.flatnonzero(np.diff(speed) > 0.0) + 1
+    drive = rolling.motion(100.0, lambda time: np.where(time % 20.0 < 10.0, 0.0, 0.3), rate=20.0)
+    whole = rolling.recording(drive)
+    starts = np.flatnonzero(np.diff(drive.speed) > 0.0) + 1
     torque = whole.joints.torque.copy()
     torque[starts] += 100.0
     assert 'wild' not in faults(rolling.checked(whole=whole, joints={'torque': torque}))
@@ -756,9 +748,7 @@ def test_a_rover_that_is_dragged_back_on_locked_wheels_has_rates_with_a_sign(tor
 @pytest.mark.parametrize('climbs', [True, False])
 def test_a_rover_that_slides_back_on_a_slope_has_rates_with_a_sign(climbs, turned):
     """On 20 degrees it slides back for a third of the drive while its wheels go on."""
-    time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
-    speed, slope = 0.0 * time + 0.3, 0.0 * time + 0.35 * climbs
-    whole = rolling.recording(rolling.Motion(time, speed, 0.0 * time, slope))
+    whole = rolling.driven(120.0, 0.3, slope=0.35 * climbs)
     velocity = whole.reference.velocity.copy()
     velocity[np.arange(len(velocity)) % 60 > 40, 0] -= 0.5
     imu = {'force': whole.imu.force * [turned, turned, 1.0]}
@@ -796,10 +786,10 @@ def test_rates_without_a_sign_reverse_no_wheels_of_a_rover_that_turns_backwards_
 
 def test_turns_about_the_z_of_a_leaning_rover_are_no_scale_of_its_gyro():
     """On 20 degrees uphill the heading turns 1/cos(20 degrees) times as fast as the rover does."""
-    time = np.arange(0.0, 220.0, 1.0 / rolling.RATE)
-    yaw, still = 0.15 * np.sign(np.sin(time)) * (time > 10.0), 0.0 * time
-    whole = rolling.recording(rolling.Motion(time, still + 0.3, yaw, still + 0.35))
-    psi = np.interp(whole.imu.seconds, time, np.cumsum(yaw) / rolling.RATE)
+    yaw = lambda time: 0.15 * np.sign(np.sin(time)) * (time > 10.0)  # noqa: E731
+    motion = rolling.motion(220.0, 0.3, yaw=yaw, slope=0.35)
+    whole = rolling.recording(motion)
+    psi = np.interp(whole.imu.seconds, motion.time, np.cumsum(motion.yaw_rate) / rolling.RATE)
     lean = scipy.spatial.transform.Rotation.from_euler('y', -0.35)
     turned = lean * scipy.spatial.transform.Rotation.from_rotvec(np.outer(psi, [0.0, 0.0, 1.0]))
     assert 'gyro_scale' not in faults(checked(whole=whole, imu={'orientation': turned.as_quat()}))
@@ -841,12 +831,12 @@ def test_a_late_reference_of_a_rover_that_turns_late_is_no_fault_of_its_wheels()
 
 def test_the_unit_of_rates_is_told_in_turns_about_a_point_between_steered_wheels():
     """The rims of steered wheels run faster than the rover: it turns slowly about its middle."""
-    time = np.arange(0.0, 200.0, 1.0 / rolling.RATE)
-    yaw = np.interp(time, [40.0, 42.0], [0.0, 0.8])
-    speed = np.interp(time, [10.0, 11.0, 40.0, 42.0], [0.0, 0.28, 0.28, 0.3])
-    whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    speed = [10.0, 11.0, 40.0, 42.0], [0.0, 0.28, 0.28, 0.3]
+    motion = rolling.motion(200.0, speed, yaw=([40.0, 42.0], [0.0, 0.8]))
+    whole = rolling.recording(motion)
     x, y = np.array([0.4, 0.4, -0.4, -0.4]), np.array(rolling.PARAMETERS['wheels.y'])
-    along, aside = speed[:, None] - yaw[:, None] * y, yaw[:, None] * x
+    along = motion.speed[:, None] - motion.yaw_rate[:, None] * y
+    aside = motion.yaw_rate[:, None] * x
     angle = np.arctan(aside / np.where(along == 0.0, 1.0, along))
     rate = along / np.cos(angle) / rolling.RADIUS
     rate += np.random.default_rng(2).normal(0.0, 0.004, rate.shape)
@@ -878,11 +868,12 @@ def test_rates_in_rpm_at_a_slip_of_a_third_may_be_counts_of_a_coarse_encoder():
 
 def test_out_and_back_in_the_world_is_no_reversing():
     """After half a turn in place a velocity in the world is negative, and the wheels are not."""
-    time = np.arange(0.0, 150.0, 1.0 / rolling.RATE)
-    speed = np.interp(time, [10, 11, 58, 59, 70, 71, 130, 131], [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0])
-    yaw = np.interp(time, [60, 61, 66, 67], [0.0, math.pi / 6.0, math.pi / 6.0, 0.0])
-    whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
-    way = np.interp(whole.reference.seconds, time, np.sign(np.cos(np.cumsum(yaw) / rolling.RATE)))
+    speed = [10, 11, 58, 59, 70, 71, 130, 131], [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0]
+    yaw = [60, 61, 66, 67], [0.0, math.pi / 6.0, math.pi / 6.0, 0.0]
+    motion = rolling.motion(150.0, speed, yaw=yaw)
+    whole = rolling.recording(motion)
+    ahead = np.sign(np.cos(np.cumsum(motion.yaw_rate) / rolling.RATE))
+    way = np.interp(whole.reference.seconds, motion.time, ahead)
     world = {'velocity': whole.reference.velocity * way[:, None]}
     assert faults(checked(whole=whole, reference=world)) == ['reference_world']
 
@@ -903,10 +894,8 @@ def test_rates_of_a_rover_that_drives_down_backwards_show_that_they_have_no_sign
 
 def test_a_wheel_that_a_rover_of_two_turns_about_is_not_frozen():
     """Half a minute about the left wheel, whose coarse encoder shows nothing."""
-    time = np.arange(0.0, 80.0, 1.0 / rolling.RATE)
-    speed = np.interp(time, [4.0, 5.0, 75.0, 76.0], [0.0, 0.3, 0.3, 0.0])
-    yaw = np.interp(time, [30, 31, 60, 61], [0.0, 0.75, 0.75, 0.0])  # speed over half the track
-    whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    yaw = [30, 31, 60, 61], [0.0, 0.75, 0.75, 0.0]  # speed over half the track
+    whole = rolling.driven(80.0, ([4.0, 5.0, 75.0, 76.0], [0.0, 0.3, 0.3, 0.0]), yaw=yaw)
     stands = np.abs(whole.joints.rate[:, :2]) < 0.2
     rate = np.where(stands, 0.0, whole.joints.rate[:, :2])
     joints = {'names': rolling.NAMES[:2], 'rate': rate, 'torque': whole.joints.torque[:, :2]}
@@ -918,13 +907,12 @@ def test_a_wheel_that_a_rover_of_two_turns_about_is_not_frozen():
 
 
 def test_counts_that_come_and_go_at_a_crawl_are_no_zeros_of_a_wheel_in_another_unit():
-    time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
-    speed = np.interp(time, [4.0, 5.0, 60.0, 61.0], [0.0, 0.3, 0.3, 0.02])
-    whole = rolling.recording(rolling.Motion(time, speed, 0.0 * time, 0.0 * time))
-    turned = np.cumsum(speed) / rolling.RATE / rolling.RADIUS
+    drive = rolling.motion(120.0, ([4.0, 5.0, 60.0, 61.0], [0.0, 0.3, 0.3, 0.02]))
+    whole = rolling.recording(drive)
+    turned = np.cumsum(drive.speed) / rolling.RATE / rolling.RADIUS
     counts = np.floor(turned[:, None] / 0.02 + [0.1, 0.3, 0.6, 0.8])
     random = np.random.default_rng(2)
-    interval = random.uniform(0.99, 1.01, time.size) / rolling.RATE
+    interval = random.uniform(0.99, 1.01, drive.time.size) / rolling.RATE
     rate = 0.02 * np.diff(counts, axis=0, prepend=counts[:1]) / interval[:, None]
     told = checked(whole=whole, joints={'rate': rate * [30.0 / math.pi, 1.0, 1.0, 1.0]}).findings
     assert {f.kind for f in told} >= {'unit'} and 'jumps' not in {f.kind for f in told}

@@ -154,9 +154,8 @@ def test_joints_that_do_not_steer_as_the_rover_turns(change, wheel, said):
 
 
 def test_joints_across_that_are_exchanged():
-    time = np.arange(0.0, 120.0, 0.1)
-    yaw = np.interp(time, [0.0, 10.0, 11.0], [0.0, 0.0, 0.3]) * np.sign(np.sin(0.3 * time))
-    weaves = rolling.Motion(time, np.interp(time, [3.0, 4.0], [0.0, 0.3]), yaw, 0.0 * time)
+    yaw = lambda t: np.interp(t, [10.0, 11.0], [0.0, 0.3]) * np.sign(np.sin(0.3 * t))  # noqa: E731
+    weaves = rolling.motion(120.0, ([3.0, 4.0], [0.0, 0.3]), yaw=yaw)
     report = steered(lambda angle: angle[:, [1, 0, 2, 3]], motion=weaves)
     assert [f.wheel for f in report.findings if f.fault == 'steering_angle'] == [
         'front_left, front_right'
@@ -164,12 +163,10 @@ def test_joints_across_that_are_exchanged():
 
 
 def test_angles_of_curves_driven_backward_are_right_where_rates_have_no_sign():
-    time = np.arange(0.0, 160.0, 0.1)
-    yaw = np.interp(time, [5.0, 6.0, 30.0, 31.0, 85.0, 86.0, 110.0, 111.0], [0, 0.2, 0.2, 0] * 2)
-    speed = np.interp(time, [1.0, 2.0, 79.0, 80.0, 81.0, 159.0], [0.0, 0.3, 0.3, 0.0, -0.3, -0.3])
-    report = steered(
-        lambda angle: angle, motion=rolling.Motion(time, speed, yaw, 0.0 * time), sent=np.abs
-    )
+    yaw = [5.0, 6.0, 30.0, 31.0, 85.0, 86.0, 110.0, 111.0], [0, 0.2, 0.2, 0] * 2
+    speed = [1.0, 2.0, 79.0, 80.0, 81.0, 159.0], [0.0, 0.3, 0.3, 0.0, -0.3, -0.3]
+    curves = rolling.motion(160.0, speed, yaw=yaw)
+    report = steered(lambda angle: angle, motion=curves, sent=np.abs)
     assert {f.fault for f in report.findings} == {'rates_unsigned'}
 
 

@@ -58,9 +58,8 @@ def test_an_accelerometer_reversed_beside_wheels_that_count_backwards(backwards)
 def test_fine_steps_of_a_rate_at_a_constant_speed_are_not_frozen():
     """A rate that noise moves by a step now and then, and on a long straight hardly ever."""
     random = np.random.default_rng(2)
-    time = np.arange(0.0, 90.0, 1.0 / rolling.RATE)
-    speed = np.interp(time, [2, 6, 40, 44], [0.0, 0.15, 0.15, 0.3])
-    whole = rolling.recording(rolling.Motion(time, speed, 0.0 * time, 0.0 * time))
+    drive = rolling.motion(90.0, ([2, 6, 40, 44], [0.0, 0.15, 0.15, 0.3]))
+    time, speed, whole = drive.time, drive.speed, rolling.recording(drive)
     step = 2e-4  # [rad/s]
     exact = np.repeat(speed[:, None], 4, axis=1) / rolling.RADIUS
     scatter = np.array([0.05, 0.9, 0.9, 0.9]) * step

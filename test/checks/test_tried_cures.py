@@ -16,10 +16,8 @@ SKID = {'wheels.x': [0.3, 0.3, -0.3, -0.3]}  # wheels in two rows: its turns nee
 
 def spot_turns():
     """Four seconds ahead, then nothing but turns on the spot, to both sides."""
-    time = np.arange(0.0, 90.0, 1.0 / rolling.RATE)
-    speed = np.interp(time, [5, 6, 9, 10], [0, 0.2, 0.2, 0])
-    yaw = np.interp(time, [12, 13, 40, 41, 45, 46, 80, 81], [0, 0.4, 0.4, 0, 0, -0.4, -0.4, 0])
-    return rolling.Motion(time, speed, yaw, 0.0 * time)
+    yaw = [12, 13, 40, 41, 45, 46, 80, 81], [0, 0.4, 0.4, 0, 0, -0.4, -0.4, 0]
+    return rolling.motion(90.0, ([5, 6, 9, 10], [0, 0.2, 0.2, 0]), yaw=yaw)
 
 
 @pytest.mark.parametrize('seed', [0, pytest.param(1, marks=pytest.mark.slow)])
@@ -41,9 +39,7 @@ def test_wheels_backwards_in_turns_on_the_spot_are_found_all_the_same(wheels):
 
 def test_a_rover_that_slides_back_in_curves_has_no_reversed_wheels_for_sure():
     """Wheels drive up a slope of 0.2 rad, the body goes down."""
-    time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
-    down = rolling.Motion(time, 0.0 * time + 0.25, 0.1 * np.sin(time / 5.0), 0.0 * time - 0.2)
-    whole = rolling.recording(down)
+    whole = rolling.driven(120.0, 0.25, yaw=lambda time: 0.1 * np.sin(time / 5.0), slope=-0.2)
     (finding,) = rolling.checked(whole=whole, joints={'rate': -whole.joints.rate}).findings
     assert finding.confidence < 0.5 and 'or the rover slides back' in finding.words
 
@@ -51,9 +47,7 @@ def test_a_rover_that_slides_back_in_curves_has_no_reversed_wheels_for_sure():
 @pytest.mark.parametrize('what', ['wheels', 'reference', 'both torque and reference'])
 def test_slopes_tell_whether_wheels_or_reference_run_backwards(what):
     """A drive without turns, starts or stops: only the torque uphill says which way it goes."""
-    time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
-    hill = np.interp(time, [20, 30, 60, 70, 90], [0, 0.12, 0.12, -0.05, 0])
-    whole = rolling.recording(rolling.Motion(time, 0.0 * time + 0.25, 0.0 * time, hill))
+    whole = rolling.driven(120.0, 0.25, slope=([20, 30, 60, 70, 90], [0, 0.12, 0.12, -0.05, 0]))
     joints, reference = whole.joints, whole.reference
     if what == 'wheels':
         joints = replace(joints, rate=-joints.rate, torque=-joints.torque)

@@ -22,10 +22,8 @@ def reasons(report, kind):
 
 
 def one_way_and_a_turn():
-    time = np.arange(0.0, 107.5, 1.0 / rolling.RATE)
-    speed = np.interp(time, [10, 11, 60, 61, 65, 66], [0, 0.3, 0.3, 0, 0, 0.3])
-    yaw = np.interp(time, [100, 101, 107, 108], [0, 0.22, 0.22, 0])
-    return rolling.Motion(time, speed, yaw, 0.0 * time)
+    speed = [10, 11, 60, 61, 65, 66], [0, 0.3, 0.3, 0, 0, 0.3]
+    return rolling.motion(107.5, speed, yaw=([100, 101, 107, 108], [0, 0.22, 0.22, 0]))
 
 
 @pytest.mark.parametrize('degrees', [pytest.param(5.0, marks=pytest.mark.slow), 8.0])

@@ -46,7 +46,6 @@ class Calibration:
     changes: tuple[Change, ...]
     not_seen: tuple[NotChecked, ...]
     findings: tuple[Finding, ...]
-    figures: dict[str, Any]
 
 
 def calibrate(
@@ -69,26 +68,21 @@ def calibrate(
         _torques(changes, evidence)
     _track(changes, evidence)
     report.not_checked.append(not_checked('mass', 'centre'))
-    mended = {change.key for change in changes.made}
-    alternatives = ('mass', 'reference_scale' if 'wheels.radius' in mended else '')
-    left = [f for f in report.findings if f.parameter not in mended and f.fault not in alternatives]
-    return Calibration(tuple(changes.made), tuple(report.not_checked), tuple(left), report.figures)
+    alternatives = ('mass', 'reference_scale' if 'wheels.radius' in changes else '')
+    left = [f for f in report.findings if f.parameter not in changes]
+    left = [finding for finding in left if finding.fault not in alternatives]
+    return Calibration(tuple(changes.values()), tuple(report.not_checked), tuple(left))
 
 
-class _Changes:
-    """The changes so far, and the values of the rover file."""
+class _Changes(dict[str, Change]):
+    """The changes so far, by key; ``before``: the values of the rover file."""
 
-    def __init__(self, before: Mapping[str, Value]) -> None:
+    def __init__(self, before: Mapping[str, Any]) -> None:
         self.before = before
-        self.made: list[Change] = []
-
-    def number(self, key: str) -> float:
-        """Return a number of the rover file."""
-        return float(self.before[key])  # type: ignore[arg-type]
 
     def add(self, key: str, after: Value, std: float | None, source: str) -> None:
         """Note a change."""
-        self.made.append(Change(key, self.before.get(key), after, std, source))
+        self[key] = Change(key, self.before.get(key), after, std, source)
 
 
 def _sure(report: CheckReport) -> list[Finding]:
@@ -123,7 +117,7 @@ def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evi
         std = math.degrees(tilt.std)
         source = f'specific force over {tilt.turn:.0f} rad of turning, slope removed'
     for key, new in zip(imu.MOUNTING, imu.mounting_angles(rotation), strict=True):
-        if abs(math.remainder(new - changes.number(key), 360.0)) > imu.LEAST_SHOWN:
+        if abs(math.remainder(new - changes.before[key], 360.0)) > imu.LEAST_SHOWN:
             changes.add(key, round(new, 3), std, source)
     return evidence
 
@@ -163,7 +157,7 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
     for key, figure in figures.items():
         if key in doubtful:
             continue
-        seen, stated = report.figures.get(figure), changes.number(key)
+        seen, stated = report.figures.get(figure), changes.before[key]
         if not seen or not math.isfinite(seen):
             continue
         if stated and abs(math.log(seen / stated)) < WORTH_CHANGING:

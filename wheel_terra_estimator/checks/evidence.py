@@ -20,6 +20,7 @@ from wheel_terra_estimator.checks.series import (
     Channel,
     JointSeries,
     Recording,
+    VelocitySeries,
     beside,
     nearest,
     of_one_wheel,
@@ -288,6 +289,10 @@ class Evidence:
         channel = replace(getattr(self.recording, name), **values)
         return replace(self, recording=replace(self.recording, **{name: channel}))
 
+    def with_reference(self, reference: VelocitySeries | None) -> Evidence:
+        """Return the evidence with another reference."""
+        return replace(self, recording=replace(self.recording, reference=reference))
+
     def turned(self, rotation: FloatArray) -> Evidence:
         """Return the evidence with another mounting of the IMU."""
         change = rotation @ self.rotation.T
@@ -296,9 +301,7 @@ class Evidence:
         return replace(self, rotation=rotation, force=force, gyro=gyro)
 
 
-def gather(
-    recording: Recording, facts: RoverFacts, rotation: FloatArray, figures: dict[str, Any]
-) -> Evidence | None:
+def gather(recording: Recording, facts: RoverFacts, figures: dict[str, Any]) -> Evidence | None:
     """Return the evidence of a recording; None where no wheel of the rover is in it.
 
     Messages may hold some of the wheels only: a row has the nearest reading of each. Rows are where
@@ -344,7 +347,7 @@ def gather(
         at = (imu.stamp - rows.stamp[0]) * 1e-9
         width = float(np.median(np.diff(time)))
         force, gyro = (
-            averaged(at, np.nan_to_num(values) @ rotation.T, time, width) - bias
+            averaged(at, np.nan_to_num(values) @ facts.mounting.T, time, width) - bias
             if np.isfinite(values).any()
             else None
             for values, bias in (
@@ -352,7 +355,9 @@ def gather(
                 (imu.rate, facts.errors.angular_rate_bias),
             )
         )
-    return Evidence(recording, facts, time, rate, torque, force, gyro, rotation, figures, steering)
+    return Evidence(
+        recording, facts, time, rate, torque, force, gyro, facts.mounting, figures, steering
+    )
 
 
 def noise_of(values: FloatArray, bends: Mask | slice = slice(None)) -> float:

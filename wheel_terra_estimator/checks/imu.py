@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wheel_terra_estimator.arrays import MAD_TO_STD, FloatArray
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import (
     EVEN_GROUND_STD,
     LEAST_YAW,
@@ -33,6 +33,7 @@ from wheel_terra_estimator.checks.finding import (
     listed,
     not_checked,
 )
+from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
     DRIFT,
@@ -41,12 +42,12 @@ from wheel_terra_estimator.checks.statistics import (
     block_fit,
     block_fits,
     confidence,
-    in_parts,
     moving_mean,
     probability,
     robust_std,
     runs,
     spike_height,
+    spread,
     step_of,
 )
 from wheel_terra_estimator.checks.turning import (
@@ -100,115 +101,82 @@ MOUNTING = tuple(f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch'
 FROZEN_TIME = 1.0  # time that no number of a running IMU stays the same [s]
 
 
-@dataclass(frozen=True)
-class ImuState:
-    """The IMU after what was found has been mended: what the later checks use."""
-
-    recording: Recording
-    rotation: FloatArray
-    gravity: float
-
-    @property
-    def imu(self) -> ImuSeries:
-        """Its messages."""
-        assert self.recording.imu is not None
-        return self.recording.imu
-
-    def with_values(self, **values: FloatArray) -> ImuState:
-        """Return the state with other messages."""
-        return self.with_imu(replace(self.imu, **values))  # type: ignore[arg-type]
-
-    def with_imu(self, imu: ImuSeries) -> ImuState:
-        """Return the state with another channel of the IMU."""
-        return replace(self, recording=replace(self.recording, imu=imu))
-
-    def without(self, *names: str) -> ImuState:
-        """Return the state without the force or the rate, where they are faulty."""
-        nothing = np.full_like(self.imu.force, np.nan)
-        return self.with_values(**dict.fromkeys(names, nothing))
-
-    def has(self, name: str) -> bool:
-        """Whether there is a force or a rate that means something."""
-        return bool(np.isfinite(getattr(self.imu, name)).any())
-
-    def found(self, key: str, sure: float, **details: Any) -> Finding:
-        """Return a finding on its topic."""
-        return found(key, self.imu.topic, sure, **details)
+Judged = tuple[list[Outcome], ImuSeries]
 
 
-Judged = tuple[list[Outcome], ImuState]
-
-
-def check_imu(state: ImuState) -> Judged:
+def check_imu(recording: Recording, facts: RoverFacts) -> tuple[list[Outcome], Recording]:
     """Return contradictions within the IMU readings, and the recording with them corrected."""
-    if state.recording.imu is None or state.imu.stamp.size < LEAST_MESSAGES:
+    imu = recording.imu
+    if imu is None or imu.stamp.size < LEAST_MESSAGES:
         none: list[Outcome] = [not_checked(kind, 'no_imu') for kind in ('mounting', 'gravity')]
-        return none, replace(state, recording=replace(state.recording, imu=None))
-    outcomes, state = _placeholders(state)
+        return none, replace(recording, imu=None)
+    outcomes, imu = _placeholders(imu)
     for check, *needed in (
         (_frozen, 'force', 'rate'),
         (_gravity, 'force'),
         (_outliers, 'force', 'rate'),
         (_up_by_orientation, 'force'),
     ):
-        if all(map(state.has, needed)):
-            findings, state = check(state)
+        if all(_has(imu, name) for name in needed):
+            findings, imu = check(imu, facts)
             outcomes += findings
-    return outcomes, state
+    return outcomes, replace(recording, imu=imu)
 
 
-def _up_difference(imu: ImuSeries) -> float:
-    """Return the angle between up by orientation and by specific force [rad]; nan: unknown."""
+def _has(imu: ImuSeries, name: str) -> bool:
+    """Return whether there is a force or a rate that means something."""
+    return bool(np.isfinite(getattr(imu, name)).any())
+
+
+def _without(imu: ImuSeries, *names: str) -> ImuSeries:
+    """Return the messages without force, rate or orientation, where these are faulty."""
+    nothing = {name: np.full_like(getattr(imu, name), np.nan) for name in names}
+    return replace(imu, **nothing)  # type: ignore[arg-type]
+
+
+def _up_by_orientation(imu: ImuSeries, facts: RoverFacts) -> Judged:
+    """Return an orientation that has up elsewhere than the specific force, both in its frame."""
     norm = np.linalg.norm(imu.orientation, axis=1)
     known = np.flatnonzero((norm > 0.5) & (norm < 2.0))
     if known.size < LEAST_MESSAGES:
-        return math.nan
+        return [], imu
     some = known[:: max(known.size // MOST_COMPARED, 1)]
     up = Rotation.from_quat(imu.orientation[some]).apply(imu.force[some])[:, 2]
     size = np.linalg.norm(np.median(imu.force, axis=0))  # without noise and vibration
-    return math.acos(float(np.clip(np.median(up) / size, -1.0, 1.0)))
-
-
-def _up_by_orientation(state: ImuState) -> Judged:
-    """Return an orientation that has up elsewhere than the specific force, both in its frame."""
-    imu = state.imu
-    difference = _up_difference(imu)
-    upright = float((state.rotation @ np.median(imu.force, axis=0))[2]) > 0.0
+    difference = math.acos(float(np.clip(np.median(up) / size, -1.0, 1.0)))
+    upright = float((facts.mounting @ np.median(imu.force, axis=0))[2]) > 0.0
     turned_round = difference > math.pi - UP_DIFFERENCE and not upright  # see `check_upside`
     if not difference >= UP_DIFFERENCE or turned_round:
-        return [], state
+        return [], imu
     how = f'its up and that of linear_acceleration lie {math.degrees(difference):.0f} degrees apart'
-    finding = state.found('orientation', 0.97, how=how)
-    return [finding], state.with_values(orientation=np.full_like(imu.orientation, np.nan))
+    return [found('orientation', imu.topic, 0.97, how=how)], _without(imu, 'orientation')
 
 
-def _placeholders(state: ImuState) -> Judged:
+def _placeholders(imu: ImuSeries) -> Judged:
     outcomes: list[Outcome] = []
-    imu = state.imu
     for name, field, of, tells in (
         ('force', 'linear_acceleration', 'gravity', 'slope and load'),
         ('rate', 'angular_velocity', 'sign', 'turns'),
     ):
-        if not state.has(name) and name not in imu.absent:
-            outcomes.append(state.found('imu_nan', 0.99, share=100.0, field=field))
-        elif not state.has(name):
+        if not _has(imu, name) and name not in imu.absent:
+            outcomes.append(found('imu_nan', imu.topic, 0.99, share=100.0, field=field))
+        elif not _has(imu, name):
             outcomes.append(not_checked(of, f'{name}_missing', field=field, tells=tells))
         elif not np.nan_to_num(getattr(imu, name)).any():
-            outcomes.append(state.found('force_zero', 0.999, field=field))
-            state = state.without(name)
+            outcomes.append(found('force_zero', imu.topic, 0.999, field=field))
+            imu = _without(imu, name)
     known = np.isfinite(imu.orientation).all(axis=1)
     orientation = imu.orientation[known]
     if known.sum() > LEAST_MESSAGES:
         still = np.ptp(orientation, axis=0).max() == 0.0 and np.ptp(imu.rate, axis=0).max() > 0.0
         if still or np.median(np.linalg.norm(orientation, axis=1)) < 0.5:
             shown = ', '.join(f'{value:g}' for value in orientation[0])
-            outcomes.append(state.found('orientation_placeholder', 0.999, shown=shown))
-            state = state.with_values(orientation=np.full_like(imu.orientation, np.nan))
-    return outcomes, state
+            outcomes.append(found('orientation_placeholder', imu.topic, 0.999, shown=shown))
+            imu = _without(imu, 'orientation')
+    return outcomes, imu
 
 
-def _frozen(state: ImuState) -> Judged:
-    imu = state.imu
+def _frozen(imu: ImuSeries, _: RoverFacts) -> Judged:
     same = (np.diff(np.hstack([imu.force, imu.rate]), axis=0) == 0.0).all(axis=1)
     longest = max((imu.seconds[b] - imu.seconds[a] for a, b in runs(same)), default=0.0)
     if np.mean(same) > FROZEN_SHARE:
@@ -216,18 +184,15 @@ def _frozen(state: ImuState) -> Judged:
     elif longest > FROZEN_TIME:
         how = f'all six numbers stay identical for up to {longest:.1f} s'
     else:
-        return [], state
+        return [], imu
     alive = ~np.concatenate([[False], same])
-    if alive.sum() >= LEAST_MESSAGES:
-        state = state.with_imu(rows_of(imu, alive))
-    else:
-        state = state.without('force', 'rate')
-    return [state.found('sensor_frozen', 0.99, how=how)], state
+    left = rows_of(imu, alive) if alive.sum() >= LEAST_MESSAGES else _without(imu, 'force', 'rate')
+    return [found('sensor_frozen', imu.topic, 0.99, how=how)], left
 
 
-def _outliers(state: ImuState) -> Judged:
+def _outliers(imu: ImuSeries, _: RoverFacts) -> Judged:
     """Leave out single samples that no body can make; the node does so by the same limits."""
-    imu, outcomes, kept = state.imu, list[Outcome](), np.ones(state.imu.stamp.size, dtype=bool)
+    outcomes, kept = list[Outcome](), np.ones(imu.stamp.size, dtype=bool)
     for values, limit, unit in (
         (imu.force, OUTLIER_FORCE, 'm/s^2'),
         (imu.rate, OUTLIER_RATE, 'rad/s'),
@@ -239,49 +204,42 @@ def _outliers(state: ImuState) -> Judged:
         single = (off > np.maximum(limit, OUTLIER_SIGMAS * noise)).any(axis=1)  # or in another unit
         if LEAST_OUTLIERS <= single.sum() <= MOST_OUTLIERS * single.size:
             details = {'count': int(single.sum()), 'share': 100.0 * np.mean(single), 'unit': unit}
-            outcomes.append(state.found('imu_wild', 0.97, most=float(off.max()), **details))
+            details['most'] = float(off.max())
+            outcomes.append(found('imu_wild', imu.topic, 0.97, **details))
             kept &= ~single
-    return outcomes, state.with_imu(rows_of(imu, kept)) if outcomes else state
+    return outcomes, rows_of(imu, kept) if outcomes else imu
 
 
-def _gravity(state: ImuState) -> Judged:
-    imu, gravity = state.imu, state.gravity
+def _gravity(imu: ImuSeries, facts: RoverFacts) -> Judged:
+    gravity = facts.gravity
     middle = np.median(imu.force, axis=0)
     # Second by second: vibration goes, and a slope is the same while a rover turns on it.
     seconds = max(int(np.ptp(imu.stamp) * 1e-9), 1)
-    parts = in_parts(imu.force, min(seconds, len(imu.force)))
-    middles = np.concatenate([np.median(part, axis=1) for part in parts])
-    size = float(np.median([np.linalg.norm(one) for one in middles]))
+    parts = np.array_split(imu.force, min(seconds, len(imu.force)))
+    size = float(np.median([np.linalg.norm(np.median(part, axis=0)) for part in parts]))
     off = abs(size - gravity)
-    if not off > max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):  # nan: an axis without a number
-        clear = off > max(SLOPES * gravity, GRAVITY_BIAS)
-        return [_scale_of_force(state, size)] if clear else [], state
 
-    def reported(key: str, value: float, **figures: Any) -> list[Outcome]:
-        return [state.found(key, 0.98, value=value, size=size, gravity=gravity, **figures)]
+    def told(key: str, value: float, sure: float = 0.98, **figures: Any) -> list[Outcome]:
+        figures |= {'value': value, 'size': size, 'gravity': gravity}
+        return [found(key, imu.topic, sure, **figures)]
 
-    upright = abs(float((state.rotation @ middle)[2])) > UPRIGHT_SHARE * size
+    if not off > max(SLOPES * gravity, GRAVITY_BIAS):  # nan: an axis without a number
+        return [], imu
+    upright = abs(float((facts.mounting @ middle)[2])) > UPRIGHT_SHARE * size
     # What a slope leaves may have the size of gravity in g.
     in_g = abs(size * STANDARD_GRAVITY / gravity - 1.0) <= UNIT_TOLERANCE and upright
     places = GRAVITIES.items()
     place = next((p for p, there in places if abs(size / there - 1.0) <= GRAVITY_TOLERANCE), '')
     elsewhere = bool(place) and upright  # a slope leaves as much, but along the ground
     if size < 0.3 * min(gravity, STANDARD_GRAVITY) and not in_g and not elsewhere:
-        return reported('gravity_off', gravity), state.without('force')
+        return told('gravity_off', gravity), _without(imu, 'force')
     for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
         if abs(size * factor / gravity - 1.0) <= UNIT_TOLERANCE:
-            return reported('force_unit', factor, unit=unit), state.with_values(
-                force=imu.force * factor
-            )
-    if place:
-        there = GRAVITIES[place]
-        return reported('planet', there, place=place), replace(state, gravity=there)
-    return [_scale_of_force(state, size)], state
-
-
-def _scale_of_force(state: ImuState, size: float) -> Finding:
-    value = round(state.gravity / size, 4)
-    return state.found('force_scale', 0.9, value=value, size=size, gravity=state.gravity)
+            mended = replace(imu, force=imu.force * factor)
+            return told('force_unit', factor, unit=unit), mended
+    if place and off > GRAVITY_TOLERANCE * gravity:
+        return told('planet', GRAVITIES[place], place=place), imu
+    return told('force_scale', round(gravity / size, 4), 0.9), imu
 
 
 # With the wheels ---------------------------------------------------------------------------------
@@ -585,6 +543,5 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
 def _upper_rms(values: FloatArray) -> FloatArray:
     """Return the noise (p,) of the livelier half of the blocks of (k, p) changes."""
     count = min(max(len(values) // 50, 1), 200)
-    off = [np.abs(b - np.median(b, axis=1, keepdims=True)) for b in in_parts(values, count)]
-    noise = MAD_TO_STD * np.concatenate([np.median(one, axis=1) for one in off])
+    noise = [spread(part) for part in np.array_split(values, count)]
     return np.median(np.sort(noise, axis=0)[count // 2 :], axis=0)

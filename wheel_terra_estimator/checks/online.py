@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray, Floats
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, Floats
 from wheel_terra_estimator.checks import rover_facts
 from wheel_terra_estimator.checks.finding import FAULTS, RANK, CheckReport, Finding, NotChecked
 from wheel_terra_estimator.checks.run import (
@@ -229,38 +229,26 @@ class OnlineChecks:
         n, means = len(self._radius), np.array([means for _, means in self._rows])
         rate, torques, depth, inertial, velocity = np.split(means, [n, 2 * n, 3 * n, -2], axis=1)
 
+        def series(kind: Any, topic: str, rows: BoolArray, *values: Any, least: int = 1) -> Any:
+            at = stamp[rows]
+            return kind(topic, at, at, *values) if at.size >= least else None
+
         def there(values: FloatArray) -> Any:
             return np.isfinite(values).any(axis=1)
 
-        k, names = there(rate), facts.names
-        joints = JointSeries(
-            self._configuration.wheel_odometry,
-            stamp[k],
-            stamp[k],
-            names,
-            facts.direction * rate[k],
-            facts.direction * errors.torque.reading(torques[k]),
-        )
+        names, k = facts.names, there(rate)
+        read = facts.direction * rate[k], facts.direction * errors.torque.reading(torques[k])
+        joints = series(JointSeries, self._configuration.wheel_odometry, k, names, *read)
         # A reading with a part that is no number says nothing of the sensor.
-        k, base = np.isfinite(inertial).all(axis=1), inertial.reshape(-1, 2, 3)
-        read = base + np.stack([errors.specific_force_bias, errors.angular_rate_bias])
-        force, turning = ((read[k, i] @ facts.mounting) for i in (0, 1))
-        none = np.full((force.shape[0], 4), np.nan)
-        felt = ImuSeries('imu/data', stamp[k], stamp[k], force, turning, none)
+        k = np.isfinite(inertial).all(axis=1)
+        biases = errors.specific_force_bias, errors.angular_rate_bias
+        halves = zip(np.hsplit(inertial[k], 2), biases, strict=True)
+        felt = [(half + bias) @ facts.mounting for half, bias in halves]
+        imu = series(ImuSeries, 'imu/data', k, *felt, np.full((k.sum(), 4), np.nan))
         k = there(depth)
-        deep = errors.sinkage.reading(depth[k])
-        digs = SinkageSeries('sinkage', stamp[k], stamp[k], names, deep)
+        sinkage = series(SinkageSeries, 'sinkage', k, names, errors.sinkage.reading(depth[k]))
         k = np.isfinite(velocity[:, 0])
         ahead = np.column_stack([velocity[k, 0], np.zeros((k.sum(), 2))])
-        slip_free = VelocitySeries(
-            'reference_odom', stamp[k], stamp[k], ahead, ahead[:, 1], velocity[k, 1]
-        )
-        return Recording(
-            '',
-            (),
-            joints if joints.stamp.size else None,
-            felt if felt.stamp.size else None,
-            digs if digs.stamp.size else None,
-            slip_free if slip_free.stamp.size > 1 else None,
-            None,
-        )
+        seen = ahead, ahead[:, 1], velocity[k, 1]
+        reference = series(VelocitySeries, 'reference_odom', k, *seen, least=2)
+        return Recording('', (), joints, imu, sinkage, reference, None)

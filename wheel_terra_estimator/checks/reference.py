@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -169,7 +168,7 @@ def check_source(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
     A velocity of another source differs from the wheels by their noise, at the least.
     """
-    recording, reference = evidence.recording, evidence.recording.reference
+    reference = evidence.recording.reference
     if reference is None:
         return [], evidence
     rim = nearest(evidence.joints.stamp, evidence.rim, reference.stamp)
@@ -183,24 +182,18 @@ def check_source(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     noise = abs(scale) * noise_of(evidence.rim[evidence.moving])
     if not NO_NOISE * float(np.median(np.abs(forward))) < noise > left / SHARES_NOISE:
         return [], evidence
-    return [evidence.found('reference_wheels', 0.95)], replace(
-        evidence, recording=replace(recording, reference=None)
-    )
+    return [evidence.found('reference_wheels', 0.95)], evidence.with_reference(None)
 
 
 def check_frame(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return a reference in another frame or unit, and the evidence with that mended."""
-    reference = evidence.recording.reference
-    if reference is None or reference.stamp.size < LEAST_REFERENCES:
+    """Return a reference in another frame, and the evidence with that mended.
+
+    One that is given in a world frame keeps its direction there.
+    """
+    there = _beside_rims(evidence)
+    if there is None:
         return [], evidence
-    frame, evidence = _frame(evidence, reference)
-    unit, evidence = _unit(evidence)
-    return [*frame, *unit], evidence
-
-
-def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome], Evidence]:
-    """Find a velocity that is given in a world frame: it keeps its direction there."""
-    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
+    reference, rim = there
     direction, in_world = _direction(evidence, reference, rim)
     if math.isnan(abs(direction)):
         return [], evidence
@@ -274,12 +267,12 @@ def speed_ratios(evidence: Evidence) -> FloatArray | None:
     return np.asarray(speed[rows] / rim[rows])
 
 
-def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    reference = evidence.recording.reference
-    assert reference is not None
-    if not evidence.facts.known or ASIDE in evidence.figures:
+def check_reference_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return the units that a reference may be in, and the evidence mended where it is one."""
+    there = _beside_rims(evidence)
+    if there is None or not evidence.facts.known or ASIDE in evidence.figures:
         return [], evidence
-    ratios = speed_ratios(evidence)
+    reference, ratios = there[0], speed_ratios(evidence)
     if ratios is None or np.median(ratios) < LEAST_UNIT_RATIO:
         return [], evidence
     ratio = float(np.quantile(ratios, LEAST_SLIP))

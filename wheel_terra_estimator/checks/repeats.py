@@ -17,7 +17,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import Outcome
-from wheel_terra_estimator.checks.series import SinkageSeries, rows_of
+from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import runs
 
 LEAST_TIME = 5.0  # time of driving in which a reading that stays is frozen [s]
@@ -36,31 +36,21 @@ CLEAR_SINKAGE = 0.005  # of the other wheels, beside which none reads 0 all the 
 
 def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return readings that stay the same while driving, and the evidence without these."""
-    if not evidence.moving.any():
-        return [], evidence
-    sinkage = evidence.recording.sinkage
-    deep, mended = ([], evidence) if sinkage is None else _sinkage(evidence, sinkage)
-    outcomes, evidence = _reference(mended)
-    imu = evidence.recording.imu
-    for name, field in (('force', 'linear_acceleration'), ('gyro', 'angular_velocity')):
-        if imu is not None and getattr(evidence, name) is not None:
-            readings = imu.force if name == 'force' else imu.rate
-            if dead := stays(evidence, evidence.seconds(imu), readings):
-                outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
-                evidence = replace(evidence, **{name: None})  # type: ignore[arg-type]
-    joints, evidence = _joints(evidence)
-    held, evidence = _held(evidence)
-    return [*outcomes, *joints, *deep, *held], evidence
+    outcomes = list[Outcome]()
+    for check in (_sinkage, _reference, _imu, _joints, _held) if evidence.moving.any() else ():
+        found, evidence = check(evidence)
+        outcomes += found
+    return outcomes, evidence
 
 
 def _held(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return rates and torques, or velocities, that are sent on a timer, and these once each."""
     outcomes, reference = list[Outcome](), evidence.recording.reference
-    times = _times_sent(np.hstack([evidence.rate, evidence.torque]), evidence.moving)
+    values = np.nan_to_num(np.hstack([evidence.rate, evidence.torque]))
+    times = _times_sent(values, evidence.moving)
     if times > 1.0:
         details = {'times': times, 'period': times * evidence.period}
         outcomes.append(evidence.found('rates_held', 0.95, **details))
-        values = np.nan_to_num(np.hstack([evidence.rate, evidence.torque]))
         new = np.append(True, np.any(np.diff(values, axis=0) != 0.0, axis=1))
         evidence = evidence.rows(new | ~evidence.moving)
     if reference is None:
@@ -71,14 +61,13 @@ def _held(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         details = {'times': times, 'period': times * reference.period}
         outcomes.append(evidence.found('reference_held', 0.95, **details))
         new = np.append(True, np.diff(reference.velocity[:, 0]) != 0.0)
-        recording = replace(evidence.recording, reference=rows_of(reference, new))
-        evidence = replace(evidence, recording=recording)
+        evidence = evidence.with_reference(rows_of(reference, new))
     return outcomes, evidence
 
 
 def _times_sent(values: FloatArray, driven: Mask) -> float:
     """Return how many messages in a row hold the same (k, p) values; 1: one, or no such number."""
-    changes = np.any(np.diff(np.nan_to_num(values), axis=0) != 0.0, axis=1) & driven[1:]
+    changes = np.any(np.diff(values, axis=0) != 0.0, axis=1) & driven[1:]
     steps = np.diff(np.flatnonzero(changes))
     times = float(np.median(steps)) if steps.size >= LEAST_CHANGES else 1.0
     return times if times >= 2.0 and np.mean(np.abs(steps - times) <= 1.0) >= AT_ONCE else 1.0
@@ -88,15 +77,27 @@ def _reference(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     reference = evidence.recording.reference
     if reference is None:
         return [], evidence
-    left, findings, driven = None, [], float(evidence.moving.sum()) * evidence.period
     if not reference.velocity.any():
-        findings = [evidence.found('reference_zero', 0.9)] if driven > LEAST_TIME else []
-    elif dead := stays(evidence, evidence.seconds(reference), reference.velocity):
-        findings = [evidence.found('reference_frozen', 0.97, how=dead.how)]
-        left = None if dead.rows.all() else rows_of(reference, ~dead.rows)
-    if not findings:
+        driven = float(evidence.moving.sum()) * evidence.period > LEAST_TIME
+        finding = [evidence.found('reference_zero', 0.9)] * driven
+        return [*finding], evidence.with_reference(None) if driven else evidence
+    dead = stays(evidence, evidence.seconds(reference), reference.velocity)
+    if dead is None:
         return [], evidence
-    return [*findings], replace(evidence, recording=replace(evidence.recording, reference=left))
+    left = None if dead.rows.all() else rows_of(reference, ~dead.rows)
+    finding = [evidence.found('reference_frozen', 0.97, how=dead.how)]
+    return [*finding], evidence.with_reference(left)
+
+
+def _imu(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    outcomes, imu = list[Outcome](), evidence.recording.imu
+    for name, field in (('force', 'linear_acceleration'), ('gyro', 'angular_velocity')):
+        if imu is not None and getattr(evidence, name) is not None:
+            readings = imu.force if name == 'force' else imu.rate
+            if dead := stays(evidence, evidence.seconds(imu), readings):
+                outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
+                evidence = replace(evidence, **{name: None})  # type: ignore[arg-type]
+    return outcomes, evidence
 
 
 def _joints(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -115,9 +116,12 @@ def _joints(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return outcomes, evidence.with_rate(*left)
 
 
-def _sinkage(evidence: Evidence, sinkage: SinkageSeries) -> tuple[list[Outcome], Evidence]:
+def _sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels whose sinkage stays the same; 0 is right on firm ground."""
-    outcomes, known = list[Outcome](), sinkage.sinkage.copy()
+    outcomes, sinkage = list[Outcome](), evidence.recording.sinkage
+    if sinkage is None:
+        return [], evidence
+    known = sinkage.sinkage.copy()
     middle = np.nan_to_num(np.nanmedian(np.abs(sinkage.sinkage), axis=0))
     for i, name in enumerate(sinkage.names):
         others = float(np.median(np.delete(middle, i))) if middle.size > 1 else 0.0
@@ -174,7 +178,8 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         steps = beside.size > LEAST_BESIDE and not noisy
         if steps and np.ptp(speed[first:last]) < CALM * evidence.working_rate:
             continue
-        usual = _usual(beside)
+        changes = np.flatnonzero(~beside)
+        usual = np.quantile(np.diff(changes), 0.9) if changes.size > LEAST_MESSAGES else 1.0
         others = np.delete(readings, np.s_[first : last + 1], axis=0)
         coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
             FINE, len(others) // 2
@@ -186,9 +191,3 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         if lasts > longest:
             longest, value = lasts, float(readings[first, 0]) if values.shape[1] == 1 else math.nan
     return Stays(rows, longest, value) if longest else None
-
-
-def _usual(same: Mask) -> float:
-    """Return over how many messages a reading stays, given (k - 1,) whether it repeats itself."""
-    changes = np.flatnonzero(~same)
-    return float(np.quantile(np.diff(changes), 0.9)) if changes.size > LEAST_MESSAGES else 1.0

@@ -189,10 +189,11 @@ def against_each_other(
     recording: Recording, facts: RoverFacts, checks: Sequence[Check], mended: Mended
 ) -> Evidence | None:
     """Hold one channel against another; None where hardly any wheel rates are."""
-    state = imu.ImuState(recording, facts.mounting, facts.gravity)
-    state = mended('gravity', state, lambda: imu.check_imu(state), 'check_imu')
-    facts = replace(facts, gravity=state.gravity)
-    evidence = gather(state.recording, facts, state.rotation, mended.report.figures)
+    sensed = mended('gravity', recording, lambda: imu.check_imu(recording, facts), 'check_imu')
+    found_there = {finding.fault: finding for finding in mended.report.findings}
+    if 'planet' in found_there:
+        facts = replace(facts, gravity=found_there['planet'].value)
+    evidence = gather(sensed, facts, mended.report.figures)
     if evidence is None or np.isfinite(evidence.rate).any(axis=1).sum() < LEAST_MOVING_ROWS:
         return None
     for kind, module, check, *_ in checks:
@@ -225,6 +226,7 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('noise', wheel_rates, 'check_noise'),
     ('mounting', imu, 'check_tilt'),
     ('mounting', reference, 'check_frame', DRIVING),
+    ('unit', reference, 'check_reference_unit', DRIVING),
     ('gain', torque, 'check_torque', DRIVING),
     ('mounting', imu, 'check_yaw', DRIVING),
     ('jumps', reference, 'check_jumps', DRIVING),

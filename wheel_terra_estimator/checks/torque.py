@@ -102,9 +102,7 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     The mean alone is not enough: a wheel with a slightly smaller radius is dragged by the others.
     """
     facts, by_wheel = evidence.facts, responses(evidence)
-    if by_wheel is not None and _fight(evidence, by_wheel):
-        by_wheel = None
-    if by_wheel is None:
+    if by_wheel is None or _fight(evidence, by_wheel):
         return [not_checked('sign', 'torque_no_change')], evidence
     usual = float(np.median([abs(response.value) for response, _ in by_wheel]))
     agree = all(response.value * level.value > 0.0 for response, level in by_wheel)

@@ -144,14 +144,6 @@ class Fit(NamedTuple):
         return self.track if abs(self.correlation) > LEAST_CORRELATION else 0.0
 
 
-class Comparison(NamedTuple):
-    """The best hypothesis, its fit, and its trial on the halves beside the best other one."""
-
-    fix: Fix
-    fit: Fit
-    trial: Trial
-
-
 def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
     """Return how well each of f hypotheses accounts for wheels and gyro."""
     yaw, lateral = stretch.yaw, stretch.lateral
@@ -183,8 +175,11 @@ def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
     return [Fit(*map(float, one)) for one in zip(cost, track, alike, strict=True)]
 
 
-def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
-    """Compare hypotheses, the first of which is that nothing is wrong."""
+def compare(stretch: Turning, fixes: Sequence[Fix]) -> tuple[Fix, Fit, Trial]:
+    """Return the best of hypotheses, its fit, and its trial on halves beside the best other one.
+
+    The first is that nothing is wrong.
+    """
     whole = fits_of(fixes, stretch)
     both = [stretch.rows(half) for half in halves(np.ones(stretch.yaw.size))]
     parts = [[fit.cost for fit in fits_of(fixes, half)] for half in both]
@@ -208,7 +203,7 @@ def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
         )
         for part in parts
     ]
-    return Comparison(fixes[best], whole[best], worst(trials))
+    return fixes[best], whole[best], worst(trials)
 
 
 def exchanges(stretch: Turning) -> list[Fix]:
@@ -270,6 +265,8 @@ def check_steering_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels that are not steered as the rover turns, and the evidence without them."""
     facts, track = evidence.facts, track_ratio(evidence)
+    if not np.isfinite(evidence.steering).any():
+        return [], evidence
     gain, zero = _steered_as_turned(evidence)
     still, order = np.abs(gain) < STILL, _sides_exchanged(facts)
     ahead = np.nan_to_num(evidence.steering[evidence.unturned])
@@ -390,26 +387,26 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
         return _Chosen(signs)
     stretch = stretch_of(evidence, there, rows)
     signed = [Fix((1, *those)) for those in itertools.product((1, -1), repeat=count - 1)]
-    best = compare(stretch, [*signed, *exchanges(stretch)[1:]])
-    if not best.trial.falls and count > 2 and stretch.turns.sum() >= 2 * LEAST_TURNING_ROWS:
+    best, fit, trial = compare(stretch, [*signed, *exchanges(stretch)[1:]])
+    if not trial.falls and count > 2 and stretch.turns.sum() >= 2 * LEAST_TURNING_ROWS:
         again = compare(stretch.rows(stretch.turns), exchanges(stretch))  # they show in turns alone
-        best = again if again.trial.falls else best
+        best, fit, trial = again if again[2].falls else (best, fit, trial)
     # Nothing is clearly better than what the rover file says, or good enough.
     steered = np.isfinite(evidence.steering).any()
-    if not best.trial.falls or best.trial.after > (MOST_LEFT_STEERED if steered else MOST_LEFT):
+    if not trial.falls or trial.after > (MOST_LEFT_STEERED if steered else MOST_LEFT):
         return _Chosen(signs, fits_of([Fix((1,) * count)], stretch)[0].clear_track)
-    turn = best.fit.clear_track
-    signs[there] = best.fix.signs
+    turn = fit.clear_track
+    signs[there] = best.signs
     facts = evidence.facts
     if evidence.gyro is None and facts.has_sides() and not np.ptp(signs * facts.side):
         return _Chosen(np.ones(signs.size))  # it may be a turn on the spot
     doubled = 2 * int(np.sum(signs < 0.0))
     if doubled > count or (doubled == count and turn < 0.0):
         signs, turn = -signs, -turn  # the pair with fewer reversed wheels is meant
-    trial = best.trial.words('wheels apart', 'of their speed')
-    trial += '' if best.trial.passes else ', or others do: drive straight'
-    exchanged = tuple((int(there[a]), int(there[b])) for a, b in best.fix.exchanged)
-    return _Chosen(signs, turn, exchanged, trial, 0.99 if best.trial.passes else 0.5)
+    words = trial.words('wheels apart', 'of their speed')
+    words += '' if trial.passes else ', or others do: drive straight'
+    exchanged = tuple((int(there[a]), int(there[b])) for a, b in best.exchanged)
+    return _Chosen(signs, turn, exchanged, words, 0.99 if trial.passes else 0.5)
 
 
 def turns_upright(evidence: Evidence) -> float:

@@ -186,8 +186,7 @@ def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         lost = _sudden((size == 0.0) & drives, size > LIVELY * np.quantile(size, 0.9), at)
         if len(runs(lost)) >= FEW_ZEROS:
             outcomes.append(evidence.found('reference_zeros', 0.95, count=int(lost.sum())))
-            left = replace(evidence.recording, reference=rows_of(reference, ~lost))
-            evidence = replace(evidence, recording=left)
+            evidence = evidence.with_reference(rows_of(reference, ~lost))
     if not zero.any():
         return outcomes, evidence
     wheels = zero.any(axis=0)
