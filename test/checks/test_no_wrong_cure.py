@@ -230,6 +230,8 @@ def test_a_track_that_no_second_gyro_bears_out_is_told_with_its_rival():
     (finding,) = checked(wide, reference={'yaw_rate': 0.0 * WHOLE.reference.yaw_rate}).findings
     assert finding.fault == 'track' and 'or the gyro has a scale error' in finding.words
     assert finding.value == pytest.approx(2.0 * rolling.HALF_TRACK, rel=0.03)
+    (finding,) = checked(wide, reference=None).findings
+    assert finding.confidence == 0.5 and 'or the wheels slip' in finding.words
 
 
 @pytest.mark.parametrize('reversed_wheel', [False, True])
@@ -241,13 +243,6 @@ def test_a_wheel_that_the_others_drag_keeps_the_sign_of_its_torque(reversed_whee
     report = checked(joints={'torque': torque})
     told = [f.wheel for f in report.findings if f.fault == 'torque_sign']
     assert told == (['front_right'] if reversed_wheel else [])
-
-
-def test_an_imu_that_states_no_acceleration_is_told():
-    nothing = np.full_like(WHOLE.imu.force, np.nan)
-    report = checked(imu={'force': nothing, 'absent': ('force',)})
-    assert any('no linear_acceleration' in n.reason for n in report.not_checked)
-    assert not {f.kind for f in report.findings} & {'placeholder', 'gravity'}
 
 
 def test_noise_of_an_imu_is_that_of_the_livelier_half():
@@ -331,15 +326,6 @@ def test_a_reference_that_points_aside_is_no_reversed_one(angle):
     (told,) = (f for f in report.findings if f.kind == 'mounting')
     assert told.fault == 'reference_turned' and 'world' in told.words and told.confidence <= 0.5
     assert told.value == pytest.approx(angle, abs=3.0)
-
-
-def test_a_specific_force_a_little_off_gravity_is_reported():
-    """A zero along z, a scale or another gravity: nothing in a recording tells which."""
-    for force in (WHOLE.imu.force + 0.6 * np.eye(3)[2], 1.25 * WHOLE.imu.force):
-        told = checked(imu={'force': force}).findings
-        told = [f for f in told if f.kind in ('gravity', 'unit', 'zero')]
-        assert [f.fault for f in told] == ['force_scale'] and told[0].parameter is None
-        assert 'z zero' in told[0].words and 'rover.gravity' in told[0].words
 
 
 def test_a_turn_on_the_spot_reverses_no_axis_of_the_accelerometer():
@@ -663,15 +649,8 @@ def test_a_tilted_gyro_has_no_other_scale():
     assert told[0].value == pytest.approx(2.0, abs=0.1)
 
 
-def test_a_yaw_that_a_shaky_imu_leaves_open_is_said_to_be_open():
-    noise = 0.4 * np.random.default_rng(8).standard_normal(WHOLE.imu.force.shape)
-    report = checked(imu={'force': WHOLE.imu.force + noise})
-    assert any(e.reason.startswith('yaw of the IMU below') for e in report.not_checked)
-
-
 def test_wheels_of_a_side_that_hang_on_one_encoder_are_no_copies():
     joints = replace(WHOLE.joints, rate=WHOLE.joints.rate[:, [0, 1, 0, 1]])
-    assert not checked(joints=joints).findings
     swapped = rolling.rover(**{'wheels.names': [rolling.NAMES[i] for i in (1, 0, 2, 3)]})
     assert faults(checked(swapped, joints=joints)) == ['exchanged']
     reverse = replace(joints, rate=joints.rate * [-1, 1, 1, 1])
@@ -706,19 +685,6 @@ def test_one_late_message_beside_a_loss_is_no_step_of_a_clock():
     arrival[199] += 900_000_000  # before the two that are lost
     late = replace(reference, log_time=arrival)
     assert faults(rolling.checked(reference=late)) == []
-
-
-def test_two_damaged_messages_are_no_habit_of_a_driver():
-    rate = WHOLE.joints.rate.copy()
-    rate[[300, 400]] = 40.0  # of all wheels
-    assert faults(rolling.checked(joints=replace(WHOLE.joints, rate=rate))) == []
-
-
-def test_a_reference_that_is_lost_twice_has_no_second_publisher():
-    seconds, velocity = WHOLE.reference.seconds, WHOLE.reference.velocity.copy()
-    velocity[(abs(seconds - 30.0) < 1.0) | (abs(seconds - 80.0) < 1.0)] = 0.0
-    reference = replace(WHOLE.reference, velocity=velocity)
-    assert 'reference_zeros' not in faults(rolling.checked(reference=reference))
 
 
 def test_torques_that_break_wheels_away_are_not_wild():

@@ -18,13 +18,6 @@ from wheel_terra_estimator.checks.series import rows_of
 WHOLE = rolling.recording()
 
 
-def test_a_reference_that_freezes_before_a_stop_and_a_way_back():
-    velocity = WHOLE.reference.velocity.copy()
-    velocity[WHOLE.reference.seconds > 50.0] = velocity[WHOLE.reference.seconds > 50.0][0]
-    (finding,) = found(reference={'velocity': velocity})
-    assert finding.fault == 'reference_frozen'
-
-
 def test_a_wheel_without_rates_keeps_its_sign():
     rate = WHOLE.joints.rate * [-1, math.nan, 1, 1]
     told = {f.fault: f for f in found(joints={'rate': rate})}

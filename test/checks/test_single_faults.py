@@ -69,6 +69,7 @@ def one_number(*numbers):
 
 RPM, DEGREES, COUNTS, G = 30.0 / math.pi, 180.0 / math.pi, 4096 / (2.0 * math.pi), rolling.GRAVITY
 EXCHANGED = 'wheels.names: [front_right, front_left, rear_left, rear_right]'
+SWAPPED = 'wheels.names: [front_right, front_left, rear_right, rear_left]'
 RENAMED = 'wheels.names: [fl_wheel, front_right, rear_left, rear_right]'
 THREE = {**both(lambda v: v[:, :3]), 'names': lambda names: names[:3]}
 FROZEN = 'up to '
@@ -78,10 +79,16 @@ NOISE = np.random.default_rng(9970).normal(0.0, 0.02, WHOLE.joints.rate.shape)
 TENTH = (np.arange(WHOLE.joints.stamp.size) % 10 == 0)[:, None]
 HALF_PERIOD = round(0.5e9 / rolling.RATE)
 LOST = (WHOLE.reference.seconds % 10.0 < 2.0)[:, None]
+SLIPS = np.where(WHOLE.reference.seconds % 100.0 < 70.0, 0.62, 1.0)[:, None]  # miles at 0.38?
+LATER = np.where(WHOLE.joints.seconds > 88.0, 2_500_000_000, 0)
+TWICE = np.abs(WHOLE.reference.seconds[:, None] - [30.0, 80.0]).min(axis=1, keepdims=True) < 1.0
+BELOW = [0.0, 0.06, 0.0, 0.06]
+GONE = (abs(WHOLE.reference.seconds - 140.0) < 20.0)[:, None]
 FAULTS = [  # channel, what its fields become, the only fault, its wheel, its true size, said
     (JOINTS, both(by([1, 1, -1, 1])), 'backwards', RL, None, 'direction: [1, 1, -1, 1]'),
     (JOINTS, both(by([-1, 1, -1, 1])), 'backwards', f'{FL}, {RL}', None, '[-1, 1, -1, 1]'),
     (JOINTS, both(lambda v: v[:, [1, 0, 2, 3]]), 'exchanged', f'{FL}, {FR}', None, EXCHANGED),
+    (JOINTS, both(lambda v: v[:, [1, 0, 3, 2]]), 'swapped_sides', None, None, SWAPPED),
     (JOINTS, {'rate': by(RPM)}, 'rate_unit', None, approx(1.0 / RPM), ''),
     (JOINTS, {'rate': by(DEGREES)}, 'rate_unit', None, approx(1.0 / DEGREES), ''),
     (JOINTS, {'rate': by(COUNTS)}, 'rate_counts', None, approx(1.0 / COUNTS, rel=0.05), 'counts'),
@@ -109,6 +116,10 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, {'torque': np.abs}, 'torque_unsigned', None, None, ''),
     (JOINTS, {'torque': by(0.0)}, 'torque_placeholder', None, None, 'effort'),
     (JOINTS, {'torque': by([1, -1, 1, 1])}, 'torque_sign', FR, None, ''),
+    (JOINTS, {'torque': by(1e-3)}, 'torque_scale', None, None, 'gear'),  # kilonewton metres
+    (JOINTS, {'torque': plus(*4 * [20.0])}, 'torque_zero', ALL, approx(20.0, rel=0.1), ''),
+    (JOINTS, {'torque': plus(*4 * [60.0])}, 'torque_zero', ALL, approx(60.0, rel=0.1), ''),
+    (JOINTS, {'stamp': lambda s: s + LATER}, 'order', None, None, 'None'),  # no offset mends it
     (*stays(JOINTS, 'torque', 2), 'torque_frozen', RL, None, FROZEN),
     (JOINTS, {'names': lambda n: ('fl_wheel', *n[1:])}, 'joint_name', FL, None, RENAMED),
     (JOINTS, THREE, 'missing_wheel', RR, None, ''),
@@ -119,6 +130,8 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (IMU, {'force': plus(0.0, 0.0, -G)}, 'gravity_off', None, None, ''),
     (IMU, {'force': plus(1.0, 0.0, -G)}, 'gravity_off', None, None, 'REP 145'),  # on a slope
     (IMU, {'force': by(1.62 / G)}, 'planet', None, approx(1.62), 'rover.gravity: 1.62'),
+    (IMU, {'force': plus(0.0, 0.0, 0.6)}, 'force_scale', None, None, 'z zero'),
+    (IMU, {'force': by(1.25)}, 'force_scale', None, None, 'rover.gravity'),
     (IMU, {'force': plus(0.6, 0.0, 0.0)}, 'force_bias', None, approx(0.6, abs=0.05), 'bias: [0.6'),
     (IMU, {'force': np.round}, 'imu_noise', None, approx(1.0 / math.sqrt(12.0), rel=0.1), ''),
     (IMU, {'force': np.negative}, 'force_reversed', None, None, 'linear_acceleration'),
@@ -146,13 +159,20 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
      'reference_wheels', None, None, ''),
     (REFERENCE, {'velocity': lambda v: np.where(LOST, 0.0, v)}, 'reference_zeros', None, None, ''),
     (REFERENCE, {'velocity': by(3.6)}, 'reference_unit', None, approx(1.0 / 3.6), 'kilometres'),
+    (REFERENCE, {'velocity': by(3.6 * SLIPS)}, 'reference_unit', None, approx(1.0 / 3.6), ''),
     (REFERENCE, units(100.0), 'reference_unit', None, approx(0.01), ''),
     (REFERENCE, units(1000.0), 'reference_unit', None, approx(0.001), ''),
     (REFERENCE, {'variance': lambda v: 0.0 * v + 1e6}, 'covariance', None, None, ''),
     (REFERENCE, {'variance': lambda v: 1e-4 * v * np.linspace(0.5, 2.0, len(v))},
      'covariance', None, approx(0.01, rel=0.3), ''),
     (*stays(REFERENCE, 'velocity'), 'reference_frozen', None, None, FROZEN),
+    (*stays(REFERENCE, 'velocity', since=50.0, until=math.inf), 'reference_frozen', None, None, ''),
+    (REFERENCE, {'velocity': lambda v: np.where(GONE, 0.0, v)}, 'reference_frozen', None, None,
+     FROZEN),
     (SINKAGE, {'sinkage': by(1000.0)}, 'sinkage_unit', None, approx(0.001), ''),
+    (SINKAGE, {'stamp': lambda s: s + 800_000_000}, 'sinkage_offset', None, approx(0.8, abs=0.1),
+     'sensors.sinkage_stamp_offset'),
+    (SINKAGE, {'sinkage': lambda v: v * [1, 1, 1, 0]}, 'sinkage_frozen', RR, None, 'is 0 in every'),
     (SINKAGE, {'sinkage': plus(0.0, 0.04, 0.0, 0.0)}, 'sinkage_zero', FR,
      approx(0.04, abs=0.002), ''),
     (*stays(SINKAGE, 'sinkage', 1), 'sinkage_frozen', FR, None, FROZEN),
@@ -200,6 +220,21 @@ def jerks(torque):
     return torque + 100.0 * np.isin(np.arange(len(torque)), starts)[:, None]
 
 
+def damaged(rate):
+    """Two messages of all wheels."""
+    return np.where(np.isin(np.arange(len(rate)), (300, 400))[:, None], 40.0, rate)
+
+
+def jittered(stamp):
+    """By one and a half periods, as they come."""
+    jitter = 1.5 * np.median(np.diff(stamp)) * np.random.default_rng(4).standard_normal(stamp.size)
+    return np.sort(stamp + jitter.astype(np.int64))
+
+
+def too_late(stamp):
+    return stamp + 2_500_000_000
+
+
 def wandered(rate):
     """A bias until the first start."""
     return rate + np.outer(WHOLE.imu.seconds < 12.0, [0.0, 0.0, 0.05])
@@ -210,11 +245,23 @@ ALIKE = [  # channel, what its fields become, the only faults that may be told, 
     (JOINTS, {'rate': rounded(0.02)}, set(), ''),
     (JOINTS, {'rate': counted}, {'rate_steps'}, ''),
     (JOINTS, {'rate': one_dead_among_coarse}, {'rate_frozen', 'rate_steps'}, ''),
+    (JOINTS, {'rate': damaged}, set(), ''),
+    (JOINTS, {'rate': lambda v: v[:, [0, 1, 0, 1]]}, set(), ''),  # an encoder for each side
     (JOINTS, {'torque': jerks}, set(), ''),
     (JOINTS, {'torque': rounded(1.0)}, set(), ''),
+    (IMU, {'force': scattered(0.4)}, {'imu_noise'}, 'yaw of the IMU below'),
+    (IMU, {'force': by(math.nan), 'absent': lambda _: ('force',)}, set(), 'no linear_acceleration'),
+    (IMU, {'stamp': jittered}, set(), ''),
+    (IMU, {'stamp': too_late, 'log_time': too_late}, set(), 'or stamps more than 2 s off'),
+    (IMU, {'rate': rounded(0.1)}, {'imu_noise'}, ''),
     (IMU, {'rate': scattered(0.1)}, {'imu_noise'}, ''),
     (IMU, {'rate': wandered}, set(), ''),
     (REFERENCE, {'velocity': rounded(0.05)}, {'covariance'}, ''),
+    (REFERENCE, {'velocity': lambda v: np.where(TWICE, 0.0, v)}, set(), ''),
+    (*stays(REFERENCE, 'velocity', since=0.0, until=15.0), set(), ''),
+    (*stays(SINKAGE, 'sinkage', since=0.0, until=15.0), set(), ''),
+    (SINKAGE, {'sinkage': by(0.0)}, set(), ''),  # on firm ground
+    (SINKAGE, {'sinkage': lambda v: v - BELOW}, set(), ''),  # half of the wheels
     (SINKAGE, {'sinkage': rounded(0.005)}, set(), ''),
     (SINKAGE, {'sinkage': scattered(0.06)}, set(), ''),
     (SINKAGE, {'sinkage': lambda v: scattered(0.2)(0.0 * v + 0.05)}, set(), 'a wrong unit'),

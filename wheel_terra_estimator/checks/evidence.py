@@ -343,7 +343,7 @@ def gather(recording: Recording, facts: RoverFacts, figures: dict[str, Any]) -> 
     torque = facts.errors.torque.true(torque)
     force = gyro = None
     imu = recording.imu
-    if imu is not None and imu.stamp.size > 1 and time.size > 1:
+    if imu is not None:
         at = (imu.stamp - rows.stamp[0]) * 1e-9
         width = float(np.median(np.diff(time)))
         force, gyro = (

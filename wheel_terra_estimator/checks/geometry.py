@@ -101,11 +101,11 @@ def _straight_speeds(evidence: Evidence) -> _Speeds | None:
     reference = evidence.recording.reference
     if reference is None:
         return None
+    rows = evidence.rim_at(reference.stamp, evidence.straight.astype(float)) > 0.99
+    if rows.sum() < LEAST_REFERENCES:
+        return None
     rim = evidence.rim_at(reference.stamp, evidence.rim)
-    straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float))
-    forward = reference.velocity[:, 0]
-    rows = np.isfinite(rim) & (straight > 0.99) & np.isfinite(forward)
-    return _Speeds(rim[rows], forward[rows], rows) if rows.sum() >= LEAST_REFERENCES else None
+    return _Speeds(rim[rows], reference.velocity[rows, 0], rows)
 
 
 def radius_ratio(evidence: Evidence) -> TriedRatio | NotChecked:
@@ -365,7 +365,7 @@ def measured_track(evidence: Evidence) -> TriedRatio | NotChecked:
     facts, difference = evidence.facts, evidence.side_difference
     if evidence.gyro is None or not facts.known or not facts.has_sides():
         return not_checked('track', 'no_sides')
-    rows = evidence.turning & np.isfinite(difference)
+    rows = evidence.turning
     yaw, difference = evidence.yaw[rows], difference[rows]
     clear = rows.sum() > 60 and correlation(yaw, difference) > CLEAR_TURN
     if not clear or float(np.quantile(np.abs(evidence.gyro[:, 2]), 0.95)) < LEAST_TURN_RATE:

@@ -295,11 +295,8 @@ def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray, FloatArray] |
 
     The rest is what the bias changes by. None without a standstill.
     """
-    imu, gyro = evidence.recording.imu, evidence.gyro
-    if imu is None or gyro is None:
-        return None
-    rest = evidence.at_rest
-    if rest.sum() * evidence.period < LEAST_STANDSTILL:
+    gyro, rest = evidence.gyro, evidence.at_rest
+    if gyro is None or rest.sum() * evidence.period < LEAST_STANDSTILL:
         return None
     spread = np.array([robust_std(column) for column in gyro[rest].T])
     noise = spread / math.sqrt(max(rest.sum() / 4.0, 1.0))
@@ -423,18 +420,23 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     force = f'mean specific force ({up[0]:.2f}, {up[1]:.2f}, {up[2]:.2f}) m/s^2'
     words: dict[str, Any] = {'force': force}
     sure = 0.999
+    starts = mounting_yaw(mended)
     if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
         upright = turns_upright(evidence)
         if upright > CLEAR_AGREEMENT:
             reversed_force = replace(evidence, force=-evidence.force)
-            starts = mounting_yaw(reversed_force)
+            forward = mounting_yaw(reversed_force)
             # Measured backward then it lies on its back, and the sides are swapped.
-            if starts is None or abs(starts.value) <= 0.5 * math.pi:
+            if forward is None or abs(forward.value) <= 0.5 * math.pi:
                 return [evidence.found('force_reversed', 0.97, **words)], reversed_force
         if upright > -CLEAR_AGREEMENT:
             sure = UNTURNED
             words['alternative'] = ', or linear_acceleration has the wrong sign: drive circles'
-    if mounting_yaw(mended) is None:  # about another axis it would be upright as well
+        elif starts is not None and abs(starts.value) > 0.5 * math.pi:  # all as in a mirror
+            sure = UNTURNED
+            words['alternative'] = ', or linear_acceleration has the wrong sign, and left and right'
+            words['alternative'] += ' wheels are swapped: look at the IMU'
+    if starts is None:  # about another axis it would be upright as well
         sure = 0.5
         words.setdefault('alternative', '')
         words['alternative'] += '; which way its x axis points is open: drive brisk starts'

@@ -238,25 +238,19 @@ def _direction(
     return complex(direction.mean()), bool(turns)
 
 
-def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[FloatArray, Mask]:
-    """Return rim speeds at the stamps of velocities, and the rows in which the rover goes ahead.
+def speed_ratios(evidence: Evidence) -> FloatArray | None:
+    """Return reference speeds over rim speeds where the rover goes ahead; None: they tell no unit.
 
     In turns on the spot the mean of the rims is next to nothing.
     """
-    rim = np.abs(evidence.rim_at(series.stamp, row_medians(evidence.speed)))
-    usual = float(np.nanquantile(rim, 0.9)) if np.isfinite(rim).any() else 0.0
-    least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
-    mean = np.abs(evidence.rim_at(series.stamp, evidence.rim))
-    rows = (rim > max(share * usual, least, 1e-9)) & (mean > MOSTLY * rim)
-    return rim, rows & np.isfinite(series.velocity[:, :2]).all(axis=1)
-
-
-def speed_ratios(evidence: Evidence) -> FloatArray | None:
-    """Return reference speeds over rim speeds; None where they tell no unit."""
     reference = evidence.recording.reference
     if reference is None:
         return None
-    rim, rows = ahead(evidence, reference, 0.4)
+    rim = np.abs(evidence.rim_at(reference.stamp, row_medians(evidence.speed)))
+    usual = float(np.nanquantile(rim, 0.9)) if np.isfinite(rim).any() else 0.0
+    least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
+    mean = np.abs(evidence.rim_at(reference.stamp, evidence.rim))
+    rows = (rim > max(0.4 * usual, least, 1e-9)) & (mean > MOSTLY * rim)
     speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
     if rows.sum() < LEAST_ROWS:
         return None

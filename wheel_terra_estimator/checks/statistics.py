@@ -159,8 +159,6 @@ def runs(same: BoolArray) -> list[tuple[int, int]]:
 
 def correlation(first: FloatArray, second: FloatArray) -> float:
     """Return the correlation of two series about zero, 0 where one of them is zero."""
-    known = np.isfinite(first) & np.isfinite(second)
-    first, second = first[known], second[known]
     size = float(np.sqrt((first @ first) * (second @ second)))
     return float(first @ second / size) if size > 0.0 else 0.0
 

@@ -92,19 +92,19 @@ class Turning:
     speed: FloatArray
     yaw: FloatArray
     lateral: FloatArray
-    unbiased: bool = True  # else a constant yaw rate may be the gyro's
-    along: FloatArray | None = None  # (k, m) cosine of the steering angles; None: not steered
+    unbiased: bool  # else a constant yaw rate may be the gyro's
+    along: FloatArray  # (k, m) cosine of the steering angles; 1 where not steered
 
     def rows(self, part: slice | Mask) -> Turning:
         """Return a part of the stretch."""
-        along = None if self.along is None else self.along[part]
-        return replace(self, speed=self.speed[part], yaw=self.yaw[part], along=along)
+        speed, yaw, along = self.speed[part], self.yaw[part], self.along[part]
+        return replace(self, speed=speed, yaw=yaw, along=along)
 
     @cached_property
     def turns(self) -> Mask:
         """Rows in which the gyro sees a turn."""
         size = np.abs(self.yaw)
-        if size.size < 3 or not self.lateral.any():
+        if not self.lateral.any():
             return np.zeros(size.shape, dtype=bool)
         noise = robust_std(np.diff(self.yaw)) / math.sqrt(2.0)
         level = max(4.0 * noise, 0.3 * float(np.quantile(size, 0.98)), LEAST_TURN_RATE)
@@ -123,12 +123,6 @@ class Fix(NamedTuple):
         for a, b in self.exchanged:
             order[a], order[b] = b, a
         return order
-
-    def mirrors(self, other: Fix) -> bool:
-        """Whether both differ by the sign of everything."""
-        return self.exchanged == other.exchanged and all(
-            a == -b for a, b in zip(self.signs, other.signs, strict=True)
-        )
 
 
 class Fit(NamedTuple):
@@ -150,7 +144,7 @@ def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
     columns = np.array([fix.order(lateral.size) for fix in fixes])
     signs = np.array([fix.signs for fix in fixes], dtype=float)
     speed = stretch.speed.T[columns].transpose(0, 2, 1) * signs[:, None]  # (f, k, m)
-    speed = speed if stretch.along is None else speed * stretch.along
+    speed = speed * stretch.along
     track, alike, cost = np.zeros((3, len(fixes)))
     rolling = speed
     if stretch.turns.sum() >= LEAST_TURNING_ROWS:
@@ -187,13 +181,8 @@ def compare(stretch: Turning, fixes: Sequence[Fix]) -> tuple[Fix, Fit, Trial]:
     alike = [i for i, fit in enumerate(whole) if fit.cost < least + TIE]
     # Of two that differ by swapped sides the one that agrees with the gyro is meant.
     best = max(alike, key=lambda i: (whole[i].track > 0.0, -i))
-    others = [
-        i
-        for i in range(1, len(fixes))
-        if i != best
-        and not fixes[i].mirrors(fixes[best])
-        and whole[i].track * whole[best].track >= 0.0
-    ]
+    tracks = [fit.track * whole[best].track for fit in whole]
+    others = [i for i in range(1, len(fixes)) if i != best and tracks[i] >= 0.0]
     alternative = min(others, key=lambda i: whole[i].cost, default=None)
     trials = [
         Trial(
@@ -214,7 +203,7 @@ def exchanges(stretch: Turning) -> list[Fix]:
     count = stretch.lateral.size
     left, right = (np.flatnonzero(s * stretch.lateral > 0.0).tolist() for s in (1.0, -1.0))
     pairings = [(pair,) for pair in itertools.product(left, right) if count > 2]
-    if stretch.along is not None and np.ptp(stretch.along, axis=1).max(initial=0.0) > 0.0:
+    if np.ptp(stretch.along, axis=1).max(initial=0.0) > 0.0:
         rows = [list(itertools.combinations(side, 2)) for side in (left, right)]
         pairings += [(pair,) for side in rows for pair in side] + list(zip(*rows, strict=False))
     return [Fix((1,) * count), *(Fix((1,) * count, tuple(pairs)) for pairs in pairings)]
@@ -229,7 +218,7 @@ def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turni
     if keep.size > TRIAL_ROWS:
         keep = keep[np.linspace(0, keep.size - 1, TRIAL_ROWS).astype(int)]
     lateral = (facts.lateral if facts.known else facts.side)[there]
-    sides = (lateral > 0.0).any() and (lateral < 0.0).any() and np.isfinite(lateral).all()
+    sides = (lateral > 0.0).any() and (lateral < 0.0).any()
     if evidence.gyro is None or not sides:
         lateral = np.zeros(there.size)
     speed = (evidence.rate * evidence.radius)[keep][:, there]
@@ -322,7 +311,7 @@ def _steered_against(evidence: Evidence) -> bool:
 def check_axes(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return x and y in each other's place by the sides in the names, and the evidence mended."""
     facts, wheels = evidence.facts, evidence.facts.configuration.wheels
-    if not facts.known or len(facts.names) != wheels.x.size:
+    if not facts.known:
         return [], evidence
     sides = np.array([side_of(name) for name in facts.names])
     if not (sides * wheels.x > 0.0).all() or (sides * wheels.y > 0.0).all():
@@ -340,7 +329,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels that count backwards or are exchanged, sides or a reference that are."""
     facts = evidence.facts
     there, rows = _known(evidence)
-    if rows.sum() < LEAST_MOVING_ROWS or not there.size:
+    if rows.sum() < LEAST_MOVING_ROWS:
         kinds = ('sign', 'swapped_sides', 'exchanged_wheels')
         return [not_checked(kind, 'hardly_moves') for kind in kinds], evidence
     outcomes: list[Outcome] = []
