@@ -47,7 +47,6 @@ START_SLIP = 0.15  # part of the accelerations of rims that slip and lags take, 
 START_STD = 0.03  # of them by the model, at least [-]
 TRACK_STD = 0.02  # deviation that slip leaves in a scale of speed by turns, at least [-]
 RESISTANCE = Estimate(0.08, 0.05)  # of firm ground over the weight [-]
-UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)  # where no torque shows it [-]
 SOFT_DEPTH = 0.06  # sinkage over radius above which ground is not taken for firm [-]
 MOST_ROUNDING = 0.02  # error of the mean rate by rounding, over the working rate, at most [-]
 SLOPE_OF_SLIP = Estimate(0.2, 0.2)  # slip over traction of firm ground [-]
@@ -153,25 +152,20 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     demand = np.zeros(rim.size)
     if evidence.force is not None:
         demand = speeds.at(evidence, evidence.force[:, 0]) / facts.gravity
-    resistance = UNKNOWN_RESISTANCE
-    traction = demand + resistance.value
-    if np.isfinite(evidence.torque).any(axis=0).all():
-        traction = speeds.at(evidence, thrust(evidence)) / (facts.mass * facts.gravity)
-        estimate = _resistance(evidence, float(np.median(traction - demand)))
-        if isinstance(estimate, NotChecked):
-            return estimate
-        resistance = estimate
-    elif plain.value > 1.0:
-        # Only a larger radius makes a rover faster than its rolling wheels.
-        return Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD))
-    else:
+    if not np.isfinite(evidence.torque).any(axis=0).all():
+        if plain.value > 1.0:  # Only a larger radius makes a rover faster than its rolling wheels.
+            return Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD))
         return not_checked('radius', 'no_torque')
+    traction = speeds.at(evidence, thrust(evidence)) / (facts.mass * facts.gravity)
+    costs = float(np.median(traction - demand))
+    resistance = _resistance(evidence, costs)
+    if isinstance(resistance, NotChecked):
+        return resistance
     depth = _depth(evidence).value
     middle = float(np.median(demand)) + resistance.value
     as_slip = (plain.value < 1.0) == (middle >= 0.0)  # downhill wheels skid: faster than the rims
     if as_slip and depth > SOFT_DEPTH:
         return not_checked('radius', 'soft', depth=depth)
-    costs = float(np.median(traction - demand))
     unseen = _depth(evidence) is FIRM_DEPTH and 1.0 - (costs / MOST_COST) ** 4 < plain.value
     if unseen and plain.value < MOST_SOFT and middle >= 0.0:
         return not_checked('radius', 'costly', seen=costs)
@@ -417,7 +411,7 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     track = measured_track(evidence)
     if isinstance(track, NotChecked):
         return [track]
-    (ratio, trial, alone), stated = track, stated_track(evidence)
+    ratio, trial, stated = track.ratio, track.trial, stated_track(evidence)
     times = ratio.value * evidence.likelier_radius
     figures['rover.effective_over_stated_track'] = round(times, 3)
     figures['rover.effective_track_m'] = round(times * stated, 4)

@@ -131,7 +131,7 @@ def _has(imu: ImuSeries, name: str) -> bool:
 def _without(imu: ImuSeries, *names: str) -> ImuSeries:
     """Return the messages without force, rate or orientation, where these are faulty."""
     nothing = {name: np.full_like(getattr(imu, name), np.nan) for name in names}
-    return replace(imu, **nothing)  # type: ignore[arg-type]
+    return replace(imu, **nothing)
 
 
 def _up_by_orientation(imu: ImuSeries, facts: RoverFacts) -> Judged:

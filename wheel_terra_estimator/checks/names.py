@@ -108,11 +108,9 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     names = tuple(renamed.get(name, name) for name in facts.names)
     outcomes: list[Outcome] = []
     if renamed:
-        details: dict[str, Any] = {
-            'wheel': ', '.join(renamed),
-            'other': ', '.join(renamed.values()),
-        }
-        outcomes.append(found('joint_name', joints.topic, 0.95, names=', '.join(names), **details))
+        pairs = {'wheel': renamed, 'other': renamed.values(), 'names': names}
+        details: dict[str, Any] = {key: ', '.join(those) for key, those in pairs.items()}
+        outcomes.append(found('joint_name', joints.topic, 0.95, **details))
     gone = [name for name in absent if name not in renamed]
     if gone:
         outcomes.append(_missing(joints.topic, gone, 'in no message'))
@@ -134,15 +132,10 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     for name in spare:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
             outcomes.append(found('spare_joint', joints.topic, 0.7, wheel=name))
-    return [*outcomes, *_steering(joints, facts)], replace(facts, names=names)
-
-
-def _steering(joints: JointSeries, facts: RoverFacts) -> list[Outcome]:
-    """Return joints that steer, where the rover file has none."""
     steering = [name for name in joints.names if 'steer' in name.lower()]
-    if not steering or any(facts.configuration.wheels.steering_joints):
-        return []
-    return [found('steering', joints.topic, 0.9, listed=', '.join(steering))]
+    if steering and not any(facts.configuration.wheels.steering_joints):
+        outcomes.append(found('steering', joints.topic, 0.9, listed=', '.join(steering)))
+    return outcomes, replace(facts, names=names)
 
 
 def proposal(recording: Recording) -> dict[str, Any]:

@@ -71,10 +71,8 @@ class Tally(NamedTuple):
             score = self.score - 1
             return self._replace(score=score, stands=self.stands and score > 0)
         score = min(self.score + 1, CAP)
-        stands = score >= NEEDED or (self.stands and score > 0)
-        return self._replace(
-            score=score, stands=stands, finding=self.finding if self.stands else found
-        )
+        finding = self.finding if self.stands else found
+        return self._replace(score=score, stands=score >= NEEDED, finding=finding)
 
 
 @dataclass(frozen=True)

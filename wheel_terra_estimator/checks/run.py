@@ -190,9 +190,8 @@ def against_each_other(
 ) -> Evidence | None:
     """Hold one channel against another; None where hardly any wheel rates are."""
     sensed = mended('gravity', recording, lambda: imu.check_imu(recording, facts), 'check_imu')
-    found_there = {finding.fault: finding for finding in mended.report.findings}
-    if 'planet' in found_there:
-        facts = replace(facts, gravity=found_there['planet'].value)
+    planet = next((f.value for f in mended.report.findings if f.fault == 'planet'), None)
+    facts = replace(facts, gravity=planet or facts.gravity)
     evidence = gather(sensed, facts, mended.report.figures)
     if evidence is None or np.isfinite(evidence.rate).any(axis=1).sum() < LEAST_MOVING_ROWS:
         return None

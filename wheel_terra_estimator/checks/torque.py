@@ -87,7 +87,7 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if any(isinstance(o, Finding) for o in scale):
         return outcomes, without
     wrong = _zeros(evidence, zeros)
-    if any(isinstance(o, Finding) for o in wrong) and zeros is not None:
+    if any(isinstance(o, Finding) for o in wrong):
         evidence = without
     return [*outcomes, *_gain(evidence), *wrong], evidence
 

@@ -337,9 +337,8 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         findings, evidence = _unit_findings(evidence, units, how, sure * len(units))
         findings += [evidence.found('reference_unit', sure, **one) for one in of_reference.values()]
         return findings, evidence.with_rate(evidence.rate * math.nan)
-    rolls = ratio and track and abs(ratio * track - 1.0) < SAME_SCALE
     scaled = ratio is not None and ratio > MOST_COUNT and not OF_RADII[0] < ratio < OF_RADII[1]
-    if track and rolls and scaled and not units:
+    if ratio and track and scaled and not units and abs(ratio * track - 1.0) < SAME_SCALE:
         units, how = {f'rad/s before a gear of {track:.3g}': 1.0 / track}, 'speeds and turns'
     doubtful = False  # no unit with a usual slip, and perhaps counts
     if ratio is not None and ratio < MOST_COUNT and units:
