@@ -93,10 +93,10 @@ def test_zeros_of_a_gyro_are_in_the_frame_that_is_written():
     """Starts are felt backwards, curves not at all: which cure it is, nothing tells."""
     imu, zero = rolling.recording().imu, np.array([0.01, 0.004, 0.0])
     back = replace(imu, force=imu.force * [-1.0, 0.0, 1.0], rate=imu.rate + zero)
-    told = {
-        change.key: change.after
-        for change in calibrate(replace(rolling.recording(), imu=back), rolling.rover()).changes
-    }
+    calibration = calibrate(replace(rolling.recording(), imu=back), rolling.rover())
+    told = {change.key: change.after for change in calibration.changes}
+    (yaw,) = (f for f in calibration.findings if f.fault == 'imu_yaw')
+    assert 'wrong sign: drive circles' in yaw.words and yaw.confidence < 0.8
     assert not any('mounting' in key for key in told)
     assert told['sensors.angular_rate_bias'] == pytest.approx(zero, abs=1e-3)
 
@@ -183,6 +183,8 @@ def test_a_scale_that_may_be_the_mass_is_left_to_the_user():
     assert 'sensors.torque_gain' not in {change.key for change in told.changes}
     left = next(finding for finding in told.findings if finding.kind == 'gain')
     assert left.value == pytest.approx(1.4, rel=0.1) and 'rover.mass' in left.cure
+    mass = next(f for f in check_recording(wrong, rolling.rover()).findings if f.kind == 'mass')
+    assert mass.confidence == left.confidence <= 0.5
     mended = rolling.rover(**{'sensors.torque_gain': [left.value]})
     assert not {'gain', 'mass'} & {f.kind for f in check_recording(wrong, mended).findings}
 

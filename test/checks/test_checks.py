@@ -88,13 +88,6 @@ def test_a_small_tilt_is_told_by_full_turns(degrees, gravity):
     assert finding.value == pytest.approx(degrees, abs=0.3)
 
 
-def test_torque_scale_is_a_gain_or_a_mass():
-    report = checked(joints={'torque': 1.5 * WHOLE.joints.torque})
-    assert kinds(report) == {('gain', None), ('mass', None)}
-    gain = next(f for f in report.findings if f.kind == 'gain')
-    assert gain.value == pytest.approx(1.5, abs=3.0 * gain.std)
-
-
 def test_a_wheel_without_torque_leaves_the_scale_open():
     torque = WHOLE.joints.torque * [1.0, np.nan, 1.0, 1.0]  # without it nobody knows the sum
     report = checked(joints={'torque': 1.5 * torque})
@@ -124,17 +117,6 @@ def test_a_variance_of_zero_is_right_where_the_rover_file_states_what_is_seen():
     assert not [f for f in told.findings if f.kind == 'covariance']
     far = checked(rolling.rover(**{'sensors.reference_std': 0.5}), whole=recording)
     assert [f for f in far.findings if f.kind == 'covariance']
-
-
-def test_values_that_a_log_holds_scatter_as_the_new_ones_do():
-    """A log at five times the rate of the source repeats each reading four times."""
-    reference = rolling.recording().reference
-    step = np.diff(reference.stamp, append=2 * reference.stamp[-1] - reference.stamp[-2]) // 5
-    held = {field: np.repeat(getattr(reference, field), 5, axis=0) for field in SERIES}
-    held['stamp'] = held['stamp'] + np.repeat(step, 5) * np.tile(np.arange(5), step.size)
-    recording = replace(rolling.recording(), reference=replace(reference, **held))
-    told = checked(whole=recording)
-    assert told.figures['reference.noise_m_s'] == pytest.approx(0.01, rel=0.3)  # true: 0.01
 
 
 def test_a_rover_that_starts_and_stops_between_references_scatters_no_reference():
@@ -277,22 +259,6 @@ def test_messages_that_hold_some_of_the_wheels_are_checked_as_whole_ones(apart):
     assert report.figures['torque.gain'] == pytest.approx(usual.figures['torque.gain'], abs=0.02)
     assert report.figures['wheels.rate_noise_rad_s'] == pytest.approx(0.004, rel=0.1)  # the truth
     only(checked(joints=rows_of(some, np.repeat(np.arange(some.stamp.size), 2))), 'order')
-
-
-@pytest.mark.parametrize('jitter', [0.0, 0.004])
-def test_noise_of_an_encoder_is_that_of_its_counts_and_stamps(jitter):
-    """720 counts a turn, read too early or too late; the check proposes what is calibrated."""
-    joints, step, period = WHOLE.joints, 2.0 * np.pi / 720, 1.0 / rolling.RATE
-    angle = np.cumsum(joints.rate, axis=0) * period
-    read = angle + jitter * np.random.default_rng(1).standard_normal(angle.shape)
-    rate = np.diff(step * np.floor(read / step), axis=0, prepend=0.0) / period
-    report = checked(joints=replace(joints, rate=rate))
-    turning = np.abs(joints.rate) > 0.5
-    truth = np.std((rate - joints.rate)[turning])
-    seen = report.figures['wheels.rate_noise_rad_s']
-    assert seen == pytest.approx(truth, rel=0.15)
-    found = [f.value for f in report.findings if f.parameter == 'sensors.wheel_rate_std']
-    assert found == [pytest.approx(seen, rel=0.05)]
 
 
 def test_without_a_rover_file_signs_are_found_all_the_same():

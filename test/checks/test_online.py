@@ -362,35 +362,6 @@ def test_the_table_of_faults_names_kinds_parameters_and_channels_that_there_are(
         assert fault.channel in {field.name for field in fields(Recording)}
 
 
-def checks_over(drive, fault, seconds):
-    checks, slots = OnlineChecks(drive.configuration), {}
-    for m in sorted((a.measurement for a in drive.arrivals), key=lambda m: m.stamp):
-        name = {InertialReading: 'inertial', WheelOdometry: 'wheel_odometry'}.get(type(m))
-        if name and m.stamp < drive.arrivals[0].measurement.stamp + seconds * 1e9:
-            slots.setdefault(m.stamp, {})[name] = fault(m)
-    for stamp, inputs in slots.items():
-        checks.step(stamp, StepInputs(**inputs))
-    return checks
-
-
-def test_a_kept_state_gives_the_same_verdict():
-    """Late inputs are run again from kept states: what came between leaves no trace."""
-    fault = on_imu(1.0 / 9.80665)
-    drive = drive_of(SIX)
-    checks = checks_over(drive, fault, 3.0)
-    assert not checks.standing('slip')
-    kept = checks.snapshot()
-    first = next(a.measurement for a in drive.arrivals)
-    stamp = first.stamp + 5_000_000_000
-    reading = InertialReading(stamp, np.array([0.0, 0.0, 1.0]), np.zeros(3), None)
-    for _ in range(2):
-        checks.step(stamp, StepInputs(inertial=reading))
-        assert checks.standing('slip'), 'the second judgement'
-        checks.restore(kept)
-        assert not checks.standing('slip')
-    assert checks.window().imu.stamp.size == checks_over(drive, fault, 3.0).window().imu.stamp.size
-
-
 def test_a_finding_comes_and_goes_with_hysteresis():
     said = found('imu_upside', 'imu/data', 0.9, force='', angles='')
     tally = Tally(0, 'check_upside', said).after(said)

@@ -63,19 +63,3 @@ def test_an_accelerometer_reversed_beside_wheels_that_count_backwards(backwards)
     assert told['backwards'].wheel == ', '.join(
         name for name, sign in zip(rolling.NAMES, backwards, strict=True) if sign < 0
     )
-
-
-def test_fine_steps_of_a_rate_at_a_constant_speed_are_not_frozen():
-    """A rate that noise moves by a step now and then, and on a long straight hardly ever."""
-    random = np.random.default_rng(2)
-    drive = rolling.motion(90.0, ([2, 6, 40, 44], [0.0, 0.15, 0.15, 0.3]))
-    time, speed, whole = drive.time, drive.speed, rolling.recording(drive)
-    step = 2e-4  # [rad/s]
-    exact = np.repeat(speed[:, None], 4, axis=1) / rolling.RADIUS
-    scatter = np.array([0.05, 0.9, 0.9, 0.9]) * step
-    exact += scatter * random.standard_normal(exact.shape)
-    rate = step * np.round(exact / step)
-    rate[(time > 6.0) & (time < 14.0), 0] = step * round(0.15 / rolling.RADIUS / step)
-    joints = replace(whole.joints, rate=rate)
-    told = rolling.checked(whole=replace(whole, joints=joints)).findings
-    assert 'frozen' not in {f.kind for f in told}

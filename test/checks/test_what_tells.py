@@ -104,6 +104,14 @@ def test_without_a_depth_soft_ground_may_be_a_radius(sinkage):
     assert not may_be or all(f.confidence <= 0.5 for f in told)
 
 
+def test_without_a_way_back_zeros_of_the_torques_may_hide_slip():
+    hill = [20, 22, 38, 40, 42, 58], [0, 0.12, 0.12, -0.12, -0.12, 0]
+    whole = rolling.driven(220.0, ([10, 11], [0.0, 0.3]), slope=hill)
+    told = checked(SKIDS, whole, reference={'velocity': 0.95 * whole.reference.velocity}).findings
+    assert len(told) == 2 and all('torque zeros hide slip' in f.words for f in told)
+    assert max(f.confidence for f in told) <= 0.5
+
+
 def tilted(yaw, **rover):
     motion = rolling.ten_minute_drive()
     whole = rolling.recording(replace(motion, yaw_rate=yaw(motion.yaw_rate)))
