@@ -150,19 +150,6 @@ def test_sinkage_counted_upwards_by_a_small_wheel():
     assert 'sinkage_sign' in told
 
 
-def test_pauses_of_a_recording_are_no_bursts():
-    """Two minutes behind every 15 s of the same drive, in all its channels."""
-
-    def paused(channel):
-        since = channel.stamp - WHOLE.joints.stamp[0]
-        wait = since // 15_000_000_000 * 120_000_000_000
-        return replace(channel, stamp=channel.stamp + wait, log_time=channel.log_time + wait)
-
-    names = ('joints', 'imu', 'sinkage', 'reference')
-    report = checked(**{name: paused(getattr(WHOLE, name)) for name in names})
-    assert not any('bursts' in finding.words for finding in report.findings)
-
-
 def test_messages_read_from_a_buffer_are_named_and_not_lost():
     """Eight at a time, 0.1 ms apart, stamped when they are read."""
     joints = WHOLE.joints

@@ -26,16 +26,6 @@ def held(channel, field, since, until, column=...):
 WHOLE = rolling.recording()
 
 
-def test_a_simulation_without_noise_freezes_nothing():
-    motion = rolling.ten_minute_drive()
-    exact = replace(
-        WHOLE.reference,
-        velocity=np.column_stack([motion.speed[::5], 0 * motion.time[::5], 0 * motion.time[::5]]),
-    )
-    rates = (motion.speed[:, None] - motion.yaw_rate[:, None] * rover_y()) / rolling.RADIUS
-    assert 'frozen' not in {f.kind for f in found(reference=exact, joints={'rate': rates})}
-
-
 @pytest.mark.parametrize('dead', [None, 2])
 def test_rates_without_noise_that_stay_together_are_alive_and_one_alone_is_not(dead):
     """A simulator without noise: a curve that changes all along, then a steady straight."""
