@@ -318,5 +318,5 @@ def test_a_candidate_that_was_not_named_leaves_what_it_leaves(probability, p_val
 def test_scatter_is_left_only_where_no_reference_shares_an_error(shared, nearest, said):
     left = Remainder(0.1, 0.1, 0.0, 1e-6, 1.0, shared)
     verdict = SimpleNamespace(status='unexplained', left=left)
-    chosen = SimpleNamespace(verdict=verdict, misread={})
-    assert said in sentence(chosen, (), 1e-6, None, nearest)
+    chosen = SimpleNamespace(verdict=verdict, misread={}, effects=())
+    assert said in sentence(chosen, 1e-6, None, nearest)

@@ -30,7 +30,7 @@ from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_lab.studies.campaigns.scoring import diagnose as diagnose_campaign
 from wheel_terra_lab.trials.campaign import Plan, make_campaign
 from wheel_terra_lab.trials.forms import FORMS
-from wheel_terra_lab.trials.truth import solve
+from wheel_terra_lab.trials.truth import OUTPUTS, solve
 
 TWO = Options(effects=('bulldozing', 'cohesion'))
 """Where what is found is no effect: a sixth of the time of all."""
@@ -112,15 +112,37 @@ def test_a_channel_that_is_off_on_unseen_rows_does_not_agree(unproposed):
     assert item['floor'] >= 0.0
 
 
+def on_patches(table, soil, rows, patch, shares):
+    """Return the table with rows of each patch on soil of a share of the stiffness."""
+    plain, table = solve(rows, soil), dict(table)
+    for one, share in zip(np.unique(patch), shares, strict=True):
+        change = solve(rows, replace(soil, frictional_modulus=share * soil.frictional_modulus))
+        for key in OUTPUTS:
+            table[key] = table[key] + np.where(patch == one, change[key] - plain[key], 0.0)
+    return table
+
+
+def on_five_beds():
+    """Return a table of which each load rolls on a bed of its own, and the settings."""
+    table, values, soil, rows = make('sweep40')
+    shares = 0.8, 1.1, 1.25, 0.9, 1.05
+    return on_patches(table, soil, rows, rows['normal_load'], shares), values
+
+
+def test_beds_that_differ_are_said_beside_an_effect_that_is_on_for_nothing():
+    """The law that would be proposed for what beds do is none."""
+    table, values = on_five_beds()
+    values |= {'effects.slip_sinkage_exponent.enabled': True}
+    found = run(table, values, options=Options(('cohesion', 'drivetrain_friction')))
+    assert (found.verdict, found.effects, found.proposal) == ('unexplained', (), None)
+    assert 'slip_sinkage_exponent is on, and these rows fit better without it' in found.notes[0]
+    assert any('beds differ from sweep to sweep' in note for note in found.notes)
+    assert 'fresh bed' in found.next_measurement[0].what
+
+
 @pytest.mark.parametrize('options', [FEW, pytest.param(None, marks=pytest.mark.slow)])
 def test_beds_that_differ_from_sweep_to_sweep_are_no_effect(unproposed, options):
-    table, values, soil, rows = make('sweep40')
-    plain, load = solve(rows, soil), rows['normal_load']
-    for share, one in zip((0.8, 1.1, 1.25, 0.9, 1.05), np.unique(load), strict=True):
-        other = replace(soil, frictional_modulus=share * soil.frictional_modulus)
-        change = solve(rows, other)
-        for key in ('sinkage', 'drawbar_pull', 'torque'):
-            table[key] = table[key] + np.where(load == one, change[key] - plain[key], 0.0)
+    table, values = on_five_beds()
     found = run(table, values, options=options)
     assert (found.verdict, found.effects) == ('agrees', ())
     assert 'fresh bed' in found.next_measurement[0].what
@@ -160,12 +182,8 @@ def test_soil_that_differs_from_day_to_day_is_no_effect(unproposed):
 
 def test_a_drive_whose_wheels_roll_on_different_patches_has_no_effect(unproposed):
     table, values, soil, rows = make('basic16')
-    plain, patch = solve(rows, soil), np.random.default_rng(2).integers(0, 4, 16)
-    for number, share in enumerate((0.85, 1.1, 0.95, 1.2)):
-        other = replace(soil, frictional_modulus=share * soil.frictional_modulus)
-        change = solve(rows, other)
-        for key in ('sinkage', 'drawbar_pull', 'torque'):
-            table[key] = table[key] + np.where(patch == number, change[key] - plain[key], 0.0)
+    patch = np.random.default_rng(2).integers(0, 4, 16)
+    table = on_patches(table, soil, rows, patch, (0.85, 1.1, 0.95, 1.2))
     drive = replace(check_table('t.csv', table), true_rows=np.ones(16, dtype=bool))
     found = diagnose(drive, reader.from_parameters(values, complete=False), options=TWO)
     assert (found.verdict, found.effects) == ('agrees', ())

@@ -30,11 +30,17 @@ from wheel_terra_estimator.discrepancy.proposal import (
     propose,
     rivals,
 )
-from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
+from wheel_terra_estimator.discrepancy.result import (
+    OPEN,
+    Curves,
+    FittedParameter,
+    NamedEffect,
+    Proposal,
+    QuantityGap,
+)
 from wheel_terra_estimator.discrepancy.selection.readings import units_apart
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import (
-    Confidence,
     Verdict,
     chi_square_p_value,
     choose,
@@ -79,30 +85,20 @@ _BEATS_LAW = 4.0
 
 
 @dataclass(frozen=True)
-class Naming:
-    """One named effect: its key, its competitors, its confidence and what that comes from."""
-
-    key: str
-    competitors: tuple[str, ...]
-    confidence: Confidence
-    features: Mapping[str, float]
-    alike: tuple[str, ...] = ()  # what looks like it and was not tried
-
-
-@dataclass(frozen=True)
 class Decision:
     """What was decided, and the fits and predictions that speak for it."""
 
     # Those of the search, with ``nothing`` refitted under the floor of the decision
     findings: Findings
     verdict: Verdict
-    floor_index: int  # of ``findings.selection.floors``: the model-error floor in use
+    floor: float  # model-error floor in use, share of each quantity's range
     after: Fit  # the chosen explanation, refitted under that floor
     variance: FloatArray
     curves: Curves
     gap: Mapping[str, QuantityGap]  # quantity -> QuantityGap
-    names: tuple[Naming, ...] = ()  # strongest first; empty unless ``named``
-    doubtful: tuple[Naming, ...] = ()  # names that would have been given, were they likely enough
+    effects: tuple[NamedEffect, ...] = ()  # strongest first; empty unless ``named``
+    # Those that would have been named, were they likely enough
+    doubtful: tuple[NamedEffect, ...] = ()
     # Column -> factor that it lacks, or what it is, where it looks misread; nothing is named then
     misread: Mapping[str, float | str] = field(default_factory=dict)
     proposal: Proposal | None = None  # A law, where something is missing and no name is given
@@ -112,20 +108,17 @@ class Decision:
     def unless(self, apart: Decision, probability: float, ground: str) -> Decision:
         """Return ``apart``, the decision where beds differ, if that is the more probable one.
 
-        Else the names are less sure, and no law is proposed unless beds are improbable.
+        Else, or where it has another model than the configured one, the names are less sure, and
+        no law is proposed unless beds are improbable.
         """
         if not apart.verdict.left.accounted_for:
             return self  # nor do beds
-        if probability > _LIKELY:
+        ours, theirs = (d.findings.setting.forward.base_effects for d in (self, apart))
+        if probability > _LIKELY and ours.keys() == theirs.keys():
             return replace(apart, beds_differ=probability, ground=ground)
-        names = _as_sure(self.names, 1.0 - probability)
+        effects = _as_sure(self.effects, 1.0 - probability)
         law = self.proposal if probability < _OPEN_TO_BEDS else None
-        return replace(self, names=names, proposal=law, beds_differ=probability, ground=ground)
-
-    @property
-    def floor(self) -> float:
-        """Model-error floor in use, share of each quantity's range."""
-        return self.findings.selection.floors[self.floor_index].largest
+        return replace(self, effects=effects, proposal=law, beds_differ=probability, ground=ground)
 
 
 @dataclass(frozen=True)
@@ -145,7 +138,7 @@ class Decider:
     def decision(self) -> Decision:
         """Return the best explanation that stands, else the soil alone."""
         selection, problem = self.findings.selection, self.findings.setting.problem
-        tried, doubtful = list[int](), tuple[Naming, ...]()
+        tried, doubtful = list[int](), tuple[NamedEffect, ...]()
         while True:
             enough = self.misread or len(tried) >= _MOST_TRIED
             verdict = unnamed(selection, problem) if enough else choose(selection, problem, tried)
@@ -160,7 +153,7 @@ class Decider:
             names, likely = self._against_law(decision, named)
             if likely and any(item.after < item.refit for item in decision.gap.values()):
                 share = _OF_SEVERAL if len(names) >= _SEVERAL else 1.0
-                return replace(decision, names=_as_sure(names, share))
+                return replace(decision, effects=_as_sure(names, share))
             doubtful = doubtful or names
 
     @cached_property
@@ -183,8 +176,8 @@ class Decider:
         return Gap(self.table, decision.findings, decision.gap, decision.variance)
 
     def _against_law(
-        self, decision: Decision, names: tuple[Naming, ...]
-    ) -> tuple[tuple[Naming, ...], bool]:
+        self, decision: Decision, names: tuple[NamedEffect, ...]
+    ) -> tuple[tuple[NamedEffect, ...], bool]:
         """Return the names, as sure as they are beside a law, and whether they are given."""
         beyond_doubt = _least(names) >= _BEYOND_DOUBT
         if beyond_doubt and len(names) < _SEVERAL:
@@ -198,13 +191,16 @@ class Decider:
             return names, True
         law = self._law(decision)
         ahead = gap.closed(unseen) - (law.closed if law else 0.0)
-        same = law is not None and equivalent_effects(law) == {effect_of(n.key) for n in names}
+        same = law is not None and equivalent_effects(law) == {n.name for n in names}
         if law is not None and ahead < -_CLEARLY and not same:
             return names, False
         ahead_of_all = same or (ahead >= _CLEARLY and len(names) > 1)
         odds = _BEATS_LAW if ahead_of_all and not decision.verdict.left.significant else 1.0
         surer = [confidence(n.features, n.features['alike'], odds) for n in names]
-        names = tuple(replace(n, confidence=c) for n, c in zip(names, surer, strict=True))
+        names = tuple(
+            replace(n, confidence=c.of_name, confidence_of_set=c.of_set)
+            for n, c in zip(names, surer, strict=True)
+        )
         return names, _least(names, odds) >= _LIKELY
 
     def _left_open(self, decision: Decision) -> Decision:
@@ -228,12 +224,12 @@ class Decider:
     def _judged(self, verdict: Verdict) -> Decision:
         """Refit nothing and the chosen explanation under its own floor, and predict unseen rows."""
         selection, nothing = self.findings.selection, self.findings.nothing
-        place = selection.quiet_floor(verdict.index)
-        floor, chosen = selection.floors[place], selection.explanations[verdict.index]
+        floor = selection.floors[selection.quiet_floor(verdict.index)]
+        chosen = selection.explanations[verdict.index]
         own = self.findings.setting.problem.variance(floor.amplitude)
         fits = [nothing, chosen.fitted] if chosen.names else [nothing]
         found = self._predicted(fits, own, floor.largest)
-        return Decision(verdict=verdict, floor_index=place, misread=self.misread, **found)
+        return Decision(verdict=verdict, floor=floor.largest, misread=self.misread, **found)
 
     def _predicted(self, fits: list[Fit], variance: FloatArray, floor: float) -> dict[str, Any]:
         """Refit nothing and what was chosen (the last), and predict rows that no fit saw."""
@@ -254,18 +250,23 @@ class Decider:
         }
 
 
-def _as_sure(names: tuple[Naming, ...], share: float) -> tuple[Naming, ...]:
+def _as_sure(names: tuple[NamedEffect, ...], share: float) -> tuple[NamedEffect, ...]:
     """Return names beside something else that may be the truth."""
-    return tuple(replace(n, confidence=n.confidence.times(share)) for n in names)
+    return tuple(
+        replace(n, confidence=share * n.confidence, confidence_of_set=share * n.confidence_of_set)
+        for n in names
+    )
 
 
-def _least(names: tuple[Naming, ...], odds: float = 1.0) -> float:
+def _least(names: tuple[NamedEffect, ...], odds: float = 1.0) -> float:
     """Return the confidence of the least likely set of names, among what was tried."""
     every = ((name.features, name.features['nameless']) for name in names)
     return min(confidence(values, nameless, odds).of_set for values, nameless in every)
 
 
-def _names(table: SteadyTable, decision: Decision, beside: tuple[Rival, ...]) -> tuple[Naming, ...]:
+def _names(
+    table: SteadyTable, decision: Decision, beside: tuple[Rival, ...]
+) -> tuple[NamedEffect, ...]:
     """Return the named effects with their confidence; first the one that alone explains more."""
     findings, fitted, known = decision.findings, decision.after, catalogue()
     selection = findings.selection
@@ -288,8 +289,25 @@ def _names(table: SteadyTable, decision: Decision, beside: tuple[Rival, ...]) ->
         alike = (*alike, *(words for words, odds in nameless.items() if odds > _NOTABLE))
         alone = float(selection.totals[selection.index((key,))])
         sure = confidence(values, values['alike'])
-        found.append((alone, Naming(key, competitors, sure, values, alike)))
-    return tuple(naming for _, naming in sorted(found, key=lambda item: -item[0]))
+        name = effect_of(key)
+        effect = NamedEffect(
+            name,
+            {
+                c.name: FittedParameter(value, std, c.unit, c.meaning)
+                for c, _, value, std, _ in fitted.numbers()
+                if c.owner == key
+            },
+            sure.of_name,
+            sure.of_set,
+            tuple(map(effect_of, competitors)),
+            decision.verdict.left.noticeable,
+            known[key].claim,
+            values,
+            known[key].form if len(known[name].forms) > 1 else '',
+            alike,
+        )
+        found.append((alone, effect))
+    return tuple(effect for _, effect in sorted(found, key=lambda item: -item[0]))
 
 
 def _known_alike(

@@ -33,6 +33,7 @@ from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
 from wheel_terra_estimator.discrepancy.selection.verdict import (
     LARGEST_Z_SCORE,
+    MOST_ODDS,
     TEMPERATURE,
     largest_z_score,
 )
@@ -71,7 +72,6 @@ _FINE = 1.35  # ... unless it is no more than so many times the noise, ...
 _PAYS = 5.0  # ... or so many times as much (in squared noise deviations) goes from the others
 _HOLDS = (2.5, 5.0, 10.0, 20.0, 40.0)  # times narrower: until the refitted soil is plausible
 _PRIOR_OF_LAW = 0.1  # probability of a law of one term beside the names: about that of a misfit
-_MOST_ODDS = 10.0  # nats
 _ALIKE = 0.8  # cosine of two signatures from which one resembles the other
 _RESEMBLING = 3
 # Terms equivalent to a named effect, in one of its forms or another.
@@ -232,7 +232,7 @@ class Rival:
 
     def odds(self, total: float) -> float:
         """Return the odds of it against an explanation of that total, tempered."""
-        return math.exp(min((self.total - total) / TEMPERATURE, _MOST_ODDS))
+        return math.exp(min((self.total - total) / TEMPERATURE, MOST_ODDS))
 
 
 def rivals(table: SteadyTable, findings: Findings) -> tuple[Rival, ...]:

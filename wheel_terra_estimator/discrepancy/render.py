@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 
@@ -23,7 +22,6 @@ from wheel_terra_estimator.discrepancy.result import (
     Candidate,
     Diagnosis,
     FittedParameter,
-    NamedEffect,
     NextMeasurement,
     Proposal,
     SoilShift,
@@ -33,7 +31,7 @@ from wheel_terra_estimator.discrepancy.selection.signatures import CLEAR
 from wheel_terra_estimator.discrepancy.selection.verdict import chi_square_p_value
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
-from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
+from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
 
 _CANDIDATES_SHOWN = 12
@@ -48,8 +46,7 @@ def render(
     ``table``, ``both``: the rows under diagnosis, and with those of a reference behind them.
     """
     findings, after, variance = decision.findings, decision.after, decision.variance
-    setting, known, left = findings.setting, catalogue(), decision.verdict.left
-    effects = _effects(decision, known)
+    setting, left = findings.setting, decision.verdict.left
     nearest = () if after.names or decision.misread else _nearest(decision)
     stretch = changed_stretch(both, setting, after, variance)
     proposal = _proposal(decision)
@@ -62,14 +59,14 @@ def render(
     moved = (*soil, *_shifts(findings, after, *setting.forward.base_effects))
     return Diagnosis(
         verdict=decision.verdict.status,
-        sentence=words.sentence(decision, effects, gap_p_value, stretch, nearest),
+        sentence=words.sentence(decision, gap_p_value, stretch, nearest),
         table=table,
         configuration=configuration,
-        effects=effects,
+        effects=decision.effects,
         candidates=_candidates(decision),
         gap=decision.gap,
         not_visible=dict(findings.not_visible),
-        smallest_visible=_smallest_visible(findings, known),
+        smallest_visible=_smallest_visible(findings),
         where=locate(both, setting.problem, findings.nothing, variance, setting.forward.active),
         next_measurement=(
             *(fresh if beds_first else ()),
@@ -105,34 +102,6 @@ def render(
     )
 
 
-def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffect, ...]:
-    """Return the named effects as they are reported."""
-    fitted = decision.after
-    parameters = _parameters(fitted)
-    found = []
-    for naming in decision.names:
-        key, name = naming.key, effect_of(naming.key)
-        found.append(
-            NamedEffect(
-                name,
-                {
-                    owned.split('.', 1)[1]: value
-                    for owned, value in parameters.items()
-                    if owned.split('.', 1)[0] == key
-                },
-                naming.confidence.of_name,
-                naming.confidence.of_set,
-                tuple(map(effect_of, naming.competitors)),
-                decision.verdict.left.noticeable,
-                known[key].claim,
-                naming.features,
-                known[key].form if len(known[name].forms) > 1 else '',
-                naming.alike,
-            )
-        )
-    return tuple(found)
-
-
 def _parameters(fitted: Fit, *, base: bool = False) -> dict[str, FittedParameter]:
     """Return the parameters of the effects of a fit, or of those that were on before."""
     return {
@@ -160,8 +129,8 @@ def _nearest(decision: Decision) -> tuple[str, ...]:
     """Return up to three effects: those that were too doubtful to be named, then single ones."""
     best_first = decision.findings.selection.explanations
     singles = (e.names[0] for e in best_first if len(e.names) == 1)
-    keys = [*(name.key for name in decision.doubtful), *singles]
-    return tuple(dict.fromkeys(map(effect_of, keys)))[:_NEAREST]
+    names = [*(effect.name for effect in decision.doubtful), *map(effect_of, singles)]
+    return tuple(dict.fromkeys(names))[:_NEAREST]
 
 
 def _candidates(decision: Decision) -> tuple[Candidate, ...]:
@@ -188,11 +157,9 @@ def _candidates(decision: Decision) -> tuple[Candidate, ...]:
     )
 
 
-def _smallest_visible(
-    findings: Findings, known: Mapping[str, Effect]
-) -> dict[str, tuple[str, float, str]]:
+def _smallest_visible(findings: Findings) -> dict[str, tuple[str, float, str]]:
     """Size of each effect that these rows would have shown clearly (signature scaled linearly)."""
-    found: dict[str, tuple[str, float, str]] = {}
+    found, known = dict[str, tuple[str, float, str]](), catalogue()
     for name, s in findings.signatures.items():
         if name in findings.setting.effects and s.distance > 0.0:
             parameter = known[name].parameters[0]

@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray
+from wheel_terra_estimator.arrays import FloatArray, IndexArray
 from wheel_terra_estimator.configuration.configuration import Configuration, Readings
 from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
@@ -25,7 +25,8 @@ from wheel_terra_estimator.discrepancy.proposal import Rival
 from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.discrepancy.selection.readings import Columns
-from wheel_terra_estimator.discrepancy.selection.search import apart, search
+from wheel_terra_estimator.discrepancy.selection.search import Findings, apart, search
+from wheel_terra_estimator.discrepancy.selection.verdict import MOST_ODDS
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
 from wheel_terra_estimator.discrepancy.tables.averaging import join
 from wheel_terra_estimator.discrepancy.tables.checks import (
@@ -42,7 +43,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
-_MOST_ODDS = 10.0  # nats
 _UNLIKELY = 0.05  # odds of different beds below which they are not reported
 _WRONGLY_ON = 0.05  # prior probability of an effect that is on and should not be; assumed
 _BEDS_DIFFER = 0.2  # prior probability, where rows may be on several; assumed
@@ -128,21 +128,18 @@ def diagnose(
         misread_in, misread = f'{" and ".join(asked)}: ', found[1]
     decider = Decider(table, both, findings, chosen.allowed_error, misread)
     decision = decider.decision()
-    grounds = table.grounds() if reference is None and not misread else {}
-    if grounds and decision.verdict.status != 'agrees':
-        ground, parted = apart(findings, grounds)
-        odds = math.exp(min(parted.selection.best - findings.selection.best, _MOST_ODDS))
-        odds *= _BEDS_DIFFER / (1.0 - _BEDS_DIFFER)
-        if odds > _UNLIKELY:
-            other = Decider(table, both, parted, chosen.allowed_error, beds_differ=True).decision()
-            decision = decision.unless(other, odds / (1.0 + odds), ground)
     notes: tuple[str, ...] = ()
-    if decision.verdict.status != 'agrees' and reference is None and not misread:
-        on = _forms_of_what_is_on(forward, chosen)
-        for name, forms in on.items():
-            if len(forms) > 1:
-                not_tried[name] += '; its other forms, in its place, were tried'
-        decision, notes = _in_doubt_of_what_is_on(decision, decider, forward, effects, on)
+    if reference is None and not misread:
+        grounds = table.grounds()
+        decision = _beside_beds(decision, decider, grounds)
+        if decision.verdict.status != 'agrees':
+            on = _forms_of_what_is_on(forward, chosen)
+            for name, forms in on.items():
+                if len(forms) > 1:
+                    not_tried[name] += '; its other forms, in its place, were tried'
+            decision, notes = _in_doubt_of_what_is_on(
+                decision, decider, forward, effects, on, grounds
+            )
     diagnosis = render(table, both, configuration, decision)
     seconds = time.perf_counter() - started
     notes, said = (*notes, *diagnosis.notes), f'{misread_in}{diagnosis.sentence}'
@@ -181,37 +178,65 @@ def _effects_to_try(
     return tried, not_tried
 
 
+def _beside_beds(
+    decision: Decision,
+    decider: Decider,
+    grounds: Mapping[str, IndexArray],
+    off: Sequence[Findings] = (),  # each without an effect that is on and should not be
+) -> Decision:
+    """Let soil that differs between grounds compete with a decision, whatever is on."""
+    if not grounds or decision.verdict.status == 'agrees':
+        return decision
+    weights = [0.0, *[math.log(_WRONGLY_ON)] * len(off)]
+    found = [decider.findings, *off]
+    parted = [apart(findings, grounds) for findings in found]
+    alike = max(w + f.selection.best for w, f in zip(weights, found, strict=True))
+    differing = [w + f.selection.best for w, (_, f) in zip(weights, parted, strict=True)]
+    odds = math.exp(min(max(differing) - alike, MOST_ODDS)) * _BEDS_DIFFER / (1.0 - _BEDS_DIFFER)
+    if odds <= _UNLIKELY:
+        return decision
+    ground, findings = parted[int(np.argmax(differing))]
+    other = replace(decider, findings=findings, beds_differ=True, laws={}).decision()
+    return decision.unless(other, odds / (1.0 + odds), ground)
+
+
 def _in_doubt_of_what_is_on(
     decision: Decision,
     decider: Decider,
     forward: Forward,
     effects: Mapping[str, Effect],
     on: Mapping[str, Mapping[str, Effect]],  # each effect that is on -> forms to be tried
+    grounds: Mapping[str, IndexArray],
 ) -> tuple[Decision, tuple[str, ...]]:
     """Let each effect that is on compete with its other forms and with its absence.
 
     Return the decision then, and a note where the rows fit better without one.
     """
     findings, setting, wrong = decider.findings, decider.findings.setting, dict[str, Rival]()
+    off = list[Findings]()
     for name, forms in on.items():
         rest = tuple(c for c in setting.nuisance if effect_of(c.owner) != name)
         given = decider.table, forward.without(name), rest
-        alone = search(*given, forms, setting.floors).selection
-        best, total = alone.explanations[0].names, alone.best + math.log(_WRONGLY_ON)
+        alone = search(*given, forms, setting.floors)
+        best = alone.selection.explanations[0].names
+        total = alone.selection.best + math.log(_WRONGLY_ON)
         if total < findings.selection.best or set(best) & forward.base_effects.keys():
             continue  # as it is, with what else is missing, or with other numbers
         if best:
             found = search(*given, {**effects, **forms}, setting.floors)
-            again = replace(decider, findings=found, laws={}).decision()
-            if [effect_of(naming.key) for naming in again.names] == [name]:
-                before = {q: decision.gap[q].before for q in again.gap}  # as configured
-                gap = {q: replace(g, before=before[q]) for q, g in again.gap.items()}
-                curves = replace(again.curves, before=decision.curves.before)
+            again = replace(decider, findings=found, laws={})
+            renamed = _beside_beds(again.decision(), again, grounds)
+            if [effect.name for effect in renamed.effects] == [name]:
+                before = {q: decision.gap[q].before for q in renamed.gap}  # as configured
+                gap = {q: replace(g, before=before[q]) for q, g in renamed.gap.items()}
+                curves = replace(renamed.curves, before=decision.curves.before)
                 note = f'{name} is on in another form; the form named here takes its place'
-                return replace(again, gap=gap, curves=curves), (note,)
+                return replace(renamed, gap=gap, curves=curves), (note,)
         wrong[name] = Rival(total, f'{name}, which is on, where it is not')
+        off.append(alone)
     if wrong:
-        decision = replace(decider, beside=tuple(wrong.values())).decision()
+        decider = replace(decider, beside=tuple(wrong.values()))
+        decision = _beside_beds(decider.decision(), decider, grounds, off)
     words = 'is on, and these rows fit better without it: look for it first'
     return decision, tuple(f'{name} {words}' for name in wrong)
 

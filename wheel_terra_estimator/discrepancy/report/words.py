@@ -30,7 +30,6 @@ from wheel_terra_estimator.discrepancy.numbers import (
 from wheel_terra_estimator.discrepancy.result import (
     OPEN,
     Diagnosis,
-    NamedEffect,
     NextMeasurement,
     Noise,
     QuantityGap,
@@ -405,7 +404,6 @@ def _agreement(decision: Decision, gap_p_value: float) -> str:
 
 def sentence(
     decision: Decision,
-    effects: tuple[NamedEffect, ...],
     gap_p_value: float,
     stretch: Stretch | None,
     nearest: tuple[str, ...],
@@ -442,7 +440,7 @@ def sentence(
             f'to be named{f" ({aside})" if aside else ""}.'
         )
     parts = []
-    for effect in effects:
+    for effect in decision.effects:
         values = ', '.join(
             with_unit(f'{name} = {number(p.value)} +- {number(p.std, 2)}', p.unit)
             for name, p in effect.parameters.items()
@@ -456,6 +454,6 @@ def sentence(
             text += f', unless it is {" or ".join(effect.alike)}, which would look alike'
         parts.append(text)
     result = 'Missing in the model: ' + ', and '.join(parts)
-    if any(effect.remainder for effect in effects):
+    if any(effect.remainder for effect in decision.effects):
         result += '; a misfit remains that this does not explain'
     return result + '.'

@@ -12,6 +12,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc, expit  # scipy.stats takes longer to load than a diagnosis
@@ -119,6 +120,8 @@ MOST = 0.9
 # Nats by which a competitor must at least beat the same set without it.
 BETTER_THAN_EMPTY = 1.0
 TEMPERATURE = 1.3
+# Between what has no name (a law, other beds, an effect that is on) and names: more counts no more.
+MOST_ODDS = 10.0  # [nats]
 
 
 @dataclass(frozen=True)
@@ -251,16 +254,11 @@ FEATURES = (
 _TEMPERATURE = 1.5
 
 
-@dataclass(frozen=True)
-class Confidence:
+class Confidence(NamedTuple):
     """Probability that a name is right, and that it or one of its competitors is."""
 
     of_name: float
     of_set: float
-
-    def times(self, probability: float) -> Confidence:
-        """Return both beside something else that may be the truth."""
-        return Confidence(self.of_name * probability, self.of_set * probability)
 
 
 def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, float]:
