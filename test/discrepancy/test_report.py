@@ -160,7 +160,7 @@ def test_numbers_are_those_of_the_diagnosis(page, named):
         cells = parsed.row(f'{quantity} [{unit}]')
         assert cells[1:4] == [number(scale * x) for x in (gap.before, gap.refit, gap.after)]
     for candidate in named.candidates:
-        cells = parsed.row(candidate.full_label.replace('_', ' '))
+        cells = parsed.row(candidate.label.replace('_', ' '))
         assert cells[1] == f'{candidate.log_evidence:.1f}'
         assert cells[-1] == candidate.why_not
     for shift in named.soil:

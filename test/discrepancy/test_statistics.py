@@ -465,7 +465,9 @@ def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
         nothing = of_soil(forward, problem, soil, one)
         named = dict(zip(QUANTITIES, measured.T, strict=True))
         table = check_table('t', {**columns, **named})
-        found.append(locate(table, problem, nothing, one, None))
+        setting = SimpleNamespace(problem=problem, forward=forward)
+        seen = SimpleNamespace(table=table, nothing=nothing, setting=setting)
+        found.append(locate(seen, one))
         if number == 0:
             cells = (problem.observed - problem.flat(nothing.outputs)) / problem.std
             pull = cells[problem.quantity == 1] ** 2

@@ -109,14 +109,13 @@ def plot_diagnosis(diagnosis: Diagnosis, axes: Axes | None = None) -> Axes:
                     color=LINE_COLOURS[k],
                     label=labels[k] if row == 0 else None,
                 )
-            if gap.noise is not None:
-                panel.hlines(
-                    gap.noise / whole,
-                    row - 0.4,
-                    row + 0.4,
-                    color='black',
-                    label='noise' if row == 0 else '_',
-                )
+            panel.hlines(
+                gap.noise / whole,
+                row - 0.4,
+                row + 0.4,
+                color='black',
+                label='noise' if row == 0 else '_',
+            )
             panel.annotate(
                 plain(quantity),
                 (row, 0.0),

@@ -171,11 +171,10 @@ def _print_result(diagnosis: Diagnosis, output: Path) -> None:
     print(f'  {soil_line(diagnosis)}')
     for quantity, gap in diagnosis.gap.items():
         scale, unit = SHOWN[quantity]
-        noise = '' if gap.noise is None else f', noise {number(scale * gap.noise)}'
         print(
             f'  {quantity} [{unit}]: error on unseen rows {number(scale * gap.before)} '
             f'as configured, {number(scale * gap.refit)} soil refitted, '
-            f'{number(scale * gap.after)} in the end{noise}'
+            f'{number(scale * gap.after)} in the end, noise {number(scale * gap.noise)}'
         )
     if diagnosis.proposal:
         print(f'  proposed law (proposal.yaml): {diagnosis.proposal.words}')

@@ -125,8 +125,7 @@ class Decision:
 class Decider:
     """What a decision is made from."""
 
-    table: SteadyTable
-    both: SteadyTable  # with the rows of a reference behind those of the table
+    table: SteadyTable  # the rows under diagnosis; those of a reference stand behind them
     findings: Findings
     allowed_error: float  # model error that is no reason for doubt [share of the range]
     misread: Mapping[str, float | str] = field(default_factory=dict)  # as in the decision
@@ -237,8 +236,8 @@ class Decider:
         fits = [setting.refit(f, variance) for f in fits]
         findings = replace(self.findings, nothing=fits[0])
         beside = setting.problem.variance(floor)
-        rows = len(self.table)
-        groups = np.where(np.arange(len(self.both)) < rows, slip_groups(self.both), -1)
+        rows, every = len(self.table), self.findings.table
+        groups = np.where(np.arange(len(every)) < rows, slip_groups(every), -1)
         outs = hold_out(setting, fits, beside, groups)
         curves = _curves(rows, findings, fits[-1], outs, floor)
         return {

@@ -16,6 +16,7 @@ from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import BED
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.numbers import joined
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import (
     OPEN,
@@ -38,17 +39,12 @@ _CANDIDATES_SHOWN = 12
 _NEAREST = 3  # effects listed as nearest where none is identified
 
 
-def render(
-    table: SteadyTable, both: SteadyTable, configuration: Configuration, decision: Decision
-) -> Diagnosis:
-    """Return the diagnosis of a decision.
-
-    ``table``, ``both``: the rows under diagnosis, and with those of a reference behind them.
-    """
+def render(table: SteadyTable, configuration: Configuration, decision: Decision) -> Diagnosis:
+    """Return the diagnosis of a decision on the rows of a table."""
     findings, after, variance = decision.findings, decision.after, decision.variance
     setting, left = findings.setting, decision.verdict.left
     nearest = () if after.names or decision.misread else _nearest(decision)
-    stretch = changed_stretch(both, setting, after, variance)
+    stretch = changed_stretch(findings.table, setting, after, variance)
     proposal = _proposal(decision)
     gap_p_value = chi_square_p_value(decision.findings.nothing, decision.variance)
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
@@ -67,7 +63,7 @@ def render(
         gap=decision.gap,
         not_visible=dict(findings.not_visible),
         smallest_visible=_smallest_visible(findings),
-        where=locate(both, setting.problem, findings.nothing, variance, setting.forward.active),
+        where=locate(findings, variance),
         next_measurement=(
             *(fresh if beds_first else ()),
             *([words.REFERENCE_AGAIN] if bed else []),
@@ -86,7 +82,7 @@ def render(
         remainder_amplitude=left.amplitude,
         floor=decision.floor,
         notes=(
-            *words.notes(both, findings, after, () if decision.misread else moved, stretch),
+            *words.notes(findings, after, () if decision.misread else moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
             *words.own_beds(decision, table),
             *([bed] if bed else []),
@@ -151,6 +147,8 @@ def _candidates(decision: Decision) -> tuple[Candidate, ...]:
             float(selection.probability[h].sum()),
             _parameters(explanation.fitted),
             '' if h == verdict.index else words.why_not(findings, verdict, h, totals, chosen),
+            joined(explanation.names),
+            ', '.join(key for key in explanation.names if effect_of(key) != key),
         )
         for h in sorted((nothing, *shown), key=lambda h: -totals[h])
         for explanation in (selection.explanations[h],)

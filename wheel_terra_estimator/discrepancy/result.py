@@ -7,15 +7,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IndexArray
-from wheel_terra_estimator.discrepancy.numbers import joined
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.frames import unit_of
-from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK, effect_of
+from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration
@@ -59,30 +58,20 @@ class NamedEffect:
 class Candidate:
     """One set of effects that was fitted, the empty one (``nothing``) included."""
 
-    json_also: ClassVar[Mapping[str, str]] = {'name': 'label', 'form': 'form'}
-
     names: tuple[str, ...] = field(metadata=_ASIDE)  # the effects in it
     # Log marginal likelihood relative to ``nothing``: above 0 the data favour it
     log_evidence: float
     probability: float  # posterior probability among all fitted sets
     parameters: Mapping[str, FittedParameter]  # ``effect.parameter`` -> fitted parameter
-    why_not: str = ''  # why it was not added; empty for the chosen one
+    why_not: str  # why it was not added; empty for the chosen one
+    name: str  # names joined for people
+    form: str  # forms of the effects, where they are not the first ones
 
     @property
     def label(self) -> str:
-        """Names joined for people."""
-        return joined(self.names)
-
-    @property
-    def full_label(self) -> str:
         """Names with their forms, where these are not the first ones."""
         parts = (key.partition(FORM_MARK) for key in self.names)
         return ' + '.join(f'{n} ({form})' if form else n for n, _, form in parts) or 'nothing'
-
-    @property
-    def form(self) -> str:
-        """Forms of the effects, where they are not the first ones."""
-        return ', '.join(key for key in self.names if effect_of(key) != key)
 
 
 @dataclass(frozen=True)
@@ -97,7 +86,7 @@ class QuantityGap:
     before: float
     refit: float
     after: float
-    noise: float | None
+    noise: float
     fitted: float = 0.0
     limit: float = math.inf
 
@@ -330,13 +319,11 @@ class Diagnosis:
 def as_json(value: Any) -> Any:
     """Turn results into dicts, lists, text and finite numbers: JSON has no NaN.
 
-    A dataclass gives its fields but those marked as no part of the report, and the properties that
-    its ``json_also`` lists (key -> property).
+    A dataclass gives its fields but those marked as no part of the report.
     """
     if is_dataclass(value):
-        own = {f.name: f.name for f in fields(value) if f.metadata.get('json', True)}
-        own |= getattr(value, 'json_also', {})
-        return {key: as_json(getattr(value, name)) for key, name in own.items()}
+        own = [f.name for f in fields(value) if f.metadata.get('json', True)]
+        return {name: as_json(getattr(value, name)) for name in own}
     if isinstance(value, Mapping):
         return {key: as_json(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -126,7 +126,7 @@ def diagnose(
         for quantity, times in found[1].items()
     ):  # a load, slip or mere size may be an error that both share
         misread_in, misread = f'{" and ".join(asked)}: ', found[1]
-    decider = Decider(table, both, findings, chosen.allowed_error, misread)
+    decider = Decider(table, findings, chosen.allowed_error, misread)
     decision = decider.decision()
     notes: tuple[str, ...] = ()
     if reference is None and not misread:
@@ -140,7 +140,7 @@ def diagnose(
             decision, notes = _in_doubt_of_what_is_on(
                 decision, decider, forward, effects, on, grounds
             )
-    diagnosis = render(table, both, configuration, decision)
+    diagnosis = render(table, configuration, decision)
     seconds = time.perf_counter() - started
     notes, said = (*notes, *diagnosis.notes), f'{misread_in}{diagnosis.sentence}'
     return replace(diagnosis, sentence=said, not_tried=not_tried, notes=notes, seconds=seconds)
@@ -216,7 +216,8 @@ def _in_doubt_of_what_is_on(
     off = list[Findings]()
     for name, forms in on.items():
         rest = tuple(c for c in setting.nuisance if effect_of(c.owner) != name)
-        given = decider.table, forward.without(name), rest
+        others = {key: v for key, v in forward.base_effects.items() if effect_of(key) != name}
+        given = decider.table, replace(forward, base_effects=others), rest
         alone = search(*given, forms, setting.floors)
         best = alone.selection.explanations[0].names
         total = alone.selection.best + math.log(_WRONGLY_ON)

@@ -280,12 +280,12 @@ def summary(name: str, case: Case, diagnosis: Diagnosis) -> str:
         '|---|---|---|---|---|',
     ]
     for quantity, gap in diagnosis.gap.items():
-        noise = '-' if gap.noise is None else f'{gap.noise:.2g}'
         lines.append(
-            f'| {quantity} | {gap.before:.3g} | {gap.refit:.3g} | {gap.after:.3g} | {noise} |'
+            f'| {quantity} | {gap.before:.3g} | {gap.refit:.3g} | {gap.after:.3g} '
+            f'| {gap.noise:.2g} |'
         )
     best = [
-        f'{c.label} {c.log_evidence:+.1f}' for c in diagnosis.candidates[:6] if c.why_not or c.names
+        f'{c.name} {c.log_evidence:+.1f}' for c in diagnosis.candidates[:6] if c.why_not or c.names
     ]
     lines += ['', f'ln evidence: {", ".join(best)}. {diagnosis.where.sentence}.']
     pulls = [f'{s.name} {s.z_score:+.1f}' for s in diagnosis.soil if abs(s.z_score) > 3.0]

@@ -149,7 +149,7 @@ def compare(folder: Path, diagnosis: Diagnosis) -> Outcome:
         diagnosis.proposal.words if diagnosis.proposal else '',
         diagnosis.seconds,
         {
-            quantity: (gap.noise or math.nan, gap.before, gap.refit, gap.after)
+            quantity: (gap.noise, gap.before, gap.refit, gap.after)
             for quantity, gap in diagnosis.gap.items()
         },
     )

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -128,7 +129,8 @@ def _predicted(
     points = OperatingPoints(
         wheel=wheel, slip_radius=old.slip_radius, gravity=float(np.median(old.gravity)), **columns
     )
-    state = setting.forward.at(points, other_rows=True).solve(
+    elsewhere = replace(setting.forward, points=points, active=None, readings=None)
+    state = elsewhere.solve(
         [f.coordinates for f in fits],
         [f.u for f in fits],
         by=[[], *(range(len(f.u)) for f in fits[1:])],

@@ -13,6 +13,7 @@ from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, with_unit
 from wheel_terra_estimator.discrepancy.result import InputRange, Where
+from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.frames import unit_of
 
@@ -24,15 +25,10 @@ _SURE = 0.05
 _ONE_SIGN = 0.3  # below this share of the size a mean misfit is not significant
 
 
-def locate(
-    table: SteadyTable,
-    problem: Problem,
-    nothing: Fit,
-    variance: FloatArray,  # of the rotated axes, with the floor
-    ours: BoolArray | None,  # (N,) rows to look at, where the others are a reference
-) -> Where:
+def locate(findings: Findings, variance: FloatArray) -> Where:
     """Return the region of the inputs in which the soil-refitted model is worst.
 
+    ``variance`` is that of the rotated axes, with the floor. Rows of a reference are not looked at.
     The residuals after a refit are neither independent nor equal in size; the p-value therefore
     comes from noise drawn and refitted on the same rows (linear), under the same scan.
     """
@@ -42,6 +38,8 @@ def locate(
         shared = problem.shared_error(residual, ours, variance)
         return np.asarray((residual - shared) / problem.std[:, None])
 
+    table, nothing, problem = findings.table, findings.nothing, findings.setting.problem
+    ours = findings.setting.forward.active
     looked_at = np.ones(len(table), dtype=bool) if ours is None else ours
     cells = own((problem.wanted - problem.flat(nothing.outputs))[:, None])[:, 0]
     cells = np.where(problem.outlier | ~looked_at[problem.row], 0.0, cells)

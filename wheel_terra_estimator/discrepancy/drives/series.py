@@ -30,19 +30,14 @@ class Channel:
     time: FloatArray
     values: FloatArray
 
-    def within(self, start: float, end: float) -> FloatArray:
-        """Return the samples (j, m) with start <= time < end."""
+    def within(self, start: float, end: float) -> Channel:
+        """Return the samples with start <= time < end."""
         first, last = np.searchsorted(self.time, [start, end])
-        return self.values[first:last]
-
-    def times_within(self, start: float, end: float) -> FloatArray:
-        """Return the stamps (j,) [s] with start <= time < end."""
-        first, last = np.searchsorted(self.time, [start, end])
-        return self.time[first:last]
+        return Channel(self.time[first:last], self.values[first:last])
 
     def longest_gap(self, start: float, end: float) -> float:
         """Return the longest silence [s] within a stretch, its ends included."""
-        times = self.times_within(start, end)
+        times = self.within(start, end).time
         return float(np.max(np.diff(np.concatenate([[start], times, [end]]))))
 
 
@@ -72,7 +67,7 @@ class DriveSeries:
 
         Errors of references are independent, those of the smoother are common to all samples.
         """
-        variances = self.speed.within(start, end)[:, 1]
+        variances = self.speed.within(start, end).values[:, 1]
         stated = variances[variances > 0]
         if not stated.size:
             return 0.0

@@ -178,7 +178,7 @@ class _WindowFinder:
         unsettled = settle
         windows: list[Window] = []
         while now < end:
-            ahead = self.series.rate.within(now, now + 0.5)
+            ahead = self.series.rate.within(now, now + 0.5).values
             rate = float(np.nanmean(np.abs(ahead))) if np.isfinite(ahead).any() else np.nan
             rim = rate * float(np.mean(wheels.slip_radius))
             if not rim > 3 * self.configuration.rest_speed:
@@ -221,7 +221,7 @@ class _WindowFinder:
     def _judge(self, start: float, end: float, passages: int) -> tuple[str, Window | None]:
         """Return the quality of a stretch and, where it is steady, its window."""
         s = self.series
-        samples = len(s.rate.times_within(start, end))
+        samples = len(s.rate.within(start, end).time)
         count = min(passages or LEAST_SEGMENTS, samples // 3)
         if count < LEAST_SEGMENTS or s.rate.longest_gap(start, end) > 1.0:
             return 'no data', None
@@ -301,8 +301,8 @@ class _WindowFinder:
 
 def _segments(channel: Channel, start: float, end: float, count: int) -> FloatArray:
     """Return the means of equal parts of a stretch, (count, m); nan where a part has no sample."""
-    times = channel.times_within(start, end)
-    values = channel.within(start, end)
+    inside_stretch = channel.within(start, end)
+    times, values = inside_stretch.time, inside_stretch.values
     index = np.minimum(((times - start) / (end - start) * count).astype(int), count - 1)
     result = np.full((count, values.shape[1]), np.nan)
     for part in range(count):

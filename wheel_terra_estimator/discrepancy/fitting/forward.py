@@ -22,7 +22,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import by_variant
-from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
+from wheel_terra_estimator.terramechanics.effects.base import Effect
 from wheel_terra_estimator.terramechanics.load_balance import explicit_entrance_angle
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -67,17 +67,6 @@ class Forward:
         self.base_effects = by_variant(self.base_effects)
         measured = np.asarray(self.points.leaving_angle, dtype=float)
         self._leaving_angle = None if np.isnan(measured).all() else measured
-
-    def at(self, points: OperatingPoints, other_rows: bool = False) -> Forward:
-        """Return the same model at other points; ``other_rows`` are none of the table's."""
-        if other_rows:
-            return replace(self, points=points, active=None, readings=None)
-        return replace(self, points=points)
-
-    def without(self, name: str) -> Forward:
-        """Return the same model with an effect switched off, whichever its form."""
-        rest = {key: v for key, v in self.base_effects.items() if effect_of(key) != name}
-        return replace(self, base_effects=rest)
 
     def _contact(
         self, hypotheses: Sequence[Sequence[Coordinate]], columns: Sequence[Mapping[str, float]]
@@ -234,7 +223,7 @@ class Forward:
         given = np.asarray(getattr(self.points, name), dtype=float)
         step = np.where((given > 0.99) | (name == 'leaving_angle'), -1e-4, 1e-4)
         moved: dict[str, Any] = {name: given + step}
-        beside = self.at(replace(self.points, **moved))
+        beside = replace(self, points=replace(self.points, **moved))
         base, other = (
             model.solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
             for model in (self, beside)

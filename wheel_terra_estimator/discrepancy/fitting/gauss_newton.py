@@ -104,19 +104,32 @@ class Descent:
         return better
 
     def step(self, precision: FloatArray, gradient: FloatArray) -> FloatArray:
-        """Set the next trial point; return the way there.
+        """Set the next trial point; return the way there, which stays inside the bounds.
 
         At the best point, (P, P) precision, and gradient of the squares alone: where they fall.
         """
-        step, expected = _bounded_step(
-            precision,
-            gradient - self.prior * self._u,
-            self._u,
-            self.prior,
-            self._limits,
-            self._damping,
-        )
-        self.trial = self._u + step
+        u, (lower, upper) = self._u, self._limits
+        gradient = gradient - self.prior * u
+        damped = precision + self._damping * np.diag(np.diag(precision))
+        free = np.ones(len(u), dtype=bool)
+        step = np.zeros(len(u))
+        # Few passes suffice: a coordinate that would leave its range stays at the bound.
+        for _ in range(3):
+            fixed = ~free
+            right = gradient[free] - damped[np.ix_(free, fixed)] @ step[fixed]
+            step[free] = np.linalg.solve(damped[np.ix_(free, free)], right)
+            # A strength may double, so that an effect of many prior deviations is reached.
+            longest = np.maximum(_LONGEST_STEP, np.where(self.prior < 1.0, np.abs(u), 0.0))
+            step /= max(1.0, float((np.abs(step) / longest).max(initial=0.0)))
+            new = u + step
+            outside = free & ((new < lower) | (new > upper))
+            if not outside.any():
+                break
+            step[outside] = np.clip(new, lower, upper)[outside] - u[outside]
+            free &= ~outside
+        step = np.clip(u + step, lower, upper) - u
+        expected = float(gradient @ step - 0.5 * step @ precision @ step)
+        self.trial = u + step
         self.going = expected >= _CLOSE_ENOUGH and not 0.0 <= self._gain < _CLOSE_ENOUGH
         return step
 
@@ -183,38 +196,3 @@ def fit(
                 slope = state.angle_slope[index] @ step
                 angle[b] = np.clip(state.angle[index] + slope, *_ANGLES)
     return [best[b] for b in range(len(ways))]
-
-
-def _bounded_step(
-    precision: FloatArray,
-    gradient: FloatArray,
-    u: FloatArray,
-    prior: FloatArray,
-    limit: tuple[FloatArray, FloatArray],
-    damping: float,
-) -> tuple[FloatArray, float]:
-    """Return a damped step that stays inside the limits, and the fall that it should bring.
-
-    ``gradient`` points where the objective falls; ``prior`` is the prior's part of the precision.
-    """
-    lower, upper = limit
-    damped = precision + damping * np.diag(np.diag(precision))
-    free = np.ones(len(u), dtype=bool)
-    step = np.zeros(len(u))
-    # Few passes suffice: a coordinate that would leave its range stays at the bound.
-    for _ in range(3):
-        fixed = ~free
-        right = gradient[free] - damped[np.ix_(free, fixed)] @ step[fixed]
-        step[free] = np.linalg.solve(damped[np.ix_(free, free)], right)
-        # A strength may double, so that an effect of many prior deviations is reached.
-        longest = np.maximum(_LONGEST_STEP, np.where(prior < 1.0, np.abs(u), 0.0))
-        step /= max(1.0, float((np.abs(step) / longest).max(initial=0.0)))
-        new = u + step
-        outside = free & ((new < lower) | (new > upper))
-        if not outside.any():
-            break
-        step[outside] = np.clip(new, lower, upper)[outside] - u[outside]
-        free &= ~outside
-    step = np.clip(u + step, lower, upper) - u
-    expected = float(gradient @ step - 0.5 * step @ precision @ step)
-    return step, expected

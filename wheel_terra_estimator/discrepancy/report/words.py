@@ -219,13 +219,13 @@ def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
 
 
 def notes(
-    table: SteadyTable,
     findings: Findings,
     after: Fit,
     shifts: Iterable[SoilShift],
     stretch: Stretch | None,
 ) -> tuple[str, ...]:
     """Return remarks for people: the reader's, noise, outliers, soil far off, effects at bounds."""
+    table = findings.table
     found = list(table.notes)
     if stretch:
         found.append(f'{stretch.text}; diagnose the two apart')

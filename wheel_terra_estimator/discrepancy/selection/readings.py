@@ -114,10 +114,12 @@ class Columns:
             or not (as_they_are.only_far or as_they_are.accounted_for)
         )
         count = len(selection.explanations[0].names)
+        few = [len(explanation.names) < 2 for explanation in selection.explanations]
+        best_single = float(selection.totals[few].max())  # of at most one effect
         for reading in self._likeliest(self._readings())[:_TRIED]:
             density, alone = self._density(reading), -math.inf
             for tried in ({}, self.effects)[: 2 if density or count > 1 else 1]:
-                if tried and alone + density < selection.best_single:
+                if tried and alone + density < best_single:
                     break  # what is read wrongly says more than any one effect
                 found = self._explained(reading, tried)
                 alone = found.selection.best
@@ -146,14 +148,16 @@ class Columns:
                 wanted=setting.problem.wanted * cells,
                 rotation=setting.problem.rotation / cells,
             )
-            other = replace(setting, forward=self.forward.at(reading.points), problem=problem)
+            forward = replace(self.forward, points=reading.points)
+            other = replace(setting, forward=forward, problem=problem)
             fitted = other.fit([()], [np.zeros(len(self.nuisance))], None, variance)[0]
             if fitted.objective < nothing.objective - _LIKELIER:
                 ranked.append((fitted.objective, reading))
         return [reading for _, reading in sorted(ranked, key=lambda r: r[0])]
 
     def _explained(self, reading: Reading, effects: Mapping[str, Effect]) -> Findings:
-        forward, floors = self.forward.at(reading.points), self.findings.setting.floors
+        forward = replace(self.forward, points=reading.points)
+        floors = self.findings.setting.floors
         return search(reading.table, forward, self.nuisance, effects, floors)
 
     def _density(self, reading: Reading) -> float:

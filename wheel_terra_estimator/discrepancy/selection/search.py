@@ -67,6 +67,7 @@ _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 class Findings:
     """Outcome of the search on one table."""
 
+    table: SteadyTable  # all rows, a reference's with them
     setting: Setting  # model, cells, noise as used in the end
     nothing: Fit  # soil refitted only
     selection: Selection
@@ -127,6 +128,7 @@ def search(
         apart.append({cell[:2] for cell in outliers})
         noise = builder.estimate(stated, best, outliers)
     return Findings(
+        table,
         setting,
         nothing,
         selection,
@@ -307,7 +309,8 @@ class _Builder:
         )
         moved = np.clip(pull[group], -_FARTHEST, _FARTHEST) * std
         moved = np.clip(slip + moved, -0.97, 0.97) - slip
-        self.forward = self.forward.at(replace(self.forward.points, slip=slip + moved))
+        points = replace(self.forward.points, slip=slip + moved)
+        self.forward = replace(self.forward, points=points)
         angle = self.forward.solve([nothing.coordinates], [nothing.u], jacobian=False).angle[0]
         slope = self.forward.by_input('slip', nothing.coordinates, nothing.u, angle)
         self.by_input = [CommonError(slope, std, group)]

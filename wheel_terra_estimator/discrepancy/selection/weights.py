@@ -261,12 +261,6 @@ class Selection:
         return float(self.totals[0])
 
     @property
-    def best_single(self) -> float:
-        """That of the best one of at most one effect."""
-        few = [len(e.names) < 2 for e in self.explanations]
-        return float(self.totals[few].max())
-
-    @property
     def nothing(self) -> int:
         """Place of the explanation without an effect."""
         return self.index(())
