@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -218,7 +217,8 @@ class Decider:
         variance = setting.problem.variance(0.0 if exact else FIT_FLOOR)
         # Far from the configured soil, and without a floor, the fit goes along a bent valley.
         nothing = setting.refit(nothing, variance, _LONG)
-        return replace(decision, proposal=law, **self._predicted([nothing], variance, 0.0))
+        plain = self._predicted(decision.verdict, [nothing], variance, 0.0)
+        return replace(plain, floor=decision.floor, doubtful=decision.doubtful, proposal=law)
 
     def _judged(self, verdict: Verdict) -> Decision:
         """Refit nothing and the chosen explanation under its own floor, and predict unseen rows."""
@@ -227,10 +227,11 @@ class Decider:
         chosen = selection.explanations[verdict.index]
         own = self.findings.setting.problem.variance(floor.amplitude)
         fits = [nothing, chosen.fitted] if chosen.names else [nothing]
-        found = self._predicted(fits, own, floor.largest)
-        return Decision(verdict=verdict, floor=floor.largest, misread=self.misread, **found)
+        return self._predicted(verdict, fits, own, floor.largest)
 
-    def _predicted(self, fits: list[Fit], variance: FloatArray, floor: float) -> dict[str, Any]:
+    def _predicted(
+        self, verdict: Verdict, fits: list[Fit], variance: FloatArray, floor: float
+    ) -> Decision:
         """Refit nothing and what was chosen (the last), and predict rows that no fit saw."""
         setting = self.findings.setting
         fits = [setting.refit(f, variance) for f in fits]
@@ -240,13 +241,10 @@ class Decider:
         groups = np.where(np.arange(len(every)) < rows, slip_groups(every), -1)
         outs = hold_out(setting, fits, beside, groups)
         curves = _curves(rows, findings, fits[-1], outs, floor)
-        return {
-            'findings': findings,
-            'after': fits[-1],
-            'variance': beside,
-            'curves': curves,
-            'gap': gaps(self.table, findings, curves, self.allowed_error),
-        }
+        gap = gaps(self.table, findings, curves, self.allowed_error)
+        return Decision(
+            findings, verdict, floor, fits[-1], beside, curves, gap, misread=self.misread
+        )
 
 
 def _as_sure(names: tuple[NamedEffect, ...], share: float) -> tuple[NamedEffect, ...]:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -175,9 +174,8 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
     for member, names in enumerate(verdict.ambiguity_groups):
         others = set(after.names) - {after.names[member]}
         for competitor in names:
-            with suppress(KeyError):
-                place = selection.index((*others, competitor))
-                competitors.append(selection.explanations[place].fitted)
+            place = selection.index((*others, competitor))
+            competitors.append(selection.explanations[place].fitted)
     if not competitors:
         by_effects: dict[frozenset[str], Fit] = {}
         for explanation in selection.explanations:  # each set of effects in its best forms

@@ -190,8 +190,8 @@ def _beside_beds(
     weights = [0.0, *[math.log(_WRONGLY_ON)] * len(off)]
     found = [decider.findings, *off]
     parted = [apart(findings, grounds) for findings in found]
-    alike = max(w + f.selection.best for w, f in zip(weights, found, strict=True))
-    differing = [w + f.selection.best for w, (_, f) in zip(weights, parted, strict=True)]
+    alike = max(w + f.selection.totals[0] for w, f in zip(weights, found, strict=True))
+    differing = [w + f.selection.totals[0] for w, (_, f) in zip(weights, parted, strict=True)]
     odds = math.exp(min(max(differing) - alike, MOST_ODDS)) * _BEDS_DIFFER / (1.0 - _BEDS_DIFFER)
     if odds <= _UNLIKELY:
         return decision
@@ -220,8 +220,8 @@ def _in_doubt_of_what_is_on(
         given = decider.table, replace(forward, base_effects=others), rest
         alone = search(*given, forms, setting.floors)
         best = alone.selection.explanations[0].names
-        total = alone.selection.best + math.log(_WRONGLY_ON)
-        if total < findings.selection.best or set(best) & forward.base_effects.keys():
+        total = alone.selection.totals[0] + math.log(_WRONGLY_ON)
+        if total < findings.selection.totals[0] or set(best) & forward.base_effects.keys():
             continue  # as it is, with what else is missing, or with other numbers
         if best:
             found = search(*given, {**effects, **forms}, setting.floors)

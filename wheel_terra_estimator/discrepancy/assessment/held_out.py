@@ -72,9 +72,8 @@ def _without(inverse: FloatArray, out: IndexArray) -> FloatArray:
     that no large matrix is decomposed for any group.
     """
     kept = inverse.copy()
-    if out.size:
-        kept -= inverse[:, out] @ np.linalg.solve(inverse[np.ix_(out, out)], inverse[out])
-        kept[out] = kept[:, out] = 0.0
+    kept -= inverse[:, out] @ np.linalg.solve(inverse[np.ix_(out, out)], inverse[out])
+    kept[out] = kept[:, out] = 0.0
     return kept
 
 

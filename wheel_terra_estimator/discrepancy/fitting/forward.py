@@ -185,10 +185,14 @@ class Forward:
         """Jacobians (implicit functions): dy/du at fixed angle, then along the balance."""
         copies = list(columns)
         owner = list(range(len(columns)))
+        steps = list[FloatArray]()
         for b, (hypothesis, values) in enumerate(zip(hypotheses, u, strict=True)):
+            moved_by = list[float]()
             for c, x in ((hypothesis[k], values[k]) for k in by[b]):
-                copies.append({**columns[b], c.key: float(c.value(x + self._step(c, x)))})
+                moved_by.append(-STEP if x + STEP > c.upper else STEP)
+                copies.append({**columns[b], c.key: float(c.value(x + moved_by[-1]))})
                 owner.append(b)
+            steps.append(np.array(moved_by))
         # Once more the plain copies, for the derivative along the angle.
         step = 1e-6
         contact, terms = self._contact(hypotheses, [*copies, *columns])
@@ -197,24 +201,19 @@ class Forward:
         )
         beyond, moved = residual[len(copies) :], shifted[len(copies) :]
         jacobians, slopes, at = [], [], len(columns)
-        for b, hypothesis in enumerate(hypotheses):
-            count = len(by[b])
-            steps = np.array([self._step(hypothesis[k], u[b][k]) for k in by[b]])
+        for b, own in enumerate(steps):
+            count = len(own)
             base_r, base_y = residual[b], shifted[b]
             by_angle = (beyond[b] - base_r) / step
             y_by_angle = (moved[b] - base_y) / step
-            direct_r = (residual[at : at + count] - base_r) / steps[:, None]
-            direct_y = (shifted[at : at + count] - base_y) / steps[:, None, None]
+            direct_r = (residual[at : at + count] - base_r) / own[:, None]
+            direct_y = (shifted[at : at + count] - base_y) / own[:, None, None]
             angle_by_u = -direct_r / by_angle
             total = direct_y + y_by_angle[None] * angle_by_u[:, :, None]
             jacobians.append(np.moveaxis(total, 0, -1))
             slopes.append(angle_by_u.T)
             at += count
         return State(angle, outputs, jacobians, slopes)
-
-    @staticmethod
-    def _step(coordinate: Coordinate, x: float) -> float:
-        return -STEP if x + STEP > coordinate.upper else STEP
 
     def by_input(
         self, name: str, hypothesis: Sequence[Coordinate], u: FloatArray, angle: FloatArray

@@ -96,8 +96,8 @@ class Columns:
             return said
         tens = (_scaled(lacked, self.table, self.forward.points) for lacked in off)
         for reading in self._likeliest(tens):
-            gain = self._explained(reading, self.effects).selection.best + self._density(reading)
-            if gain > self.findings.selection.best + _CLEARLY:
+            gain = self._explained(reading, self.effects).selection.totals[0]
+            if gain + self._density(reading) > self.findings.selection.totals[0] + _CLEARLY:
                 said.update(reading.said)
         return said
 
@@ -122,7 +122,7 @@ class Columns:
                 if tried and alone + density < best_single:
                     break  # what is read wrongly says more than any one effect
                 found = self._explained(reading, tried)
-                alone = found.selection.best
+                alone = found.selection.totals[0]
                 verdict = choose(found.selection, found.setting.problem)
                 fits = verdict.status == 'agrees' or (far and verdict.left.only_far)
                 if tried:  # effects beside it: fewer than without it, and nothing is left
@@ -131,7 +131,7 @@ class Columns:
                 # A biased radius looks like another one where all lugs are alike.
                 surely = tried or not far or 'slip' in reading.said
                 needed = _CLEARLY if surely else _LIKELIER
-                if fits and found.selection.best + density > selection.best + needed:
+                if fits and alone + density > selection.totals[0] + needed:
                     return reading.said
         return {}
 

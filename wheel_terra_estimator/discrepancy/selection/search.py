@@ -107,7 +107,7 @@ def search(
     reasons = {name: unavailable(effect, table, lug_height) for name, effect in effects.items()}
     possible = {name: effect for name, effect in effects.items() if not reasons[name]}
     apart = [{cell[:2] for cell in outliers}]
-    for turn in range(_PASSES):
+    while True:
         problem, nothing = builder.fit_nothing(noise.std, outliers, nothing)
         rim = forward.points.wheel.radius * (1.0 - np.cos(nothing.angle))
         deepest = float(np.max(rim))
@@ -115,14 +115,12 @@ def search(
         visible = {name: possible[name] for name, s in found.items() if s.greatest >= SEEN}
         setting = Setting(builder.forward, problem, nuisance, visible, floors, deepest)
         selection = _select(setting, nothing)
-        if turn == _PASSES - 1:
-            break
         # Outliers are sought anew, from scratch, under the best explanation.
         best = selection.explanations[0].fitted
         floor = floors[int(np.argmax(selection.probability[0]))]
         whole = builder.build(noise.std, ())
         again = find_outliers(whole, best, np.array(floor.amplitude), builder.narrow)
-        if {cell[:2] for cell in again} in apart:
+        if {cell[:2] for cell in again} in apart or len(apart) == _PASSES:
             break  # the same cells as before, or as once before: they would go round
         outliers = again
         apart.append({cell[:2] for cell in outliers})

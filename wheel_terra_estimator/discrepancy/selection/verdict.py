@@ -189,9 +189,7 @@ def _explained(selection: Selection, nothing: int, best: int) -> float:
     """Share of the squared misfit in excess of the noise that a set of effects removes."""
     before = selection.explanations[nothing].fitted.residual
     after = selection.explanations[best].fitted.residual
-    excess = float(before @ before) - len(before)
-    if excess <= 0.0:
-        return 1.0  # there was none
+    excess = max(float(before @ before) - len(before), 1e-9)
     return (float(before @ before) - float(after @ after)) / excess
 
 

@@ -256,11 +256,6 @@ class Selection:
         return log_sum(self.log_joint, axis=1)
 
     @property
-    def best(self) -> float:
-        """That of the best one."""
-        return float(self.totals[0])
-
-    @property
     def nothing(self) -> int:
         """Place of the explanation without an effect."""
         return self.index(())
@@ -277,10 +272,7 @@ class Selection:
 
     def index(self, names: Sequence[str]) -> int:
         """Return the place of the explanation with exactly these effects."""
-        for h, explanation in enumerate(self.explanations):
-            if set(explanation.names) == set(names):
-                return h
-        raise KeyError(names)
+        return next(h for h, e in enumerate(self.explanations) if set(e.names) == set(names))
 
 
 def log_prior(names: Sequence[str], visible: Iterable[str]) -> float:
