@@ -48,8 +48,8 @@ def render(table: SteadyTable, configuration: Configuration, decision: Decision)
     gap_p_value = chi_square_p_value(decision.findings.nothing, decision.variance)
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
     soil = _shifts(findings, after, 'soil')
-    bed = words.another_bed(after)
-    fresh = words.fresh_bed(decision, table)
+    bed, beds = words.another_bed(after), words.own_beds(decision, table)
+    said, fresh = ([one] for one in beds) if beds else ([], [])
     beds_first = decision.beds_differ > 0.5  # more likely than not
     moved = (*soil, *_shifts(findings, after, *setting.forward.base_effects))
     return Diagnosis(
@@ -83,7 +83,7 @@ def render(table: SteadyTable, configuration: Configuration, decision: Decision)
         notes=(
             *words.notes(findings, after, () if decision.misread else moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
-            *words.own_beds(decision, table),
+            *said,
             *([bed] if bed else []),
             *words.alone(decision.gap),
         ),
@@ -138,14 +138,13 @@ def _candidates(decision: Decision) -> tuple[Candidate, ...]:
         shown.append(verdict.index)
     totals = selection.totals
     at_nothing = selection.explanations[nothing].log_evidence
-    chosen = set(selection.explanations[verdict.index].names)
     return tuple(
         Candidate(
             explanation.names,
             explanation.log_evidence - at_nothing,
             float(selection.probability[h].sum()),
             _parameters(explanation.fitted),
-            '' if h == verdict.index else words.why_not(findings, verdict, h, totals, chosen),
+            words.why_not(findings, verdict, h),
             joined(explanation.names),
             ', '.join(key for key in explanation.names if effect_of(key) != key),
         )

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from scipy.special import chdtrc
 
-from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import channels_off
 from wheel_terra_estimator.discrepancy.decision import Decision
@@ -50,7 +49,6 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     SteadyTable,
 )
 from wheel_terra_estimator.terramechanics.effects import catalogue
-from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
 
 FACTORS = {
@@ -169,14 +167,15 @@ def soil_line(diagnosis: Diagnosis) -> str:
     return f'Largest shift: {moved(farthest)}; standard deviations of the soil from: {sources}.'
 
 
-def why_not(
-    findings: Findings, verdict: Verdict, index: int, totals: FloatArray, chosen: set[str]
-) -> str:
-    """Return why an explanation was not the one."""
+def why_not(findings: Findings, verdict: Verdict, index: int) -> str:
+    """Return why an explanation was not the one; empty for that one."""
+    if index == verdict.index:
+        return ''
     selection = findings.selection
-    names = selection.explanations[index].names
-    behind = float(totals[verdict.index] - totals[index])
-    if {effect_of(key) for key in names} == {effect_of(key) for key in chosen}:
+    own, other = selection.explanations[index], selection.explanations[verdict.index]
+    names, chosen = own.names, set(other.names)
+    behind = float(selection.totals[verdict.index] - selection.totals[index])
+    if own.effects == other.effects:
         return f'another form of the same: {behind:.1f} nats behind'
     open_names = {name for competitors in verdict.ambiguity_groups for name in competitors}
     if len(names) == len(chosen) and set(names) - chosen <= open_names:
@@ -273,35 +272,30 @@ def _repeatability(noise: Noise) -> list[str]:
     return found
 
 
-def own_beds(decision: Decision, table: SteadyTable) -> tuple[str, ...]:
-    """Return a remark where the soil may differ from sweep to sweep, day to day or row to row."""
+def own_beds(decision: Decision, table: SteadyTable) -> tuple[str, NextMeasurement] | None:
+    """Return a remark where the soil may differ (sweeps, days, rows), and what to measure then."""
     if not decision.beds_differ:
-        return ()
+        return None
     usual = percent(SCATTER[decision.ground]['stiffness'])
-    swept = _swept(table) if decision.ground == 'sweep' else ''
-    together = f'{swept} and bed changed together: ' if swept else ''
-    return (
-        f'{together}that the beds differ from {decision.ground} to {decision.ground} ({usual} of '
-        f'the stiffness is usual) is {percent(decision.beds_differ)} likely',
-    )
-
-
-def fresh_bed(decision: Decision, table: SteadyTable) -> tuple[NextMeasurement, ...]:
-    """Return the measurement that tells beds that differ from an effect."""
-    if not decision.beds_differ:
-        return ()
+    swept = ' and '.join(plain(name) for name in table.varying() if name not in ON_ONE_BED)
     what = {
         'row': 'the drive again beside its ruts',
         'sweep': 'one sweep again on a fresh bed, with a column trial',
         'day': 'a sweep of each day again, all on one day',
     }[decision.ground]
-    swept = _swept(table)
+    together = ''
     if decision.ground == 'sweep' and not swept:  # trials alone
         what = 'the sweep again on three more fresh beds'
-    elif decision.ground == 'sweep' and 'trial' in table.columns:
-        what = f'the sweeps of least and greatest {swept} again, each on two fresh beds'
+    elif decision.ground == 'sweep':
+        together = f'{swept} and bed changed together: '
+        if 'trial' in table.columns:
+            what = f'the sweeps of least and greatest {swept} again, each on two fresh beds'
+    remark = (
+        f'{together}that the beds differ from {decision.ground} to {decision.ground} ({usual} of '
+        f'the stiffness is usual) is {percent(decision.beds_differ)} likely'
+    )
     competitors = 'another bed', f'an effect of {swept or "slip"}'
-    return (NextMeasurement(what, competitors, 0.0, math.inf),)
+    return remark, NextMeasurement(what, competitors, 0.0, math.inf)
 
 
 def another_bed(fitted: Fit) -> str:
@@ -330,10 +324,6 @@ def alone(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
         return ()
     share = 'the error that table and reference share is in no file: model.yaml alone errs by'
     return (f'{share} {", ".join(errors)}',)
-
-
-def _swept(table: SteadyTable) -> str:
-    return ' and '.join(plain(name) for name in table.varying() if name not in ON_ONE_BED)
 
 
 _SLIPS = {

@@ -172,7 +172,7 @@ def _read_rows(
     ordered: list[tuple[str, int, list[Any]]] = [
         (column.name, column.place, []) for column in header.columns if column.name in ORDER_COLUMNS
     ]
-    others = {place: _Other() for place, _ in header.unused}
+    others: dict[int, list[float | None]] = {place: [] for place, _ in header.unused}
     width = len(header.titles)
     for line, row in rows:
         cells = [*row, *[''] * (width - len(row))]
@@ -185,36 +185,23 @@ def _read_rows(
         for _, place, texts in ordered:
             texts.append(cells[place])
         for place, other in others.items():
-            other.take(len(lines), cells[place], decimal_comma)
+            other.append(value_of(cells[place], decimal_comma))
         lines.append(line)
-    header.check_unused([place for place, other in others.items() if other.holds_numbers])
+    header.check_unused([place for place, other in others.items() if _holds_numbers(other)])
     columns = {column.name: np.array(found) for column, found in values}
     columns |= {name: _ordered(texts) for name, _, texts in ordered}
     return np.array(lines, dtype=np.intp), columns
 
 
-class _Other:
-    """What stands in a column that is not used."""
+def _holds_numbers(values: Sequence[float | None]) -> bool:
+    """Return whether a column is one of numbers (None: a text, nan: empty), but those of its rows.
 
-    def __init__(self) -> None:
-        self._numbers = self._texts = 0
-        self._counts = True  # 0, 1, 2 ... or 1, 2, 3 ...: numbers of the rows
-        self._first = 0.0
-
-    def take(self, index: int, cell: Any, decimal_comma: bool) -> None:
-        """Take in the cell of a row."""
-        value = value_of(cell, decimal_comma)
-        if value is None:
-            self._texts += 1
-        elif not math.isnan(value):
-            self._first = value if index == 0 else self._first
-            self._counts &= value == self._first + index and self._first in (0.0, 1.0)
-            self._numbers += 1
-
-    @property
-    def holds_numbers(self) -> bool:
-        """Whether it is one of numbers, but those of the rows."""
-        return self._numbers > self._texts and not (self._counts and self._numbers > 1)
+    These are 0, 1, 2 ... or 1, 2, 3 ...
+    """
+    numbers = [(i, v) for i, v in enumerate(values) if v is not None and not math.isnan(v)]
+    first = 1.0 if numbers and numbers[0] == (0, 1.0) else 0.0
+    count = all(value == first + i for i, value in numbers)
+    return len(numbers) > values.count(None) and not (count and len(numbers) > 1)
 
 
 def _ordered(cells: Sequence[Any]) -> FloatArray:
