@@ -34,10 +34,8 @@ def rubbing_table(folder):
         campaign = make_campaign(seed, 'sweep40', Plan(hide='outside', names=('side_drag',)))
         if 20 < campaign.distances[0] < 60:
             campaign.write_csv(folder / 'rig.csv')
-            lines = ['/**:', '  ros__parameters:']
-            for key, value in campaign.settings().items():
-                lines.append(f'    {key}: {json.dumps(value)}')
-            (folder / 'rig.yaml').write_text('\n'.join(lines) + '\n')
+            rig = reader.from_parameters(campaign.settings(), complete=False)
+            rig.write(folder / 'rig.yaml')
             return campaign
     raise AssertionError('no campaign of this size')
 
