@@ -218,6 +218,8 @@ class Decider:
         # Far from the configured soil, and without a floor, the fit goes along a bent valley.
         nothing = setting.refit(nothing, variance, _LONG)
         plain = self._predicted(decision.verdict, [nothing], variance, 0.0)
+        if decision.verdict.status == 'undecided' and not channels_off(plain.gap):
+            return replace(decision, proposal=law)  # what is off is so beside the floor alone
         return replace(plain, floor=decision.floor, doubtful=decision.doubtful, proposal=law)
 
     def _judged(self, verdict: Verdict) -> Decision:
