@@ -252,18 +252,6 @@ def test_lists_that_make_no_law(lists, part):
         reader.from_parameters({'effects.learned_closure.enabled': True, **law}, complete=False)
 
 
-def test_a_law_says_effects_only_where_all_of_its_terms_are_some():
-    def law(*terms):
-        targets, features = zip(*(term.split('_by_') for term in terms), strict=True)
-        return SimpleNamespace(targets=targets, features=features)
-
-    assert proposals.equivalent_effects(law('torque_by_one', 'drawbar_pull_by_one')) == {
-        'drivetrain_friction',
-        'pull_zero',
-    }
-    assert proposals.equivalent_effects(law('torque_by_one', 'exponent_by_slope')) == frozenset()
-
-
 def test_a_change_is_said_in_the_units_of_the_rows():
     """A tenth of load, load times radius, radius: two wheels of 0.2 m, 100 and 300 N."""
     rows = np.tile([0.02, 40.0, 20.0], (2, 1))

@@ -74,8 +74,8 @@ _HOLDS = (2.5, 5.0, 10.0, 20.0, 40.0)  # times narrower: until the refitted soil
 _PRIOR_OF_LAW = 0.1  # probability of a law of one term beside the names: about that of a misfit
 _ALIKE = 0.8  # cosine of two signatures from which one resembles the other
 _RESEMBLING = 3
-# Terms equivalent to a named effect, in one of its forms or another.
-_SAME = {
+# Terms that are near a named effect, or equivalent to it in one of its forms.
+_LIKE = {
     'exponent_by_slip': 'slip_sinkage_exponent',
     'exponent_by_slip_squared': 'slip_sinkage_exponent',
     'peak_angle_by_slip': 'stress_peak_shift',
@@ -88,9 +88,6 @@ _SAME = {
     'shear_modulus_by_slip_squared': 'shear_deformation',
     'bearing_pressure_by_pass': 'multipass',
     'bearing_pressure_by_rim_speed': 'rate_dependence',
-}
-# Terms that are near one.
-_LIKE = _SAME | {
     'exponent_by_load': 'slip_sinkage_exponent',
     'drawbar_pull_by_load': 'pull_zero',
     'torque_by_torque_squared': 'torque_gain',
@@ -214,12 +211,6 @@ def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
         return None
     found = _proposal(gap, setting, refit, *best)
     return replace(found, closed=most, soil_held=hold_soil)
-
-
-def equivalent_effects(law: Proposal) -> frozenset[str]:
-    """Return the effects equivalent to a law, term by term; none where a term has no equivalent."""
-    terms = [f'{t}_by_{f}' for t, f in zip(law.targets, law.features, strict=True)]
-    return frozenset(_SAME[term] for term in terms) if set(terms) <= set(_SAME) else frozenset()
 
 
 @dataclass(frozen=True)
