@@ -350,6 +350,14 @@ def test_a_wrong_unit_is_said_before_any_effect(few_known, stds, factors, said, 
     assert said in found.sentence and 'looks wrong' in found.sentence
 
 
+def test_a_wrong_unit_is_asked_for_beside_an_effect_as_well(few_known):
+    table, values, *_ = make('sweep40', ('bulldozing',), 3.0)
+    for name in ('torque', 'torque_std'):
+        table[name] = table[name] / KGF
+    found = run(table, values)
+    assert (found.misread, found.effects) == ({'torque': pytest.approx(KGF)}, ())
+
+
 @pytest.mark.parametrize(
     ('gain', 'unit'), [(0.73, 'lbf ft in place of N m'), (0.78, ''), (0.6, '')]
 )

@@ -11,7 +11,7 @@ import numpy as np
 from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
-from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, with_unit
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, plain, with_unit
 from wheel_terra_estimator.discrepancy.result import InputRange, Where
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -43,20 +43,20 @@ def locate(findings: Findings, variance: FloatArray) -> Where:
     looked_at = np.ones(len(table), dtype=bool) if ours is None else ours
     cells = own((problem.wanted - problem.flat(nothing.outputs))[:, None])[:, 0]
     cells = np.where(problem.outlier | ~looked_at[problem.row], 0.0, cells)
-    residual = np.full((len(table), len(QUANTITIES)), np.nan)
-    residual[problem.row, problem.quantity] = cells
-    present = [q for q in range(len(QUANTITIES)) if (problem.quantity == q).any()]
-    of = {q: cells[(problem.quantity == q) & looked_at[problem.row]] for q in present}
-    excess = {q: max(float((of[q] ** 2 - 1.0).sum()), 1e-9) for q in present}
+    excess = dict[int, float]()
+    for q in np.unique(problem.quantity).tolist():
+        of = cells[(problem.quantity == q) & looked_at[problem.row]]
+        excess[q] = max(float((of**2 - 1.0).sum()), 1e-9)
     total = sum(excess.values())
-    shares = {QUANTITIES[q]: excess[q] / total for q in present}
-    worst = max(present, key=lambda q: excess[q])
-    mine = np.isfinite(residual[:, worst]) & looked_at
+    shares = {QUANTITIES[q]: size / total for q, size in excess.items()}
+    worst = max(excess, key=lambda q: excess[q])
+    at = problem.quantity == worst
+    here, values, std = problem.row[at], np.zeros(len(table)), np.zeros(len(table))
+    values[here], std[here] = cells[at], problem.std[at]
+    mine = looked_at & (std > 0.0)
     names = [name for name in table.varying() if np.isfinite(table.columns[name]).all()]
     boxes, sides = _boxes(table, names)
-    values = np.where(mine, residual[:, worst], 0.0)
-    share_inside = float('nan')
-    p_value, inside = 1.0, mine
+    p_value, inside, share_inside = 1.0, mine, 1.0
     box: tuple[InputRange, ...] = ()
     if len(boxes):
         counts = np.maximum(boxes @ mine, 1.0)
@@ -64,28 +64,22 @@ def locate(findings: Findings, variance: FloatArray) -> Where:
         best = int(np.argmax(score))
         draws = own(_simulated(problem, nothing, None if ours is None else variance))
         null = np.zeros((len(table), _DRAWS))
-        null[problem.row[problem.quantity == worst]] = draws[problem.quantity == worst]
+        null[here] = draws[at]
         null[~mine] = 0.0
         strongest = _score(boxes @ null**2, counts[:, None]).max(axis=0)
         p_value = float((1 + (strongest >= score[best]).sum()) / (1 + len(strongest)))
         chosen = (boxes[best] > 0) & mine
         square = float((values**2).sum())
-        share_inside = float((values[chosen] ** 2).sum()) / max(square, 1e-12)
+        share = float((values[chosen] ** 2).sum()) / max(square, 1e-12)
         # A box that holds no more than its rows' share of the gap is no region.
-        if p_value < _SURE and share_inside > 1.3 * chosen.sum() / mine.sum():
-            box, inside = sides[best], chosen
-    if not box:
-        share_inside = 1.0
-    std = np.zeros(len(table))
-    std[problem.row[problem.quantity == worst]] = problem.std[problem.quantity == worst]
+        if p_value < _SURE and share > 1.3 * chosen.sum() / mine.sum():
+            box, inside, share_inside = sides[best], chosen, share
     std = std[inside]
     physical = values[inside] * std
     mean, size = float(np.mean(physical)), float(np.sqrt(np.mean(physical**2)))
     noise = float(np.sqrt(np.mean(std**2)))
     quantity, sentence = QUANTITIES[worst], 'no region stands out from the noise'
-    # What a reference does not show exactly is in the draws only.
-    beyond_noise = ours is None and excess[worst] > 3.0 * np.sqrt(2.0 * mine.sum())
-    if p_value < _SURE or beyond_noise:
+    if p_value < _SURE:
         sentence = _sentence(quantity, box, mean, size, noise)
     return Where(sentence, quantity, shares, box, np.flatnonzero(inside), share_inside, p_value)
 
@@ -154,7 +148,7 @@ def _sentence(
     where = ' and '.join(map(_text, box)) or whole
     value, signed = (mean, 'on average ') if one_sign else (size, 'of both signs there, ')
     return (
-        f'{quantity.replace("_", " ")} is worst, {where}: measured minus model is {signed}'
+        f'{plain(quantity)} is worst, {where}: measured minus model is {signed}'
         f'{amount(quantity, value)} {SHOWN[quantity][1]}{" there" if one_sign else ""} '
         f'({value / noise:+.1f} noise standard deviations{"" if one_sign else " in size"})'
     )
