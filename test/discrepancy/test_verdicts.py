@@ -152,10 +152,10 @@ def test_beds_that_differ_from_sweep_to_sweep_are_no_effect(unproposed, options)
     assert found.noise.std[0, 0] == pytest.approx(second['sinkage_std'][0], rel=0.4)
     repeated = SimpleNamespace(columns={'trial': rows['slip']}, varying=lambda: ('normal_load',))
     beds = SimpleNamespace(beds_differ=0.5, ground='sweep')
-    _, again = words.own_beds(beds, repeated)
+    _, (again,) = words.own_beds(beds, repeated)
     assert again.what.startswith('the sweeps of least and greatest normal load again')
     trials_alone = SimpleNamespace(columns={'trial': rows['slip']}, varying=lambda: ('slip',))
-    said, again = words.own_beds(beds, trials_alone)
+    (said,), (again,) = words.own_beds(beds, trials_alone)
     assert again.what == 'the sweep again on three more fresh beds'
     assert said.startswith('that the beds differ')
 

@@ -48,8 +48,8 @@ def render(table: SteadyTable, configuration: Configuration, decision: Decision)
     gap_p_value = chi_square_p_value(decision.findings.nothing, decision.variance)
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
     soil = _shifts(findings, after, 'soil')
-    bed, beds = words.another_bed(after), words.own_beds(decision, table)
-    said, fresh = ([one] for one in beds) if beds else ([], [])
+    bed = words.another_bed(after)
+    remarks, fresh = words.own_beds(decision, table)
     beds_first = decision.beds_differ > 0.5  # more likely than not
     moved = (*soil, *_shifts(findings, after, *setting.forward.base_effects))
     return Diagnosis(
@@ -83,7 +83,7 @@ def render(table: SteadyTable, configuration: Configuration, decision: Decision)
         notes=(
             *words.notes(findings, after, () if decision.misread else moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
-            *said,
+            *remarks,
             *([bed] if bed else []),
             *words.alone(decision.gap),
         ),

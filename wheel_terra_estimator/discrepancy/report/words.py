@@ -272,10 +272,12 @@ def _repeatability(noise: Noise) -> list[str]:
     return found
 
 
-def own_beds(decision: Decision, table: SteadyTable) -> tuple[str, NextMeasurement] | None:
+def own_beds(
+    decision: Decision, table: SteadyTable
+) -> tuple[tuple[str, ...], tuple[NextMeasurement, ...]]:
     """Return a remark where the soil may differ (sweeps, days, rows), and what to measure then."""
     if not decision.beds_differ:
-        return None
+        return (), ()
     usual = percent(SCATTER[decision.ground]['stiffness'])
     swept = ' and '.join(plain(name) for name in table.varying() if name not in ON_ONE_BED)
     what = {
@@ -295,7 +297,7 @@ def own_beds(decision: Decision, table: SteadyTable) -> tuple[str, NextMeasureme
         f'the stiffness is usual) is {percent(decision.beds_differ)} likely'
     )
     competitors = 'another bed', f'an effect of {swept or "slip"}'
-    return remark, NextMeasurement(what, competitors, 0.0, math.inf)
+    return (remark,), (NextMeasurement(what, competitors, 0.0, math.inf),)
 
 
 def another_bed(fitted: Fit) -> str:

@@ -27,7 +27,7 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
 _CLEARLY = 10.0  # nats by which another reading must explain the rows better than any effect
-_LIKELIER = 5.0  # the same, where the rows as they are do not fit the soil
+_LIKELIER = 5.0  # nats by which it must fit better, beside a rough floor, to be weighed
 _FLOOR_NEEDED = 0.8  # probability of a structural error from which soil alone does not fit
 _LOADS = (0.5, 2.0)  # of a pair of wheels, or one of it
 _TOGETHER = (('normal_load', 'drawbar_pull'), ('drawbar_pull', 'torque'))  # of one unit of force
@@ -128,10 +128,7 @@ class Columns:
                 if tried:  # effects beside it: fewer than without it, and nothing is left
                     names = found.selection.explanations[verdict.index].names
                     fits = len(names) + (not density) <= count and not verdict.left.noticeable
-                # A biased radius looks like another one where all lugs are alike.
-                surely = tried or not far or 'slip' in reading.said
-                needed = _CLEARLY if surely else _LIKELIER
-                if fits and alone + density > selection.totals[0] + needed:
+                if fits and alone + density > selection.totals[0] + _CLEARLY:
                     return reading.said
         return {}
 
