@@ -35,6 +35,7 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
     CommonError,
     build_problem,
     kernel,
+    over_covariance,
     slip_features,
 )
 from wheel_terra_estimator.discrepancy.report.words import _repeatability
@@ -200,6 +201,25 @@ def test_rotation_gives_the_dense_covariance(setting):
     np.testing.assert_allclose(
         dense / np.outer(root, root), expected / np.outer(root, root), atol=1e-8
     )
+
+
+def test_gap_test_is_calibrated(forward, setting):
+    """P-values of tables in which nothing is missing are uniform; a real effect gives tiny ones."""
+    soil, truth, std, inputs, scale = setting
+    rng = np.random.default_rng(3)
+    problem = build_problem(truth, std, inputs, scale)
+    one = np.ones(problem.size)
+    at_truth = of_soil(forward, problem, soil, one, None, 3)
+    squares = []
+    for _ in range(200):
+        shift = at_truth.sensitivity @ rng.standard_normal(len(soil))
+        cells = problem.observed + shift + problem.std * rng.standard_normal(problem.size)
+        case = replace(at_truth, residual=problem.rotation @ (cells - problem.observed))
+        squares.append(gap_test.chi_square_p_value(case, one))
+    assert scipy.stats.kstest(squares, 'uniform').pvalue > 1e-3
+    digging = problem.rotation @ problem.flat(np.outer(0.004 * forward.points.slip, [1.0, 0, 0]))
+    real = replace(at_truth, residual=digging)
+    assert gap_test.chi_square_p_value(real, one) < 1e-3
 
 
 def test_cells_left_out_are_marginalised(setting):
@@ -547,6 +567,14 @@ def test_a_number_at_its_bound_is_the_bound():
     fitted = Fit((), own, np.array([3.3, 5.0]), *none, np.zeros(0), 0.0, np.ones(2))
     values = [number.value for number in fitted.numbers()]
     assert str(values) == '[0.0, 2.5]'
+
+
+def test_what_is_over_a_covariance_is_over_the_dense_one(rng):
+    variance, jacobian = rng.uniform(0.2, 4.0, 8), rng.standard_normal((8, 2))
+    prior, vectors = np.array([0.3, 2.0]), rng.standard_normal((8, 3))
+    whole = np.diag(variance) + (jacobian / prior) @ jacobian.T
+    found = over_covariance(vectors, variance, jacobian, prior)
+    np.testing.assert_allclose(whole @ found, vectors, atol=1e-12)
 
 
 def test_a_cell_set_apart_is_the_evidence_of_its_wider_noise(rng):

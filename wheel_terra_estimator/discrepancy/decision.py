@@ -148,7 +148,7 @@ class Decider:
             tried.append(verdict.index)
             named = _names(self.table, decision, self._rivals)
             names, likely = self._against_law(decision, named)
-            if likely:
+            if likely and any(item.after < item.refit for item in decision.gap.values()):
                 share = _OF_SEVERAL if len(names) >= _SEVERAL else 1.0
                 return replace(decision, effects=_as_sure(names, share))
             doubtful = doubtful or names
