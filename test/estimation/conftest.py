@@ -29,3 +29,11 @@ def climbed(climb):
     estimator = WheelSoilEstimator(climb.configuration)
     core = EstimatorCore(climb.configuration, estimator)
     return core, play(core, (arrival.measurement for arrival in climb.arrivals)), estimator
+
+
+@pytest.fixture(scope='session')
+def parts():
+    """A rover on sand in parts; nobody changes them."""
+    from parts import on_sand
+
+    return on_sand()

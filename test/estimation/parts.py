@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rover for tests of single parts of the estimator, steady inputs of all, simulated drives."""
 
+import functools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
@@ -85,3 +87,9 @@ class Parts:
         return initial_filter(
             self.configuration, self.rover, self.sensors, self.layout, self.models, loads
         )
+
+
+@functools.cache
+def on_sand(*keys):
+    """Return the parts of a rover on sand, with other values of keys; nobody changes them."""
+    return Parts(reader.load(SAND, keys))

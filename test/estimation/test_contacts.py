@@ -8,10 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from parts import SAND, Parts
 from scipy.optimize import minimize_scalar
 
-from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.contact_age import (
     VARIANCE_AT_ONE_LENGTH,
     VARIANCE_DECAY,
@@ -44,11 +42,6 @@ from wheel_terra_estimator.estimation.sideways import Sideways
 
 NAN = float('nan')
 FORWARD = (0.05,) * 6
-
-
-@pytest.fixture(scope='module')
-def parts():
-    return Parts(reader.load(SAND))
 
 
 def window(yaw=0.0, pitch=0.0, force=(0.0, 0.0, 9.8), readings=5):

@@ -4,9 +4,8 @@
 
 import numpy as np
 import pytest
-from parts import SAND, Parts
+from parts import on_sand
 
-from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
@@ -33,11 +32,6 @@ from wheel_terra_estimator.estimation.outputs import Outputs
 
 NAN = float('nan')
 FORWARD = (0.05,) * 6
-
-
-@pytest.fixture
-def parts():
-    return Parts(reader.load(SAND))
 
 
 @pytest.fixture
@@ -225,7 +219,7 @@ def wandering(rng, count, dt, std, time):
 def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, most):
     """A satellite receiver at 5 Hz, off by 3 cm/s for 15 s at a time: its errors are covered."""
     keys = [f'sensors.reference_wander_std:={stated}', 'sensors.reference_std:=0.01']
-    parts = Parts(reader.load(SAND, [*keys, 'filter.gate:=1e6']))
+    parts = on_sand(*keys, 'filter.gate:=1e6')
     rng, dt, count, inside = np.random.default_rng(4), 0.2, 75, []
     for _ in range(16):
         ekf, update = parts.filter(), reference_update(parts)
@@ -241,7 +235,7 @@ def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, m
 
 
 def test_the_error_that_lasts_keeps_its_deviation_over_any_step():
-    parts = Parts(reader.load(SAND, ['sensors.reference_wander_std:=0.03']))
+    parts = on_sand('sensors.reference_wander_std:=0.03')
     prediction, e = Prediction.unchanged(parts.filter().x), parts.layout.reference_error
     reference_update(parts).predict(prediction, 0.5 * parts.sensors.reference_wander_time)
     hold = prediction.F[e, e]
@@ -676,7 +670,7 @@ def test_the_jacobian_of_a_settled_sinkage_is_its_derivative(parts, ekf):
 
 def test_a_stiffer_soil_has_both_moduli_of_sinkage_larger_by_the_same_factor():
     """k_c / b + k_phi is what the wheel feels: twice of it is twice of each."""
-    parts = Parts(reader.load(SAND, ['soil.cohesive_modulus:=2000.0']))
+    parts = on_sand('soil.cohesive_modulus:=2000.0')
     outputs = Outputs(parts.configuration, parts.rover, parts.sensors, parts.layout)
     size = parts.layout.size
     names, before, _ = outputs.learned_soil(np.zeros(size), np.zeros((size, size)))

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from parts import SAND, Parts
+from parts import on_sand
 
-from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.inputs.contact_sensors import LeavingAngleInput, SinkageInput
 from wheel_terra_estimator.estimation.inputs.inertial import GyroZero, InertialInput
 from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
@@ -110,7 +109,7 @@ def test_a_gyro_without_accelerometer_and_the_reverse_are_kept_apart():
     assert window.mean_force() == pytest.approx((9.8 * np.sin(0.1), 0.0, 9.8 * np.cos(0.1)))
 
 
-PARTS = Parts(reader.load(SAND))
+PARTS = on_sand()
 RADIUS = PARTS.rover.slip_radius[0]
 
 

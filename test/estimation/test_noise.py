@@ -8,7 +8,7 @@ from math import nan, radians
 import numpy as np
 import pytest
 from fake_estimator import SECOND, play
-from parts import SAND, Parts
+from parts import on_sand
 from test_core_with_filter import START
 from test_core_with_filter import drive as noisy_drive
 
@@ -26,7 +26,7 @@ NAN = float('nan')
 
 
 def sensors():
-    figures = Parts(reader.load(SAND)).sensors
+    figures = on_sand().sensors
     return replace(figures, imu_rate=100.0, wheel_odometry_rate=10.0, sinkage_rate=10.0)
 
 

@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from parts import SAND, Parts
+from parts import SAND, Parts, on_sand
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
@@ -27,7 +27,7 @@ NAN = float('nan')
 
 def process(rims, ratio=0.8, keys=()):
     """Return a process after a cycle at 0 s in which all wheels had these rim speeds."""
-    parts = Parts(reader.load(SAND, keys))
+    parts = on_sand(*keys)
     made = SpeedProcess(parts.configuration, parts.rover, parts.sensors)
     ekf = parts.filter()
     # The ratio is remembered from a drive at speed.
@@ -56,7 +56,7 @@ def noise():
 
 
 def filter_at(speed, std=1e-3):
-    ekf = Parts(reader.load(SAND)).filter()
+    ekf = on_sand().filter()
     ekf.set(SPEED, speed, std**2)
     return ekf
 
@@ -92,8 +92,7 @@ def test_the_speed_between_two_cycles_is_what_the_step_makes_of_the_last_one():
     assert variance - noise == pytest.approx(np.var(drawn @ [a, b]), rel=0.02)
 
 
-def test_wheels_that_are_first_heard_roll_or_spin_or_stand():
-    parts = Parts(reader.load(SAND))
+def test_wheels_that_are_first_heard_roll_or_spin_or_stand(parts):
     for rim, std in ((0.5, 0.3 * 0.5), (-0.5, 0.3 * 0.5), (0.0, parts.rover.rest_speed)):
         made, ekf = SpeedProcess(parts.configuration, parts.rover, parts.sensors), parts.filter()
         made.begin(ekf, speeds([NAN] * 6))
@@ -139,17 +138,15 @@ def test_wheels_that_disagree_leave_the_speed_to_the_accelerometer():
         ([NAN, 0.0, 0.2], 0.0),  # too few to tell
     ],
 )
-def test_disagreement_of_the_wheels(changes, expected):
+def test_disagreement_of_the_wheels(changes, expected, parts):
     made = process([0.3] * len(changes))
-    parts = Parts(reader.load(SAND))
     least = 3.0 * parts.sensors.wheel_rate_std * max(parts.rover.slip_radius)
     found = made.disagreement(speeds([0.3 + change for change in changes]))
     assert found == pytest.approx(max(expected - least, 0.0))
 
 
-def test_a_rover_that_must_pull_more_slips_more_at_once():
+def test_a_rover_that_must_pull_more_slips_more_at_once(parts):
     """At a slip per demand of 2, a demand that grows by 0.05 takes a tenth of the rim speed."""
-    parts = Parts(reader.load(SAND))
     made, mean = process([0.05] * 6), parts.filter().x.copy()
     mean[[SPEED, SLIP_PER_DEMAND]] = 0.04, 2.0
     ahead, astern = (parts.cycle([rim] * 6, demand_change=0.05) for rim in (0.05, -0.05))
@@ -173,7 +170,7 @@ def test_a_reversal_carries_the_slip_over_by_what_is_asked_less():
 
     It begins with half of that: ruts and shear form anew.
     """
-    made, ekf = process([0.05] * 6, ratio=0.8), Parts(reader.load(SAND)).filter()
+    made, ekf = process([0.05] * 6, ratio=0.8), on_sand().filter()
     ekf.set(SLIP_PER_DEMAND, 1.5, 0.5**2)
     made.reverse_direction(ekf, before=0.1, now=-0.1)
     assert made.state.ratio == pytest.approx(1.05)
@@ -186,12 +183,12 @@ def test_a_reversal_carries_the_slip_over_by_what_is_asked_less():
 def test_a_start_goes_by_the_remembered_ratio_and_not_by_that_of_its_first_moment():
     """Wheels at 10 mm/s and a speed of 3 mm/s, half of it noise: at 50 mm/s the slip is 0.2."""
     made = process([0.01] * 6, ratio=0.8)
-    made.end_cycle(0.0, Parts(reader.load(SAND)).filter(), speeds([0.01] * 6), settled=False)
+    made.end_cycle(0.0, on_sand().filter(), speeds([0.01] * 6), settled=False)
     found = made.step(0.1, speeds([0.05] * 6), InertialWindow(), inflated=True)
     assert found.speed_gain * 0.003 + found.constant == pytest.approx(0.003 + 0.8 * 0.04)
 
 
-def test_a_rover_that_ends_a_turn_opens_its_speed():
+def test_a_rover_that_ends_a_turn_opens_its_speed(parts):
     """Left wheels slow down and right ones speed up over two seconds, each cycle within noise."""
     turning = process([0.07, 0.03] * 3)
     straight = process([0.05, 0.05] * 3)
@@ -201,7 +198,6 @@ def test_a_rover_that_ends_a_turn_opens_its_speed():
         straight.follow_sides(speeds([0.05 + 0.001 * i] * 6), 0.1)
     # A mean over a second lags a ramp of 10 mm/s^2 by 10 mm/s (1 - exp(-2)) after two of them;
     # what noise may make of it is taken off.
-    parts = Parts(reader.load(SAND))
     noise = 3.0 * parts.sensors.wheel_rate_std * max(parts.rover.slip_radius)
     lag = 0.01 * (1.0 - np.exp(-2.0))
     assert turning.state.inflation == pytest.approx(lag - noise, rel=0.1)
@@ -259,8 +255,7 @@ def test_without_a_reference_the_rover_does_not_move_against_its_wheels():
 
 
 @pytest.mark.parametrize('way', [1.0, -1.0])
-def test_without_a_reference_the_rover_is_no_faster_than_a_wheel_that_drives_it(way):
-    parts = Parts(reader.load(SAND))
+def test_without_a_reference_the_rover_is_no_faster_than_a_wheel_that_drives_it(way, parts):
     rims = way * np.array([0.05] * 5 + [0.004])
     drives = 0.5 * np.array(parts.cycle().loads.load) * np.array(parts.rover.slip_radius)
     for torque, std, kept in (
@@ -282,7 +277,7 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
     length = EQUILIBRIUM_LENGTH
 
     def after(travel, buried=False):
-        cycle = Parts(reader.load(SAND)).cycle([rim] * 6, dt=travel / rim)
+        cycle = on_sand().cycle([rim] * 6, dt=travel / rim)
         return made.towards_equilibrium_slip(free, cycle, 1.0, length, buried=buried)
 
     assert after(length).speed_gain == pytest.approx(np.exp(-1.0))
@@ -313,10 +308,9 @@ def test_wheels_alone_say_nothing_of_the_accelerometers_zero():
         assert process([before] * 6).by_wheels(0.1, speeds([0.06] * 6), 0.0).bias_gain == 0.0
 
 
-def test_at_rest_the_accelerometer_tells_its_zero():
+def test_at_rest_the_accelerometer_tells_its_zero(parts):
     """Twenty readings of one constant beside a prior: weighted least squares."""
     zero, cycles, dt = 0.03, 20, 0.1
-    parts = Parts(reader.load(SAND))
     made, ekf = process([0.0] * 6), filter_at(0.0, 1e-4)
     prior = float(ekf.P[GRAVITY_BIAS, GRAVITY_BIAS])
     window = InertialWindow(readings=1, speed_change=zero * dt, duration=dt)
@@ -332,7 +326,7 @@ def test_at_rest_the_accelerometer_tells_its_zero():
 
 def test_noise_of_the_wheel_rates_does_not_stop_a_rover_in_the_filter():
     """Its wheels seem to change speed each cycle, its accelerometer feels nothing."""
-    parts, dt = Parts(reader.load(SAND)), 0.1
+    parts, dt = on_sand(), 0.1
     ekf, rng, noise = filter_at(0.045, 0.01), np.random.default_rng(3), 0.005
     window = InertialWindow(readings=1, speed_change=0.0, duration=dt)
     for rims in 0.05 + noise * np.clip(rng.standard_normal((200, 2)), -1.4, 1.4):
@@ -356,8 +350,7 @@ def test_wheels_do_not_drive_a_rover_that_moves_against_them():
     assert (speed_gain, constant) == (1.0, 0.0)
 
 
-def test_a_jolt_is_felt_at_once_and_an_accelerometer_that_jolts_for_long_is_doubted():
-    parts = Parts(reader.load(SAND))
+def test_a_jolt_is_felt_at_once_and_an_accelerometer_that_jolts_for_long_is_doubted(parts):
     made, ekf, dt = process([0.05] * 6), filter_at(0.04), 0.1
 
     def weight_of_wheels(change):
@@ -388,7 +381,7 @@ def test_the_slip_of_a_sharp_turn_is_none_to_start_with(turning, ratio):
 def test_a_start_up_transient_is_removed_and_nothing_else(speed, kept):
     """Far from the wheels, by less than the accelerometer's noise: a start-up transient."""
     made, ekf = process([0.06] * 6), filter_at(speed)
-    made.remove_start_transient(ekf, Parts(reader.load(SAND)).cycle([0.06] * 6))
+    made.remove_start_transient(ekf, on_sand().cycle([0.06] * 6))
     expected = speed if kept else 0.8 * 0.06
     assert ekf.x[SPEED] == pytest.approx(expected)
 

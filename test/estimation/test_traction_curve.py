@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from parts import SAND, Parts
+from parts import Parts, on_sand
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.equilibrium_slip import EquilibriumSlip
@@ -20,11 +20,6 @@ from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-
-
-@pytest.fixture(scope='module')
-def parts():
-    return Parts(reader.load(SAND))
 
 
 @pytest.fixture(scope='module')
@@ -91,7 +86,7 @@ def test_lugs_of_which_no_file_says_it_shear_half_way_up(slip, stated):
     """Lugs of a tenth of the radius: sheared at the rim they would take 0.05 to 0.2 more."""
     keys = ['wheels.lug_height:=[0.015, 0.015, 0.015, 0.015, 0.015, 0.015]']
     keys += ['effects.lug_shear_radius.enabled:=true'] * stated
-    lugged = Parts(reader.load(SAND, keys))
+    lugged = on_sand(*keys)
     demand = pull_share(lugged, slip)
     found = EquilibriumSlip(lugged.configuration, lugged.rover).at(demand, beyond=0.8)
     assert found == pytest.approx(slip, abs=0.02)

@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from parts import SAND, Parts, drive, step_inputs
+from parts import SAND, drive, step_inputs
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -247,9 +247,8 @@ def test_torques_alone_carry_no_rover_backwards():
     assert np.all(sets[-1].slip_std > 0.15)  # of the slip nothing is known
 
 
-def test_a_rover_that_is_stuck_stays_so_without_a_reference_until_the_ground_asks_for_less():
+def test_a_rover_that_is_stuck_stays_so_without_a_reference_until_the_ground_asks_for_less(parts):
     """On 8 degrees it digs itself in; its references end, and 9 s later the slope does."""
-    parts = Parts(reader.load(SAND))
     estimator, rover = WheelSoilEstimator(parts.configuration), parts.rover
     torque = 0.35 * np.array(parts.cycle().loads.load) * np.array(rover.slip_radius)
     told = {}

@@ -9,9 +9,7 @@ import pytest
 from fake_estimator import SECOND, configuration
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from parts import SAND, Parts
 
-from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
@@ -95,8 +93,7 @@ def contradictions(sets, judged):
     return found
 
 
-def test_a_slip_is_known_to_a_thousandth_at_best_and_to_one_at_worst():
-    parts = Parts(reader.load(SAND))
+def test_a_slip_is_known_to_a_thousandth_at_best_and_to_one_at_worst(parts):
     judge = SlipJudge(parts.rover)
     for speed_std, std in ((1e-9, 1e-3), (5.0, 1.0)):
         headings = straight_headings(parts.rover)
@@ -206,9 +203,8 @@ def test_a_new_run_begins_without_a_class():
     assert int(classes.follow(sets_of([0.5], config=config)[0]).slip_class[0]) == 1
 
 
-def test_a_wheel_that_begins_to_turn_is_not_sure_to_spin():
+def test_a_wheel_that_begins_to_turn_is_not_sure_to_spin(parts):
     """A rate just above rest, before the filter knows that the rover has begun to move."""
-    parts = Parts(reader.load(SAND))
     rest, n = parts.rover.rest_speed, parts.rover.wheel_count
     headings = straight_headings(parts.rover)
     noise = parts.sensors.wheel_rate_std * parts.rover.slip_radius[0]
@@ -252,8 +248,7 @@ def test_the_deviation_of_a_slip_is_that_of_its_two_speeds(rim, v):
     assert slip_and_deviation(rim, v, 0.004, 0.003, 0.002)[1] == pytest.approx(expected)
 
 
-def test_slip_and_slip_velocity_are_held_while_no_rate_is_known():
-    parts = Parts(reader.load(SAND))
+def test_slip_and_slip_velocity_are_held_while_no_rate_is_known(parts):
     judge = SlipJudge(parts.rover)
     headings = straight_headings(parts.rover)
     body = BodyMotion(0.04, 0.001, 0.0, 0.0, headings, 0.0, False, (0.0005,) * 6)
