@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Estimate sets made up for tests."""
+"""Estimate sets made up for tests, and what holds of every set."""
 
 from dataclasses import fields
 from typing import Any
@@ -31,3 +31,12 @@ def some_estimates(wheels: int = 2, **changes: Any) -> EstimateSet:
         'reasons': ('slip 0.10 +- 0.05', 'at rest') + ('slip',) * (wheels - 2),
     }
     return EstimateSet(**{**values, **changes})
+
+
+def assert_sound(estimates: EstimateSet) -> None:
+    """Every number is finite, every deviation and variance is one, no slip is beyond its range."""
+    for name, value in vars(estimates).items():
+        if isinstance(value, (np.ndarray, float)):
+            assert np.isfinite(value).all(), name
+            assert not name.endswith(('_std', '_variance')) or np.all(value >= 0.0), name
+    assert (np.abs(estimates.slip) <= 1.0).all()

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How speed goes on between reference velocities."""
 
+import functools
+from copy import copy
+
 import numpy as np
 import pytest
 from parts import SAND, Parts, on_sand
@@ -25,15 +28,20 @@ from wheel_terra_estimator.estimation.inputs.noise import StatedNoise
 NAN = float('nan')
 
 
-def process(rims, ratio=0.8, keys=()):
-    """Return a process after a cycle at 0 s in which all wheels had these rim speeds."""
-    parts = on_sand(*keys)
+@functools.cache
+def driven(ratio):
+    """Return a process and a filter after a drive at speed, of which this ratio is remembered."""
+    parts = on_sand()
     made = SpeedProcess(parts.configuration, parts.rover, parts.sensors)
-    ekf = parts.filter()
-    # The ratio is remembered from a drive at speed.
-    fast = RimSpeeds((1.0,) * len(rims), 1.0, 1.0)
-    ekf.set(SPEED, ratio, 1e-4)
-    made.end_cycle(0.0, ekf, fast, settled=True)
+    ekf = filter_at(ratio, 1e-2)
+    made.end_cycle(0.0, ekf, RimSpeeds((1.0,) * 6, 1.0, 1.0), settled=True)
+    return made, ekf
+
+
+def process(rims, ratio=0.8):
+    """Return a process after a cycle at 0 s in which all wheels had these rim speeds."""
+    found, ekf = driven(ratio)
+    made = copy(found)
     made.end_cycle(0.0, ekf, speeds(rims), settled=False)
     made.state = made.state._replace(settled=True)
     return made

@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from estimate_sets import assert_sound
 from parts import SAND, drive, step_inputs
 
 from wheel_terra_estimator.configuration import reader
@@ -218,18 +219,12 @@ def slid(followed):
         speed = float(np.clip(0.02 - 0.03 * (time - 2.0), -0.1, 0.02)) if told else None
         estimator.step(*step_inputs(time, np.full(6, 0.4), np.full(6, 20.0), force, speed))
         sets.append(estimator.estimates())
+        assert_sound(sets[-1])
     return sets
 
 
-def finite(s):
-    numbers = [getattr(s, f.name) for f in fields(s)]
-    return all(np.isfinite(v).all() for v in numbers if isinstance(v, (float, np.ndarray)))
-
-
 def test_sliding_back_is_slip_one():
-    sets = slid(followed=True)
-    assert all(map(finite, sets))
-    s = sets[-1]
+    s = slid(followed=True)[-1]
     assert s.forward_velocity == pytest.approx(-0.1, abs=0.01)
     assert s.slip == pytest.approx(np.ones(6), abs=0.0)
     assert (s.slip_class != SlipClass.UNKNOWN).all()
@@ -242,7 +237,6 @@ def test_sliding_back_is_slip_one():
 
 def test_torques_alone_carry_no_rover_backwards():
     sets = slid(followed=False)
-    assert all(map(finite, sets))
     assert min(s.forward_velocity for s in sets) > -0.002  # the least rim speed that turns
     assert np.all(sets[-1].slip_std > 0.15)  # of the slip nothing is known
 
@@ -394,10 +388,8 @@ def run(estimator, seconds, wheels, up=9.8, gap=0.1, rate=0.4):
 def test_a_rig_with_one_wheel_works(gap, rate):
     sets = run(WheelSoilEstimator(reader.load(ONE_WHEEL)), 50.0 * gap, 1, gap=gap, rate=rate)
     for s in sets:
-        for name, value in vars(s).items():
-            if isinstance(value, np.ndarray):
-                assert np.isfinite(value).all(), name
-                assert not name.endswith('_std') or (value > 0.0).all(), name
+        assert_sound(s)
+        assert all((value > 0.0).all() for name, value in vars(s).items() if name.endswith('_std'))
     if rate > 0.0:
         rim = rate * float(reader.load(ONE_WHEEL).wheels.slip_radius[0])
         assert sets[-1].slip[0] == pytest.approx(1.0 - 0.04 / rim, abs=0.02)
@@ -439,7 +431,7 @@ def test_the_error_of_the_rear_camera_counts_where_it_measures(measured):
 
 def test_noisy_rates_of_slow_wheels_do_not_weaken_the_soil():
     """Rates that scatter by 14 %: a strength fitted at those slips falls to a third of the true."""
-    drive = simulate(load('calibration_drive', rover='pathfinder'), 9, duration=40.0)
+    drive = simulate(load('calibration_drive', rover='pathfinder'), 9, duration=30.0)
     truth, estimator = drive.truth, WheelSoilEstimator(drive.configuration)
     sets = estimate(drive, estimator=estimator)[200:]  # 5 s after the start
     index = np.searchsorted(truth.stamp, [s.stamp for s in sets])
