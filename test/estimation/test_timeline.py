@@ -350,27 +350,6 @@ def test_a_step_back_of_less_than_a_second_goes_on_in_the_same_run():
     assert times(sets) == [round(0.1 * i, 6) for i in range(33)]
 
 
-def test_one_stale_message_ends_no_run():
-    core, _ = make_core()
-    for i in range(300):
-        core.add(imu(0.02 * i))
-        if i % 5 == 0:
-            core.add(odometry(0.02 * i))
-            core.add(sinkage(0.02 * i))
-        if i in (200, 250):
-            core.add(sinkage(0.02 * i - 3.0))
-            core.add(imu(0.02 * i + 0.01))
-            core.add(odometry(0.02 * i - 4.0))
-            core.add(imu(0.02 * i + 0.015))
-    health = core.health()
-    assert health['clock_steps_back'] == 0
-    assert health['sinkage_rejected: stamp older than `history` (raise it, or set its clock)'] == 2
-    assert (
-        health['joint_states_rejected: stamp older than `history` (raise it, or set its clock)']
-        == 2
-    )
-
-
 def test_one_stamp_from_the_future_does_no_harm():
     core, _ = make_core()
     stream = drive(2.0)

@@ -133,6 +133,14 @@ def test_a_measured_leaving_angle_overrides_the_law():
     assert none == low
 
 
+def test_stresses_that_are_turned_about_the_hub_turn_load_and_pull_and_keep_the_torque():
+    model, shift, load = conditioned({}), 0.4, 80.0
+    torque, pull = answer(model, 0.5, 0.02, load, centroid_shift=shift)
+    before = load * math.cos(shift) - pull * math.sin(shift)
+    expected = torque, pull * math.cos(shift) + load * math.sin(shift)
+    assert answer(model, 0.5, 0.02, before) == pytest.approx(expected)
+
+
 def test_soil_without_shear_strength_takes_no_torque_and_resists():
     """Without c and tan(phi) there are normal stresses alone: they turn nothing and push back."""
     model = ConditionedForces(WHEEL, SAND)
