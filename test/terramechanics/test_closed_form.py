@@ -158,6 +158,10 @@ def test_cohesion_alone_is_mobilised_as_in_the_quadrature():
     truth, ours = (state(slip, soil=clay, method=m) for m in ('quadrature', 'closed_form'))
     assert ours.torque == pytest.approx(truth.torque, rel=0.05)
     assert ours.drawbar_pull == pytest.approx(truth.drawbar_pull, abs=0.02 * 80.0)
+    # A share in proportion to the displacement is, in the mean, that of its mean: no error.
+    soft = replace(clay, shear_modulus=0.1)
+    truth, ours = (state(slip[3:], soil=soft, method=m) for m in ('quadrature', 'closed_form'))
+    assert ours.torque == pytest.approx(truth.torque, rel=0.01)
 
 
 def test_balance_without_iteration_agrees_with_the_bracketed_solver():

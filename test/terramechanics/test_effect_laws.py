@@ -52,11 +52,12 @@ def test_a_gain_acts_before_a_zero_error_and_after_the_soil():
     settings = {
         'sinkage_offset': {'offset': 0.002},
         'sinkage_gain': {'gain': 0.2},
-        'lug_digging': {'kd': 1.0},
+        'lug_digging': {'kd': 1.0, 'rework': 1.0},
     }
-    z = state(0.5, LOAD).sinkage[0]
-    read = state(0.5, LOAD, effects=settings).sinkage[0]
-    assert read == pytest.approx(1.2 * (z + 0.5 * WHEEL.lug_height) + 0.002)
+    z = state(0.6, LOAD).sinkage[0]
+    read = state(0.6, LOAD, effects=settings).sinkage[0]
+    dug = WHEEL.lug_height * 0.6 / (1.0 - 0.6)
+    assert read == pytest.approx(1.2 * (z + dug) + 0.002)
 
 
 @pytest.mark.parametrize(('inside', 'felt'), [(-0.001, 0.0), (5e-4, 1.25e-4), (0.003, 0.0025)])

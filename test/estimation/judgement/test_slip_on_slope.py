@@ -148,6 +148,13 @@ def test_beyond_what_was_driven_the_greatest_pull_is_less_known():
     assert at(driven.latest, 5.0)[1] == pytest.approx(at(plain, 5.0)[1], rel=0.02)
 
 
+def test_the_demand_is_a_mean_over_four_tenths_of_a_second():
+    curve = SlopeCurve()
+    for i in range(5):  # 0.4 s after a step, exp(-1) of it is left
+        curve.update(Instant(i * PERIOD, 0.2 * (i > 0), 0.2, 0.02, RIM * PERIOD, 1.0))
+    assert curve.state.demand == pytest.approx(0.2 * (1.0 - math.exp(-1.0)))
+
+
 def test_what_is_not_known_teaches_nothing():
     curve = SlopeCurve()
     before = curve.state
