@@ -139,15 +139,6 @@ def test_the_table_is_that_of_the_page():
 # -- What is not known ----------------------------------------------------------------------------
 
 
-def test_a_pulsed_command_with_all_classes_unknown_is_cut():
-    rover = Rover()
-    scales = []
-    for i in range(1200):
-        rover.estimate(slip_class=UNKNOWN, rim=0.1 if i % 19 else 0.0)
-        scales.append(rover.command(0.1 if i % 19 else 0.0).scale if i % 19 else 0.3)
-    assert max(scales[40:]) == 0.3
-
-
 def test_pulses_from_rest_pass_whole_only_once_until_a_class_is_known():
     rover = Rover()
     pulses = []

@@ -68,6 +68,7 @@ def test_a_set_comes_at_once_and_holds_all_inputs_up_to_its_stamp():
     (estimates,) = core.add(odometry(0.1, rate=1.0))
     expected = (2.0 * 1.3 * math.exp(-0.05) + 3.0 * 1.3) * math.exp(-0.05) + 2.2
     assert math.isclose(estimates.forward_velocity, expected, rel_tol=1e-12)
+    assert core.health()['reruns'] == 0
 
 
 def test_a_reading_with_other_numbers_is_another_one():
