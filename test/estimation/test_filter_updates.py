@@ -179,6 +179,16 @@ def test_two_unlike_references_on_standing_wheels_are_wild(parts, ekf):
         assert ekf.x[SPEED] == pytest.approx(0.0, abs=0.003)
 
 
+@pytest.mark.parametrize(('deviations', 'alike'), [(3.0, True), (6.0, False)])
+def test_outliers_four_deviations_apart_do_not_agree(parts, ekf, deviations, alike):
+    update, std = reference_update(parts), parts.sensors.reference_std
+    ekf.set(SPEED, 0.9, 0.1 * std**2)
+    assert not hear(parts, update, ekf, 1.0, 0.5, fastest_rim=1.0)
+    _, prior = update.innovation(ekf, ReferenceVelocity(0, 0.5, 0.0))
+    apart = deviations * np.sqrt(3.0 * std**2 + prior)  # of both readings, and of the innovation
+    assert bool(hear(parts, update, ekf, 2.0, 0.5 - apart, fastest_rim=1.0)) is alike
+
+
 def test_the_first_reference_of_a_run_may_be_wild(parts):
     """No gap is known yet: it is no seldom one that shows another slip."""
     fresh = parts.filter()

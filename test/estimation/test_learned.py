@@ -150,6 +150,16 @@ def test_nothing_before_the_first_set():
     assert EstimatorCore(reader.load(['frostyboy'])).learned() == {}
 
 
+def test_what_is_known_exactly_here_is_known_elsewhere_as_well_as_soil_varies():
+    """Phoon and Kulhawy 1999: 12 % of the tangent, 38 % of what makes it stiff, of a logarithm."""
+    estimator = WheelSoilEstimator(reader.load(['generic_six_wheel']))  # which states no soil
+    known = np.zeros_like(estimator._ekf.P)
+    zero = estimator._zero_velocity.state.zero
+    found = estimator._learned.values(estimator._ekf.x, known, zero)
+    for key, spread in (('soil.cohesion', 0.12), ('soil.shear_modulus', 0.38)):
+        assert found[f'{key}_std'] == pytest.approx(found[key] * spread, rel=0.03)
+
+
 def test_the_soil_that_is_kept_carries_what_its_drive_was_seen_to_climb():
     """Strength learned too low beside errors that the file does not hold: the slip seen decides."""
     configuration = reader.load(['generic_six_wheel', 'hit_lss1'])

@@ -142,6 +142,15 @@ def test_the_noise_of_references_is_seen_beside_a_filter_that_follows_them(noise
     assert noise.observed('reference') == pytest.approx(factor * np.sqrt(R), rel=0.3)
 
 
+def test_the_noise_of_references_is_a_mean_over_thirty(noise):
+    """Differences of two deviations, then one of one: a quarter of the variance."""
+    std = noise.stated['reference']
+    before = compared(noise, [std * (-1) ** i for i in range(400)], std**2, 1e-9 * std**2)
+    noise.compare_reference(400.0, 0.0, std**2, 1e-9 * std**2)
+    after = noise.observed('reference')
+    assert (after / before) ** 2 == pytest.approx(1.0 - (1.0 - 0.25) / 30.0)
+
+
 def test_a_vibrating_rover_is_told_in_words(noise):
     std = 20.0 * noise.stated['accelerometer']
     read(noise, 'accelerometer', std, 0.01 * np.arange(6000))

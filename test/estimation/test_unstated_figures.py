@@ -79,26 +79,29 @@ def test_a_soil_that_somebody_states_is_known_as_well_as_he_says():
 
 
 def bounds_of(**stated):
-    """Return the bounds of the state, and the configuration."""
+    """Return the bounds of the state, the configuration and the entries of stiffness."""
     configuration = reader.from_parameters({**TEN_LINES, **stated})
     rover = Rover.from_configuration(configuration)
     layout = layout_of(rover, SensorFigures.from_configuration(configuration))
-    return bounds(rover, layout, SoilPriors.from_configuration(configuration)), configuration
+    limits = bounds(rover, layout, SoilPriors.from_configuration(configuration))
+    return limits, configuration, layout.stiffness
 
 
 def test_hard_ground_may_be_stiffer_than_any_soil_but_no_ground_gives_way_by_decimetres():
     """Shear moduli of soils: 10 to 25 mm in sand, to 36 mm in the shipped ones but one."""
-    limits, configuration = bounds_of()
+    limits, configuration, stiffness = bounds_of()
     factors = np.exp([limit[SHEAR_MODULUS] for limit in limits])
     low, high = configuration.soil.shear_modulus * factors
     assert low < 0.001
     assert 0.036 < high < 0.05
+    # Three deviations of a soil that nobody states to either side.
+    assert np.abs([limit[stiffness] for limit in limits]) == pytest.approx(np.full((2, 6), 3 * 1.3))
 
 
 @pytest.mark.parametrize('n1', [0.0, 0.4])
 def test_no_soil_lifts_a_wheel_that_slips(n1):
     """Every slip-sinkage law (Ding 2010, Lyasko 2010) has more sinkage at more slip."""
-    (least, _), _ = bounds_of(**({f'{EFFECT}.enabled': True, f'{EFFECT}.n1': n1} if n1 else {}))
+    (least, _), *_ = bounds_of(**({f'{EFFECT}.enabled': True, f'{EFFECT}.n1': n1} if n1 else {}))
     assert n1 + least[SLIP_SINKAGE] == pytest.approx(0.0)
 
 

@@ -69,6 +69,7 @@ def test_all_listed_names_are_there_and_complete():
         assert effect.validity
         assert set(effect.confounded_with) <= set(known)
         assert effect.incompatible_with <= set(known)
+        assert not any(form.candidate and form.why_aside for form in effect.forms)
         for p in effect.all_parameters:
             assert p.lower <= p.default <= p.upper and p.prior_scale > 0.0 and p.unit
     assert known['lug_digging'].parameters[0].name == 'kd'
