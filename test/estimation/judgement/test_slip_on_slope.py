@@ -112,21 +112,23 @@ def test_a_slip_that_fits_the_curve_moves_nothing(offset, demand, monkeypatch):
     np.testing.assert_allclose(curve.state.mean, mean, atol=1e-4)
 
 
-def test_the_probability_is_that_of_drawn_curves():
-    mean, covariance = np.array([0.05, -0.8, -0.7]), np.diag([0.03, 0.2, 0.15]) ** 2
-    draws = np.random.default_rng(3).multivariate_normal(mean, covariance, 200_000)
-    told = slips_at(mean, covariance, 0.03)
+@pytest.mark.parametrize(
+    ('strength', 'stds', 'beyond'),
+    [(-0.7, (0.03, 0.2, 0.15), 0.0), (-0.5, (0.01, 0.05, 0.05), 0.4)],  # driven there, and beyond
+)
+def test_what_is_told_of_a_slope_is_that_of_drawn_curves(strength, stds, beyond):
+    mean, count = np.array([0.05, -0.8, strength]), 200_000
+    told = slips_at(mean, np.diag(stds) ** 2, 0.03, np.full(SLOPES.size, beyond))
+    random = np.random.default_rng(3)
+    offset, scale, greatest = random.normal(mean, stds, (count, 3)).T
+    greatest = np.exp(greatest + random.normal(0.0, beyond, count))
     for place in (5, 7, 8, 9):
-        demand = math.tan(math.radians(SLOPES[place]))
-        share = demand / np.exp(draws[:, 2])
-        slip = np.where(
-            share < 1.0, draws[:, 0] - np.exp(draws[:, 1]) * np.log1p(-np.minimum(share, 0.9999)), 1
-        )
-        slip = np.minimum(slip, 1.0)
+        share = np.minimum(math.tan(math.radians(SLOPES[place])) / greatest, 1.0 - 1e-12)
+        slip = np.minimum(offset - np.exp(scale) * np.log1p(-share), 1.0)
         assert told.slip[place] == pytest.approx(slip.mean(), abs=0.015)
         assert told.std[place] == pytest.approx(math.hypot(slip.std(), 0.03), abs=0.025)
-        beyond = slip + np.random.default_rng(4).normal(0.0, 0.03, slip.size) > ENTRAPPED_SLIP
-        assert told.entrapment[place] == pytest.approx(beyond.mean(), abs=0.03)
+        trapped = slip + random.normal(0.0, 0.03, count) > ENTRAPPED_SLIP
+        assert told.entrapment[place] == pytest.approx(trapped.mean(), abs=0.03)
 
 
 def test_beyond_what_was_driven_the_greatest_pull_is_less_known():
@@ -134,13 +136,6 @@ def test_beyond_what_was_driven_the_greatest_pull_is_less_known():
     beyond = np.where(SLOPES > 10.0, 0.4, 0.0)
     sure, told = slips_at(mean, covariance, 0.03), slips_at(mean, covariance, 0.03, beyond)
     np.testing.assert_array_equal(told.std[SLOPES <= 10.0], sure.std[SLOPES <= 10.0])
-    draws = np.random.default_rng(3).normal(mean, np.sqrt(np.diag(covariance)), (200_000, 3))
-    greatest = np.exp(draws[:, 2] + np.random.default_rng(4).normal(0.0, 0.4, 200_000))
-    for place in (7, 8, 9):
-        share = np.minimum(math.tan(math.radians(SLOPES[place])) / greatest, 1.0 - 1e-12)
-        slip = np.minimum(draws[:, 0] - np.exp(draws[:, 1]) * np.log1p(-share), 1.0)
-        assert told.slip[place] == pytest.approx(slip.mean(), abs=0.03)
-        assert told.std[place] == pytest.approx(math.hypot(slip.std(), 0.03), rel=0.2)
     driven = learned((0.0, 5.0, 10.0)).state
     assert math.degrees(math.atan(driven.driven[1])) == pytest.approx(10.0, abs=0.5)
     plain = slips_at(driven.mean, driven.covariance, 0.03)
