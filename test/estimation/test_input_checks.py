@@ -32,23 +32,6 @@ def reasons(checks):
     return [reason for counter in checks.rejected for reason in counter]
 
 
-@pytest.mark.parametrize(
-    'measurement',
-    [
-        odometry(0.0),
-        imu(0.0),
-        sinkage(0.0),
-        reference(0.0),
-        odometry(0.0, torque=2.0),
-        WheelOdometry(stamp_at(0.0), np.array([NAN, 2.0]), np.array([NAN, NAN])),  # not known
-        SinkageReading(stamp_at(0.0), np.array([NAN, 0.01])),
-    ],
-)
-def test_a_good_measurement_passes_as_it_is(checks, measurement):
-    assert check(checks, measurement) is measurement
-    assert reasons(checks) == []
-
-
 @pytest.mark.parametrize('stamp', [0, -5, 2**31 * 10**9, 2**63])
 @pytest.mark.parametrize('kind', [odometry, imu, sinkage, reference])
 def test_impossible_stamps(checks, stamp, kind):
