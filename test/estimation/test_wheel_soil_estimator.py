@@ -441,3 +441,19 @@ def test_noisy_rates_of_slow_wheels_do_not_weaken_the_soil():
     assert np.mean(np.abs(error) < 1.96 * std) > 0.9
     learned = estimator.learned()['soil.friction_angle_deg']
     assert learned == pytest.approx(38.0, rel=0.3)  # that of the scenario
+
+
+def test_references_off_by_more_than_they_state_widen_the_deviation_of_the_speed():
+    """They are 1 cm/s off, to one side and the other for six seconds each; 3 mm/s is stated."""
+    driven = drive(30.0)
+    stds = []
+    for error in (0.0, 0.01):
+        arrivals, count = list(driven.arrivals), 0
+        for i, arrival in enumerate(arrivals):
+            if isinstance(m := arrival.measurement, ReferenceVelocity):
+                count += 1
+                off = m.forward + (error if count // 6 % 2 else -error)
+                arrivals[i] = arrival._replace(measurement=replace(m, forward=off))
+        sets = estimate(replace(driven, arrivals=arrivals))
+        stds.append(np.sqrt(np.mean([s.forward_velocity_variance for s in sets[-100:]])))
+    assert stds[1] > 2.0 * stds[0]

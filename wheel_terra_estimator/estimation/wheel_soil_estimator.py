@@ -41,7 +41,7 @@ from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.estimation.filter.consistency import correlated_cycles
+from wheel_terra_estimator.estimation.filter.consistency import correlated_cycles, excess
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance, SumOfPulls, rut_tilt
 from wheel_terra_estimator.estimation.filter.initial_state import (
@@ -702,9 +702,8 @@ class WheelSoilEstimator:
         time = self._clock.time
         window = self._trusted(self._inertial.state.window, time)
         slip_known = self._reference.known(time)
-        return SpeedAndVariance(
-            *self._speed.present(self._ekf, time, rims, window, inflated=slip_known)
-        )
+        speed, variance = self._speed.present(self._ekf, time, rims, window, inflated=slip_known)
+        return SpeedAndVariance(speed, variance * excess(self._reference.state.nis))
 
     def _speed_by_torque(self, rims: RimSpeeds) -> SpeedAndVariance | None:
         """Return speed [m/s] and variance by the typical slip at the measured torques.

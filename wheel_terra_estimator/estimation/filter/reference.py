@@ -154,7 +154,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         most = _MOST_DEVIATIONS
         score = clipped(residual / math.sqrt(total), -most, most)
         state = self.state
-        state = state._replace(nis=smoothed_nis(state.nis, nis))
+        state = state._replace(nis=smoothed_nis(state.nis, min(nis, self._gate)))
         if nis <= self._gate or state.rejected_in_a_row:  # a single outlier is no bias
             mean = state.mean_innovation
             state = state._replace(mean_innovation=mean + (score - mean) / _MEAN_COUNT)
