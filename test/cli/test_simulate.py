@@ -87,6 +87,23 @@ def test_true_slip_of_wheels_at_rest_is_unknown(tmp_path):
     np.testing.assert_array_equal(truth.slip.value, drive.truth.slip)
 
 
+def test_odometry_is_the_motion_of_rolling_wheels(tmp_path):
+    pivot = {'drive.forward': [0.025], 'drive.turn_rate': [-0.05], 'duration': 2.0}
+    drive = simulate(load({'configuration': ['generic_six_wheel', 'test_sand'], **pivot}))
+    write_simulated_drive(drive, tmp_path / 'bag')
+    store, wheels = jazzy_types(), drive.configuration.wheels
+    with open_bag(tmp_path / 'bag') as bag:
+        sent = [
+            store.deserialize_cdr(m.data, 'nav_msgs/msg/Odometry').twist.twist
+            for m in bag.messages(('/odom',))
+        ][-1]
+    # The left side stands, the right one drives.
+    rim = drive.truth.wheel_rate[-1] * wheels.slip_radius
+    turn = np.mean(rim[1::2] - rim[::2]) / (wheels.y[0] - wheels.y[1])
+    assert sent.angular.z == pytest.approx(turn, abs=2e-3)
+    assert sent.linear.x == pytest.approx(rim.mean(), abs=1e-3)
+
+
 def test_log_times_are_arrivals(bag_path):
     store = jazzy_types()
     with open_bag(bag_path) as bag:

@@ -231,6 +231,18 @@ def test_a_friction_of_rows_that_turn_both_ways_stays_a_friction():
     assert not model.sensors.torque_zero.any()
 
 
+def test_a_friction_of_rows_that_turn_backwards_is_a_zero_below_0():
+    """The drive adds to the size of a torque, and a zero is added with its sign."""
+    table, values, *_ = make('basic16', ('drivetrain_friction',), 2.0)
+    for key in ('angular_velocity', 'drawbar_pull', 'torque'):
+        table[key] = -table[key]
+    found = run(table, values, options=Options(effects=('drivetrain_friction', 'bulldozing')))
+    size = found.effects[0].parameters['torque'].value
+    model, _ = corrected(found)
+    assert 'drivetrain_friction' not in model.effects and size > 0.0
+    assert model.sensors.torque_zero.tolist() == pytest.approx([-size])
+
+
 def test_curves_of_uncertain_slips_stand_where_the_slip_was_read(tmp_path, monkeypatch):
     """The fit stands at more probable slips, which are nearer to the truth than those read."""
     table, values, *_ = make('sweep40')
