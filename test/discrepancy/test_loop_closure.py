@@ -18,7 +18,7 @@ from wheel_terra_lab.trials.truth import OUTPUTS, TrueSoil, solve
 
 FILES = ['generic_six_wheel', 'hit_lss1']
 LUGS = 'wheels.lug_height:=[0.015, 0.015, 0.015, 0.015, 0.015, 0.015]'
-TRUTH = {'lug_shear_radius': {'lam': 1.0}}
+N1 = 0.4  # of the slip-sinkage in both, which the model lacks
 NOISE = {'sinkage': 0.8e-3, 'drawbar_pull': 3.0, 'torque': 0.3}
 
 
@@ -43,7 +43,7 @@ def rig_table(soil):
     rows = {key: np.full(slip.size, value) for key, value in fixed.items()}
     rows |= {'slip': slip, 'normal_load': load}
     true = TrueSoil(**{name: float(getattr(soil, name)) for name in TrueSoil.__dataclass_fields__})
-    hidden = LISTED['lug_shear_radius'].make(TRUTH['lug_shear_radius']['lam'], 0.5, rows, true)
+    hidden = LISTED['slip_sinkage_exponent'].make(N1, 0.5, rows, true)
     out = solve(rows, true, (hidden,))
     rng = np.random.default_rng(0)
     for key in OUTPUTS:
@@ -54,9 +54,14 @@ def rig_table(soil):
 
 def drive_uphill(seed):
     """Another drive, uphill, in soil with the same effect: the soil's numbers are off as well."""
-    others = ('slip_sinkage_exponent', 'lug_digging', 'soil_mound', 'stress_peak_shift')
+    others = ('lug_digging', 'soil_mound', 'stress_peak_shift')
     off = [f'effects.{name}.enabled:=false' for name in (*others, 'multipass', 'bulldozing')]
-    on = ['effects.lug_shear_radius.enabled:=true', 'effects.lug_shear_radius.lam:=1.0']
+    on = [
+        'effects.slip_sinkage_exponent.enabled:=true',
+        f'effects.slip_sinkage_exponent.n1:={N1}',
+        'effects.lug_shear_radius.enabled:=true',
+        'effects.lug_shear_radius.lam:=0.5',  # as the estimator assumes
+    ]
     planned = scenario.load(
         {
             'configuration': FILES,
@@ -99,11 +104,11 @@ def corrected(tmp_path_factory):
     """The base model, and what a rig's table made of it."""
     base = reader.load(FILES, [LUGS])
     diagnosis = diagnose(rig_table(base.soil), base)
-    assert [effect.name for effect in diagnosis.effects] == ['lug_shear_radius']
+    assert [effect.name for effect in diagnosis.effects] == ['slip_sinkage_exponent']
     path = tmp_path_factory.mktemp('loop') / 'model.yaml'
     write_model(diagnosis, path)
     found = reader.load([*FILES, path], [LUGS])
-    assert found.effects['lug_shear_radius']['lam'] == pytest.approx(1.0, abs=0.15)
+    assert found.effects['slip_sinkage_exponent']['n1'] == pytest.approx(N1, abs=0.05)
     return base, found
 
 
@@ -121,6 +126,5 @@ def test_a_drive_is_estimated_better_with_the_corrected_model(corrected, seeds):
         for squares in ([errors(model, driven) for driven in drives] for model in (base, better))
     )
     print(f'{seeds}: {before} -> {after}')
-    assert after['sinkage'] < 0.55 * before['sinkage'], (before, after)
-    # Where lugs shear the soil is a state of the filter: the pull does not wait for the table.
-    assert after['drawbar_pull'] < 1.1 * before['drawbar_pull'], (before, after)
+    assert after['sinkage'] < 0.35 * before['sinkage'], (before, after)
+    assert after['drawbar_pull'] < before['drawbar_pull'], (before, after)
