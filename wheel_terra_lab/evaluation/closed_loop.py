@@ -13,10 +13,8 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.input_judge import InputJudge
-from wheel_terra_estimator.estimation.core import EstimatorCore
-from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.estimation.traction_law import LimiterTuning
-from wheel_terra_estimator.estimation.traction_limiter import (
+from wheel_terra_estimator.control.traction_law import LimiterTuning
+from wheel_terra_estimator.control.traction_limiter import (
     Estimates,
     Interlock,
     LimiterState,
@@ -25,6 +23,8 @@ from wheel_terra_estimator.estimation.traction_limiter import (
     after_estimates,
     after_stuck,
 )
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 from wheel_terra_estimator.simulation.drive import Drive
 from wheel_terra_estimator.simulation.drives import Command

@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.estimation.traction_law import LimiterTuning, traction_scale
-from wheel_terra_estimator.estimation.traction_limiter import (
+from wheel_terra_estimator.control.traction_law import LimiterTuning, traction_scale
+from wheel_terra_estimator.control.traction_limiter import (
     INTERLOCK,
     ZERO,
     Estimates,
@@ -27,6 +26,7 @@ from wheel_terra_estimator.estimation.traction_limiter import (
     after_stuck,
     decide,
 )
+from wheel_terra_estimator.errors import UserError
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'limiter.md'
 UNKNOWN = 255

@@ -24,9 +24,9 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from wheel_terra_estimator.estimation import traction_limiter as limiter
-from wheel_terra_estimator.estimation.traction_law import LimiterTuning
-from wheel_terra_estimator.estimation.traction_limiter import (
+from wheel_terra_estimator.control import traction_limiter as limiter
+from wheel_terra_estimator.control.traction_law import LimiterTuning
+from wheel_terra_estimator.control.traction_limiter import (
     Estimates,
     Event,
     Interlock,

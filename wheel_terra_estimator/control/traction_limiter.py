@@ -17,8 +17,8 @@ from statistics import median
 from types import MappingProxyType
 from typing import NamedTuple
 
+from wheel_terra_estimator.control.traction_law import LimiterTuning, traction_scale
 from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT, SlipClass
-from wheel_terra_estimator.estimation.traction_law import LimiterTuning, traction_scale
 
 Velocity = tuple[float, float, float, float, float, float]
 """Command: linear x, y, z [m/s], angular x, y, z [rad/s]."""
