@@ -30,7 +30,8 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 # Effects of a table or of an instrument that the filter must not apply: loads are terrain-normal
 # already, and the pull comes from specific force, not from an attitude.
 _NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias', 'pull_zero', 'pull_gain'})
-LEAST_BEARING = 0.05  # load that the soil carries over that of the wheel, at least [-]
+LEAST_BEARING = 0.05
+"""Least vertical force, over the wheel's load or over that of the normal stress alone [-]."""
 MOST_RATIO = 3.0
 """v/(r w) beyond which the shear is saturated, so that torque and pull stay the same [-]."""
 LEAST_SINKAGE = 1e-4  # [m]
