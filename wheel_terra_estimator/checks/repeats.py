@@ -78,15 +78,15 @@ def _reference(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if reference is None:
         return [], evidence
     if not reference.velocity.any():
-        driven = float(evidence.moving.sum()) * evidence.period > LEAST_TIME
-        finding = [evidence.found('reference_zero', 0.9)] * driven
-        return [*finding], evidence.with_reference(None) if driven else evidence
+        if float(evidence.moving.sum()) * evidence.period <= LEAST_TIME:
+            return [], evidence
+        return [evidence.found('reference_zero', 0.9)], evidence.with_reference(None)
     dead = stays(evidence, evidence.seconds(reference), reference.velocity)
     if dead is None:
         return [], evidence
     left = None if dead.rows.all() else rows_of(reference, ~dead.rows)
-    finding = [evidence.found('reference_frozen', 0.97, how=dead.how)]
-    return [*finding], evidence.with_reference(left)
+    finding = evidence.found('reference_frozen', 0.97, how=dead.how)
+    return [finding], evidence.with_reference(left)
 
 
 def _imu(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -66,7 +66,15 @@ def robust_std(values: FloatArray) -> float:
 
 def spread(values: FloatArray) -> Any:
     """Return the deviation of known values along the first axis, as `robust_std` does."""
-    return MAD_TO_STD * np.median(np.abs(values - np.median(values, axis=0)), axis=0)
+    return MAD_TO_STD * _median(np.abs(values - _median(values)))
+
+
+def _median(values: FloatArray) -> Any:
+    """Return what numpy's does along the first axis, for few values several times as fast."""
+    half = len(values) // 2
+    ordered = np.partition(values, half, axis=0)
+    low = ordered[half] if len(values) % 2 else ordered[:half].max(axis=0)
+    return 0.5 * (low + ordered[half])
 
 
 def block_fit(
