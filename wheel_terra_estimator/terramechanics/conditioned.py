@@ -122,7 +122,7 @@ class ConditionedForces:
     def forces(self, inputs: ConditionedInputs) -> tuple[FloatArray, FloatArray]:
         """Return torque [N m] and pull [N] of all wheels, positive forward, (..., n) each."""
         inputs = _within_the_model(inputs)
-        contact = self._contact(inputs, self._as_built)
+        contact = self._contact(inputs, copy(self._as_built))
         angle = contact.entrance_angle
         form = closed_form.BranchForces(
             contact, contact.peak_angle / angle, contact.leaving_angle / angle
@@ -142,16 +142,15 @@ class ConditionedForces:
 
         The centroid shift has no part in it.
         """
-        as_built = copy(self._as_built)
-        as_built.bearing_modulus = as_built.bearing_modulus * modulus_factor
-        as_built.sinkage_exponent = as_built.sinkage_exponent + exponent_change
-        contact = self._contact(_within_the_model(inputs), as_built)
+        contact = copy(self._as_built)
+        contact.bearing_modulus = contact.bearing_modulus * modulus_factor
+        contact.sinkage_exponent = contact.sinkage_exponent + exponent_change
+        contact = self._contact(_within_the_model(inputs), contact)
         load, _, _ = closed_form.forces(contact, self._terms)
         return Bearing(np.asarray(load), np.asarray(contact.sinkage_exponent))
 
-    def _contact(self, inputs: ConditionedInputs, as_built: Contact) -> Contact:
-        """Return the contacts with the terms on inputs done and their angles known."""
-        contact = copy(as_built)
+    def _contact(self, inputs: ConditionedInputs, contact: Contact) -> Contact:
+        """Return contacts as built with the inputs, the terms on these done, and the angles."""
         contact.slip = slip_of_speed_ratio(inputs.speed_ratio)
         contact.velocity_ratio = inputs.speed_ratio * self._slip_radius
         contact.normal_load = contact.stated_load = inputs.normal_load
