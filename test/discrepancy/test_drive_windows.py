@@ -192,6 +192,18 @@ def test_what_is_not_steady_is_not_used_and_is_said(section, quality):
     assert sum(rows.seconds.values()) == pytest.approx(drive.duration, abs=1.0)
 
 
+@pytest.mark.parametrize(('rim_speed', 'stands'), [(0.0055, 12.0), (0.0065, 0.0)])
+def test_a_rover_at_three_times_the_rest_speed_stands(rim_speed, stands):
+    crawl = [{'slip': 0.1, 'slope': 0.0, 'rate': rim_speed / (RADIUS + LUG), 'duration': 12.0}]
+    configuration = settings(rest_speed=0.002)
+    series = collect(Drive(crawl).measurements, 4, 'a crawl')
+    finder = windows._WindowFinder(series, configuration)
+    finder.search()
+    assert finder.seconds.get('standing', 0.0) == pytest.approx(stands, abs=0.5)
+    settled = 0.0 if stands else 0.5 * RADIUS / rim_speed  # half a radius of rim travel
+    assert finder.seconds.get('settling', 0.0) == pytest.approx(settled)
+
+
 def test_digging_in_is_no_steady_row():
     drive = Drive([{'slip': 0.5, 'slope': 0.0, 'duration': 60.0}])
     sinking = [

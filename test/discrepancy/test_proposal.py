@@ -254,10 +254,10 @@ def test_lists_that_make_no_law(lists, part):
 
 def test_a_change_is_said_in_the_units_of_the_rows():
     """A tenth of load, load times radius, radius: two wheels of 0.2 m, 100 and 300 N."""
-    rows = np.tile([0.02, 40.0, 20.0], (2, 1))
+    rows = np.tile([0.02, 37.0, 20.0], (2, 1))
     table = type('Table', (), {'measured': rows, '__len__': lambda self: len(rows)})()
     at = OperatingPoints(np.array([0.1, 0.2]), np.array([100.0, 300.0]), Wheel(0.2, 0.1))
-    assert proposals._size('drawbar_pull', 0.1, table, at) == '20 N (50 % of its mean)'
+    assert proposals._size('drawbar_pull', 0.1, table, at) == '20 N (54 % of its mean)'
     assert proposals._size('torque', 0.1, table, at) == '4 N m (20 % of its mean)'
     assert proposals._size('sinkage', 0.1, table, at) == '20 mm (100 % of its mean)'
     rows[:, 2] = 0.0  # a placeholder: no share of its mean

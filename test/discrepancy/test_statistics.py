@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -51,6 +53,7 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
+NUMBER = re.compile(r'(\d+(?:\.\d+)?)( %)?')
 SOIL = Soil(15600.0, 2.4e6, 1.1, 250.0, np.radians(31.9), 0.011, 0.4, -0.2)
 WHEEL = Wheel(0.157, 0.165, 0.01, 30.0, 0.002)
 
@@ -99,12 +102,20 @@ def smooth_error(problem, inputs, scale, amplitude):
 
 
 @pytest.mark.parametrize(
-    ('source', 'pascal'), [('', 0.2 * 250 + 10), ('published', 0.5 * 250 + 50), ('proxy', 175.0)]
+    ('source', 'row'), [('', '| empty'), ('published', '| `published`'), ('proxy', '| `proxy`')]
 )
-def test_cohesion_is_known_to_a_share_and_some_pascal(source, pascal):
-    """As docs/diagnose.md has it; a share that is taken for pascals holds it fast."""
-    cohesion = next(c for c in soil_coordinates(SOIL, {}, source) if c.name == 'cohesion')
-    assert cohesion.scale / WIDENING == pytest.approx(pascal)
+def test_soil_numbers_are_known_as_well_as_the_documentation_says(source, row):
+    """Logarithms to a share, the others to what stands there, cohesion to a share and pascals."""
+    page = (Path(__file__).parents[2] / 'docs' / 'diagnose.md').read_text(encoding='utf-8')
+    cells = next(line for line in page.splitlines() if line.startswith(row)).split('|')[2:8]
+    modulus, exponent, friction, shear, (share, pascal), ratios = (
+        [float(n) * (0.01 if percent else 1.0) for n, percent in NUMBER.findall(cell)]
+        for cell in cells
+    )
+    expected = [*modulus, *exponent, *friction, *shear, share * SOIL.cohesion + pascal]
+    expected += [ratios[0], ratios[-1]]
+    found = [c.scale / WIDENING for c in soil_coordinates(SOIL, {}, source)]
+    assert found == pytest.approx(expected)
 
 
 def test_batched_model_is_the_package_model(forward):
@@ -500,7 +511,24 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
         nothing = of_soil(forward, problem, soil, one)
         table = SimpleNamespace(columns={'time': order.astype(float)})
         work = SimpleNamespace(problem=problem)
-        return changed_stretch(table, work, nothing, one)
+        found = changed_stretch(table, work, nothing, one)
+        if found is not None:  # against the densities of all readings, with and without it
+            inside = (order >= found.start) & (order <= found.end)
+            assert found.gain == pytest.approx(evidence(problem, nothing, inside))
+        return found
+
+    def evidence(problem, fitted, inside):
+        names = [coordinate.name for coordinate in fitted.coordinates]
+        soil = fitted.sensitivity[:, [names.index(n) for n in ('stiffness', 'tan_friction')]]
+        own = 3.0 * problem.rotation @ (soil * inside[problem.row][:, None])
+        common = fitted.jacobian / np.sqrt(fitted.prior)
+        before = np.eye(problem.size) + common @ common.T
+        target = problem.residual(fitted.outputs) + problem.rotation @ fitted.sensitivity @ fitted.u
+        after, before = (
+            scipy.stats.multivariate_normal(cov=covariance).logpdf(target)
+            for covariance in (before + own @ own.T, before)
+        )
+        return float(after - before)
 
     assert 0.3 < told(0.5).stiffness < 0.8
     patch = told(0.4, (order >= 5) & (order <= 7))  # three rows: too few for a soil of their own

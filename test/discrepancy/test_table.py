@@ -307,6 +307,39 @@ def test_many_rows_are_averaged_over_neighbouring_inputs():
     assert len(averaged(table.select(np.arange(10)), 4)) == 4
 
 
+def test_repeated_rows_are_means_without_what_is_eight_robust_deviations_off():
+    """Readings of 3 Nm, one off, at three slips: 1.4826 is the deviation of their spread."""
+    common = [-1.0] * 15 + [0.0] + [1.0] * 14
+    readings = np.concatenate([[*common, 11.0], [*common, 13.0], [*common, 1.0]])
+    slip = np.repeat([0.1, 0.2, 0.7], 31)
+    many = {'slip': slip, 'normal_load': np.full(93, 80.0), 'torque': 3.0 + readings}
+    many['sinkage'] = 0.01 + 1e-6 * np.arange(93)  # no row is a copy of another
+    table = averaged(check_table('x.csv', many), 10)
+    assert table.columns['slip'] == pytest.approx([0.1, 0.2, 0.7])
+    assert table.measured[:, 2] == pytest.approx([3.0 + 10.0 / 31.0, 3.0 - 1.0 / 30.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ('cells', 'asked'),
+    [
+        ('3 4 7 9 2 bad bad bad', True),
+        ('3 4 7 bad bad bad bad bad', False),
+        ('3 4 7 9 bad bad bad bad', False),
+        ('0 1 2 3 4 5 6 7', False),  # counts the rows
+        ('1 2 3 4 5 6 7 8', False),
+        ('2 3 4 5 6 7 8 9', True),
+    ],
+)
+def test_an_unknown_column_is_asked_for_where_most_of_it_are_numbers(tmp_path, cells, asked):
+    pairs = zip(lines(), cells.split(), strict=True)
+    path = write(tmp_path, f'{HEADER},gauge\n' + '\n'.join(map(','.join, pairs)))
+    if asked:
+        with pytest.raises(UserError, match="not used: 'gauge';"):
+            read_table(path)
+    else:
+        assert len(read_table(path)) == 8
+
+
 def test_a_unit_behind_an_unknown_name_makes_it_no_column(tmp_path):
     text = HEADER.replace('sinkage', 'sinkage_mm') + ',current_n\n'
     text += '\n'.join(f'{line},{20 + 0.1 * i}' for i, line in enumerate(lines())) + '\n'

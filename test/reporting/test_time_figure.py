@@ -71,13 +71,17 @@ def test_no_two_words_meet_and_none_lies_in_a_drawing(tmp_path):
     assert '<script src' not in page
 
 
-@pytest.mark.parametrize(('low', 'high'), [(0.0, 1.0), (-0.05, 1.2), (-3e3, 7e3), (0.011, 0.0118)])
+@pytest.mark.parametrize(
+    ('low', 'high'), [(0.0, 1.0), (0.0, 0.4), (-0.05, 1.2), (-3e3, 7e3), (0.011, 0.0118)]
+)
 def test_round_numbers_within_limits(low, high):
     numbers = nice(low, high)
     assert 2 <= len(numbers) <= 6
     for value, text in numbers:
         assert low - 1e-9 <= value <= high + 1e-9
         assert float(text.replace('\u2212', '-')) == pytest.approx(value, abs=1e-12)
+    digits = [text.partition('.')[2] for _, text in numbers]  # no more than tell them apart
+    assert len({len(d) for d in digits}) == 1 and any(not d or d[-1] != '0' for d in digits)
     assert nice(1.0, 1.0) == []
 
 

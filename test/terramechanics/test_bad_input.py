@@ -27,7 +27,12 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
         (lambda: points(0.1, slip_radius='hub'), r"slip radius is 'hub'"),
         (lambda: replace(SAND, cohesion=-1.0), r'cohesion is -1 Pa; allowed is \[0, inf\) Pa'),
         (lambda: replace(SAND, shear_modulus=0.0), r'shear deformation modulus is 0 m'),
-        (lambda: replace(SAND, leaving_angle_ratio=0.3), r'leaving angle ratio is 0\.3'),
+        (
+            lambda: replace(SAND, leaving_angle_ratio=0.3),
+            r'leaving angle ratio is 0\.3; allowed is \[-1\.5, 0\]',
+        ),
+        (lambda: replace(SAND, friction_angle=1.1), r'friction angle is 1\.1 rad; .*\[0, 1\.047'),
+        (lambda: replace(SAND, peak_stress_ratio=1.2), r'ratio is 1\.2; allowed is \[0, 1\]'),
         (lambda: replace(SAND, pressure_law='clay'), r"pressure law is 'clay'"),
         (lambda: WheelSoilModel(SAND, method='guess'), r"method is 'guess'"),
         (lambda: Wheel('wide', 0.1), r"wheel radius is 'wide'; allowed is a number"),

@@ -239,6 +239,20 @@ def test_a_load_is_met_to_a_share_of_itself(load):
     assert angle == pytest.approx(0.3, rel=1e-9)
 
 
+def test_newton_on_logarithms_meets_a_power_at_once():
+    """Its exponent is the slope of the logarithms: the second look is at the solution."""
+    looks = []
+
+    def carried(angles: Any) -> Any:
+        looks.append(angles[0])
+        return 5.0 * angles**2.2
+
+    angle, carries = solve_entrance_angle(carried, np.array([2.0]), np.array([0.1]))
+    exact = (2.0 / 5.0) ** (1.0 / 2.2)
+    assert carries.all() and angle == pytest.approx(exact, rel=1e-9)
+    assert looks[1] == pytest.approx(exact, rel=1e-4) and len(looks) <= 4
+
+
 def test_what_three_angles_do_not_settle_goes_to_the_bracketed_solver():
     """A force that is no power of the angle: W = exp(20 t) - 1, so that t = ln(1 + W) / 20."""
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 import shlex
-import sys
 from pathlib import Path
 
 from wheel_terra_estimator.cli.outputs import add_output
@@ -72,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.simulation.drive import Drive
 
     check_folder(arguments.output, arguments.overwrite)
-    quiet = not sys.stderr.isatty() or duration < 60.0
+    quiet = True if duration < 60.0 else None  # None: where there is no terminal
     with tqdm(total=round(duration), unit='s', disable=quiet, leave=False) as bar:
         drive = Drive(scenario, arguments.seed).run(duration, bar.update)
     bag = write_simulated_drive(drive, arguments.output, arguments.overwrite)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sys
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
@@ -207,6 +206,5 @@ def _shown(
     """Show the rate and the time left on a terminal; end the workers when the loop is left."""
     from tqdm import tqdm
 
-    quiet = not sys.stderr.isatty()
-    with closing(outcomes):
-        yield from tqdm(outcomes, total=total, unit='bag', disable=quiet)
+    with closing(outcomes):  # None: quiet where there is no terminal
+        yield from tqdm(outcomes, total=total, unit='bag', disable=None)

@@ -22,7 +22,6 @@ from wheel_terra_estimator.terramechanics.model import (
 )
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY, OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.stresses import bearing_law
 
 # Generic Fourier coefficients of the stress per depth [N/cm^3] (the paper's supplement, table S3).
 _A00, _A10, _B11, _B01, _B_11 = 0.206, 0.169, 0.212, 0.358, 0.055
@@ -183,7 +182,7 @@ def reece_soil(soil: Soil, width: float, gravity: float) -> Soil:
     """Return the soil with Reece's pressure c kc' + rho g b kphi', the same at this width [m]."""
     if soil.pressure_law == 'reece':
         return soil
-    pressure = bearing_law('bekker', soil.cohesive_modulus, soil.frictional_modulus, width, 0, 0)[0]
+    pressure, _ = soil.bearing(width, gravity)
     modulus = pressure * width**soil.sinkage_exponent / (soil.density * gravity * width)
     return replace(soil, cohesive_modulus=0.0, frictional_modulus=modulus, pressure_law='reece')
 

@@ -174,7 +174,7 @@ def _white_part(
     spread: float,
 ) -> tuple[float, float, float]:
     """Return the most probable noise factor, its degrees of freedom and its log likelihood."""
-    best, chosen = -np.inf, (1.0, 0.0)
+    found = []
     outer = jacobian @ jacobian.T
     for amplitude in _SMOOTH:
         smooth = outer + np.diag(amplitude**2 * roughness)
@@ -184,10 +184,10 @@ def _white_part(
         score = -0.5 * (np.log(variance) + power / variance).sum(axis=1)
         score -= 0.5 * (np.log(factors / usual) / spread) ** 2
         top = int(np.argmax(score))
-        if score[top] > best:
-            share = factors[top] ** 2 / variance[top]
-            best, chosen = float(score[top]), (float(factors[top]), float((share**2).sum()))
-    return chosen[0], max(chosen[1], 2.0), best
+        share = factors[top] ** 2 / variance[top]
+        found.append((float(score[top]), float(factors[top]), float((share**2).sum())))
+    best, factor, count = max(found)
+    return factor, max(count, 2.0), best
 
 
 _ROBUST_FLOOR = 0.02  # structural error beside which outliers are sought [share of the range]

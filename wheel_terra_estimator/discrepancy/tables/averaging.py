@@ -119,15 +119,11 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, Stead
 
 def _halved(scaled: FloatArray, cells: list[IndexArray], most: int) -> list[IndexArray]:
     """Split the cell with the most rows times extent until there are ``most``."""
-    done: list[IndexArray] = []
     heap = [(-_weight(scaled[cell]), i, cell) for i, cell in enumerate(cells)]
     heapq.heapify(heap)
     label = len(heap)
-    while heap and len(heap) + len(done) < most:
-        weight, _, cell = heapq.heappop(heap)
-        if weight == 0.0:
-            done.append(cell)
-            continue
+    while len(heap) < most and heap[0][0] < 0.0:  # not all are of equal rows
+        _, _, cell = heapq.heappop(heap)
         axis = int(np.argmax(np.ptp(scaled[cell], axis=0)))
         values = scaled[cell, axis]
         levels = np.unique(values)
@@ -135,7 +131,7 @@ def _halved(scaled: FloatArray, cells: list[IndexArray], most: int) -> list[Inde
         for half in (cell[values < cut], cell[values >= cut]):
             heapq.heappush(heap, (-_weight(scaled[half]), label, half))
             label += 1
-    return [*done, *(cell for _, _, cell in heap)]
+    return [cell for _, _, cell in heap]
 
 
 def _weight(values: FloatArray) -> float:
