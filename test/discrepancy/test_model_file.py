@@ -106,7 +106,7 @@ def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
     assert_errors(predicted(table, found.configuration, tmp_path), table, found.gap, 'before')
 
 
-def test_an_effect_that_is_on_for_nothing_gets_no_other_name():
+def test_an_effect_that_is_on_for_nothing_gets_no_other_name(unproposed):
     """Nothing is missing from these rows; the engineer believes that wheels stiffen the soil."""
     table, values, *_ = make('full56')
     values |= {'effects.multipass.enabled': True, 'effects.multipass.stiffening': 0.25}

@@ -630,6 +630,13 @@ def test_the_balance_of_forces_on_a_slope(parts, ekf):
     standing = [StationaryPull(5.0, 20.0), *[None] * 5]
     held = balance.update(ekf, found, total, cycle, stationary=standing, **SURE)
     assert held.residual - tilted.residual == pytest.approx(float(found.pull[0]) - 5.0)
+    # What the model does not know of the pull of a wheel: a tenth of its load at a deviation of 1.
+    given = {'stationary': standing, 'model_variance': 4.0, 'repeats': 1.0}
+    doubted = balance.update(ekf, found, total, cycle, **given)
+    tenths = 0.1 * np.array(loads[1:])
+    assert doubted.variance - held.variance == pytest.approx(4.0 * float(tenths @ tenths))
+    own = 20.0**2 - float(found.pull_noise[0]) ** 2
+    assert held.variance - tilted.variance == pytest.approx(own)
 
 
 def test_cycles_that_see_the_same_ground_are_one_piece_of_information():

@@ -128,6 +128,17 @@ def test_forces_that_an_unknown_yaw_rate_would_change_are_that_uncertain():
     assert (known.force_std < 0.5 * scatter).all()
 
 
+def test_deviations_of_slip_angles_are_those_of_speeds_that_are_drawn():
+    steering, rng, draws = (0.9, -0.6, 0.0, 0.0), np.random.default_rng(6), 20_000
+    found = told(speed_std=0.006, yaw_rate_std=0.01, steering=steering)
+    speed, yaw_rate = rng.normal(0.08, 0.006, draws), rng.normal(0.0, 0.01, draws)
+    aside = rng.normal(found.velocity, math.sqrt(found.velocity_variance), draws)
+    for i, (x, y) in enumerate(zip(X, Y, strict=True)):
+        angle = np.arctan2(aside + yaw_rate * x, speed - yaw_rate * y) - steering[i]
+        assert found.angle[i] == pytest.approx(angle.mean(), abs=0.02)
+        assert found.angle_std[i] == pytest.approx(angle.std(), rel=0.05)
+
+
 def test_at_rest_angles_are_held_and_not_known():
     motion = SidewaysMotion(ROVER)
     before = motion.update(0.0, STRAIGHT._replace(lateral_force=1.0))

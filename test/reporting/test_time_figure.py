@@ -3,10 +3,13 @@
 """The drawing of a drive: paths are where the data are, words are beside them."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.reporting.drive_figure import drive_figure
+from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.html import render
 from wheel_terra_estimator.reporting.time_figure import (
     HEIGHT,
@@ -43,6 +46,32 @@ def test_a_path_is_where_the_data_are_and_broken_where_they_are_not():
     assert len(places) == 96
     slip = 1.0 - places[:, 1] / HEIGHT * 1.25
     assert slip == pytest.approx(np.sin(places[:, 0] / 20.0), abs=2e-4)
+
+
+def test_a_drive_is_drawn_in_the_units_of_its_panels():
+    """Two wheels at 0.1 m/s; rims run 0.02 and 0.06 m/s faster, ruts are 12 mm deep."""
+    both, seconds = np.ones((11, 2)), np.linspace(0.0, 10.0, 11)
+    values = {'slip': 0.3, 'sinkage': 0.012, 'drawbar_pull': 40.0, 'slip_velocity': 0.0}
+    deviations = {'slip_std': 0.05, 'sinkage_std': 0.002, 'drawbar_pull_std': 3.0}
+    history = SimpleNamespace(
+        names=('left_wheel', 'right_wheel'),
+        seconds=seconds,
+        forward_velocity=np.full(11, 0.1),
+        values={name: value * both for name, value in (values | deviations).items()},
+        slip_class=np.zeros((11, 2), dtype=int),
+        warning_times=(),
+    )
+    history.values['slip_velocity'] = both * (0.02, 0.06)
+    figure = drive_figure(history, None, Border(slip=0.3, sinkage=0.01))
+    (deviations_drawn,) = re.findall(r'± (\S+) standard', figure.switches[-1].text)
+    lines = {(line.panel, line.curve.name): line.y for line in figure._lines if line.y.ndim == 1}
+    assert lines[0, 'mean rim speed'] == pytest.approx(0.14)
+    assert lines[0, 'body'] == pytest.approx(0.1)
+    bands = {line.panel: line.y for line in figure._lines if line.y.ndim == 2}
+    for panel, value, std in ((1, 0.3, 0.05), (3, 12.0, 2.0), (4, 40.0, 3.0)):
+        assert lines[panel, 'right'] == pytest.approx(value)
+        half = float(deviations_drawn) * std
+        assert bands[panel].T == pytest.approx(np.tile([value - half, value + half], (11, 1)))
 
 
 def test_strips_begin_and_end_with_their_class():

@@ -90,14 +90,10 @@ class OnlineChecks:
     """Judge of a stream of steps; deterministic, driven by stamps alone."""
 
     def __init__(self, configuration: Configuration) -> None:
-        self.retune(configuration)
-        self.reset()
-
-    def retune(self, configuration: Configuration) -> None:
-        """Continue with other tuning."""
         self._configuration = configuration
         self._facts = rover_facts.from_configuration(configuration)
         self._radius: list[float] = self._facts.radius.tolist()
+        self.reset()
 
     def standing(self, driving: str) -> tuple[Finding, ...]:
         """Return the findings that stand now.

@@ -59,9 +59,6 @@ class InputJudge(Stepped, Protocol):
     def judged(self, estimates: EstimateSet, health: Mapping[str, Any]) -> EstimateSet:
         """Return the estimates as they may be published."""
 
-    def retune(self, configuration: Configuration) -> None:
-        """Continue with other tuning."""
-
 
 class EstimatorCore:
     """Estimates of one rover from its measurements."""
@@ -142,8 +139,6 @@ class EstimatorCore:
         """
         self._ran_on()  # the state is the same whatever was run before
         self._estimator = _estimator(configuration)
-        if self._judge is not None:
-            self._judge.retune(configuration)
         settings = _time_settings(configuration)
         self._lags.fixed = settings.max_lag
         self._watch.retune(settings.clock_step, self._lags.longest, settings.history)
