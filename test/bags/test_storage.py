@@ -38,6 +38,14 @@ def test_folder_single_file_and_folder_without_metadata_are_the_same(make_bag, w
     assert found == whole and 'metadata.yaml is missing' in notes[0]
 
 
+def test_a_file_that_the_metadata_do_not_list_is_not_read_and_said(make_bag, drive, whole):
+    folder, other = make_bag(), make_bag(drive[:6], 'another')
+    (other / 'another.mcap').rename(folder / 'another.mcap')
+    found, notes = contents(folder)
+    assert found == whole
+    assert notes == ['another.mcap is not listed in metadata.yaml and was not read']
+
+
 def test_a_sound_file_is_read_by_its_index(make_bag, whole, monkeypatch):
     monkeypatch.setattr(McapFile, '_survey', lambda _: pytest.fail('read from front to end'))
     assert messages(make_bag()) == whole

@@ -34,6 +34,9 @@ def test_json_holds_what_a_program_needs(printed):
 def test_one_effect_and_a_misspelt_one(printed, refused):
     text = printed(['effects', 'soil_mound'])
     assert text.startswith('soil_mound') and 'lug_digging' not in text
+    words = ' '.join(text.split())  # the numbers of docs/effects.md
+    assert 'range 0 to 8, prior half-normal, scale 1 onset' in words
+    assert 'range 0 to 0.9, prior normal, 0.4 +- 0.15 form' in words
     refused(['effects', 'soil_mund'], "did you mean 'soil_mound'?")
 
 

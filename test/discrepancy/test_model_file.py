@@ -88,7 +88,7 @@ def test_predict_with_the_written_model_gives_the_reported_error(hidden, known, 
     assert zero == pytest.approx(there, abs=4.0 * std)
 
 
-def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
+def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path, unproposed):
     """Slip multiplies the sinkage (Lyasko); the engineer has an exponent that grows with slip."""
     _, values, soil, rows = make('basic16')
     law = FORMS['slip_sinkage_exponent:lyasko'].make(1.5, 0.5, rows, soil)

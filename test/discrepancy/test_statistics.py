@@ -43,6 +43,7 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
 from wheel_terra_estimator.discrepancy.report.words import _repeatability
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import verdict as gap_test
+from wheel_terra_estimator.discrepancy.selection.signatures import shapes
 from wheel_terra_estimator.discrepancy.selection.verdict import _competitors
 from wheel_terra_estimator.discrepancy.selection.weights import Setting, default_floors
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
@@ -561,6 +562,17 @@ def test_an_error_that_a_good_model_may_have_is_smaller_than_one_that_asks_for_a
     misfits = {tuple(np.flatnonzero(f.amplitude).tolist()) for f in floors if f.unexplained}
     assert misfits == {(0, 1, 2, 3), (0,), (1,), (2,), (1, 2, 3)}
     assert sum(np.exp(floor.log_prior) for floor in floors) == pytest.approx(1.0)
+
+
+def test_shapes_that_are_tried_lie_about_the_prior_and_within_the_rows():
+    """A mound begins at a slip of 0.4 ± 0.15 (docs/effects.md); a layer is above the ruts."""
+    mound, layer = (effect_coordinates(catalogue()[name]) for name in ('soil_mound', 'hard_layer'))
+    onsets = [float(mound[1].value(start[1])) for start in shapes(mound, 0.05, 1.0)]
+    assert onsets == pytest.approx([0.25, 0.4, 0.55])
+    depths = [float(layer[1].value(start[1])) for start in shapes(layer, 0.05, 1.0)]
+    assert 0.0 < depths[0] < depths[1] < depths[2] < 0.05
+    for own in (mound, layer):
+        assert {start[0] for start in shapes(own, 0.05, 2.0)} == {own[0].coordinate(0.0) + 2.0}
 
 
 def test_sizes_that_an_effect_may_have_share_one_probability():

@@ -154,7 +154,7 @@ def test_no_column_of_numbers_is_lost_without_a_word(word, unit, form, case):
         assert header._harmless(title)
 
 
-def test_a_frame_is_read_as_the_file_is(tmp_path):
+def test_a_frame_is_read_as_the_file_is(tmp_path, unproposed):
     pandas = pytest.importorskip('pandas')
     table = rows()
     titles = ('Slip [%]', 'Vertical load (kN)', 'Sinkage [mm]', 'DP [N]', 'T [N m]')
@@ -179,7 +179,7 @@ def test_a_frame_is_read_as_the_file_is(tmp_path):
     np.testing.assert_allclose(found.table.measured, file.measured, rtol=1e-12)
 
 
-def test_a_map_of_columns(tmp_path, refused):
+def test_a_map_of_columns(tmp_path, refused, unproposed):
     text = HEADER.replace('sinkage', 'z [mm]').replace('torque', 'M').replace('drawbar_pull', 'Fx')
     table = rows()
     body = [

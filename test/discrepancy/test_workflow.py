@@ -390,7 +390,7 @@ def test_noise_and_outliers_need_not_be_stated():
     assert 'bulldozing' in {effect.name, *effect.confounded_with}
 
 
-def test_reference_cancels_a_common_structural_error():
+def test_reference_cancels_a_common_structural_error(unproposed):
     """6 % of structure in both tables; only the reference makes the friction visible."""
     table, values, _, rows = make('basic16', structure=0.06, seed=11)
     reference = {key: value.copy() for key, value in table.items()}
