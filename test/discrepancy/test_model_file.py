@@ -11,7 +11,11 @@ from test_workflow import FEW, make, noisy, run
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import workflow
-from wheel_terra_estimator.discrepancy.report.model_file import corrected, write_model
+from wheel_terra_estimator.discrepancy.report.model_file import (
+    _sensor_keys,
+    corrected,
+    write_model,
+)
 from wheel_terra_estimator.discrepancy.result import Proposal
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
@@ -217,6 +221,31 @@ def test_an_error_of_a_reading_that_was_an_effect_moves_to_the_sensors(tmp_path)
     both = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
     assert 'torque_gain' not in both.effects
     assert both.sensors.torque_gain[0] == pytest.approx(1.1 * 1.2, rel=0.05)
+
+
+@pytest.mark.parametrize('turning', [1.0, -1.0, 0.0])
+def test_a_reading_is_the_same_by_effects_and_by_errors_of_the_sensors(turning):
+    """The motor gives T and the friction; the effect's gain, then the sensor's, read both."""
+    prefix = 'effects.drivetrain_friction'
+    values = {
+        'sensors.torque_gain': [1.2],
+        'sensors.torque_zero': [0.1],
+        'effects.torque_gain.enabled': True,
+        'effects.torque_gain.gain': 0.25,
+        f'{prefix}.enabled': True,
+        f'{prefix}.torque': 0.4,
+        f'{prefix}.torque_std': 0.2,
+    }
+    keys, moved = _sensor_keys(reader.from_parameters(values, complete=False), turning)
+    (gain,) = keys['sensors.torque_gain']
+    (zero,) = keys.get('sensors.torque_zero', [0.1])
+    friction = 0.4 if turning else 0.0  # of rows that turn both ways it stays an effect
+    assert ('drivetrain_friction' in moved) == bool(turning)
+    for torque in (-3.0, 2.0):
+        read = 1.2 * 1.25 * (torque + friction * turning) + 0.1
+        assert gain * torque + zero == pytest.approx(read)
+    std = keys.get('sensors.torque_zero_std', 0.0)  # as the zero that it belongs to
+    assert std == pytest.approx(1.2 * 1.25 * 0.2 if turning else 0.0)
 
 
 @pytest.mark.slow

@@ -117,7 +117,8 @@ def _sensor_keys(
             float(zero + gain * size) for zero, gain in zip(zeros, gains, strict=True)
         ]
         if parameter in stds.get(owner, {}):
-            keys[f'sensors.{quantity}_zero_std'] = float(stds[owner][parameter] * gains.mean())
+            std = abs(scale) * stds[owner][parameter]
+            keys[f'sensors.{quantity}_zero_std'] = float(std * gains.mean())
         moved.append(owner)
     return keys, tuple(moved)
 
