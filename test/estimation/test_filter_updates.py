@@ -153,7 +153,9 @@ def test_models_are_doubted_while_the_references_keep_to_one_side(parts, ekf):
         fresh = parts.filter()
         fresh.set(SPEED, 0.045, 1e-8)
         doubt[name] = references(parts, fresh, values)[0].model_variance_factor
-    assert doubt['one side'] > 5.0
+    # A mean with gain 1/6, of variance 1/11 where they are white; its square over that, squared.
+    mean = (1.0 - (5.0 / 6.0) ** 6) * 0.004 / parts.sensors.reference_std
+    assert doubt['one side'] == pytest.approx((11.0 * mean**2) ** 2, rel=0.1) and mean > 0.5
     assert doubt['white'] < 2.0
 
 
