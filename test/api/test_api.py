@@ -237,6 +237,13 @@ def test_pictures_return_axes(drive, direct, named):
     assert len(bars.patches) == 9
     middles = [bar.get_x() + 0.5 * bar.get_width() for bar in bars.patches[:3]]
     assert middles == pytest.approx([-0.8 / 3, 0.0, 0.8 / 3])
+    for row, gap in enumerate(named[1].gap.values()):  # shares of the error as configured
+        heights = [bar.get_height() for bar in bars.patches[3 * row : 3 * row + 3]]
+        shares = np.array([gap.before, gap.refit, gap.after, gap.noise]) / gap.before
+        assert heights == pytest.approx(shares[:3].tolist())
+        (mark,) = bars.collections[row].get_segments()
+        assert mark[:, 0] == pytest.approx([row - 0.4, row + 0.4])
+        assert mark[:, 1] == pytest.approx(shares[3])
     pyplot.close('all')
 
 

@@ -128,10 +128,11 @@ def test_forces_that_an_unknown_yaw_rate_would_change_are_that_uncertain():
     assert (known.force_std < 0.5 * scatter).all()
 
 
-def test_deviations_of_slip_angles_are_those_of_speeds_that_are_drawn():
+@pytest.mark.parametrize('std', [0.006, 0.0005])  # of the speed; aside it is the model's
+def test_deviations_of_slip_angles_are_those_of_speeds_that_are_drawn(std):
     steering, rng, draws = (0.9, -0.6, 0.0, 0.0), np.random.default_rng(6), 20_000
-    found = told(speed_std=0.006, yaw_rate_std=0.01, steering=steering)
-    speed, yaw_rate = rng.normal(0.08, 0.006, draws), rng.normal(0.0, 0.01, draws)
+    found = told(speed_std=std, yaw_rate_std=0.01, steering=steering)
+    speed, yaw_rate = rng.normal(0.08, std, draws), rng.normal(0.0, 0.01, draws)
     aside = rng.normal(found.velocity, math.sqrt(found.velocity_variance), draws)
     for i, (x, y) in enumerate(zip(X, Y, strict=True)):
         angle = np.arctan2(aside + yaw_rate * x, speed - yaw_rate * y) - steering[i]
@@ -202,5 +203,6 @@ def test_a_direction_of_speeds_known_no_better_than_their_size_may_be_any():
         angle = np.arctan2(across + std * draws[1], along + 0.01 * draws[0])
         middle = np.arctan2(across, along)
         spread = np.sqrt(np.mean((angle - middle) ** 2))
-        found = _angle_std(*(np.array([v]) for v in (along, across, 0.01, std)))
+        errors = np.array([[0.01], [0.0]]), np.array([[0.0], [std]])  # each in one of the two
+        found = _angle_std(np.array([along]), np.array([across]), *errors)
         assert found[0] == pytest.approx(spread, rel=0.3)

@@ -32,8 +32,6 @@ _STEP = 0.02  # step for the stiffness, over the greatest speed [-]
 _PLACES = np.array([0.1 * u + 0.9 * u**3 for u in np.linspace(-1.0, 1.0, 49)])
 """Lateral speeds at which forces are computed, over the greatest [-]: closest where forces change
 most. Linear interpolation between them errs by 0.003 of the speed."""
-_ASIDE, _ALONG = np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])[..., None]
-"""One deviation to either side of the speeds across and along."""
 UNKNOWN_ANGLE_STD = math.pi / math.sqrt(3.0)
 """Deviation of an unknown slip angle, uniform over the whole turn [rad]."""
 
@@ -180,14 +178,11 @@ class SidewaysMotion(Component[SidewaysState]):
         sine, cosine, forward, turning = contacts[:4]
         sideward = velocity + turning
         along, across = forward * cosine + sideward * sine, sideward * cosine - forward * sine
-        # Variances of speed, yaw rate and lateral speed, rotated into the wheel's heading.
-        var_yaw_rate = given.yaw_rate_std**2
-        var_forward = given.speed_std**2 + var_yaw_rate * y * y
-        var_aside = variance + var_yaw_rate * x * x
-        var_along = var_forward * cosine**2 + var_aside * sine**2
-        var_across = var_forward * sine**2 + var_aside * cosine**2
-        angle = np.arctan2(across, along)
-        angle_std = _angle_std(along, across, np.sqrt(var_along), np.sqrt(var_across))
+        angle, none = np.arctan2(across, along), np.zeros(len(x))
+        # Errors of speed, lateral speed and yaw rate: what they add forward and aside at the hubs.
+        ahead = np.array([none + given.speed_std, none, -given.yaw_rate_std * y])
+        aside = np.array([none, none + math.sqrt(variance), given.yaw_rate_std * x])
+        angle_std = _angle_std(forward, sideward, ahead, aside)
         forces = _wheel_forces(contacts, velocity, rover.rest_speed, given.shear_modulus)
         _, std = _measured_force(rover, given)
         # The sum is measured; of what turning would change, the wheels have opposite parts.
@@ -208,14 +203,17 @@ class SidewaysMotion(Component[SidewaysState]):
 
 
 def _angle_std(
-    along: FloatArray, across: FloatArray, along_std: FloatArray, across_std: FloatArray
+    forward: FloatArray, sideward: FloatArray, ahead: FloatArray, aside: FloatArray
 ) -> FloatArray:
-    """Return the deviation of the direction of two speeds, by one deviation to either side of each.
+    """Return the deviation of the direction of two speeds (n,) by errors of both (errors, n).
 
-    Derivatives at the mean would be too small where a deviation is as large as the speed.
+    One deviation to either side of each: derivatives at the mean would be too small where it is as
+    large as the speed.
     """
-    there = np.arctan2(across + _ASIDE * across_std, along + _ALONG * along_std)
-    differences = (there - np.arctan2(across, along) + np.pi) % (2.0 * np.pi) - np.pi
+    there = np.arctan2(
+        sideward + np.concatenate([aside, -aside]), forward + np.concatenate([ahead, -ahead])
+    )
+    differences = (there - np.arctan2(sideward, forward) + np.pi) % (2.0 * np.pi) - np.pi
     return np.sqrt(0.5 * np.square(differences).sum(axis=0))
 
 
