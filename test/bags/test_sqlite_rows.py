@@ -87,6 +87,18 @@ def test_pages_that_sqlite_does_not_miss_are_said(tmp_path):
     assert 'of the recording' in notes[0]
 
 
+def test_missing_numbers_are_told_by_the_times_beside_them(tmp_path):
+    """A message a second; those of 10 and 11 s, the first and the last but one are not there."""
+    path = tmp_path / 'a.db3'
+    seconds = [Sample(START + 10**9 * i, s.topic, s.data) for i, s in enumerate(samples(30))]
+    sqlite_maker.write(path, seconds, SMALL)
+    executed(path, 'DELETE FROM messages WHERE id IN (1, 11, 12, 29)', 'CREATE TABLE other(a)')
+    zeroed(path, path.stat().st_size - PAGE, PAGE)  # of the other table: something is damaged
+    found, notes = contents(path)
+    assert len(found) == 26
+    assert 'lost before the first of these, from 8.0 s to 11.0 s, from 26.0 s on' in notes[0]
+
+
 def test_an_index_that_lies_hides_no_row_and_rows_out_of_order_are_sorted(tmp_path):
     path, whole = big(tmp_path, 50)
     gone = "DELETE FROM sqlite_master WHERE name='timestamp_idx'"
