@@ -214,6 +214,29 @@ def test_digging_in_is_no_steady_row():
         rows_from_measurements(sinking, settings())
 
 
+@pytest.mark.parametrize(
+    ('depth', 'rate', 'digs'),
+    [(0.006, 15e-5, False), (0.006, 3e-4, True), (0.06, 6e-4, False), (0.06, 1e-3, True)],
+)
+def test_in_a_window_a_wheel_may_sink_by_a_tenth_and_by_two_hundredths_of_its_radius(
+    depth, rate, digs
+):
+    """From half to half of a window of 6.3 s."""
+    sinking = []
+    for m in Drive([{'slip': 0.2, 'slope': 0.0, 'duration': 9.0}]).measurements:
+        if isinstance(m, SinkageReading):
+            m = SinkageReading(m.stamp, np.full(4, depth + rate * m.stamp * 1e-9))
+        elif isinstance(m, ReferenceVelocity):
+            m = replace(m, forward=0.8 * 0.5 * (RADIUS + LUG))
+        elif isinstance(m, InertialReading):
+            m = replace(m, specific_force=np.array([0.0, 0.0, GRAVITY]))
+        sinking.append(m)
+    finder = windows._WindowFinder(collect(sinking, 4, 'a drive'), settings())
+    finder.search()
+    assert ('digging in' in finder.seconds) == digs
+    assert (GOOD in finder.seconds) != digs
+
+
 def test_wheels_that_differ_have_no_mean_wheel():
     rows = rows_from_measurements(
         up_the_stairs(), settings(**{'wheels.radius': [0.12, 0.12, 0.115, 0.115]})

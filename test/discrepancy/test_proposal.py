@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,6 +20,7 @@ from wheel_terra_estimator.discrepancy.result import LeftOut, as_json
 from wheel_terra_estimator.discrepancy.workflow import Options
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
+from wheel_terra_estimator.terramechanics.effects import learned_closure
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
     EFFECT,
     REFERENCE_SPEED,
@@ -250,6 +253,25 @@ def test_lists_that_make_no_law(lists, part):
     law = {f'effects.learned_closure.{key}': value for key, value in zip(keys, lists, strict=True)}
     with pytest.raises(UserError, match=part):
         reader.from_parameters({'effects.learned_closure.enabled': True, **law}, complete=False)
+
+
+def test_a_change_is_stated_for_the_step_that_its_words_name():
+    steps = {
+        'everywhere alike': 1.0,
+        'per doubling of the load': math.log10(2.0),
+        'per decade of rim speed': 1.0,
+        'per earlier pass': 1.0,
+        'per 10 degrees of slope': math.radians(10.0),
+        'with the square of slip, at 1': 1.0,
+    }
+    for name, (words, step) in proposals._PER.items():
+        if band := re.match('in a band of slip around (.*)', words):
+            assert learned_closure._SINGLE[name].value(SimpleNamespace(slip=float(band[1]))) == step
+        elif name == 'torque_squared':
+            assert f'is {step} W r' in words
+        else:
+            share = re.match(r'per (0\.\d+) ', words)
+            assert step == (float(share[1]) if share else steps[words])
 
 
 def test_a_change_is_said_in_the_units_of_the_rows():

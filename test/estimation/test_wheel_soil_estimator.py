@@ -142,6 +142,25 @@ def test_a_soil_configured_by_mistake_does_not_bias_slip_and_sinkage():
     assert sinkage == pytest.approx(last(d.truth.sinkage), abs=0.004)
 
 
+def test_the_slip_that_is_usual_at_a_torque_tells_the_speed_where_no_reference_does(climb):
+    def told(mode, torque=1.0):
+        estimator = WheelSoilEstimator(climb.configuration)
+        for stamp, inputs in merged(
+            inputs_of_mode(climb.arrivals[: len(climb.arrivals) // 4], mode)
+        ):
+            if (odometry := inputs.wheel_odometry) is not None:
+                turned = replace(odometry, torque=torque * odometry.torque)
+                inputs = replace(inputs, wheel_odometry=turned)
+            estimator.step(stamp, inputs)
+        rims = estimator._speed.state.rims
+        return estimator._speed_by_torque(rims), rims.typical
+
+    assert told('reference')[0] is None and told('no_reference', math.nan)[0] is None
+    usual, rim = told('no_reference')
+    assert 0.5 * rim < usual.speed < rim  # up 8 degrees it slips
+    assert 0.0 < usual.variance < (0.5 * rim) ** 2
+
+
 def test_snapshot_comes_back_to_the_bit(climb):
     inputs = merged(a.measurement for a in climb.arrivals)
     estimator = WheelSoilEstimator(climb.configuration)
