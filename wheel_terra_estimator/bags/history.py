@@ -118,9 +118,10 @@ class DriveFigures:
         self.slip_travel = np.zeros(wheels)  # (n,) in the classes high and stuck [m]
         self._slipping = np.zeros(wheels)  # slip velocity in them at the last set [m/s]
         self.max_slip = np.zeros(wheels)  # (n,) greatest |slip| outside of class unknown [-]
-        # ``max_sinkage``, ``max_sinkage_std``: (n,) greatest sinkage and its standard deviation [m]
+        # ``max_sinkage``, ``max_sinkage_std``: (n,) greatest sinkage since slip was first known,
+        # so not the one assumed before the first motion, and its standard deviation [m]
         self.max_sinkage = np.full(wheels, -np.inf)
-        self.max_sinkage_std = np.zeros(wheels)
+        self.max_sinkage_std = np.full(wheels, np.inf)
         self.least_margin = np.full(wheels, np.inf)  # (n,) least pull margin [N]
         # (n,) greatest size of the lateral force outside of class unknown [N]
         self.max_lateral_force = np.zeros(wheels)
@@ -159,7 +160,7 @@ class DriveFigures:
         self._pull += np.where(known, values['drawbar_pull'], 0.0)
         self._known += known
         self.max_slip = np.maximum(self.max_slip, np.where(known, np.abs(values['slip']), 0.0))
-        deeper = values['sinkage'] > self.max_sinkage
+        deeper = (self._known > 0.0) & (values['sinkage'] > self.max_sinkage)
         self.max_sinkage = np.where(deeper, values['sinkage'], self.max_sinkage)
         self.max_sinkage_std = np.where(deeper, values['sinkage_std'], self.max_sinkage_std)
         self.least_margin = np.minimum(self.least_margin, values['pull_margin'])

@@ -186,7 +186,7 @@ def _wheels(
         seconds = {c.name.lower(): float(times[c][i]) for c in SlipClass}
         slip, sinkage = _percentiles(slips[:, i]), _percentiles(sinkages[:, i])
         deepest, std = float(figures.max_sinkage[i]), float(figures.max_sinkage_std[i])
-        if sinkage and std > limits[i]:  # known elsewhere, but not there
+        if sinkage and std > limits[i]:  # known elsewhere, or only at rest
             row = int(np.nanargmax(sinkages[:, i]))
             deepest = float(sinkages[row, i])
             std = float(history.values['sinkage_std'][row, i])
