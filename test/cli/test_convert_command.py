@@ -58,6 +58,14 @@ def test_the_example_converts_units_and_signs(convert, log):
     assert convert() == 2  # nothing is overwritten
 
 
+@pytest.mark.parametrize(('unit', 'told'), [('s', 'note: wheel rates 1e+02 s apart'), ('ms', '')])
+def test_a_log_in_a_wrong_unit_of_time_is_noted(convert, example, capsys, unit, told):
+    rows = [f'{time},60,-60,1.5,-1.5,0,0,1,0,0,90,12,0.5' for time in (100, 200, 300)]
+    convert('\n'.join([HEADER, *rows]), example.replace('unit: s}', f'unit: {unit}}}'))
+    said = capsys.readouterr().out
+    assert told in said and ('is the unit of the time right' in said) == bool(told)
+
+
 def test_steering_angles_and_orientation_of_the_example_reach_the_measurements(
     convert, example, tmp_path
 ):

@@ -70,6 +70,7 @@ class Converted(NamedTuple):
     counts: dict[str, int]  # messages by topic
     short: list[int]  # lines that end before a column of the map
     held: dict[str, int]  # rows that each reading of a topic is repeated over, where it is
+    period: float  # of the wheel rates [s], 0 of fewer than two
 
 
 def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -> Converted:
@@ -96,7 +97,7 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
                     f'{columns}: forward is taken from the wheels, but their signs disagree; give '
                     'sign: -1 for each that reads negative, and wheels.direction 1'
                 )
-        return Converted(bag.counts, list(sender.short), held)
+        return Converted(bag.counts, list(sender.short), held, sender.period)
 
 
 def _held(table: Path, layout: ColumnMap) -> dict[str, int]:
@@ -225,6 +226,7 @@ class _Sender:
         self.turned = 0.0  # how far all wheels have turned together [rad]
         self.squared = 0.0  # integral of the square of their rate [rad^2/s]
         self.common = 0, 0.0  # stamp [ns] and rate that the wheels last had in common
+        self.first, self.rows = 0, 0  # stamp of their first row [ns], rows of theirs
         self.one_way = self.any_way = 0.0  # common rate and mean size of rates, times speed
 
     def send(self, line: int, row: list[str]) -> None:
@@ -249,6 +251,7 @@ class _Sender:
             self.turned += 0.5 * (was + rate) * seconds
             self.squared += 0.5 * (was**2 + rate**2) * seconds
             self.common = stamp, rate
+            self.first, self.rows = self.first or stamp, self.rows + 1
         if _any_given(rates) or _any_given(angles):
             message = pack.joint_state(
                 stamp,
@@ -268,6 +271,10 @@ class _Sender:
         if self._is_new('/reference_odom', _cells(row, self.layout.reference)):
             self._reference(line, row, stamp, rates)
         self.sent += 1
+
+    @property
+    def period(self) -> float:
+        return (self.common[0] - self.first) * 1e-9 / max(self.rows - 1, 1)
 
     def _is_new(self, topic: str, cells: list[str]) -> bool:
         """Return whether a row holds a reading of its own, not a held one."""

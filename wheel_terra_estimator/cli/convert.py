@@ -15,6 +15,8 @@ EXAMPLES = (
     'wheel-terra convert --example',
     'wheel-terra convert log.csv --columns columns.yaml -o drive',
 )
+USUAL_PERIODS = 5e-4, 2.0
+"""Of wheel rates [s]: 2 kHz to one in two seconds, four times `filter.silence`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,5 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     for topic, count in written.held.items():
         print(f'note: {topic} repeats each reading over about {count} rows; it is written once')
+    if written.period and not USUAL_PERIODS[0] <= written.period <= USUAL_PERIODS[1]:
+        print(f'note: wheel rates {written.period:.2g} s apart: is the unit of the time right?')
     print(f'next: wheel-terra check {shlex.quote(str(arguments.output))} --config ROVER')
     return 0
