@@ -3,6 +3,7 @@
 """The node as other nodes see it."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -12,6 +13,7 @@ import ros_types as ros
 
 from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.messages.pack import JOINT_OUTPUTS
+from wheel_terra_estimator.ros import process
 
 ROVER = ['--ros-args', '--params-file']
 NODE = '/wheel_terra_estimator'
@@ -257,6 +259,15 @@ def test_a_file_whose_section_is_for_another_name_is_told(executor, tmp_path, ot
         path.write_text(path.read_text().replace('estimator:', 'estimater:'))
         with pytest.raises(UserError, match="sections there: 'wheel_terra_estimater:'; none"):
             EstimatorNode(context=executor.context, cli_args=arguments)
+
+
+def test_a_file_that_only_the_commands_accept_is_told_from_one_for_ros(tmp_path, capfd):
+    (tmp_path / 'bare.yaml').write_text('rover: {mass: 5.0}\n')
+    arguments = [*ROVER, str(tmp_path / 'bare.yaml')]
+    with ThreadPoolExecutor() as elsewhere:  # where it takes no signals
+        ended = elsewhere.submit(process.run_node, 'lifecycle_node', 'EstimatorNode', arguments)
+    assert ended.result() == 2
+    assert 'ROS needs the lines "/**:" and "  ros__parameters:"' in capfd.readouterr().err
 
 
 @pytest.mark.parametrize('section', ['', 'other', '/**', '/*', '/a/*', '/a/**', '/**/it', 'a/it'])

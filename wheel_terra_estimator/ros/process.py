@@ -24,6 +24,11 @@ LOOK_UP = 0.1  # [s] between two looks at the signals
 
 HOMES = ('HOME', 'ROS_HOME', 'ROS_LOG_DIR')
 LOG_CURE = 'set ROS_LOG_DIR (or ROS_HOME) to a folder that can be written'
+HEAD_CURE = (
+    'unlike the commands, ROS needs the lines "/**:" and "  ros__parameters:" above the keys'
+)
+CURES = {'logging': LOG_CURE, 'ros__parameters': HEAD_CURE}
+"""By a word of the message of rcl."""
 
 
 class _Signals:
@@ -69,7 +74,8 @@ def run_node(module: str, name: str, args: list[str] | None) -> int:
             # Return the error of rcl without its source locations.
             words = str(error).splitlines()[0].partition(', at ')[0]
             words = f'unknown: {words}' if words.startswith('[') else words
-            print(f'{words}; {LOG_CURE}' if 'logging' in words else words, file=sys.stderr)
+            cures = [cure for word, cure in CURES.items() if word in words]
+            print('; '.join([words, *cures]), file=sys.stderr)
             return 2
         if signals is not None:
             signals.serving = True
