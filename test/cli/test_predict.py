@@ -115,6 +115,12 @@ def test_rows_that_the_soil_cannot_carry_stay_empty(capsys):
     assert '1 of 2 points left empty' in captured.err
 
 
+@pytest.mark.parametrize(('more', 'told'), [([], True), (['--config', 'hit_fit'], False)])
+def test_that_no_soil_was_stated_is_told(capsys, more, told):
+    assert main(['predict', '--config', 'hit_wh3', '--load', '80', *more]) == 0
+    assert ('no soil was stated' in capsys.readouterr().err) == told
+
+
 def test_a_law_without_effects(capsys):
     smooth = ('predict', '--config', 'hit_wh3', '--config', 'hit_fit', '--slip', '-0.4:0.9:5')
     resistive = ('-p', 'rover.contact_law:=resistive_force')

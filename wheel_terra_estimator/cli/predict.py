@@ -117,6 +117,9 @@ def run(arguments: argparse.Namespace) -> int:
     # The mass is needed for the default load only.
     brings_load = bool(arguments.load or arguments.points)
     configuration = configuration_reader.from_arguments(arguments, complete=not brings_load)
+    if not configuration.soil_stated:
+        note = 'no soil was stated (--config): these are curves of the default sand'
+        print(f'wheel-terra predict: {note}', file=sys.stderr)
     points = _points(arguments, configuration)
     columns = {n: getattr(points.wheel if n in WHEEL else points, WHEEL.get(n, n)) for n in INPUTS}
     try:
@@ -180,7 +183,8 @@ def _write(
             with fresh.open('w', encoding='utf-8', newline='') as stream:
                 _write_csv(result, stream)
         else:
-            name = str(configuration.flat().get('soil.name') or 'soil as configured')
+            unnamed = 'soil as configured' if configuration.soil_stated else 'default sand'
+            name = str(configuration.flat().get('soil.name') or unnamed)
             effects = ', '.join(configuration.effects) or 'none'
             law = configuration.rover.contact_law
             method = arguments.method if law == BEKKER_WONG_JANOSI else law
