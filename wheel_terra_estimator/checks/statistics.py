@@ -8,6 +8,7 @@ to fall there, and no competing remedy may do as well.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -93,12 +94,15 @@ def block_fits(
     design: FloatArray, targets: FloatArray, instruments: FloatArray | None = None
 ) -> list[list[Estimate]]:
     """Return what `block_fit` does for each column of the targets (k, n)."""
-    instruments = design if instruments is None else instruments
+    # Rows are quicker to sort and to multiply than columns.
+    instruments = np.ascontiguousarray((design if instruments is None else instruments).T)
+    targets = np.ascontiguousarray(targets.T)
     whole, weight = _huber(design, targets, instruments)
-    weighted = instruments[:, None] * weight[..., None]
-    edges = np.linspace(0, len(targets), BLOCKS + 1).astype(int)[:-1]
-    normals = np.add.reduceat(weighted[..., None] * design[:, None, None, :], edges, axis=0)
-    rights = np.add.reduceat(weighted * targets[..., None], edges, axis=0)
+    edges = np.linspace(0, len(design), BLOCKS + 1).astype(int)
+    parts = [slice(*edge) for edge in itertools.pairwise(edges.tolist())]
+    weighted = instruments * weight[:, None]
+    normals = np.array([weighted[..., part] @ design[part] for part in parts])
+    rights = np.array([_times(weighted[..., part], targets[:, part]) for part in parts])
     left_out = _solve(normals.sum(axis=0) - normals, rights.sum(axis=0) - rights)
     scatter = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
     std = np.sqrt((BLOCKS - 1) / BLOCKS * scatter)
@@ -111,16 +115,21 @@ def block_fits(
 def _huber(
     design: FloatArray, targets: FloatArray, instruments: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return coefficients (n, p) and the weights of the rows (k, n)."""
+    """Return coefficients (n, p) and weights (n, k) for targets (n, k), instruments (p, k)."""
     weight: FloatArray = np.ones(targets.shape)
-    coefficients: FloatArray = np.zeros((targets.shape[1], design.shape[1]))
+    coefficients: FloatArray = np.zeros((len(targets), design.shape[1]))
     for _ in range(ROUNDS):
-        weighted = instruments.T * weight.T[:, None, :]
-        coefficients = _solve(weighted @ design, (weighted @ targets.T[..., None])[..., 0])
-        residual = targets - design @ coefficients.T
-        scale = np.maximum(spread(residual), 1e-12)
+        weighted = instruments * weight[:, None]
+        coefficients = _solve(weighted @ design, _times(weighted, targets))
+        residual = targets - coefficients @ design.T
+        scale = np.maximum(spread(residual.T), 1e-12)[:, None]
         weight = 1.0 / np.maximum(np.abs(residual) / (HUBER * scale), 1.0)
     return coefficients, weight
+
+
+def _times(weighted: FloatArray, targets: FloatArray) -> FloatArray:
+    """Return the products (n, p) of weighted instruments (n, p, k) and targets (n, k)."""
+    return np.asarray((weighted @ targets[..., None])[..., 0])
 
 
 def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
