@@ -205,6 +205,23 @@ def test_axes_of_the_accelerometer_that_no_rotation_gives_are_no_turned_imu(orde
     assert finding.fault == 'force_axes'
 
 
+def test_wild_rates_however_many_make_no_velocity_without_a_sign():
+    """One in thirty: of a rover that drives ahead they have both signs, its velocity has one."""
+    whole = rolling.driven(120.0, ([5, 6], [0.0, 0.3]))
+    rate, wild = whole.joints.rate.copy(), np.arange(200, 1200, 30)
+    rate[wild, 1] = 30.0 * (-1.0) ** np.arange(wild.size)
+    assert [f.fault for f in checked(whole=whole, joints={'rate': rate}).findings] == ['wild']
+
+
+def test_velocities_too_rare_for_the_motion_are_no_noise():
+    """Every three seconds, of a rover that changes its speed as fast; the wheels are late."""
+    whole = rolling.driven(150.0, lambda time: 0.3 + 0.2 * np.sin(1.2 * time))
+    rare = rows_of(whole.reference, np.arange(whole.reference.stamp.size) % 6 == 0)
+    joints = replace(whole.joints, stamp=whole.joints.stamp + 1_500_000_000)
+    told = checked(whole=replace(whole, reference=rare, joints=joints, imu=None))
+    assert 'covariance' not in {f.fault for f in told.findings}
+
+
 def test_single_wild_rates_and_torques_are_no_noise():
     random = np.random.default_rng(3)
     rate, torque = WHOLE.joints.rate.copy(), WHOLE.joints.torque.copy()

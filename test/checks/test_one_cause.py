@@ -11,7 +11,10 @@ import rolling_rover as rolling
 from rolling_rover import found
 from scipy.spatial.transform import Rotation
 
+from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.calibration import calibrate
+from wheel_terra_estimator.checks.evidence import gather
+from wheel_terra_estimator.checks.rover_facts import from_configuration
 from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import rows_of
 
@@ -92,7 +95,12 @@ def test_a_pitch_of_the_imu_that_no_circle_shows_is_named_beside_zeros_of_all_to
 JOINTS = ('front_left_steer', 'front_right_steer', 'rear_left_steer', 'rear_right_steer')
 
 
-def steered(
+def steered(*given, **other):
+    """The report on such a drive."""
+    return check_recording(*circles(*given, **other))
+
+
+def circles(
     change, x=(0.6, 0.6, -0.6, -0.6), names=rolling.NAMES, motion=None, sent=lambda v: v, **other
 ):
     """A rover with four steered wheels, long beside its track, in circles; angles changed."""
@@ -113,7 +121,7 @@ def steered(
         torque=np.hstack([whole.joints.torque, none]),
         position=np.hstack([none, change(angle)]),
     )
-    return check_recording(replace(whole, joints=joints, **other), rover)
+    return replace(whole, joints=joints, **other), rover
 
 
 def one_for_both(angle):
@@ -144,6 +152,14 @@ def test_joints_that_do_not_steer_as_the_rover_turns(change, wheel, said):
     assert [f.wheel for f in told] == [wheel] * (wheel is not None)
     assert all(said in f.words and 'by hand' in f.cure for f in told)
     assert {f.kind for f in report.findings} <= {'sign', 'radius', 'track'}
+
+
+def test_the_noise_of_a_gyro_makes_no_joint_steer_less():
+    """As large as the turns: a fit to it has wheels half as much steered."""
+    rate = WHOLE.imu.rate + np.random.default_rng(3).normal(0.0, 0.15, WHOLE.imu.rate.shape)
+    drive, rover = circles(lambda angle: angle, imu=replace(WHOLE.imu, rate=rate))
+    gain, _ = turning._steered_as_turned(gather(drive, from_configuration(rover), {}))
+    assert gain == pytest.approx(np.ones(4), abs=0.1)
 
 
 def test_joints_across_that_are_exchanged():

@@ -54,6 +54,29 @@ def test_an_accelerometer_reversed_among_swapped_sides_is_an_imu_upside_down_in_
     assert told['imu_upside'].confidence <= 0.85 and 'are swapped' in told['imu_upside'].words
 
 
+@pytest.mark.parametrize('axes', [[-1, -1, -1], [1, -1, -1]])
+def test_an_accelerometer_and_all_wheels_reversed_are_an_imu_and_a_reference(axes):
+    """Either way wheels, gyro, starts and reference agree: nothing is sure, nothing is written."""
+    joints = {name: -getattr(WHOLE.joints, name) for name in ('rate', 'torque')}
+    turned = np.array([1, -1, -1]) if axes[0] > 0 else 1.0  # upside down, or the force alone
+    imu = {'force': WHOLE.imu.force * axes, 'rate': WHOLE.imu.rate * turned}
+    told = faults(joints=joints, imu=imu)
+    assert {*told} == {'imu_upside', 'reference_reversed'}
+    assert 'linear_acceleration has the wrong sign' in told['imu_upside'].words
+    assert 'all wheels read negative' in told['reference_reversed'].words
+    assert all(f.confidence <= 0.5 for f in told.values())
+
+
+def test_sides_that_push_against_each_other_have_no_torques_reversed():
+    """Those of the right take less uphill, as in a slight turn; level ground costs nothing."""
+    sense, force = np.sign(np.round(WHOLE.joints.rate, 1)), WHOLE.imu.force[:, :1]
+    uphill = np.interp(WHOLE.joints.seconds, WHOLE.imu.seconds, force[:, 0])[:, None]
+    level = rolling.RESISTANCE * rolling.MASS * rolling.GRAVITY * rolling.RADIUS / 4 * sense
+    against = 2.0 * rolling.MASS * rolling.RADIUS / 4 * uphill * [1, -1, 1, -1]
+    told = faults(joints={'torque': WHOLE.joints.torque - level + against})
+    assert 'torque_sign' not in told
+
+
 @pytest.mark.parametrize('backwards', [[-1, 1, 1, 1], [1, -1, 1, -1]])
 def test_an_accelerometer_reversed_beside_wheels_that_count_backwards(backwards):
     """The gyro is upright: neither are the sides swapped nor does the reference run backwards."""

@@ -87,6 +87,18 @@ def test_a_scale_of_the_reference_is_no_radius(factor):
     assert track == pytest.approx(turned, rel=0.02)
 
 
+def test_a_scale_of_the_reference_is_written_as_no_radius():
+    """Steady driving says nothing of which it is: a prior alone writes no file."""
+    steady = replace(rolling.driven(200.0, 0.3), imu=None)
+    scaled = replace(steady.reference, velocity=1.15 * steady.reference.velocity)
+    no_torque = replace(steady.joints, torque=np.nan * steady.joints.torque)
+    recording = replace(steady, reference=scaled, joints=no_torque)
+    calibration = calibrate(recording, rolling.rover(**SKID))
+    assert 'wheels.radius' not in {change.key for change in calibration.changes}
+    told = [f for f in calibration.findings if 'ten metres' in f.cure]
+    assert {f.fault for f in told} == {'radius', 'reference_scale'}
+
+
 @pytest.mark.parametrize('zero', [8.0, pytest.param(-8.0, marks=pytest.mark.slow)])
 def test_a_zero_of_the_torques_is_no_radius(zero):
     motion = rolling.ten_minute_drive()

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -63,14 +63,12 @@ def calibrate(
             changes.add(finding.parameter, finding.value, finding.std, finding.words)
     _biases(changes, _mounting(changes, evidence, report), report)
     _noises_and_rates(changes, report)
-    evidence = _radius(changes, evidence, report)
+    _radius(changes, evidence, report)
     if np.isfinite(evidence.torque).any(axis=0).all():
         _torques(changes, evidence)
     _track(changes, evidence)
     report.not_checked.append(not_checked('mass', 'centre'))
-    alternatives = ('mass', 'reference_scale' if 'wheels.radius' in changes else '')
-    left = [f for f in report.findings if f.parameter not in changes]
-    left = [finding for finding in left if finding.fault not in alternatives]
+    left = (f for f in report.findings if f.parameter not in changes and f.fault != 'mass')
     return Calibration(tuple(changes.values()), tuple(report.not_checked), tuple(left))
 
 
@@ -171,22 +169,15 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
             changes.add(key, round(seen, 2), None, 'median period of the stamps')
 
 
-def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
-    configuration, figures = evidence.facts.configuration, report.figures
+def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
+    stated, rolling = evidence.facts.configuration.wheels, evidence.facts.radius
     radius = next((finding for finding in _sure(report) if finding.fault == 'radius'), None)
-    open_yet = any(finding.fault == 'reference_scale' for finding in report.findings)
-    rolling, source = evidence.facts.radius, 'straight stretches against the other wheels'
+    source = 'straight stretches against the other wheels'
     if radius is not None and evidence.recording.reference is not None:
         source = f'straight, steady, firm stretches against {evidence.recording.reference.topic}'
-        if open_yet:  # nothing is mended by it yet
-            rolling = rolling * figures['rover.radius_ratio']
-            source += ' (or its scale is off: drive ten metres along a tape)'
-    if np.allclose(rolling, configuration.wheels.slip_radius):
-        return evidence
-    lugs = configuration.wheels.slip_radius - configuration.wheels.radius
-    std = radius.std if radius is not None else None
-    changes.add('wheels.radius', (rolling - lugs).round(5).tolist(), std, source)
-    return replace(evidence, facts=replace(evidence.facts, radius=rolling))
+    if not np.allclose(rolling, stated.slip_radius):
+        lugs, std = stated.slip_radius - stated.radius, radius.std if radius is not None else None
+        changes.add('wheels.radius', (rolling - lugs).round(5).tolist(), std, source)
 
 
 def _torques(changes: _Changes, evidence: Evidence) -> None:

@@ -242,9 +242,13 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
         return not_checked('delay', 'seldom')
     time, at = even_times(evidence.time, STEP), evidence.seconds(imu)
     by_log = _moved(evidence, 'imu') - _moved(evidence, 'joints')
+    near = max(SMOOTHING, 2.0 * imu.period)  # what lies in a gap between two readings is neither's
+    readings = (np.searchsorted(np.sort(at), time + by) for by in (near, -near))
+    there = np.subtract(*readings) > 0
 
     def after(first: FloatArray, second: FloatArray, by: str) -> Lag | None:
-        around = [lag_of(time, first, time + by_log, second, by, log) for log in {by_log, 0.0}]
+        sent, seen = (time + by_log)[there], second[there]
+        around = [lag_of(time, first, sent, seen, by, log) for log in {by_log, 0.0}]
         return min(filter(None, around), key=lambda one: one.trial.after, default=None)
 
     turned = started = None

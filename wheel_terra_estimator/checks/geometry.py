@@ -43,6 +43,7 @@ LEAST_UNLIKE = 0.05  # difference of wheels that slip makes none, on one side [-
 OUTRUN_STD = 0.01  # slip that is left open where a rover outruns its wheels [-]
 PRIOR_OF_RADIUS = 0.85  # probability that it is the radius, not the scale of the reference [-]
 SURE = 0.97  # probability beside its alternative from which a fault is named alone [-]
+BESIDE = 0.8  # the same of one that is named with it, at most: neither is written [-]
 START_SLIP = 0.15  # part of the accelerations of rims that slip and lags take, one deviation [-]
 START_STD = 0.03  # of them by the model, at least [-]
 TRACK_STD = 0.02  # deviation that slip leaves in a scale of speed by turns, at least [-]
@@ -282,6 +283,7 @@ def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         hides = 'soft ground causes' if soft else 'torque zeros hide'
         words['alternative'] += f', or {hides} slip' if slips else ''
         words['separate'] = '; drive ten metres along a tape: which of the two shows ten?'
+        share = min(max(share, 1.0 - BESIDE), BESIDE)
     off = radius * ratio.std
     of_rims = {'value': round(float(np.mean(rims)), 5), 'std': round(off, 5), 'radii': listed(rims)}
     times, std = round(1.0 / ratio.value, 4), round(ratio.std / ratio.value**2, 4)

@@ -51,6 +51,7 @@ from wheel_terra_estimator.checks.statistics import (
     step_of,
 )
 from wheel_terra_estimator.checks.turning import (
+    against_reference,
     gyro_unit_known,
     ordinary_track,
     track_ratio,
@@ -421,7 +422,12 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     words: dict[str, Any] = {'force': force}
     sure = 0.999
     starts = mounting_yaw(mended)
+    std = math.degrees(STEEPEST_MEAN) / 3.0
     if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
+        if against_reference(evidence):  # of either pair of faults both have the other's turns
+            words['alternative'] = ', or linear_acceleration has the wrong sign: look at the IMU'
+            told = mounting_finding('imu_upside', evidence, mended, std, 0.5, **words)
+            return [told], replace(evidence, force=None, gyro=None)
         upright = turns_upright(evidence)
         if upright > CLEAR_AGREEMENT:
             reversed_force = replace(evidence, force=-evidence.force)
@@ -440,7 +446,6 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         sure = 0.5
         words.setdefault('alternative', '')
         words['alternative'] += '; which way its x axis points is open: drive brisk starts'
-    std = math.degrees(STEEPEST_MEAN) / 3.0
     return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended
 
 

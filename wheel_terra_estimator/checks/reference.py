@@ -343,7 +343,8 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     expected = usual or float(own)  # what the estimator goes by
     # Errors wander: what is stated may well be more than the scatter, but not more than the speed.
     usual_speed = float(np.quantile(np.abs(forward), 0.9))
-    if expected and noise / COVARIANCE_FACTOR <= expected <= usual_speed:
+    moves = noise < 2.0 * bend_noise(rim)  # what starts and stops make is no noise
+    if expected and (moves or noise / COVARIANCE_FACTOR <= expected) and expected <= usual_speed:
         return []
     noise = max(noise, LEAST_STD)
     details = {'noise': noise, 'variance': noise**2, 'stated': usual}

@@ -104,12 +104,16 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts, by_wheel = evidence.facts, responses(evidence)
     if by_wheel is None or _fight(evidence, by_wheel):
         return [not_checked('sign', 'torque_no_change')], evidence
-    usual = float(np.median([abs(response.value) for response, _ in by_wheel]))
+    changes = np.array([response.value for response, _ in by_wheel])
+    usual = float(np.median(np.abs(changes)))
     agree = all(response.value * level.value > 0.0 for response, level in by_wheel)
     wrong, unsure = [], []
     for i, (response, level) in enumerate(by_wheel):
         brakes = -level.value > SIGN_SIGMAS * level.std
-        clear = response.sigmas_from(0.0) > SIGN_SIGMAS or (brakes and agree)
+        # In a turn one side pushes against the other, all its wheels alike.
+        beside = np.delete(changes, i)[np.delete(facts.side, i) == facts.side[i]]
+        odd = beside.size and response.value * np.median(beside) < 0.0
+        clear = (response.sigmas_from(0.0) > SIGN_SIGMAS and odd) or (brakes and agree)
         drives = level.value > SIGN_SIGMAS * level.std
         if response.value < -LEAST_RESPONSE * usual and clear and not drives:
             wrong.append(i)

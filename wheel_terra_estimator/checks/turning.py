@@ -71,6 +71,7 @@ CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
 SLIDE = ', or the rover slides back'
 SOME = ', or some of them do: drive straight'
+ALL_WHEELS = ', or all wheels read negative'
 DEGREE, NEAR_DEGREES = math.radians(1.0), 0.15  # [rad]; error of a scale that few turns tell [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
@@ -290,13 +291,18 @@ def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     rows, heading = evidence.moving, integrated(evidence.time, evidence.yaw)
     if evidence.turning.sum() < LEAST_TURNING_ROWS or np.ptp(heading) < LEAST_HEADINGS:
         return gain, zero
-    yaw, speed = evidence.yaw[rows, None], np.nan_to_num(evidence.speed[rows])
+    speed = np.nan_to_num(evidence.speed[rows])
     by_angle = speed * np.tan(np.nan_to_num(evidence.steering[rows]))
     others = ~steered if not steered.all() else steered
-    aside = np.median((by_angle * steered - yaw * x)[:, others], axis=1, keepdims=True) + yaw * x
+    yaws = (np.roll(evidence.yaw, by)[rows, None] for by in (0, 1))  # of another noise
+    aside, beside = (
+        np.median((by_angle * steered - yaw * x)[:, others], axis=1, keepdims=True) + yaw * x
+        for yaw in yaws
+    )
     for i in np.flatnonzero(steered & np.isfinite(evidence.rate).any(axis=0)):
         seen = speed[:, i] * np.tan(np.nan_to_num(steering[rows, i]))
-        share, off = block_fit(np.column_stack([aside[:, i], speed[:, i]]), seen)
+        design, other = (np.column_stack([one[:, i], speed[:, i]]) for one in (aside, beside))
+        share, off = block_fit(design, seen, other)
         asked = np.quantile(np.abs(aside[:, i]), 0.9) > LEAST_ASKED * np.abs(speed[:, i]).mean()
         if asked and share.std < 0.5 * STILL:
             gain[i], zero[i] = share.value, math.atan(off.value)
@@ -355,11 +361,11 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         finding, mended = _backwards(evidence, mended, signs, chosen)
         outcomes.append(finding)
     if turn < 0.0:
-        swaps, mended = _swapped(mended)
+        swaps, mended = _swapped(mended, ALL_WHEELS if agreement == (None, None) else '')
         outcomes += swaps
     if blame == 'reference' and evidence.recording.reference is not None:
         alone = bool(turn) or agreement[1] is not None
-        sure, others = (confidence(3.0), '') if alone else (0.5, ', or all wheels read negative')
+        sure, others = (confidence(3.0), '') if alone else (0.5, ALL_WHEELS)
         if slides:
             sure, others = 0.5 * sure, f'{others}{SLIDE}'
         finding = evidence.found('reference_reversed', sure, value=-1.0, alternative=others)
@@ -383,7 +389,9 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     # Nothing is clearly better than what the rover file says, or good enough.
     steered = np.isfinite(evidence.steering).any()
     if not trial.falls or trial.after > (MOST_LEFT_STEERED if steered else MOST_LEFT):
-        return _Chosen(signs, fits_of([Fix((1,) * count)], stretch)[0].clear_track)
+        stated = fits_of([Fix((1,) * count)], stretch)[0]
+        # Beside one that fits the drive far better it tells no sides either.
+        return _Chosen(signs, stated.clear_track * (fit.cost > LEAST_FALL * stated.cost))
     turn = fit.clear_track
     signs[there] = best.signs
     facts = evidence.facts
@@ -416,6 +424,15 @@ def turns_upright(evidence: Evidence) -> float:
     if rows.sum() * evidence.period < LEAST_TURNING:
         return 0.0
     return correlation(evidence.gyro[rows, 2], difference[rows])
+
+
+def against_reference(evidence: Evidence) -> bool:
+    """Return whether the wheels, beside those that alone count backwards, run against it."""
+    there, rows = _known(evidence)
+    if rows.sum() < LEAST_MOVING_ROWS:
+        return False
+    signs = _chosen(evidence, there, rows).signs
+    return bool(signs.sum()) and (_direction(evidence, signs)[0] or 0.0) < 0.0
 
 
 _Agreement: TypeAlias = 'tuple[float | None, float | None]'
@@ -479,10 +496,11 @@ def _backwards(
     return finding, mended.with_rate(mended.rate * signs, mended.torque * signs)
 
 
-def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+def _swapped(evidence: Evidence, others: str) -> tuple[list[Outcome], Evidence]:
     """Return what makes the wheels turn against the gyro, its sign or swapped sides, and it mended.
 
-    Curves are felt and rovers are steered as the gyro says where it is right.
+    Curves are felt and rovers are steered as the gyro says where it is right; ``others``: what else
+    it may be where nothing tells, in words.
     """
     facts, (against, sense) = evidence.facts, _sense_of_gyro(evidence)
     if sense < 0 and evidence.gyro is not None:
@@ -497,12 +515,12 @@ def _swapped(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sides = evidence.found(
         'swapped_sides',
         0.97 if sense else 0.5,
-        alternative='' if sense else ', or the gyro is positive to the right',
+        alternative='' if sense else f', or the gyro is positive to the right{others}',
         names=', '.join(facts.names[i] for i in order),
     )
     if sense:
         return [sides], mended
-    against = 'the wheels, or left and right wheels are swapped'
+    against = f'the wheels, or left and right wheels are swapped{others}'
     gyro_off = evidence.found('gyro_reversed', 0.5, value=-1.0, axis='z', against=against)
     return [sides, gyro_off], mended
 

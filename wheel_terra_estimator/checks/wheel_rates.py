@@ -243,7 +243,7 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return single rates and torques that leave the ones before and after; left out from here."""
     outcomes, mended = list[Outcome](), []
     for name, table in (('velocity', evidence.rate), ('effort', evidence.torque)):
-        off, usual = spike_height(table), np.nanquantile(np.abs(table), 0.98, axis=0)
+        off, usual = spike_height(table), np.nanquantile(np.abs(table), 1.0 - MOST_WILD, axis=0)
         noise = np.array([robust_std(column) for column in np.diff(table, axis=0).T])
         wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
         # To break away or turn back takes a large torque for an instant.
@@ -279,9 +279,10 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             return [finding], evidence.with_rate(evidence.rate * np.where(wrong, factor, 1.0))
     sense = np.sign(evidence.speed)
     common, outcomes = np.sign(row_medians(sense)), list[Outcome]()
-    unlike = [np.nanmean(sense[rows & (common == way)], axis=0) for way in (1.0, -1.0)]
+    ways = [rows & (common == way) for way in (1.0, -1.0)]
+    unlike = [np.nanmean(sense[way], axis=0) for way in ways]
     unsigned = np.minimum(*np.abs(unlike)) * np.sign(unlike[0] * unlike[1]) > ONE_SIGN
-    if unsigned.any():
+    if unsigned.any() and min(way.sum() for way in ways) >= LEAST_MOVING_ROWS:
         wheels = facts.named(unsigned)
         outcomes.append(
             evidence.found('rates_unsigned', 0.95, wheel=wheels, other='other wheels go')
