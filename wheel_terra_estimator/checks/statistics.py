@@ -8,7 +8,6 @@ to fall there, and no competing remedy may do as well.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -98,11 +97,12 @@ def block_fits(
     instruments = np.ascontiguousarray((design if instruments is None else instruments).T)
     targets = np.ascontiguousarray(targets.T)
     whole, weight = _huber(design, targets, instruments)
-    edges = np.linspace(0, len(design), BLOCKS + 1).astype(int)
-    parts = [slice(*edge) for edge in itertools.pairwise(edges.tolist())]
-    weighted = instruments * weight[:, None]
-    normals = np.array([weighted[..., part] @ design[part] for part in parts])
-    rights = np.array([_times(weighted[..., part], targets[:, part]) for part in parts])
+    edges = np.linspace(0, len(design), BLOCKS + 1).astype(int)[:, None]
+    rows = edges[:-1] + np.arange(np.diff(edges, axis=0).max())  # of each block, or beyond it
+    there, rows = rows < edges[1:], np.minimum(rows, len(design) - 1)
+    weighted = np.moveaxis((instruments * weight[:, None])[..., rows] * there, 2, 0)
+    normals = weighted @ design[rows][:, None]
+    rights = _times(weighted, np.moveaxis(targets[:, rows], 1, 0))
     left_out = _solve(normals.sum(axis=0) - normals, rights.sum(axis=0) - rights)
     scatter = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
     std = np.sqrt((BLOCKS - 1) / BLOCKS * scatter)
@@ -128,7 +128,7 @@ def _huber(
 
 
 def _times(weighted: FloatArray, targets: FloatArray) -> FloatArray:
-    """Return the products (n, p) of weighted instruments (n, p, k) and targets (n, k)."""
+    """Return the products (..., p) of weighted instruments (..., p, k) and targets (..., k)."""
     return np.asarray((weighted @ targets[..., None])[..., 0])
 
 
