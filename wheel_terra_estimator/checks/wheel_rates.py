@@ -243,9 +243,10 @@ def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return single rates and torques that leave the ones before and after; left out from here."""
     outcomes, mended = list[Outcome](), []
     for name, table in (('velocity', evidence.rate), ('effort', evidence.torque)):
-        off, usual = spike_height(table), np.nanquantile(np.abs(table), 1.0 - MOST_WILD, axis=0)
+        size, off = np.abs(table[evidence.moving]), spike_height(table)
+        usual = np.nanquantile(size, 1.0 - MOST_WILD, axis=0)
         noise = np.array([robust_std(column) for column in np.diff(table, axis=0).T])
-        wild = off > np.maximum(WILD_FACTOR * usual, WILD_SIGMAS * noise)
+        wild = off > np.fmax(WILD_FACTOR * usual, WILD_SIGMAS * noise)
         # To break away or turn back takes a large torque for an instant.
         counted = wild if name == 'velocity' else wild & evidence.steady[:, None]
         if counted.any(axis=1).sum() >= LEAST_WILD and wild.sum() < MOST_WILD * wild.size:
