@@ -37,6 +37,16 @@ def test_wheels_backwards_in_turns_on_the_spot_are_found_all_the_same(wheels):
     assert 'on the other half' in finding.words
 
 
+def test_slip_that_makes_no_turn_exchanges_no_wheels():
+    """Wheels of one axle slip by a twentieth of the turns that the rover makes, against them."""
+    whole = rolling.driven(120.0, 0.3, yaw=lambda time: 0.03 * np.sign(np.sin(0.7 * time)))
+    yaw = np.interp(whole.joints.seconds, whole.imu.seconds, whole.imu.rate[:, 2])[:, None]
+    share = np.array([0.95, 0.95, 1.1, 1.1])  # of its turn that each wheel does not make
+    rate = whole.joints.rate + share * yaw * rolling.HALF_TRACK * [1, -1, 1, -1] / rolling.RADIUS
+    found = rolling.checked(rolling.rover(**SKID), whole=whole, joints={'rate': rate}).findings
+    assert 'exchanged_wheels' not in {f.kind for f in found}, [str(f) for f in found]
+
+
 def test_a_rover_that_slides_back_in_curves_has_no_reversed_wheels_for_sure():
     """Wheels drive up a slope of 0.2 rad, the body goes down."""
     whole = rolling.driven(120.0, 0.25, yaw=lambda time: 0.1 * np.sin(time / 5.0), slope=-0.2)

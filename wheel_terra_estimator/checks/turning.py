@@ -388,7 +388,9 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
         best, fit, trial = again if again[2].falls else (best, fit, trial)
     # Nothing is clearly better than what the rover file says, or good enough.
     steered = np.isfinite(evidence.steering).any()
-    if not trial.falls or trial.after > (MOST_LEFT_STEERED if steered else MOST_LEFT):
+    most = MOST_LEFT_STEERED if steered else MOST_LEFT
+    no_turns = bool(best.exchanged) and abs(fit.track) < SKID_TRACKS[0]  # but slip, by far
+    if not trial.falls or trial.after > most or no_turns:
         stated = fits_of([Fix((1,) * count)], stretch)[0]
         # Beside one that fits the drive far better it tells no sides either.
         return _Chosen(signs, stated.clear_track * (fit.cost > LEAST_FALL * stated.cost))
