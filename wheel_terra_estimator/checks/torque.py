@@ -113,7 +113,8 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         # In a turn one side pushes against the other, all its wheels alike.
         beside = np.delete(changes, i)[np.delete(facts.side, i) == facts.side[i]]
         odd = beside.size and response.value * np.median(beside) < 0.0
-        clear = (response.sigmas_from(0.0) > SIGN_SIGMAS and odd) or (brakes and agree)
+        clear = response.sigmas_from(0.0) > SIGN_SIGMAS and (odd or brakes)
+        clear |= brakes and agree
         drives = level.value > SIGN_SIGMAS * level.std
         if response.value < -LEAST_RESPONSE * usual and clear and not drives:
             wrong.append(i)
