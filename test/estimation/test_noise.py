@@ -55,6 +55,12 @@ def test_white_noise_is_seen_as_it_is_on_a_ramp_and_in_means(noise, sensor, std,
     assert read(noise, sensor, std, 0.1 * np.arange(count), **how) == pytest.approx(std, rel=0.08)
 
 
+def test_noise_is_seen_in_readings_that_are_not_evenly_spaced(noise):
+    """Wheel rates at 50 Hz, merged for estimates at 20 Hz, come after 40 and 60 ms in turn."""
+    times = np.cumsum(np.tile([0.04, 0.06], 500))
+    assert read(noise, 'wheel_rate', 0.1, times, slope=5.0) == pytest.approx(0.1, rel=0.08)
+
+
 def test_noise_clearly_beyond_what_is_stated_is_taken_in_its_place(noise):
     stated, times = noise.stated['torque'], 0.1 * np.arange(400)
     for share, taken in ((0.5, False), (1.5, False), (4.0, True)):

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Noise of the sensors: as the messages of an IMU state it, and as it is observed.
 
-The second difference x1 - 2 x2 + x3 of equally spaced readings has six times the variance of white
-noise, and hardly any part of a slow motion. Reference velocities are compared with the filter
-instead: successive innovations of a slow state differ by the noise of both references.
+A reading less the one interpolated between its neighbours has white noise of 1.5 times the
+variance, if they are equally spaced, and hardly any part of a slow motion. Reference velocities are
+compared with the filter instead: successive innovations of a slow state differ by the noise of both
+references.
 """
 
 from __future__ import annotations
@@ -63,8 +64,6 @@ class StatedNoise(NamedTuple):
 
 NOTHING_STATED = StatedNoise()
 
-_DIFFERENCE_FACTOR = 6.0  # variance of x1 - 2 x2 + x3 over that of each
-
 # How fast the observed noise is learned, and within which bounds.
 _SECONDS_PER_SAMPLE = 4  # one second in four is used: the noise of sensors changes slowly
 _FIRST_SECONDS = 12.0  # of a run [s], all of which are used where nobody states the noise
@@ -75,7 +74,6 @@ _MOST_DEVIATIONS = 2.0
 of four, one outlier in 16 readings would raise the mean without end."""
 _OUTLIER_DEVIATIONS = 10.0
 """Observed deviations beyond which a reference is an outlier, left to the gate of the filter."""
-_IN_STEP = 0.2  # greatest relative difference of two equal spacings of readings
 _LONGEST_GAP = 0.5  # between readings that are compared [s]
 _LEAST_SHARE = 0.01  # bounds of the observed deviation, over the stated one
 _MOST_SHARE = 100.0
@@ -170,18 +168,20 @@ class ObservedNoise(Component[ObservedNoiseState]):
         state = self.state.channels[sensor]
         gap = time - state.time
         variance, count = state.variance, state.readings
-        in_step = abs(gap - state.gap) <= _IN_STEP * gap <= _IN_STEP * _LONGEST_GAP
-        if in_step and len(state.before) == len(values):
+        if max(gap, state.gap) <= _LONGEST_GAP and len(state.before) == len(values):
+            early = gap / (gap + state.gap)  # weight of the earlier neighbour
+            late = 1.0 - early
             differences = [
-                (a - 2.0 * b + c) ** 2
+                (b - early * a - late * c) ** 2
                 for a, b, c in zip(state.before, state.last, values, strict=True)
                 if not isnan(a + b + c)
             ]
             if differences:
                 # The mean of n messages has an n-th of their variance.
                 rate: float = getattr(self._figures, SENSORS[sensor].rate)
-                messages = max(gap * rate, 1.0)
-                observed = messages * sum(differences) / (_DIFFERENCE_FACTOR * len(differences))
+                messages = max(0.5 * (gap + state.gap) * rate, 1.0)
+                factor = 1.0 + early**2 + late**2
+                observed = messages * sum(differences) / (factor * len(differences))
                 variance, count = self._mean(sensor, variance, count, observed, _READINGS)
         self._keep(sensor, ChannelState(time, gap, values, state.last, variance, count))
 
