@@ -11,6 +11,7 @@ from parts import Parts, on_sand
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.equilibrium_slip import EquilibriumSlip
 from wheel_terra_estimator.estimation.contacts.measured_wheels import (
+    Opinion,
     SpeedAndVariance,
     pooled,
     slip_of_torque,
@@ -122,12 +123,13 @@ def test_torque_tells_nothing_on_the_plateau_or_where_there_is_none():
     assert math.isnan(slip_of_torque(math.nan).slip)
 
 
-def test_pooled_estimates_have_the_moments_of_their_mixture():
-    """By Monte Carlo: each of the two is right as often as its inverse variance says."""
+@pytest.mark.parametrize('share', [1.0, 0.3, 0.0])
+def test_pooled_estimates_have_the_moments_of_their_mixture(share):
+    """By Monte Carlo: each of the two is right as often as inverse variance and share say."""
     rng = np.random.default_rng(6)
-    first = rng.random(400_000) < 0.9
+    first = rng.random(400_000) < 1.0 - 0.1 * share
     drawn = np.where(first, rng.normal(0.2, 0.1, first.size), rng.normal(0.6, 0.3, first.size))
-    told = pooled(SpeedAndVariance(0.2, 0.01), SpeedAndVariance(0.6, 0.09))
+    told = pooled(SpeedAndVariance(0.2, 0.01), Opinion(0.6, 0.09, share))
     assert told.speed == pytest.approx(drawn.mean(), rel=0.01)
     assert told.variance == pytest.approx(drawn.var(), rel=0.01)
 

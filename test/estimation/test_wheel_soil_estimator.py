@@ -476,3 +476,15 @@ def test_references_off_by_more_than_they_state_widen_the_deviation_of_the_speed
         sets = estimate(replace(driven, arrivals=arrivals))
         stds.append(np.sqrt(np.mean([s.forward_velocity_variance for s in sets[-100:]])))
     assert stds[1] > 2.0 * stds[0]
+
+
+def test_slip_does_not_jump_when_references_end(parts):
+    """They show a slip of 0.5; wheels with such a torque usually slip by 0.1."""
+    estimator, rover = WheelSoilEstimator(parts.configuration), parts.rover
+    torque = 0.25 * np.array(parts.cycle().loads.load) * np.array(rover.slip_radius)
+    slips = []
+    for i in range(300):
+        speed = 0.05 if i % 5 == 0 and i <= 200 else None
+        estimator.step(*step_inputs(0.1 * i, 0.1 / np.array(rover.slip_radius), torque, speed=speed))
+        slips.append(float(np.median(estimator.estimates().slip)))
+    assert np.abs(np.diff(slips[200:])).max() < 0.02

@@ -30,6 +30,7 @@ from wheel_terra_estimator.estimation.contacts.linearisation import (
 )
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.measured_wheels import (
+    Opinion,
     SpeedAndVariance,
     pooled,
     slip_of_torque,
@@ -112,7 +113,7 @@ class Instant(NamedTuple):
     sources: Sources
     """Speed as filtered; mean and covariance are empty: the smoother supplies its own."""
     cycle: SpeedAndVariance  # of the filter at its last cycle
-    by_torque: SpeedAndVariance | None  # by the typical slip at the measured torques
+    by_torque: Opinion | None  # by the typical slip at the measured torques
 
 
 class _Clock(NamedTuple):
@@ -705,11 +706,12 @@ class WheelSoilEstimator:
         speed, variance = self._speed.present(self._ekf, time, rims, window, inflated=slip_known)
         return SpeedAndVariance(speed, variance * excess(self._reference.state.nis))
 
-    def _speed_by_torque(self, rims: RimSpeeds) -> SpeedAndVariance | None:
+    def _speed_by_torque(self, rims: RimSpeeds) -> Opinion | None:
         """Return speed [m/s] and variance by the typical slip at the measured torques.
 
         None with a reference velocity, without torques, in turns, on forming contacts, or while
-        the stuck assessment says that the ground holds the rover.
+        the stuck assessment says that the ground holds the rover. Its share grows as the filter
+        forgets what the last reference showed: over the travel in which slip reverts to equilibrium.
         """
         time, turns = self._clock.time, self._turning.state.lateral_motion > _SHARP_TURN
         straight = self._contact_age.settled and not turns
@@ -719,8 +721,9 @@ class WheelSoilEstimator:
         usual = slip_of_torque(self._torque_coefficient.state)
         if isnan(usual.slip) or not abs(rims.typical) >= self._rover.low_rim:
             return None
-        speed = (1.0 - usual.slip) * rims.typical
-        return SpeedAndVariance(speed, (usual.std * rims.typical) ** 2)
+        rim, unknown = rims.typical, self._reference.unknown_for(time)
+        share = -math.expm1(-abs(rim) * unknown / EQUILIBRIUM_LENGTH)
+        return Opinion((1.0 - usual.slip) * rim, (usual.std * rim) ** 2, share)
 
     # -- Outputs ---------------------------------------------------------------------------------
 

@@ -61,14 +61,23 @@ class SpeedAndVariance(NamedTuple):
     variance: float
 
 
-def pooled(one: SpeedAndVariance, other: SpeedAndVariance) -> SpeedAndVariance:
+class Opinion(NamedTuple):
+    """A second estimate of it."""
+
+    speed: float  # [m/s]
+    variance: float
+    share: float  # of the weight by its inverse variance that it has in a pool [-]
+
+
+def pooled(one: SpeedAndVariance, other: Opinion) -> SpeedAndVariance:
     """Return the linear opinion pool (Stone 1961) of two estimates from the same readings.
 
     Mean and variance of the mixture of both, weighted by their inverse variances. Consistent
-    however strongly their errors are correlated: its variance is never below that of covariance
-    intersection, and grows with the square of their difference.
+    however strongly their errors are correlated: with the whole weight its variance is never below
+    that of covariance intersection, and grows with the square of their difference.
     """
-    both = one.variance + other.variance
-    weight, difference = other.variance / both, one.speed - other.speed
-    variance = 2.0 * weight * one.variance + weight * (1.0 - weight) * difference**2
-    return SpeedAndVariance(other.speed + weight * difference, variance)
+    difference = other.speed - one.speed
+    weight = other.share * one.variance / (one.variance + other.variance)
+    variance = (1.0 - weight) * one.variance + weight * other.variance
+    spread = weight * (1.0 - weight) * difference**2
+    return SpeedAndVariance(one.speed + weight * difference, variance + spread)

@@ -105,7 +105,11 @@ class ReferenceUpdate(Component[ReferenceState]):
 
     def known(self, time: float) -> bool:
         """Return whether the last reference that shows slip is younger than `_KNOWN_TIME`."""
-        return time - self.state.slip_time < _KNOWN_TIME
+        return self.unknown_for(time) < 0.0
+
+    def unknown_for(self, time: float) -> float:
+        """Return how long slip has not been known [s]; negative while it is."""
+        return time - self.state.slip_time - _KNOWN_TIME
 
     def known_twice(self, time: float) -> bool:
         """Return whether the last two are: one alone may average over a start."""
