@@ -485,6 +485,8 @@ def test_slip_does_not_jump_when_references_end(parts):
     slips = []
     for i in range(300):
         speed = 0.05 if i % 5 == 0 and i <= 200 else None
-        estimator.step(*step_inputs(0.1 * i, 0.1 / np.array(rover.slip_radius), torque, speed=speed))
+        estimator.step(
+            *step_inputs(0.1 * i, 0.1 / np.array(rover.slip_radius), torque, speed=speed)
+        )
         slips.append(float(np.median(estimator.estimates().slip)))
     assert np.abs(np.diff(slips[200:])).max() < 0.02

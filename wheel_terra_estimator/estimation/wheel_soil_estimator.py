@@ -711,7 +711,7 @@ class WheelSoilEstimator:
 
         None with a reference velocity, without torques, in turns, on forming contacts, or while
         the stuck assessment says that the ground holds the rover. Its share grows as the filter
-        forgets what the last reference showed: over the travel in which slip reverts to equilibrium.
+        forgets what the last reference showed, as its slip reverts to equilibrium.
         """
         time, turns = self._clock.time, self._turning.state.lateral_motion > _SHARP_TURN
         straight = self._contact_age.settled and not turns
