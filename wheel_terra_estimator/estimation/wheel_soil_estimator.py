@@ -295,7 +295,12 @@ class WheelSoilEstimator:
 
         unmodelled_std = self._sinkage_process.state.unmodelled_std
         rows = self._sinkage.update(
-            ekf, time, self._sinkages.take(), self._noise.variance('sinkage'), unmodelled_std
+            ekf,
+            time,
+            self._sinkages.take(),
+            self._noise.variance('sinkage'),
+            unmodelled_std,
+            slip_known=cycle.reference_known,
         )
         self._unloaded.update(cycle)
         forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
@@ -511,7 +516,8 @@ class WheelSoilEstimator:
         speed_std = math.sqrt(float(ekf.P[SPEED, SPEED]))
         pulls, stationary = self._stationary.update(ekf.x, speed_std, cycle)
         start = self._contact_age.shear_variance
-        repeats = correlated_cycles(cycle.rims, cycle.dt) * self._reference.model_variance_factor
+        doubt = self._reference.model_variance_factor
+        repeats = correlated_cycles(cycle.rims, cycle.dt) * doubt
         rows = self._torque.update(
             ekf,
             forces,
@@ -523,6 +529,7 @@ class WheelSoilEstimator:
         self._speed.follow_contacts(
             self._contact_age.state.travel,
             self._clock.assessment.digging if self._depth_read(cycle.time) else NAN,
+            doubt=doubt,
             reference_known=cycle.reference_known,
         )
         if not cycle.window.readings:

@@ -10,7 +10,7 @@ gate a reading before it is fused, and pass residual and Jacobian from one evalu
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -124,9 +124,14 @@ class GatedFilter(ExtendedKalmanFilter):
 
     def inflate(self, index: int, variance: float) -> None:
         """Add variance to one entry."""
-        before = self.state
+        self.inflate_along({index: math.sqrt(variance)})
+
+    def inflate_along(self, deviations: Mapping[int, float]) -> None:
+        """Add one and the same error to some entries, with its deviation of each."""
+        before, entries = self.state, list(deviations)
         self.P = before.covariance.copy()
-        self.P[index, index] += variance
+        stds = np.array(list(deviations.values()))
+        self.P[np.ix_(entries, entries)] += stds[:, None] * stds
         self._keep_transition(before, self._I)
 
     @property

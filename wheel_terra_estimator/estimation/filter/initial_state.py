@@ -125,7 +125,7 @@ def gravity_bias_std(rover: Rover, sensors: SensorFigures, orientation_std: floa
     return math.hypot(sensors.specific_force_bias_std, rover.gravity * orientation_std)
 
 
-_LOAD_EXPONENT = 0.5  # beside n: load = k z^(n + 1/2), since contacts grow with sqrt(z) (Bekker)
+LOAD_EXPONENT = 0.5  # beside n: load = k z^(n + 1/2), since contacts grow with sqrt(z) (Bekker)
 _LEAST_SINE = 0.05  # of sin(phi) cos(phi): soil without friction
 
 
@@ -181,7 +181,7 @@ def initial_filter(
         P[layout.reference_error, layout.reference_error] = sensors.reference_wander_std**2
     lower, upper = bounds(rover, layout, priors)
     # However soft the configured soil is, the ground may be hard.
-    exponent = float(configuration.soil.sinkage_exponent) + _LOAD_EXPONENT
+    exponent = float(configuration.soil.sinkage_exponent) + LOAD_EXPONENT
     hardest = exponent * np.log(np.maximum(z, _HARDEST_SINKAGE) / _HARDEST_SINKAGE)
     upper[layout.stiffness] = np.maximum(upper[layout.stiffness], hardest)
     return GatedFilter(mean, P, lower, upper)

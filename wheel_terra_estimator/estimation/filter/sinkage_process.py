@@ -17,6 +17,7 @@ from wheel_terra_estimator.estimation.contacts.linearisation import smoothed_slo
 from wheel_terra_estimator.estimation.contacts.loads import LEAST_LOAD
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
+from wheel_terra_estimator.estimation.filter.initial_state import LOAD_EXPONENT
 from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
@@ -39,8 +40,6 @@ _LEAST_SINKAGE = 5e-4  # [m], for contact length and the step on log sinkage
 _STEP = -0.02
 """Finite step of v / rim speed and of n1, for the derivatives of the bearing law [-]."""
 _STEPS = _STEP * np.eye(2, 3, 1)[:, :, None]
-_PRESSURE_POWER = 0.5
-"""Load goes with z^(N + 1/2): pressure with z^N, length of the contact with its root."""
 _LONGEST_STEP = 0.7  # change of ln sinkage in one cycle [-]
 _RELAXATION_SLOPE = 0.9  # share of the relaxation that acts on the covariance [-]
 _LAW_ERROR = 0.05  # error of the bearing law per contact length, over the sinkage [-]
@@ -137,7 +136,7 @@ class SinkageProcess(Component[SinkageState]):
             )
         )
         # One bounded Newton step on ln load over ln sinkage; the relaxation follows it anyway.
-        power = exponents[0] + _PRESSURE_POWER
+        power = exponents[0] + LOAD_EXPONENT
         growth = np.log(states.load / carried[0]) / power
         growth = np.minimum(np.maximum(growth, -_LONGEST_STEP), _LONGEST_STEP)
         target = floored * np.exp(growth)
