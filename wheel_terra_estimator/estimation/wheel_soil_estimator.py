@@ -312,7 +312,7 @@ class WheelSoilEstimator:
                 rows += force_rows
         unread = self._sinkage.unread(time)
         considered = layout.considered(
-            settled=self._contact_age.settled,
+            settled=self._contact_age.settled and self._reference.contradiction <= 1.0,
             opposes_rims=cycle.yaw_compensated.oppose(float(ekf.x[SPEED])),
             unread=unread,
             blurred=forces is not None and forces.blurred,
@@ -516,8 +516,7 @@ class WheelSoilEstimator:
         speed_std = math.sqrt(float(ekf.P[SPEED, SPEED]))
         pulls, stationary = self._stationary.update(ekf.x, speed_std, cycle)
         start = self._contact_age.shear_variance
-        doubt = self._reference.model_variance_factor
-        repeats = correlated_cycles(cycle.rims, cycle.dt) * doubt
+        repeats = correlated_cycles(cycle.rims, cycle.dt) * self._reference.model_variance_factor
         rows = self._torque.update(
             ekf,
             forces,
@@ -529,7 +528,7 @@ class WheelSoilEstimator:
         self._speed.follow_contacts(
             self._contact_age.state.travel,
             self._clock.assessment.digging if self._depth_read(cycle.time) else NAN,
-            doubt=doubt,
+            contradiction=self._reference.contradiction,
             reference_known=cycle.reference_known,
         )
         if not cycle.window.readings:

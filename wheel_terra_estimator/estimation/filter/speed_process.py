@@ -77,9 +77,6 @@ _DIGGING_WALK = 12.0
 """The same over the sinkage that most wheels gain per rim travel [1/sqrt(m)]: the slip changes with
 the contacts."""
 _MOST_WALK = 0.6  # limit of that walk [1/sqrt(m)]
-_LASTING_DOUBT = 9.0
-"""Factor on the variance of the models from which on the walk is greater as well [-]: references
-that scatter seldom reach it. Tuned on A 1000, B 1000, C 5000 and 5231."""
 _WATCHED_SHARE = 0.5
 """Factor on ``filter.ratio_walk`` where measured sinkages would show such a change [-]."""
 _SLIP_PER_DEMAND_WALK = 0.2  # [1/sqrt(m)]
@@ -227,14 +224,13 @@ class SpeedProcess(Component[SpeedState]):
         )
 
     def follow_contacts(
-        self, travel: float, digging: float, *, doubt: float, reference_known: bool
+        self, travel: float, digging: float, *, contradiction: float, reference_known: bool
     ) -> None:
         """Set the random walk of v / rim speed, greater where contacts change.
 
         `travel` is the travel since a start [m], `digging` the sinkage that most wheels gain over
         rim travel [m/m], nan = not measured. Without a reference the steady walk is not reduced.
-        `doubt` is the factor on the variance of the wheel-soil models, by references that keep to
-        one side [-]: if it is great, the slip changes faster than the walk allows for.
+        Above 1, `contradiction` by the references is a factor on its variance [-].
         """
         walk = self._walk
         start = _START_WALK * math.exp(-travel / _START_WALK_TRAVEL)
@@ -243,7 +239,7 @@ class SpeedProcess(Component[SpeedState]):
             changing = min(_DIGGING_WALK * max(digging, 0.0), _MOST_WALK)
             walk = math.hypot(steady, changing)
         walk = max(walk, start)
-        faster = min(walk * math.sqrt(max(doubt / _LASTING_DOUBT, 1.0)), _MOST_WALK)
+        faster = min(walk * math.sqrt(max(contradiction, 1.0)), _MOST_WALK)
         self.state = self.state._replace(ratio_walk=max(walk, faster))
 
     # -- Prediction ------------------------------------------------------------------------------
