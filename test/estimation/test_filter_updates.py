@@ -280,10 +280,11 @@ def test_a_rover_that_stands_has_no_speed_and_learns_the_zero_of_its_gyro(parts,
 # -- Sinkage ----------------------------------------------------------------------------------
 
 
-def read_sinkage(parts, update, ekf, time, depth, count=1, unmodelled_std=0.0):
+def read_sinkage(parts, update, ekf, time, depth, count=1, unmodelled_std=0.0, slip_known=False):
     """Fuse the sum of some readings of the first wheel; return its mean, None where it stays."""
-    sums = SinkageSums((depth,) + (0.0,) * 5, (count,) + (0,) * 5)
-    rows = update.update(ekf, time, sums, parts.sensors.sinkage_std**2, np.full(6, unmodelled_std))
+    sums, unmodelled = SinkageSums((depth,) + (0.0,) * 5, (count,) + (0,) * 5), np.zeros(6)
+    variance, unmodelled[:] = parts.sensors.sinkage_std**2, unmodelled_std
+    rows = update.update(ekf, time, sums, variance, unmodelled, slip_known=slip_known)
     ekf.fuse(rows)
     return float(ekf.x[parts.layout.sinkage.start]) if rows else None
 
@@ -304,6 +305,19 @@ def test_a_spike_of_the_sinkage_is_dropped_and_three_in_a_row_are_believed(
     assert update.state.rejected == 3
     assert update.unread(3.0) == [1, 2, 3, 4, 5]
     assert update.unread(9.0) == list(range(6))
+
+
+def test_with_a_known_slip_a_jump_of_the_sinkage_is_other_ground(parts, ekf, sinkage_update):
+    """Its stiffness carries the load at the new depth, and nothing is known of its strength."""
+    layout, n = parts.layout, float(parts.configuration.soil.sinkage_exponent)
+    for i in range(23):
+        depth = 0.02 if i < 20 else 0.06
+        read_sinkage(parts, sinkage_update, ekf, 0.1 * i, depth, slip_known=True)
+    softer = (n + 0.5) * np.log(3.0)  # load = k z^(n + 1/2) (Bekker)
+    stiffness = ekf.x[layout.stiffness]
+    assert stiffness[0] - stiffness[1] == pytest.approx(-softer, rel=0.05)
+    stds = np.sqrt(np.diagonal(ekf.P)[layout.shear_error])
+    assert stds[0] == pytest.approx(np.hypot(stds[1], 0.5 * softer), rel=0.02)
 
 
 @pytest.mark.parametrize(

@@ -229,8 +229,10 @@ def test_the_slip_walks_farther_at_a_start_and_where_most_wheels_sink(
     travel, digging, reference_known, walk
 ):
     made = process([0.05] * 6)
-    made.follow_contacts(travel, digging, reference_known=reference_known)
+    made.follow_contacts(travel, digging, contradiction=1.0, reference_known=reference_known)
     assert made.state.ratio_walk == pytest.approx(walk)
+    made.follow_contacts(travel, digging, contradiction=4.0, reference_known=reference_known)
+    assert made.state.ratio_walk == pytest.approx(max(walk, min(2.0 * walk, 0.6)))
 
 
 def test_in_a_turn_on_the_spot_the_speed_does_not_follow_what_two_sides_leave():
