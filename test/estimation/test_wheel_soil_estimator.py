@@ -13,6 +13,7 @@ from parts import SAND, drive, step_inputs
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     LeavingAngleReading,
@@ -492,19 +493,24 @@ def test_slip_does_not_jump_when_references_end(parts):
     assert np.abs(np.diff(slips[200:])).max() < 0.02
 
 
-@pytest.mark.parametrize(('side', 'moves'), [(0.0, True), (1.0, False)])
-def test_forces_that_references_contradict_do_not_move_the_speed(parts, side, moves):
-    """Torques double on the same slope, as in a bog; `side`: mean of the normalised innovations."""
+@pytest.mark.parametrize(
+    ('side', 'age', 'moves'), [(0.0, 1.0, True), (1.0, 1.0, False), (1.0, 10.0, True)]
+)
+def test_forces_that_references_contradict_do_not_move_the_speed(parts, side, age, moves):
+    """Torques double on the same slope, as in a bog, some time after the last reference [s].
+
+    `side`: mean of the normalised innovations of the references.
+    """
     rover, estimator = parts.rover, WheelSoilEstimator(parts.configuration)
     lever = np.array(parts.cycle().loads.load) * np.array(rover.slip_radius)
     speeds = []
-    for i in range(210):
-        speed = 0.09 if i % 10 == 0 and i < 200 else None
-        torque = (0.2 if i < 200 else 0.45) * lever
+    for i in range(210 + round(10 * age)):
         if i == 200:
             update = estimator._reference
             update.state = update.state._replace(mean_innovation=side)
+        speed = 0.09 if i % 10 == 0 and i < 200 else None
+        torque = (0.2 if i < 200 + 10 * age else 0.45) * lever
         rates = 0.1 / np.array(rover.slip_radius)
         estimator.step(*step_inputs(0.1 * i, rates, torque, speed=speed))
-        speeds.append(estimator.estimates().forward_velocity)
-    assert (speeds[199] - speeds[-1] > 0.004) == moves
+        speeds.append(float(estimator._ekf.x[SPEED]))
+    assert (speeds[-11] - speeds[-1] > 0.003) == moves

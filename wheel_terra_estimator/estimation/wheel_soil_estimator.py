@@ -312,7 +312,7 @@ class WheelSoilEstimator:
                 rows += force_rows
         unread = self._sinkage.unread(time)
         considered = layout.considered(
-            settled=self._contact_age.settled and self._reference.contradiction <= 1.0,
+            settled=self._contact_age.settled and self._reference.contradiction(time) <= 1.0,
             opposes_rims=cycle.yaw_compensated.oppose(float(ekf.x[SPEED])),
             unread=unread,
             blurred=forces is not None and forces.blurred,
@@ -528,7 +528,7 @@ class WheelSoilEstimator:
         self._speed.follow_contacts(
             self._contact_age.state.travel,
             self._clock.assessment.digging if self._depth_read(cycle.time) else NAN,
-            contradiction=self._reference.contradiction,
+            contradiction=self._reference.contradiction(cycle.time),
             reference_known=cycle.reference_known,
         )
         if not cycle.window.readings:

@@ -133,14 +133,13 @@ class ReferenceUpdate(Component[ReferenceState]):
         square = self.state.mean_innovation**2 * (2.0 * _MEAN_COUNT - 1.0)
         return clipped(square**2, 1.0, _MOST_VARIANCE_FACTOR)
 
-    @property
-    def contradiction(self) -> float:
-        """How clearly the references contradict the models of the forces [-]; above 1 they do.
+    def contradiction(self, time: float) -> float:
+        """Return how clearly references contradict the models of the forces [-]; above 1 they do.
 
         Then forces say nothing of the speed until the soil is learned anew, and the slip changes
-        faster than its random walk allows for.
+        faster than its random walk allows for. Without references there is nothing else but forces.
         """
-        return self.model_variance_factor / _CONTRADICTING
+        return self.model_variance_factor / _CONTRADICTING if self.known(time) else 0.0
 
     def update(
         self,
