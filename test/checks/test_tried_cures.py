@@ -37,6 +37,17 @@ def test_wheels_backwards_in_turns_on_the_spot_are_found_all_the_same(wheels):
     assert 'on the other half' in finding.words
 
 
+def test_wheels_that_spin_on_the_spot_without_turning_reverse_no_side_for_sure():
+    """As on a real Husky that stalls: the rates of a drive ahead with one side read backwards."""
+    spinning, stalls = (
+        rolling.recording(rolling.motion(60.0, 0.0, yaw=(times, rates)))
+        for times, rates in (([3, 4, 58, 59], [0, 0.4, 0.4, 0]), ([3, 4, 7], [0, 0.3, 0]))
+    )
+    whole = replace(stalls, joints=spinning.joints, reference=None)
+    (finding,) = (f for f in rolling.checked(whole=whole).findings if f.kind == 'sign')
+    assert finding.confidence < 0.8 and 'spins on the spot' in finding.words
+
+
 def test_slip_that_makes_no_turn_exchanges_no_wheels():
     """Wheels of one axle slip by a twentieth of the turns that the rover makes, against them."""
     whole = rolling.driven(120.0, 0.3, yaw=lambda time: 0.03 * np.sign(np.sin(0.7 * time)))

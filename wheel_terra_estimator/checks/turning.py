@@ -72,6 +72,7 @@ SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the 
 SLIDE = ', or the rover slides back'
 SOME = ', or some of them do: drive straight'
 ALL_WHEELS = ', or all wheels read negative'
+SPINS = ', or the rover spins on the spot and hardly turns: drive straight'
 DEGREE, NEAR_DEGREES = math.radians(1.0), 0.15  # [rad]; error of a scale that few turns tell [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
@@ -357,6 +358,9 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             trial = f'{chosen.trial}{SLIDE if slides else SOME}'
             chosen = chosen._replace(sure=0.5 * chosen.sure, trial=trial)
     signs = np.where(np.isfinite(evidence.rate).any(axis=0), signs, 1.0)
+    one_side = facts.has_sides() and not np.ptp(signs * facts.side)
+    if one_side and not turn and agreement == (None, None):
+        chosen = chosen._replace(sure=0.5 * chosen.sure, trial=f'{chosen.trial}{SPINS}')
     if (signs < 0.0).any():
         finding, mended = _backwards(evidence, mended, signs, chosen)
         outcomes.append(finding)
