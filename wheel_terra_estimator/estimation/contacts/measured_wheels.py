@@ -62,7 +62,7 @@ class SpeedAndVariance(NamedTuple):
 
 
 class Opinion(NamedTuple):
-    """A second estimate of it."""
+    """A second estimate of the body speed, pooled with that of the filter."""
 
     speed: float  # [m/s]
     variance: float
