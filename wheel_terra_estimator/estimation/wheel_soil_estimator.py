@@ -710,7 +710,8 @@ class WheelSoilEstimator:
         window = self._trusted(self._inertial.state.window, time)
         slip_known = self._reference.known(time)
         speed, variance = self._speed.present(self._ekf, time, rims, window, inflated=slip_known)
-        return SpeedAndVariance(speed, variance * excess(self._reference.state.nis))
+        variance *= excess(self._reference.state.nis)
+        return SpeedAndVariance(speed, variance + self._reference.doubt_variance)
 
     def _speed_by_torque(self, rims: RimSpeeds) -> Opinion | None:
         """Return speed [m/s] and variance by the typical slip at the measured torques.

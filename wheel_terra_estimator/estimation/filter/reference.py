@@ -123,6 +123,12 @@ class ReferenceUpdate(Component[ReferenceState]):
         return time - self.state.time < _FRESH_TIME
 
     @property
+    def doubt_variance(self) -> float:
+        """Variance by a last reference that was rejected: as likely wild as true [(m/s)^2]."""
+        state = self.state
+        return (0.5 * state.last_rejected) ** 2 if state.rejected_in_a_row else 0.0
+
+    @property
     def model_variance_factor(self) -> float:
         """Factor on the variance of the wheel-soil models [-]: 1 while the references scatter.
 
