@@ -261,7 +261,11 @@ def test_vibration_does_not_shake_the_loads(parts):
 # -- Wheels that stand ------------------------------------------------------------------------
 
 
-def standing_pull(parts, torque, speed, lateral_motion=0.0, speed_std=0.0, others=0.0):
+def standing_pull(parts, *given, **named):
+    return standing_wheel(parts, *given, **named).expected
+
+
+def standing_wheel(parts, torque, speed, lateral_motion=0.0, speed_std=0.0, others=0.0):
     x = parts.filter().x.copy()
     x[SPEED] = speed
     wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
@@ -270,7 +274,7 @@ def standing_pull(parts, torque, speed, lateral_motion=0.0, speed_std=0.0, other
     cycle = parts.cycle(
         rims, (60.0,) * n, turns=turns, torque=(torque,) * n, lateral_motion=lateral_motion
     )
-    return wheels.update(x, speed_std, cycle)[0][0]
+    return wheels.update(x, speed_std, cycle)[0]
 
 
 def test_a_dragged_wheel_is_a_drag_by_its_torque_whatever_its_jammed_drive_reads(parts):
@@ -291,7 +295,20 @@ def test_torque_over_radius_is_the_pull_of_a_wheel_that_holds_a_standing_rover(p
     assert standing_pull(parts, **slow) == standing_pull(parts, 3.0, 0.0)
     drags = standing_pull(parts, 3.0, -0.004)
     assert standing_pull(parts, **slow, others=0.05) == drags
-    assert math.isnan(standing_pull(parts, NAN, 0.0))
+
+
+def test_a_wheel_that_stands_without_a_torque_may_be_dragged(parts):
+    """It may also roll beside a dead encoder: both, and a rover that stands, are within 2 std."""
+    whole = standing_pull(parts, -8.0, 0.05)
+    for direction in (1.0, -1.0):
+        dragged = standing_wheel(parts, NAN, 0.05 * direction)
+        assert dragged.unread
+        for pull in (0.0, direction * whole):
+            assert abs(dragged.expected - pull) < 2.0 * dragged.std
+        assert dragged.expected * direction < -0.1 * 60.0
+    held = standing_wheel(parts, NAN, 0.0)
+    assert (held.expected, held.unread) == (0.0, True)
+    assert not standing_wheel(parts, -8.0, 0.05).unread
 
 
 @pytest.mark.parametrize('way', [1.0, -1.0])
@@ -306,15 +323,14 @@ def test_a_wheel_that_stalls_beside_spinning_ones_has_the_pull_of_its_torque(par
     wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
     x[SPEED] = -0.003 * way  # within what is known of a rover that is stuck
     cycle = parts.cycle(rims, loads, turns=turns, torque=tuple((way * torque).tolist()))
-    pulls, expected = wheels.update(x, 0.003, cycle)
-    assert pulls[5] == pytest.approx(way * float(pull[5]), rel=0.02)
+    expected = wheels.update(x, 0.003, cycle)
+    assert expected[5].expected == pytest.approx(way * float(pull[5]), rel=0.02)
     assert expected[:5] == [None] * 5
     # One that is dragged, or turns the other way, is locked.
     for speed, last in ((0.05 * way, 0.0036 * way), (-0.003 * way, -0.0036 * way)):
         x[SPEED] = speed
         locked, turned = (
-            wheels.update(x, 0.001, cycle._replace(rims=(*rims[:5], rim)))[0][5]
-            for rim in (0.0, last)
+            wheels.update(x, 0.001, cycle._replace(rims=(*rims[:5], rim)))[5] for rim in (0.0, last)
         )
         assert turned == locked
 
@@ -475,7 +491,7 @@ def published_pulls(parts, forces, cycle, excess=NAN, cycles=1, aside=None, load
     rover = parts.rover if load_std is None else replace(parts.rover, load_std=load_std)
     pulls = Pulls(rover, parts.sensors, parts.layout, (300.0,) * 6)
     readings = tuple((forces.torque + excess).tolist())
-    evidence = PullEvidence(forces, None, cycle, readings, (NAN,) * 6, aside, tilt_std=0.0)
+    evidence = PullEvidence(forces, None, cycle, readings, (None,) * 6, aside, tilt_std=0.0)
     for _ in range(cycles):
         pulls.update(forces.state, 1e-9 * np.eye(len(forces.state)), evidence, tilt=0.0)
     return pulls.state

@@ -387,6 +387,21 @@ def test_what_a_standing_wheel_pulled_is_forgotten_when_all_have_stood():
     assert pulls[-1] == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.parametrize('wheel', ['rear_left', 'front_right'])
+def test_a_drag_that_no_torque_tells_is_not_learned_as_soil(wheel):
+    """Without torques one wheel locks after 5 s: the simulator gives the drag and the pulls."""
+    run = drive(10.0, 3, **fault('locked', wheel, 5.0, 10.0))
+    estimator, names = WheelSoilEstimator(run.configuration), run.configuration.wheels.names
+    sets, locked = estimate(run, 'no_torque', estimator)[-10:], names.index(wheel)
+    row = np.searchsorted(run.truth.stamp, [s.stamp for s in sets])
+    error = np.array([s.drawbar_pull for s in sets]) - run.truth.drawbar_pull[row]
+    std = np.array([s.drawbar_pull_std for s in sets])
+    load = run.truth.normal_load.mean()
+    assert run.truth.drawbar_pull[row, locked].mean() < -0.5 * load
+    assert (std[:, locked] > 0.25 * load).all()
+    assert np.sqrt(np.mean((error / std) ** 2)) < 3.0
+
+
 # Rigs and mountings at the edge: one wheel, one axle, an IMU upside down, exact sensors.
 
 

@@ -37,7 +37,10 @@ from wheel_terra_estimator.estimation.contacts.measured_wheels import (
 )
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.contacts.ruts import Ruts, curvature_of
-from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
+from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
+    StationaryPull,
+    StationaryWheels,
+)
 from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
@@ -303,7 +306,8 @@ class WheelSoilEstimator:
             slip_known=cycle.reference_known,
         )
         self._unloaded.update(cycle)
-        forces, total, stationary = None, None, (NAN,) * self._rover.wheel_count
+        forces, total = None, None
+        stationary: list[StationaryPull | None] = [None] * self._rover.wheel_count
         if cycle.still:
             self._contact_age.stop()  # contacts form again after a standstill
         else:
@@ -339,7 +343,7 @@ class WheelSoilEstimator:
         cycle: Cycle,
         forces: ContactForces | None,
         total: SumOfPulls | None,
-        stationary: Floats,
+        stationary: list[StationaryPull | None],
     ) -> None:
         """Compute the pulls after the update of a cycle; arguments as in `PullEvidence`."""
         ekf, zeros = self._ekf, self._torque.zeros(self._ekf.x)
@@ -509,12 +513,12 @@ class WheelSoilEstimator:
 
     def _force_rows(
         self, cycle: Cycle
-    ) -> tuple[ContactForces, SumOfPulls | None, Floats, list[Row]]:
-        """Return contact forces, measured sum of pulls, pulls of locked wheels, and the rows."""
+    ) -> tuple[ContactForces, SumOfPulls | None, list[StationaryPull | None], list[Row]]:
+        """Return contact forces, measured sum of pulls, what standing wheels give, and the rows."""
         ekf = self._ekf
         forces = self._linearisation.update(ekf.x, cycle, self._ruts.state.depth)
         speed_std = math.sqrt(float(ekf.P[SPEED, SPEED]))
-        pulls, stationary = self._stationary.update(ekf.x, speed_std, cycle)
+        stationary = self._stationary.update(ekf.x, speed_std, cycle)
         start = self._contact_age.shear_variance
         repeats = correlated_cycles(cycle.rims, cycle.dt) * self._reference.model_variance_factor
         rows = self._torque.update(
@@ -532,13 +536,16 @@ class WheelSoilEstimator:
             reference_known=cycle.reference_known,
         )
         if not cycle.window.readings:
-            return forces, None, pulls, rows
+            return forces, None, stationary, rows
         curvature = self._turning.curvature(float(ekf.x[SPEED]))
         total = self._balance.sum_of_pulls(cycle, curvature)
+        if any(each and each.unread for each in stationary):
+            # The sum of all pulls tells the drag of this wheel, not the soil of the others.
+            return forces, total, stationary, rows
         balance = self._balance.update(
             ekf, forces, total, cycle, stationary=stationary, model_variance=start, repeats=repeats
         )
-        return forces, total, pulls, [*rows, balance]
+        return forces, total, stationary, [*rows, balance]
 
     def _depth_read(self, time: float) -> bool:
         """Return whether the sinkage of most wheels is measured."""

@@ -21,7 +21,7 @@ from wheel_terra_estimator.arrays import FloatArray, Floats
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
-from wheel_terra_estimator.estimation.contacts.stationary_wheels import MOST_DRAG
+from wheel_terra_estimator.estimation.contacts.stationary_wheels import MOST_DRAG, StationaryPull
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH, StateLayout
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
@@ -50,7 +50,7 @@ class PullEvidence(NamedTuple):
     total: SumOfPulls | None  # their sum by the accelerometer; None = unknown
     cycle: Cycle
     readings: Floats  # last torque of each wheel [N m], nan = never known
-    stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
+    stationary: Sequence[StationaryPull | None]  # what to expect of a wheel that stands
     sideways: Sideways | None  # lateral forces in a turn, where they are known; None elsewhere
     tilt_std: float  # of the body against the ground, by unmodelled slip-sinkage [rad]
 
@@ -115,12 +115,13 @@ class Pulls(Component[PullState]):
             gain = 1.0 if forces.blurred else _EXCESS_GAIN
         for i, load in enumerate(loads.load):
             if not cycle.turns[i]:
-                # Its torque gives the pull; else static friction carries its share of the slope.
+                # Where all wheels stand, static friction carries its share of the slope.
                 standing = stationary[i]
-                pull[i] = load * share if isnan(standing) else standing
+                pull[i] = standing.expected if standing else load * share
                 torque[i] = pull[i] * self._rover.rim_radius[i]
-                known = _GUESS_STD if loads.force_known else 1.0
-                std[i] = known * load + self._load_std * abs(share) + _FLOOR_STD
+                guess = standing.std if standing and isnan(readings[i]) else _GUESS_STD * load
+                std[i] = guess if loads.force_known else load
+                std[i] += self._load_std * abs(share) + _FLOOR_STD
                 own[i] = std[i] ** 2
             else:
                 if not isnan(readings[i]):  # torque residual, smoothed

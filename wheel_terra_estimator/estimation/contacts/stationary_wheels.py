@@ -35,14 +35,16 @@ MOST_DRAG = 2.0  # of the load: friction and the soil pushed ahead
 _DRAGGED_STD = 0.1
 """Deviation of a dragged wheel's pull over its load, besides torque gain and turning [-]."""
 _IDLE_STD = 0.3
-"""The same without a torque: the wheel may carry its share of the slope, or nothing."""
+"""The same without a torque: the wheel may be dragged, roll unseen beside a dead encoder, or carry
+its share of the slope, or nothing."""
 
 
 class StationaryPull(NamedTuple):
     """Pull of a wheel that does not turn under a load."""
 
-    expected: float  # by its torque, else the wheel's share of the slope [N]
+    expected: float  # by its torque, else from its share of the slope half-way to a drag [N]
     std: float  # of `expected` [N]
+    unread: bool = False  # whether it may be dragged, and no torque tells
 
 
 class StationaryWheels:
@@ -54,36 +56,33 @@ class StationaryWheels:
         self._rover, self._layout, self._models = rover, layout, models
         self._gain_std = sensors.torque_gain_std
 
-    def update(
-        self, x: FloatArray, speed_std: float, cycle: Cycle
-    ) -> tuple[tuple[float, ...], list[StationaryPull | None]]:
-        """Return the pulls of a cycle at a state `x` (size,), and what to expect of each wheel.
+    def update(self, x: FloatArray, speed_std: float, cycle: Cycle) -> list[StationaryPull | None]:
+        """Return what to expect of each wheel at a state `x` (size,); None for one that turns.
 
-        `speed_std` is the deviation of the body's speed [m/s]. Pulls are [N], nan where no torque
-        is known; None stands for a wheel that turns.
+        `speed_std` is the deviation of the body's speed [m/s].
         """
-        loads, share = cycle.loads, cycle.loads.slope_share
-        by_torque = [
-            not (turns or isnan(rim) or isnan(torque)) and load >= LEAST_LOAD
-            for turns, rim, torque, load in zip(
-                cycle.turns, cycle.rims, cycle.torque, loads.load, strict=True
-            )
-        ]
-        pulls = [NAN] * len(by_torque)
-        if any(by_torque):
-            pulls = np.where(by_torque, self._pulls(x, speed_std, cycle), NAN).tolist()
-        return tuple(pulls), [
-            None if turns else self.expectation(pull, load, share, cycle.lateral_motion)
-            for turns, pull, load in zip(cycle.turns, pulls, loads.load, strict=True)
-        ]
+        loads, n = cycle.loads, len(cycle.rims)
+        pulls = self._pulls(x, speed_std, cycle).tolist() if not all(cycle.turns) else [NAN] * n
+        expected: list[StationaryPull | None] = [None] * n
+        for i, (load, rim) in enumerate(zip(loads.load, cycle.rims, strict=True)):
+            if not cycle.turns[i]:
+                stands = not isnan(rim) and load >= LEAST_LOAD
+                expected[i] = self.expectation(
+                    pulls[i] if stands else NAN,
+                    load,
+                    loads.slope_share,
+                    cycle.lateral_motion,
+                    unread=stands and isnan(cycle.torque[i]),
+                )
+        return expected
 
     def _pulls(self, x: FloatArray, speed_std: float, cycle: Cycle) -> FloatArray:
-        """Return the pulls of wheels that stand, from their torques, (n,) [N]; nan without one.
+        """Return the pulls of wheels that stand, from their torques, (n,) [N].
 
         A locked wheel slides, one that creeps beside faster ones spins: its shear is saturated, and
-        torque gives the pull whatever the strength of the soil. Where its hub stands too, torque
-        and pull balance about the hub. A torque that drives a wheel which is dragged is not the
-        soil's: its drive is jammed.
+        torque gives the pull whatever the strength of the soil; without a torque it is that of the
+        models. Where its hub stands too, torque and pull balance about the hub; nan without one. A
+        torque that drives a wheel which is dragged is not the soil's: its drive is jammed.
         """
         rover, torques, loads = self._rover, np.array(cycle.torque), np.array(cycle.loads.load)
         speed = cycle.headings.speeds(float(x[SPEED]), cycle.yaw_rate)
@@ -108,7 +107,8 @@ class StationaryWheels:
         jammed = (direction * torques > 0.0) & ~creeps & (cycle.lateral_motion < TURN)
         usable = (by_torque != 0.0) & ~jammed
         gain = np.where(usable, by_pull / np.where(usable, by_torque, 1.0), 0.0)
-        pull = forces.pull + gain * (direction * torques - forces.torque)
+        excess = np.where(np.isnan(torques), 0.0, direction * torques - forces.torque)
+        pull = forces.pull + gain * excess
         most = MOST_DRAG * loads
         # Where no wheel turns faster than the uncertainty of the speed, the rover comes to rest.
         standing = all(abs(rim) < least_speed for rim in known(cycle.rims))
@@ -117,11 +117,22 @@ class StationaryWheels:
         return np.where(stands & ~creeps, held, direction * np.clip(pull, -most, most))
 
     def expectation(
-        self, pull: float, load: float, slope_share: float, lateral_motion: float
+        self,
+        pull: float,
+        load: float,
+        slope_share: float,
+        lateral_motion: float,
+        *,
+        unread: bool = False,
     ) -> StationaryPull:
-        """Return what to expect of a wheel that gives `pull` [N], nan = unknown."""
-        if isnan(pull):
-            return StationaryPull(load * slope_share, _IDLE_STD * load)
+        """Return what to expect of a wheel that gives `pull` [N], nan = unknown.
+
+        One whose torque is `unread` is dragged, or rolls beside a dead encoder: half-way.
+        """
+        if isnan(pull) or unread:
+            own = load * slope_share
+            half = 0.0 if isnan(pull) else 0.5 * (pull - own)
+            return StationaryPull(own + half, max(_IDLE_STD * load, abs(half)), unread)
         # In turns it is pushed sideways, too.
         share = _DRAGGED_STD + self._gain_std + min(lateral_motion, 1.0)
         return StationaryPull(pull, share * load)
