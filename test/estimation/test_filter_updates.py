@@ -27,6 +27,7 @@ from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
 from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.inputs.noise import ObservedNoise
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.outputs import Outputs
 
@@ -83,6 +84,24 @@ def test_a_reference_is_the_textbook_update(parts, ekf):
     noise, prior = parts.sensors.reference_std**2, variance + 1e-8
     expected = before + prior / (prior + noise) * 0.001
     assert ekf.x[SPEED] == pytest.approx(expected)
+
+
+def test_a_reference_is_as_noisy_as_it_states_or_as_a_file_does_else_as_is_seen(parts):
+    """White innovations of a filter that follows nothing show the noise twice (with K = 0)."""
+    update, std = reference_update(parts), 0.25 * parts.sensors.reference_std
+    rng, silent = np.random.default_rng(5), ReferenceVelocity(0, 0.05, 0.0)
+    told, unsaid = ObservedNoise(parts.sensors), ObservedNoise(parts.sensors, given=())
+    assert update.variance(silent, unsaid) == parts.sensors.reference_std**2
+    for i, innovation in enumerate(std * rng.normal(size=200)):
+        for noise in (told, unsaid):
+            noise.compare_reference(float(i), innovation, std**2, 1e-9 * std**2)
+    assert update.variance(silent, unsaid) == pytest.approx(std**2, rel=0.5)
+    assert update.variance(silent, told) == parts.sensors.reference_std**2
+    stated = ReferenceVelocity(0, 0.05, 0.01**2)
+    assert update.variance(stated, unsaid) == pytest.approx(0.01**2)
+    for _ in range(200):
+        unsaid.compare_reference(0.0, 0.0, std**2, 1e-9 * std**2)
+    assert update.variance(silent, unsaid) == parts.sensors.reference_std_floor**2
 
 
 @pytest.mark.parametrize('gap', [0.1, 0.5, 1.0, 2.0])

@@ -499,7 +499,7 @@ class WheelSoilEstimator:
         """Fuse a reference velocity."""
         time, ekf = cycle.time, self._ekf
         innovation, variance = self._reference.innovation(ekf, reference)
-        noise = self._noise.variance('reference', self._reference.variance(reference))
+        noise = self._reference.variance(reference, self._noise)
         self._noise.compare_reference(time, innovation, noise, variance, reference.variance)
         self._reference.update(
             self._ekf,

@@ -14,6 +14,7 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.filter.consistency import smoothed_nis
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import SPEED, Prediction, StateLayout
+from wheel_terra_estimator.estimation.inputs.noise import ObservedNoise
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped
@@ -219,12 +220,11 @@ class ReferenceUpdate(Component[ReferenceState]):
         self.state = state
         return inflated
 
-    def variance(self, reference: ReferenceVelocity) -> float:
-        """Return the variance that a reading states, else that of the sensor [(m/s)^2]."""
-        sensors = self._sensors
-        stated = reference.variance
-        variance = stated if stated > 0.0 else sensors.reference_std**2
-        return max(variance, sensors.reference_std_floor**2)
+    def variance(self, reference: ReferenceVelocity, noise: ObservedNoise) -> float:
+        """Return the variance of a reading [(m/s)^2]: as it states, else as of its sensor."""
+        least = self._sensors.reference_std_floor**2
+        stated = max(reference.variance, least) if reference.variance > 0.0 else None
+        return max(noise.variance('reference', stated), least)
 
     def _note_slide(self, ekf: GatedFilter, time: float, forward: float, variance: float) -> None:
         """With all wheels at rest, decide between standstill and a slide on locked wheels.
