@@ -494,6 +494,20 @@ def test_references_off_by_more_than_they_state_widen_the_deviation_of_the_speed
     assert stds[1] > 2.0 * stds[0]
 
 
+def test_references_at_rest_tell_nothing_of_the_noise_of_those_in_motion(parts):
+    """A rover stands for 20 s before exact references; in motion they scatter by 6 mm/s."""
+    estimator, rng, std = WheelSoilEstimator(parts.configuration), np.random.default_rng(2), 0.006
+    rest, torque = np.zeros(6), np.full(6, 2.0)
+    for i in range(600):
+        moves = i >= 200
+        speed = None if i % 5 else moves * (0.05 + std * rng.normal())
+        rate = moves * 0.05 / np.array(parts.rover.slip_radius)
+        estimator.step(*step_inputs(0.1 * i, rate + rest, torque, (0.0, 0.0, 9.8), speed))
+        if i == 199:
+            assert estimator._noise.observed('reference') is None
+    assert estimator._noise.observed('reference') == pytest.approx(std, rel=0.3)
+
+
 def test_slip_does_not_jump_when_references_end(parts):
     """They show a slip of 0.5; wheels with such a torque usually slip by 0.1."""
     estimator, rover = WheelSoilEstimator(parts.configuration), parts.rover
