@@ -61,7 +61,7 @@ def draw(effect: Effect, path: Path) -> None:
             if value is not None and not parameter.lower <= value <= parameter.upper:
                 continue
             settings = {} if value is None else {effect.name: {parameter.name: value}}
-            state = WheelSoilModel(SOIL, settings, strict=False).steady_state(points)
+            state = WheelSoilModel(SOIL, settings).steady_state(points)
             columns = [state.lateral_force] if aside else [*(state.outputs() * SCALES).T]
             unit = '' if parameter.unit == '-' else f' {parameter.unit}'
             label = 'off' if value is None else f'{parameter.name} = {value:g}{unit}'

@@ -111,7 +111,7 @@ def random_cases(count: int, seed: int, rows: int = 40) -> list[tuple[Soil, dict
             kc, kphi, *soil, r, width, lugs, pressure, slip = drawn.T
             wheel = Wheel(r, r * width, r * lugs, 20)
             case = Soil(kc, 10.0**kphi, *soil), points(slip, pressure * r * wheel.width, wheel)
-            flags = WheelSoilModel(case[0], effects, strict=False).steady_state(case[1]).flags
+            flags = WheelSoilModel(case[0], effects).steady_state(case[1]).flags
             drawn = drawn[flags == 0]
         cases.append((case[0], effects, case[1]))
     return cases

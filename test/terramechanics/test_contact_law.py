@@ -106,8 +106,6 @@ def test_what_resistive_force_refuses():
     law = ResistiveForce(1.0)
     with pytest.raises(ValueError, match='plane of the wheel'):
         law.steady_state(OperatingPoints(0.2, 20.0, WHEEL, slip_angle=0.1))
-    with pytest.raises(ValueError, match='shear radius'):
-        law.steady_state(OperatingPoints(0.2, 20.0, WHEEL, slip_radius='shear'))
     buried = law.steady_state(OperatingPoints(0.2, 1e6, WHEEL))
     assert buried.flags[0] == OVERLOADED
     assert buried.sinkage[0] == pytest.approx(WHEEL.radius)

@@ -125,7 +125,7 @@ def test_soil_is_pushed_with_its_own_friction_whatever_that_of_the_rim(name):
         contact.slip = contact.velocity_ratio = 0.3
         contact.cohesion, contact.tan_friction, contact.shear_modulus = 500.0, TAN, 0.01
         contact.normal_load, contact.direction = LOAD, 1.0
-        terms = Terms(effects.check_settings(settings))
+        terms = Terms(effects.with_defaults(settings))
         terms.apply('on_inputs', contact)
         contact.entrance_angle, contact.leaving_angle = 0.6, -0.1
         terms.apply('on_outputs', contact)

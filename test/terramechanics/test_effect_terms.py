@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from terra_tools import SAND, WHEEL, points, state
 
+from wheel_terra_estimator.api import Model
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics import effects as catalogue_module
@@ -21,7 +22,6 @@ from wheel_terra_estimator.terramechanics.effects import (
     Form,
     by_variant,
     catalogue,
-    check_settings,
     load_file,
     register,
 )
@@ -123,7 +123,7 @@ def test_a_soil_that_cannot_carry_the_wheel_gives_no_warning_of_numpy(name):
         )
         with warnings.catch_warnings():
             warnings.simplefilter('error')
-            model = WheelSoilModel(soil, {name: {}}, strict=False)
+            model = WheelSoilModel(soil, {name: {}})
             model.steady_state(points(**{**ROW, 'load': load}))
 
 
@@ -136,29 +136,18 @@ def test_effects_without_their_column_do_nothing():
 @pytest.mark.parametrize(
     ('settings', 'words'),
     [
-        ({'bulldozer': {}}, 'effect bulldozer is not in the catalogue'),
-        (
-            {'lug_digging': {'k': 1.0}},
-            'effect lug_digging has no parameter k in the form linear; it has kd',
-        ),
-        ({'lug_digging': {'kd': 9.0}}, r'effects.lug_digging.kd is 9; allowed is \[0, 4\]'),
-        (
-            {'grouser_thrust': {}, 'lug_shear_radius': {}},
-            'effects grouser_thrust and lug_shear_radius exclude each other',
-        ),
-        (
-            {'slip_sinkage_exponent': {'form': 'none'}},
-            "has no form 'none'; it has linear, lyasko, load",
-        ),
-        (
-            {'slip_sinkage_exponent': {'form': 'lyasko', 'n1': 0.3}},
-            'has no parameter n1 in the form lyasko; it has gain',
-        ),
+        ({'bulldozer': {}}, "'effects.bulldozer.enabled'; the nearest"),
+        ({'cohesion': None}, 'effect cohesion is of type NoneType'),
+        ({'lug_digging': {'k': 1.0}}, "nearest known one is 'effects.lug_digging.kd'"),
+        ({'lug_digging': {'kd': 9.0}}, 'at least 0 and at most 4'),
+        ({'lug_digging': {'kd': 'much'}}, "'much' is not a number"),
+        ({'grouser_thrust': {}, 'lug_shear_radius': {}}, 'cannot be on together'),
+        ({'slip_sinkage_exponent': {'form': 'none'}}, 'one of linear, lyasko, load'),
     ],
 )
 def test_settings_that_are_refused(settings, words):
-    with pytest.raises(ValueError, match=words):
-        check_settings(settings)
+    with pytest.raises(UserError, match=words):
+        Model(WHEEL, SAND, settings)
 
 
 OWN = """

@@ -63,9 +63,7 @@ def test_reece_law_equals_bekker_s_at_one_width_and_gravity():
 
 
 def test_load_that_the_soil_cannot_carry():
-    with pytest.raises(ValueError, match=r'normal load is 1e\+06 N .* carries at most'):
-        state([0.1], 1e6)
-    clamped = WheelSoilModel(SAND, strict=False).steady_state(points([0.1, 0.97], [1e6, 80.0]))
+    clamped = WheelSoilModel(SAND).steady_state(points([0.1, 0.97], [1e6, 80.0]))
     assert clamped.flags.tolist() == [OVERLOADED, OUTSIDE_VALIDITY]
     assert np.isfinite(clamped.outputs()).all()
     assert clamped.sinkage[0] == pytest.approx(WHEEL.radius)

@@ -147,7 +147,7 @@ class Model:
         self.configuration = configuration
         self.soil = Soil._of(configuration)
         self.effects = configuration.effects
-        self._model = WheelSoilModel(configuration.soil, self.effects, method, strict=False)
+        self._model = WheelSoilModel(configuration.soil, self.effects, method)
 
     @property
     def wheel(self) -> Wheel:

@@ -287,7 +287,7 @@ def _nearest(
 
     def state_of(soil: Soil) -> SteadyState:
         points = operating_points(table.columns, configuration_of(wheel, soil, *rest), table.name)
-        return WheelSoilModel(soil, rest[0], 'closed_form', strict=False).steady_state(points)
+        return WheelSoilModel(soil, rest[0], 'closed_form').steady_state(points)
 
     def distance(soil: Soil) -> float:
         state = state_of(soil)

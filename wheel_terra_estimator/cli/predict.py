@@ -162,7 +162,7 @@ def _model(arguments: argparse.Namespace, configuration: Configuration, width: f
     soil, effects, rover = configuration.soil, configuration.effects, configuration.rover
     law = rover.contact_law
     if law == BEKKER_WONG_JANOSI:
-        return WheelSoilModel(soil, effects, arguments.method, strict=False)
+        return WheelSoilModel(soil, effects, arguments.method)
     if arguments.method != METHODS[0]:
         raise UserError(f'the law {law} says how the contact is integrated; leave --method')
     if 'wheels.width' in configuration.stated:

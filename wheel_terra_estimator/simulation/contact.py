@@ -97,7 +97,7 @@ class ContactModel:
         self._soil = soil
         self._tan_friction = float(np.tan(soil.friction_angle))
         self._slip_radius = slip_radius
-        self._terms = Terms(effect_catalogue.check_settings(effects))
+        self._terms = Terms(effect_catalogue.with_defaults(effects))
 
     def forces(self, sunk: SunkWheels) -> SoilForces:
         """Return the forces, seen in the direction of travel."""

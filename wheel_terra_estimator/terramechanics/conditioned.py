@@ -19,13 +19,12 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, Quantity
 from wheel_terra_estimator.terramechanics import closed_form
-from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, check_settings
+from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, with_defaults
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS, Terms, set_angles
+from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 SMALLEST_ANGLE = 2e-3  # [rad]; below, the wheel hardly touches and angles lose their meaning
@@ -86,15 +85,7 @@ class ConditionedForces:
         slip_radius: str = 'lug_tip',
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        for name in SOIL_NUMBERS:
-            if np.ndim(getattr(soil, name)):
-                raise ValueError(
-                    f'soil {name} has shape {np.shape(getattr(soil, name))}; allowed is one number'
-                )
-        if slip_radius not in ('lug_tip', 'rim'):
-            raise ValueError(f"slip radius is {slip_radius!r}; allowed is 'lug_tip' or 'rim'")
-        check_range('gravity', gravity, 0.0, unit='m/s^2', open_lower=True)
-        settings, known = check_settings(effects or {}), catalogue()
+        settings, known = with_defaults(effects or {}), catalogue()
         self._terms = Terms(settings)
         outputs = {n: values for n, values in settings.items() if known[n].on_outputs}
         self._on_sinkage = Terms(

@@ -71,15 +71,12 @@ class ResistiveForce:
         """Solve the load balance and return sinkage, drawbar pull and torque.
 
         Where the soil cannot carry the load, they are those at a sinkage of one radius, flagged.
-        Raises ValueError where a wheel slides sideways, or the slip refers to a shear radius (this
-        law has none).
+        Raises ValueError where a wheel slides sideways.
         """
         if np.any(points.slip_angle) or np.nan_to_num(points.lateral_speed_ratio).any():
             raise ValueError(
                 'the law resistive_force holds in the plane of the wheel; leave the slip angle at 0'
             )
-        if points.slip_radius == 'shear':
-            raise ValueError("the law resistive_force has no shear radius; slip_radius 'rim'")
         load = np.asarray(points.normal_load, float)
         angle, carries = solve_entrance_angle(
             lambda angles: self.forces(points, angles)[0], load, np.full(len(points), _START)
@@ -162,10 +159,10 @@ def contact_law(
     Raises ValueError for an unknown name.
     """
     if name == BEKKER_WONG_JANOSI:
-        return WheelSoilModel(soil, effects, 'closed_form', strict=False)
+        return WheelSoilModel(soil, effects, 'closed_form')
     if name == WONG_REECE:
         reece = reece_soil(soil, width, gravity)
-        return WheelSoilModel(reece, reece_effects(effects), 'quadrature', strict=False)
+        return WheelSoilModel(reece, reece_effects(effects), 'quadrature')
     if name == RESISTIVE_FORCE:
         return ResistiveForce(plate_scale(soil, width, gravity))
     raise ValueError(f'contact law is {name!r}; allowed is one of {LAWS}')

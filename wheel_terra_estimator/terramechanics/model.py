@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.arrays import BoolArray, FloatArray, Quantity
 from wheel_terra_estimator.terramechanics import closed_form, quadrature
-from wheel_terra_estimator.terramechanics.checks import check_range, common_length
+from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects import EffectSettings, check_settings
+from wheel_terra_estimator.terramechanics.effects import EffectSettings, with_defaults
 from wheel_terra_estimator.terramechanics.kinematics import STEADY_SLIP
 from wheel_terra_estimator.terramechanics.load_balance import (
     balance,
@@ -72,17 +72,12 @@ class WheelSoilModel:
         effects: EffectSettings | None = None,
         # ``quadrature`` or ``closed_form`` (branch moments, for on-board use)
         method: str = 'quadrature',
-        *,
-        # True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
-        # at a sinkage of one radius and flagged
-        strict: bool = True,
     ) -> None:
         if method not in METHODS:
             raise ValueError(f'method is {method!r}; allowed is one of {METHODS}')
         self.soil = soil
-        self.effects = check_settings(effects or {})
+        self.effects = with_defaults(effects or {})
         self.method = method
-        self.strict = strict
         self._soil = {name: getattr(soil, name) for name in SOIL_NUMBERS}
 
     @property
@@ -92,17 +87,13 @@ class WheelSoilModel:
     def steady_state(self, points: OperatingPoints) -> SteadyState:
         """Solve the load balance and return sinkage, drawbar pull and torque.
 
-        Raises ValueError if `strict` and the soil cannot carry the load of a point, or the effects
-        leave no strength; if an array of the soil has another length than the points.
+        Where the soil cannot carry the load, they are those at a sinkage of one radius, flagged.
+        Raises ValueError where the width leaves no bearing strength.
         """
         terms = Terms(self.effects)
-        length = common_length(
-            {**{f'soil {name}': v for name, v in self._soil.items()}, 'slip': points.slip}
-        )
-        if length != len(points):
-            raise ValueError(f'the soil has {length} entries, the points {len(points)}')
         contact = build_contact(points, self._soil, self.soil.pressure_law, terms)
-        self._check(contact)
+        law = 'kc/b + kphi' if self.soil.pressure_law == 'bekker' else "c kc' + rho g b kphi'"
+        check_range(f'bearing modulus {law}', contact.bearing_modulus, 0.0, open_lower=True)
         load = np.broadcast_to(contact.normal_load, (len(points),))
         explicit = (
             self.method == 'closed_form'
@@ -113,14 +104,6 @@ class WheelSoilModel:
             angle, pull, torque, carries = balance(closed_form.proportional_forces(contact), load)
         else:
             angle, carries = self._entrance_angle(contact, load, points, terms)
-        if self.strict and not carries.all():
-            worst = int(np.flatnonzero(~carries)[0])
-            set_angles(contact, np.full_like(angle, np.pi / 2), points.leaving_angle, terms)
-            limit = np.broadcast_to(self._law.forces(contact, terms)[0], angle.shape)[worst]
-            raise ValueError(
-                f'normal load is {load[worst]:g} N (entry {worst}); this soil carries at most '
-                f'about {limit:.3g} N at a sinkage of one radius'
-            )
         set_angles(contact, angle, None if explicit else points.leaving_angle, terms)
         contact.lateral_force = self._law.lateral_force(contact, terms)
         if not explicit:
@@ -130,22 +113,6 @@ class WheelSoilModel:
         contact.torque = contact.direction * torque
         terms.apply('on_outputs', contact)  # as the instruments read them
         return _steady_state(contact, points, angle, carries)
-
-    def _check(self, contact: Contact) -> None:
-        """Raise ValueError where effects, or the width, leave no strength."""
-        law = 'kc/b + kphi' if self.soil.pressure_law == 'bekker' else "c kc' + rho g b kphi'"
-        check_range(f'bearing modulus {law}', contact.bearing_modulus, 0.0, open_lower=True)
-        if self.strict and self.effects:
-            for quantity, unit, positive in (
-                ('cohesion', 'Pa', False),
-                ('tan_friction', '-', False),
-                ('shear_modulus', 'm', True),
-                ('sinkage_exponent', '-', True),
-            ):
-                name, value = quantity.replace('_', ' '), getattr(contact, quantity)
-                check_range(
-                    f'{name} with the effects on', value, 0.0, np.inf, unit, open_lower=positive
-                )
 
     def _entrance_angle(
         self, contact: Contact, load: FloatArray, points: OperatingPoints, terms: Terms

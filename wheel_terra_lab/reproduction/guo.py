@@ -198,7 +198,7 @@ def _high_slip() -> list[Statement]:
     points = OperatingPoints(slips, 150.0, wheel)
     without = {name: v for name, v in shipped.effects.items() if name != 'soil_mound'}
     pulls = [
-        WheelSoilModel(shipped.soil, effects, strict=False).steady_state(points)
+        WheelSoilModel(shipped.soil, effects).steady_state(points)
         for effects in (without, shipped.effects)
     ]
     plain, mound = (state.drawbar_pull for state in pulls)
@@ -211,7 +211,7 @@ def _high_slip() -> list[Statement]:
     found.append(Statement('text', what, 'backwards', f'{deeper:+.0f}', deeper < 0.0))
     kappa = shipped.effects['soil_mound']['kappa']
     by_lugs = {**without, 'soil_mound': {'form': 'conveyed', 'kappa': kappa}}
-    model = WheelSoilModel(shipped.soil, by_lugs, strict=False)
+    model = WheelSoilModel(shipped.soil, by_lugs)
     gains = [
         float(np.ptp(model.steady_state(OperatingPoints(slips[[0, -1]], 150.0, of)).drawbar_pull))
         for of in (Wheel(0.25, 0.2, height, 24) for height in HEIGHTS)

@@ -14,7 +14,6 @@ import inspect
 import pkgutil
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
-from numbers import Real
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -38,9 +37,9 @@ __all__ = [
     'Form',
     'by_variant',
     'catalogue',
-    'check_settings',
     'load_file',
     'register',
+    'with_defaults',
 ]
 
 _registered: dict[str, Effect] = {}
@@ -152,44 +151,12 @@ def _check_terms(path: Path, effect: Effect) -> None:
             )
 
 
-def check_settings(settings: EffectSettings) -> dict[str, dict[str, float]]:
-    """Return the settings with defaults filled in, by variant (see ``by_variant``).
+def with_defaults(settings: EffectSettings) -> dict[str, dict[str, Any]]:
+    """Return the settings by variant (see ``by_variant``), parameters left out at their defaults.
 
-    Raises ValueError for an unknown effect, form or parameter, a value outside its range, or two
-    effects that must not be on together; the message names them.
+    Names and ranges are checked where settings are read, in ``configuration.reader``.
     """
     known = catalogue()
-    full: dict[str, dict[str, float]] = {}
-    for name, values in settings.items():
-        if name not in known:
-            raise ValueError(f'effect {name} is not in the catalogue: {", ".join(known)}')
-        if not isinstance(values, Mapping):
-            raise ValueError(f'effects.{name} is {values!r}; allowed is a mapping of parameters')
-    for key, values in by_variant(settings).items():
-        effect = known[key]
-        defaults = effect.forms[0].defaults()
-        full[key] = defaults
-        name, forms = effect.base_name, known[effect.base_name].forms
-        allowed = {p.name for p in effect.forms[0].parameters}
-        in_form = f' in the form {effect.form}' if len(forms) > 1 else ''
-        for item, value in values.items():
-            if item not in allowed:
-                raise ValueError(
-                    f'effect {name} has no parameter {item}{in_form}; it has '
-                    f'{", ".join(p.name for p in effect.forms[0].parameters)}'
-                )
-            parameter = effect.parameter(item)
-            if not isinstance(value, Real):
-                raise ValueError(f'effects.{name}.{item} is {value!r}; allowed is a number')
-            number = float(value)
-            if not parameter.lower <= number <= parameter.upper:
-                raise ValueError(
-                    f'effects.{name}.{item} is {number:g}; allowed is '
-                    f'[{parameter.lower:g}, {parameter.upper:g}] {parameter.unit}'
-                )
-            defaults[item] = number
-    on = {key.partition(FORM_MARK)[0] for key in full}
-    for name in on:
-        for other in sorted(known[name].incompatible_with & on):
-            raise ValueError(f'effects {name} and {other} exclude each other: switch one off')
-    return full
+    return {
+        key: {**known[key].defaults(), **values} for key, values in by_variant(settings).items()
+    }

@@ -88,7 +88,7 @@ def predict(model: Model, flank: str, rows: Rows) -> FloatArray:
     """Return (N, 3) sinkage, pull, lateral force."""
     side = {**model.effects['side_bulldozing'], 'form': flank}
     effects = {**model.effects, 'side_bulldozing': side}
-    state = WheelSoilModel(model.soil, effects, strict=False).steady_state(rows.points())
+    state = WheelSoilModel(model.soil, effects).steady_state(rows.points())
     return np.stack([state.sinkage, state.drawbar_pull, state.lateral_force], axis=1)
 
 

@@ -51,7 +51,7 @@ class Model:
 
     def predict(self, points: OperatingPoints, method: str = 'quadrature') -> FloatArray:
         """Return (N, 3) sinkage, drawbar pull, torque."""
-        model = WheelSoilModel(self.soil, self.effects, method, strict=False)
+        model = WheelSoilModel(self.soil, self.effects, method)
         return model.steady_state(points).outputs()
 
 
