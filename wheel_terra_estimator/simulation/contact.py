@@ -34,9 +34,10 @@ from wheel_terra_estimator.terramechanics.contact_law import (
     rim_integrals,
 )
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
-from wheel_terra_estimator.terramechanics.kinematics import shear_displacement, speed_ratio
+from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 from wheel_terra_estimator.terramechanics.quadrature import stressed
 from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.stresses import shear_displacement
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
@@ -123,7 +124,7 @@ class ContactModel:
         weights, cosine, sine = map(np.asarray, stressed(contact, self._terms, NODES))
         angle = contact.angle
         shear_radius = contact.shear_radius
-        along = shear_displacement(angle, t1, shear_radius, contact.velocity_ratio)
+        along = shear_displacement(contact, sine)
         # The rim turns by (t1 - t) while the hub moves sideways.
         across = sunk.side_slip * np.maximum(ratio, 1.0) * self._slip_radius * (t1 - angle)
         sheared = np.sqrt(along * along + across * across) + 1e-12

@@ -228,7 +228,7 @@ class BranchForces:
         contact.leaving_angle = self._leaving_share * angle
         weight, cosine, sine = quadrature.stressed(contact, _NO_TERMS, _NODES)
         weight = self._width * weight
-        mobilised, _ = stresses.mobilised_shares(contact, contact.angle, sine)
+        mobilised, _ = stresses.mobilised_shares(contact, sine)
         mobilised = weight * contact.shear_radius * mobilised
         pressed = weight * contact.radius * contact.normal_stress
         rubbed = mobilised * contact.tan_friction * contact.normal_stress

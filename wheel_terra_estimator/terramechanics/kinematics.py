@@ -48,23 +48,3 @@ def slip_of_speed_ratio(ratio: Quantity) -> FloatArray:
     driving = 1.0 - np.maximum(ratio, 0.0)
     braking = 1.0 / np.maximum(ratio, 1.0) - 1.0
     return np.where(ratio <= 1.0, driving, braking)
-
-
-def shear_displacement(
-    # ``angle``, ``entrance_angle``: hub angle t and entrance angle t1 [rad]
-    angle: Quantity,
-    entrance_angle: Quantity,
-    # ``shear_radius``, ``velocity_ratio``: R and v/w [m]
-    shear_radius: Quantity,
-    velocity_ratio: Quantity,
-    sine: Quantity | None = None,  # of the hub angle, where it is known already
-) -> Quantity:
-    """Shear displacement j = R (t1 - t) - (v/w)(sin t1 - sin t) [m].
-
-    Ding et al. 2010 eq. 14 (doi 10.1007/s11771-010-0021-7), with v/w so that slip radius and
-    shear radius may differ; j < 0 is a rim that drags the soil along (braking).
-    """
-    sine = np.sin(angle) if sine is None else sine
-    return shear_radius * (entrance_angle - angle) - velocity_ratio * (
-        np.sin(entrance_angle) - sine
-    )

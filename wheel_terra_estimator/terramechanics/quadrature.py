@@ -39,8 +39,9 @@ def forces(
     the contact; ``nodes``: other than `NODES`.
     """
     weight, cosine, sine = stressed(contact, terms, nodes)
-    angle, normal = contact.angle, contact.normal_stress
-    shear = stresses.shear_stress(contact, angle, normal, sine=sine)
+    normal = contact.normal_stress
+    strength = contact.cohesion + normal * contact.tan_friction
+    shear = strength * stresses.mobilised_shares(contact, sine)[0]
     shear *= weight * contact.shear_radius
     normal = normal * (weight * contact.radius)
     width = contact.width
@@ -59,7 +60,7 @@ def lateral_force(contact: Contact, terms: Terms, nodes: int | None = None) -> Q
         return 0.0 * contact.entrance_angle
     weight, _, sine = stressed(contact, terms, nodes)
     strength = contact.cohesion + contact.normal_stress * contact.tan_friction
-    across = strength * stresses.mobilised_shares(contact, contact.angle, sine=sine)[1]
+    across = strength * stresses.mobilised_shares(contact, sine)[1]
     return contact.width * contact.shear_radius * np.add.reduce(across * weight)
 
 
@@ -76,7 +77,7 @@ def stressed(
     cosine, sine = np.cos(angle), np.sin(angle)
     # The rear branch mirrors the front one, so both share the same stress: Wong and Reece 1967,
     # J. Terramechanics 4(1), 81-98 (doi 10.1016/0022-4898(67)90105-X).
-    stress = stresses.front_stress(contact, entry_side, cosine=cosine[:nodes])
+    stress = stresses.front_stress(contact, cosine[:nodes])
     contact.angle = angle
     contact.normal_stress = np.concatenate([stress, stress])
     terms.apply('on_normal_stress', contact)

@@ -11,7 +11,6 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import Quantity
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
 
 
 def gauss_rule(nodes: int) -> list[tuple[Quantity, Quantity]]:
@@ -52,13 +51,12 @@ def rolling_sinkage(
     return (3.0 * load / force) ** (2.0 / (2.0 * exponent + 1.0))
 
 
-def front_stress(contact: Contact, angle: Quantity, cosine: Quantity | None = None) -> Quantity:
-    """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa].
+def front_stress(contact: Contact, cosine: Quantity) -> Quantity:
+    """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N, by cos t [Pa].
 
     Wong and Reece 1967 (doi 10.1016/0022-4898(67)90105-X); Ding et al. 2010 eq. 17
-    (doi 10.1007/s11771-010-0021-7). ``cosine`` of the angle, where it is known already.
+    (doi 10.1007/s11771-010-0021-7).
     """
-    cosine = np.cos(angle) if cosine is None else cosine
     depth = contact.radius * (cosine - np.cos(contact.entrance_angle))
     relative = np.maximum(depth, 0.0) / contact.reference_depth
     return contact.bearing_modulus * relative**contact.sinkage_exponent
@@ -70,40 +68,30 @@ def mobilised_share(displacement: Quantity, shear_modulus: Quantity) -> Quantity
     return np.where(displacement >= 0.0, share, -share)
 
 
-def mobilised_shares(
-    contact: Contact, angle: Quantity, sine: Quantity | None = None
-) -> tuple[Quantity, Quantity]:
+def mobilised_shares(contact: Contact, sine: Quantity) -> tuple[Quantity, Quantity]:
     """Signed shares of the shear strength along the wheel (forward) and across it (left) [-].
 
-    Across, the soil is displaced by j_y = (v_y/w)(t1 - t), which is R (1 - s)(t1 - t) tan(beta) of
-    Ishigami et al. 2007 eq. 13 (doi 10.1002/rob.20187) written with the two speeds. Both
-    displacements share one strength: the resultant, of the size that Janosi's law gives the length
-    of (j_x, j_y), acts against the rim's motion through the soil (friction circle). The paper takes
-    each by itself, so that the resultant may exceed the strength. ``sine`` of the angle, where it
-    is known already.
+    ``sine``: of the angles of the contact. Across, the soil is displaced by j_y = (v_y/w)(t1 - t),
+    which is R (1 - s)(t1 - t) tan(beta) of Ishigami et al. 2007 eq. 13 (doi 10.1002/rob.20187)
+    written with the two speeds. Both displacements share one strength: the resultant, of the size
+    that Janosi's law gives the length of (j_x, j_y), acts against the rim's motion through the soil
+    (friction circle). The paper takes each by itself: the resultant may exceed the strength.
     """
-    along = shear_displacement(
-        angle, contact.entrance_angle, contact.shear_radius, contact.velocity_ratio, sine
-    )
+    along = shear_displacement(contact, sine)
     if contact.straight:
         return mobilised_share(along, contact.shear_modulus), 0.0
-    across = contact.lateral_ratio * (contact.entrance_angle - angle)
+    across = contact.lateral_ratio * (contact.entrance_angle - contact.angle)
     length = np.maximum(np.sqrt(along * along + across * across), _NO_DISPLACEMENT)
     share = -np.expm1(-length / contact.shear_modulus) / length
     return share * along, -share * across
 
 
-def shear_stress(
-    contact: Contact,
-    angle: Quantity,
-    normal_stress: Quantity,
-    sine: Quantity | None = None,
-) -> Quantity:
-    """Shear stress along the wheel (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa].
+def shear_displacement(contact: Contact, sine: Quantity) -> Quantity:
+    """Shear displacement j = R (t1 - t) - (v/w)(sin t1 - sin t), by t and sin t [m].
 
-    Janosi and Hanamoto 1961; Ding et al. 2010 eq. 18 (doi 10.1007/s11771-010-0021-7); less where
-    the wheel slides sideways (``mobilised_shares``). ``sine`` of the angle, where it is known
-    already.
+    Ding et al. 2010 eq. 14 (doi 10.1007/s11771-010-0021-7), with v/w so that slip radius and
+    shear radius may differ; j < 0 is a rim that drags the soil along (braking).
     """
-    strength = contact.cohesion + normal_stress * contact.tan_friction
-    return strength * mobilised_shares(contact, angle, sine)[0]
+    t1 = contact.entrance_angle
+    rolled = contact.velocity_ratio * (np.sin(t1) - sine)
+    return contact.shear_radius * (t1 - contact.angle) - rolled
