@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,68 +20,59 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Truth:
-    """State of rover and soil; arrays are (n,), in the order of ``wheels.names``, in SI units.
+class Recorded:
+    """What is recorded of a state: at one time, or with an axis of times in front.
 
-    ``slip`` is nan for a wheel at rest (below ``rest_speed``).
+    Per wheel, in the order of ``wheels.names``, and of the rover; in SI units.
     """
 
-    time: float  # since the start of the drive [s]
-    slip: FloatArray
+    slip: FloatArray  # nan for a wheel at rest (below ``rest_speed``)
     slip_velocity: FloatArray  # r w - v
     drawbar_pull: FloatArray
-    lateral_force: FloatArray  # positive left [N]
-    slip_angle: FloatArray  # [rad]
     normal_load: FloatArray
     sinkage: FloatArray
     sinkage_rate: FloatArray
     torque: FloatArray
     wheel_rate: FloatArray
+    slip_angle: FloatArray  # [rad]
+    lateral_force: FloatArray  # positive left [N]
+    forward_velocity: Any
+    lateral_velocity: Any
+    yaw_rate: Any
+    slope: Any  # of the ground in the direction of the heading, positive uphill
+    position: FloatArray  # x, y, heading
+
+
+@dataclass(frozen=True)
+class Truth(Recorded):
+    """State of rover and soil at one time; arrays are (n,), those of the rover (3,)."""
+
+    time: float  # since the start of the drive [s]
     wheel_angle: FloatArray
     steering: FloatArray  # positive left [rad]
     leaving_angle: FloatArray
     pass_number: FloatArray  # 1 on virgin soil
-    forward_velocity: float
-    lateral_velocity: float
-    yaw_rate: float
-    position: FloatArray  # (3,) x, y, heading
-    slope: float  # of the ground in the direction of the heading, positive uphill
     pitch: float  # of the chassis, positive nose up
     roll: float  # of the chassis, positive left side up
-    specific_force: FloatArray  # (3,) in the chassis frame
-    angular_rate: FloatArray  # (3,) in the chassis frame
+    specific_force: FloatArray  # in the chassis frame
+    angular_rate: FloatArray  # in the chassis frame
 
 
 @dataclass(frozen=True)
-class TruthTable:
+class TruthTable(Recorded):
     """Truth of a whole drive, one row per stamp of the wheel odometry.
 
-    (k, n) as in ``Truth``, in SI units: ``slip`` (nan at rest), ``slip_velocity``,
-    ``drawbar_pull``, ``normal_load``, ``sinkage``, ``sinkage_rate``, ``torque``, ``wheel_rate``,
-    ``slip_angle``, ``lateral_force``; ``slip_class`` (without hysteresis, 255 at rest). (k,):
-    ``stamp`` [ns], ``stuck`` (median abs(slip) of the turning wheels above 0.9 for 1 s; clears
-    after 3 s below 0.6), ``forward_velocity``, ``lateral_velocity``, ``yaw_rate``, ``slope``; (k,
-    3): ``position`` (x, y, heading). ``wheels``: names of the n wheels.
+    (k, n), in SI units: ``slip`` (nan at rest), ``slip_velocity``, ``drawbar_pull``,
+    ``normal_load``, ``sinkage``, ``sinkage_rate``, ``torque``, ``wheel_rate``, ``slip_angle``,
+    ``lateral_force``; ``slip_class`` (without hysteresis, 255 at rest). (k,): ``stamp`` [ns],
+    ``stuck`` (median abs(slip) of the turning wheels above 0.9 for 1 s; clears after 3 s below
+    0.6), ``forward_velocity``, ``lateral_velocity``, ``yaw_rate``, ``slope``; (k, 3): ``position``
+    (x, y, heading). ``wheels``: names of the n wheels.
     """
 
     stamp: IntArray
-    slip: FloatArray
-    slip_velocity: FloatArray
-    drawbar_pull: FloatArray
-    normal_load: FloatArray
-    sinkage: FloatArray
-    sinkage_rate: FloatArray
-    torque: FloatArray
-    wheel_rate: FloatArray
-    slip_angle: FloatArray
-    lateral_force: FloatArray
     slip_class: NDArray[np.uint8]
     stuck: BoolArray
-    forward_velocity: FloatArray
-    lateral_velocity: FloatArray
-    yaw_rate: FloatArray
-    slope: FloatArray
-    position: FloatArray
     wheels: tuple[str, ...] = ()
 
     @classmethod
@@ -93,12 +84,8 @@ class TruthTable:
         wheels: Sequence[str],
     ) -> TruthTable:
         """Collect rows and add class and stuck."""
-        own = {f.name for f in fields(Truth)}
-        columns = {
-            f.name: np.array([getattr(row, f.name) for row in rows])
-            for f in fields(cls)
-            if f.name in own
-        }
+        names = [f.name for f in fields(Recorded)]
+        columns = {name: np.array([getattr(row, name) for row in rows]) for name in names}
         stamp = np.array(stamps, dtype=np.int64)
         return cls(
             stamp=stamp,
