@@ -281,7 +281,7 @@ def test_a_shared_parameter_means_the_same_in_every_form():
     with pytest.raises(ValueError, match='states the parameter a in two ways'):
         Effect(
             'twice', 'c', 's', (one,), frozenset({'torque'}), 'v', 's', on_outputs=term,
-            other_forms=(Form('other', 'c', 's', (other,), 'v', 's', on_outputs=term),),
+            other_forms=(Form('other', 'c', 's', (other,), on_outputs=term),),
         )  # fmt: skip
 
 

@@ -89,22 +89,27 @@ shape = partial(_of_prior, 'normal', True)
 
 @dataclass(frozen=True)
 class Form:
-    """Another law for the same effect, beside the one that the effect itself states."""
+    """A law of an effect, beside the one that the effect itself states.
+
+    None: as of the effect.
+    """
 
     name: str  # value of the configuration key ``effects.<effect>.form``
-    # ``claim``, ``symbol``, ``parameters``, ``source``: as for the effect; ``validity``,
-    # ``touches``, ``needs``, ``candidate``: None for those of the effect
-    claim: str
-    symbol: str
-    parameters: tuple[EffectParameter, ...]
+    claim: str  # one line: what it stands for
+    symbol: str  # the term as a formula
+    parameters: tuple[EffectParameter, ...]  # at least one; `on_*` receives their values by name
+    # Which of `TOUCHABLE` it is seen by (soil and rim change the lateral force as they do pull)
+    touches: frozenset[str] | None = None
+    # ``validity``, ``source``: where it holds; paper and equation
     validity: str | None = None
     source: str = ''
-    touches: frozenset[str] | None = None
+    # Columns of a table that must be there, and vary, for the effect to be seen
     needs: tuple[str, ...] | None = None
+    # False: never tried by the discrepancy workflow unless asked for by name
     candidate: bool | None = None
-    why_aside: str = ''  # as for the effect, of this form alone
-    # ``on_inputs``, ``on_contact``, ``on_normal_stress``, ``on_outputs``: the terms of this form;
-    # those of the effect itself play no part in it
+    why_aside: str = ''  # the reason for that
+    # ``on_inputs``, ``on_contact``, ``on_normal_stress``, ``on_outputs``: the terms of this law,
+    # ``term(contact, parameters)``: see ``Contact`` for what each may change
     on_inputs: Term | None = None
     on_contact: Term | None = None
     on_normal_stress: Term | None = None
@@ -112,44 +117,29 @@ class Form:
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(Form):
     """One physical or instrument effect of the catalogue.
 
     The fields state its first form. ``forms`` has all of them, each as an effect of one form:
     the first under the effect's name, another under ``name:form``. These keys stand wherever
-    effects are settled by name and value, so that two forms can be weighed side by side.
+    effects are settled by name and value, so that two forms can be weighed side by side. The name
+    is that of docs/effects.md and of configuration keys.
     """
 
-    name: str  # as in docs/effects.md and in configuration keys
-    claim: str  # one line: what it stands for
-    symbol: str  # the term as a formula
-    parameters: tuple[EffectParameter, ...]  # at least one; `on_*` receives their values by name
-    # Which of `TOUCHABLE` it is seen by (soil and rim change the lateral force as they do pull)
     touches: frozenset[str] = frozenset(OUTPUTS)
-    # ``validity``, ``source``: where it holds; paper and equation
     validity: str = ''
-    source: str = ''
-    instrument: bool = False  # True for an error of the measurement, False for physics of the soil
-    # Columns of a table that must be there, and vary, for the effect to be seen
     needs: tuple[str, ...] = ()
+    candidate: bool = True
+    instrument: bool = False  # True for an error of the measurement, False for physics of the soil
     # Name of another effect -> what separates the two
     confounded_with: Mapping[str, str] = field(default_factory=dict)
     incompatible_with: frozenset[str] = frozenset()  # effects that must not be on at the same time
-    # False: never tried by the discrepancy workflow unless asked for by name
-    candidate: bool = True
-    why_aside: str = ''  # the reason for that
     # True: parameters that are not given are absent instead of at their defaults, and configuration
     # files state the others as flat lists (``learned_closure``)
     sparse: bool = False
     form: str = 'standard'  # name of the first form
     # Further forms; a parameter that several forms share is the same object in each
     other_forms: tuple[Form, ...] = ()
-    # ``on_inputs``, ``on_contact``, ``on_normal_stress``, ``on_outputs``: the terms,
-    # ``term(contact, parameters)``: see ``Contact`` for what each may change
-    on_inputs: Term | None = None
-    on_contact: Term | None = None
-    on_normal_stress: Term | None = None
-    on_outputs: Term | None = None
 
     def __post_init__(self) -> None:
         if not self.base_name.isidentifier():
