@@ -104,6 +104,6 @@ def check_demo(command: Path, tmp_path: Path) -> None:
     said = run(command, 'demo', '--no-node', cwd=tmp_path)
     assert 'entrapped at' in said
     assert 'warned' in said
-    assert 'truth revealed: hard_layer was hidden' in said and ': right' in said
+    assert 'hidden effect hard_layer, identified hard_layer: right' in said
     for name in ('entrapment', 'pathfinder', 'trial/diagnosis/report'):
         assert (tmp_path / 'demo_output' / f'{name}.html').stat().st_size > 100_000
