@@ -9,7 +9,6 @@ cut off or damaged: `open_bag` gives the messages that are whole and says what w
 from __future__ import annotations
 
 import heapq
-import stat
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -157,12 +156,9 @@ def _storage_files(path: Path, metadata: bag_metadata.Metadata, notes: list[str]
         found = sorted(p for p in path.iterdir() if p.name.endswith(STORAGE_SUFFIXES))
     except OSError as error:
         raise UserError(f'{path}: cannot be read ({error.strerror})') from None
-    regular = []
-    for file in found:
-        if file.is_file() and stat.S_ISREG(file.stat().st_mode):
-            regular.append(file)
-        else:
-            notes.append(f'{file.name} is no regular file and was left out')
+    regular = [file for file in found if file.is_file()]
+    others = (file.name for file in found if file not in regular)
+    notes += [f'{name} is no regular file and was left out' for name in others]
     # A packed file beside the same one unpacked is not read twice.
     regular = [f for f in regular if f.suffix != '.zstd' or f.with_suffix('') not in regular]
     if metadata.fault:

@@ -73,13 +73,7 @@ class Wheels(Section):
         slip_radius = self.radius + self.lug_height if tip else self.radius.copy()
         slip_radius.setflags(write=False)
         self.__dict__['slip_radius'] = slip_radius
-        self.__dict__['wheel'] = Wheel(
-            radius=self.radius,
-            width=self.width,
-            lug_height=self.lug_height,
-            lug_count=self.lug_count,
-            lug_thickness=self.lug_thickness,
-        )
+        self.__dict__['wheel'] = Wheel(**{f.name: getattr(self, f.name) for f in fields(Wheel)})
 
     slip_radius: FloatArray  # radius that the slip ratio refers to [m]
     wheel: Wheel

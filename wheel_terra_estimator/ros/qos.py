@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 from rclpy import qos
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -36,22 +36,15 @@ FREQUENT = ('joint_states', 'odom', 'imu/data')
 
 def input_profile(topic: str = '') -> QoSProfile:
     """Best effort fits both kinds of publishers; a lost sensor value need not be resent."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=FAST_DEPTH if topic in FREQUENT else 10,
-        reliability=ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.VOLATILE,
-    )
+    depth = FAST_DEPTH if topic in FREQUENT else 10
+    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def output_profile(latched: bool = False) -> QoSProfile:
-    """Reliable; a latched topic gives its last message to late subscribers."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=1 if latched else 10,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
+    """Reliable, as all profiles are by default; a latched one keeps its last message for others."""
+    if latched:
+        return QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    return QoSProfile(depth=10)
 
 
 def check_overrides(node: Node) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from wheel_terra_estimator.simulation.drives import Command, Drives
 from wheel_terra_estimator.simulation.plant import LONGEST_STEP, RoverPlant
 from wheel_terra_estimator.simulation.scenario import SENSOR_FAULTS, WHEEL_FAULTS, Fault, Scenario
 from wheel_terra_estimator.simulation.sensors import START, Arrival, SensorSuite
-from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Ground, Patch, Terrain
+from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Ground, Terrain
 from wheel_terra_estimator.simulation.truth import Truth, TruthTable
 
 DEFAULT_TORQUE_RATIO = 1.5
@@ -65,15 +65,10 @@ class Drive:
             return float(np.exp(deviation * np.clip(variation.standard_normal(), -2.5, 2.5)))
 
         soil = {name: factor(getattr(draw, name)) for name in SOIL_QUANTITIES}
+        stiffness = [p.factors['stiffness'] * factor(draw.patch) for p in scenario.patches]
         patches = [
-            Patch(
-                p.start,
-                p.end,
-                p.right,
-                p.left,
-                {**p.factors, 'stiffness': p.factors['stiffness'] * factor(draw.patch)},
-            )
-            for p in scenario.patches
+            replace(p, factors=p.factors | {'stiffness': own})
+            for p, own in zip(scenario.patches, stiffness, strict=True)
         ]
         slope_shift = draw.slope * variation.standard_normal()
         # Factor on the commands of the scenario, as drawn [-]

@@ -66,7 +66,7 @@ class SensorSuite:
         self._random = random
         self._faults = faults
         n = configuration.wheels.count
-        self._scale = scale = scenario.sensors.noise
+        self._scale = scale = self._there.noise
         # (n,) zeros of the torques, as drawn [N m]
         self.torque_zero = scale * self._torque.torque_zero_std * random.standard_normal(n)
         gain = COMMON_GAIN * random.standard_normal() + OWN_GAIN * random.standard_normal(n)
@@ -75,18 +75,14 @@ class SensorSuite:
         self._force_bias = scale * figures.specific_force_bias_std * random.standard_normal(3)
         self._rate_bias = scale * figures.angular_rate_bias_std * random.standard_normal(3)
         self._attitude_error = scale * figures.orientation_std * random.standard_normal(2)
-        self._delay = (
-            scenario.sensors.reference_delay
-            if scenario.sensors.reference_delay >= 0.0
-            else figures.reference_delay
-        )
-        reference_rate = scenario.sensors.reference_rate or figures.reference_rate
+        asked = self._there.reference_delay  # below 0: nothing
+        self._delay = asked if asked >= 0.0 else figures.reference_delay
         self.odometry_period = 1.0 / figures.wheel_odometry_rate  # [s] between two messages
         self._periods = {
             'odometry': self.odometry_period,
             'imu': 1.0 / figures.imu_rate,
             'sinkage': 1.0 / figures.sinkage_rate,
-            'reference': 1.0 / reference_rate,
+            'reference': 1.0 / (self._there.reference_rate or figures.reference_rate),
         }
         # Sensors are not in step with each other.
         self._next = {
