@@ -23,6 +23,7 @@ from wheel_terra_estimator.cli.demo import DRIVES
 from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.sideways import Sideways
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_estimator.messages.pipeline import Pipeline
 from wheel_terra_estimator.reporting.drive_style import Border
@@ -225,6 +226,9 @@ def sets(count: int):
             slip=dice.uniform(-1.0, 1.0, first.slip.shape),
             sinkage=dice.uniform(0.0, 0.1, first.slip.shape),
             drawbar_pull=dice.uniform(-50.0, 50.0, first.slip.shape),
+            pull_margin=dice.uniform(0.0, 90.0, first.slip.shape),
+            sideways=Sideways(*dice.uniform(-0.9, 0.9, (4, *first.slip.shape)), 0.0, 0.0),
+            slip_velocity=dice.uniform(-0.3, 0.3, first.slip.shape),
             slip_class=dice.choice([0, 1, 2, 3, 255], first.slip.shape).astype(np.uint8),
         )
 
@@ -250,14 +254,20 @@ def test_figures_of_a_thinned_drive_are_those_of_all_sets():
     )
     assert summary == same
     assert summary.sets == 300
-    classes = np.array([s.slip_class for s in everything])
-    slips = np.abs([s.slip for s in everything])
-    sinkages = np.array([s.sinkage for s in everything])
-    pulls = np.array([s.drawbar_pull for s in everything])
-    for i, wheel in enumerate(summary.wheels):
+    classes, every = long.slip_class, {k: np.abs(v) for k, v in long.values.items()}
+    for i, wheel in zip(range(classes.shape[1]), summary.wheels, strict=True):
         known = classes[:, i] != 255
-        assert wheel.max_slip == slips[known, i].max()
+        assert wheel.max_slip == every['slip'][known, i].max()
         since = int(np.argmax(known))  # not what is assumed before the first motion
-        assert wheel.max_sinkage == sinkages[since:, i].max()
-        assert wheel.mean_pull == pytest.approx(pulls[known, i].mean())
+        assert wheel.max_sinkage == every['sinkage'][since:, i].max()
+        assert wheel.mean_pull == pytest.approx(long.values['drawbar_pull'][known, i].mean())
+        assert wheel.least_margin == every['pull_margin'][:, i].min()
+        assert wheel.max_lateral_force == every['lateral_force'][known, i].max()
+        angles = np.percentile(long.values['slip_angle'][known, i], (5, 95))
+        assert same.wheels[i].slip_angle == pytest.approx(angles)
         assert wheel.seconds['high'] == pytest.approx(0.05 * (classes[:-1, i] == 2).sum())
+        assert wheel.shares['high'] == pytest.approx((classes[:-1, i] == 2).mean())
+        slipping = np.isin(classes[:-1, i], (2, 3))
+        assert wheel.slip_travel == pytest.approx(
+            0.05 * every['slip_velocity'][:-1, i][slipping].sum()
+        )

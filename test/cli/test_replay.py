@@ -217,6 +217,13 @@ def test_drive_gives_a_bag_a_report_and_a_summary(make_bag, config, tmp_path, pr
     page = report.read_text()
     assert len(re.findall('<path class="line', page)) == 2 + 2 * 3 + 2  # speeds; two wheels; slopes
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # nothing is loaded from elsewhere
+    for i, name in enumerate(('left', 'right')):  # the terminal has the first figures of the page
+        rows = re.findall(rf'<tr><td>{name}</td>(.*?)</tr>', page, re.DOTALL)
+        cells = re.findall(r'data-label=".*?">(.*?)<', ''.join(rows))
+        shown = re.split(' {3,}', re.search(rf'^  {name} +(.*)', said, re.MULTILINE)[1])
+        assert [cell.replace('±', '+-') for cell in cells[: len(shown)]] == shown
+        margin = float(cells[len(shown) + 1])
+        assert margin == pytest.approx(history.values['pull_margin'][:, i].min(), abs=0.06)
 
 
 def test_what_was_learned_is_a_further_config_of_every_command(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
@@ -127,6 +128,7 @@ def test_every_picture_is_in_the_page_and_beside_it(page):
     files = {path.name: imread(path) for path in folder.glob('*.png')}
     drawn = [source for source in parsed.sources if source.startswith('data:')]
     assert len(drawn) == len(files)
+    assert all(b'</svg>' in b64decode(source.partition(',')[2]) for source in drawn)
     assert any(name.startswith('residuals_by_') for name in files)
     assert 'curves_over_slip.png' in files, 'two loads on three slopes are six curves'
     for name, pixels in files.items():
