@@ -154,7 +154,9 @@ def test_imu_without_orientation(imu, converter):
     assert measured.specific_force.tolist() == [0.1, 0.2, 9.8]
     assert measured.angular_rate.tolist() == [0.01, 0.02, 0.03]
     assert imu((0.0, 0.0, 0.0, 0.0)).orientation is None
-    assert sum(converter.rejected.values()) == 1
+    assert imu((0.0, 0.0, 0.0, 2.5)).orientation is None
+    assert sum(converter.rejected.values()) == 2
+    assert imu((0.0, 0.0, 0.0, 1.5)).orientation.tolist() == list(UPRIGHT)
 
 
 @pytest.mark.filterwarnings('error')

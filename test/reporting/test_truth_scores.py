@@ -58,12 +58,12 @@ def truth(slip):
 
 def test_errors_and_classes():
     true = np.tile(np.linspace(0.0, 0.99, 100)[:, None], (1, 2))
-    seen = true + np.array([0.04, -0.12])
+    seen = true + np.array([0.08, -0.12])
     errors = truth_errors(history(seen), truth(true), THRESHOLDS)
     slip = errors.quantities[0]
     assert slip.name == 'slip'
-    assert slip.rms == pytest.approx(np.sqrt((0.04**2 + 0.12**2) / 2))
-    assert slip.bias == pytest.approx(-0.04)
+    assert slip.rms == pytest.approx(np.sqrt((0.08**2 + 0.12**2) / 2))
+    assert slip.bias == pytest.approx(-0.02)
     assert slip.worst == pytest.approx(0.12)
     assert slip.within_two_std == pytest.approx(0.5)
     # All was called low; truth has 31 sets up to 0.3 (bound included), then 30, 30 and 9.
@@ -120,9 +120,10 @@ def test_a_set_is_stuck_while_a_warning_stands():
 def test_comparison():
     first, second = history(np.zeros((100, 2))), history(np.zeros((100, 2)))
     second.values['sinkage'][7, 1] = 0.25
+    second = EstimateHistory(**{**vars(second), 'stamp': STAMP[5] - STAMP[0] + STAMP})
     told = {d.name: d for d in compare(first, second, ('a', 'b'), None).differences}
     assert told['sinkage'].greatest == 0.25
-    assert told['sinkage'].where == 'right at 0.7 s'
+    assert told['sinkage'].where == 'right at 1.2 s'
     assert told['slip'].rms == 0.0
     apart = EstimateHistory(**{**vars(second), 'stamp': STAMP + 10**15})
     with pytest.raises(UserError, match='no stamp in common'):
