@@ -8,6 +8,7 @@ import re
 from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
+from itertools import chain
 from types import SimpleNamespace
 
 import matplotlib as mpl
@@ -24,7 +25,7 @@ from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.report.page import write_report
 from wheel_terra_estimator.discrepancy.report.words import FACTORS, _leaves, in_words, sentence
-from wheel_terra_estimator.discrepancy.result import QuantityGap
+from wheel_terra_estimator.discrepancy.result import LeftOut, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection.verdict import Remainder
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.discrepancy.workflow import Options
@@ -139,7 +140,9 @@ def test_every_picture_is_in_the_page_and_beside_it(page):
 
 def test_numbers_are_those_of_the_diagnosis(page, named):
     parsed, _ = page
-    assert named.sentence.replace('+-', '±') in re.sub(r'\s+', ' ', parsed.text)
+    text = re.sub(r'\s+', ' ', parsed.text)
+    for line in (named.sentence.replace('+-', '±'), *chain(*in_words(named).values())):
+        assert line in text
     first = named.effects[0]
     assert f'{100 * first.confidence:.0f} %' in parsed.text
     for name, item in first.parameters.items():
@@ -212,6 +215,24 @@ def test_every_kind_of_diagnosis_has_a_report(plan, tmp_path, undrawn):
     ] in parsed.text
     if plan.get('drop'):
         assert not any(row and row[0].strip() == 'torque [N m]' for row in parsed.rows)
+
+
+def test_a_proposed_law_is_on_the_page(named, tmp_path, same_pictures):
+    gap = {name: replace(item, after=0.123) for name, item in named.gap.items()}
+    left_out = {'normal_load': {'torque': LeftOut(0.5, 0.25)}}
+    words = 'Torque grows by 0.1 per 0.1 of slip.'
+    law = Proposal(
+        words, ('torque',), ('slip',), (1.0,), (0.1,), gap, (), ('slip above 0.6',), left_out
+    )
+    diagnosis = replace(named, effects=(), proposal=law)
+    parsed = Page(write_report(diagnosis, tmp_path).read_text(encoding='utf-8'))
+    assert words in parsed.text and 'Do not trust it for: slip above 0.6.' in parsed.text
+    assert parsed.row('normal load', 'left out, level by level')[1:] == [
+        'torque [N m]',
+        '0.5',
+        '0.25',
+    ]
+    assert parsed.row('torque [N m]', 'quantity')[3] == '0.123'
 
 
 def test_names_from_the_table_cannot_break_the_page(named, tmp_path, same_pictures):
