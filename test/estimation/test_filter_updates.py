@@ -238,6 +238,19 @@ def test_neither_a_rejected_reference_nor_one_at_rest_tells_of_slip(parts, ekf):
     assert not reference_update(parts).fresh(0.0)
 
 
+def test_a_rejected_reference_leaves_the_speed_in_doubt_until_the_next_one(parts, ekf):
+    """As likely wild as true: two speeds, half each, deviate by half of their difference."""
+    update = reference_update(parts)
+    ekf.set(SPEED, 0.045, 0.001**2)
+    hear(parts, update, ekf, 0.0, 0.045)
+    assert update.doubt_variance == 0.0
+    told = float(ekf.x[SPEED])
+    hear(parts, update, ekf, 1.0, 0.02)
+    assert update.doubt_variance == pytest.approx(np.var([told, 0.02]))
+    hear(parts, update, ekf, 2.0, float(ekf.x[SPEED]))
+    assert update.doubt_variance == 0.0
+
+
 def wandering(rng, count, dt, std, time):
     """Return a first-order Gauss-Markov error at `count` times."""
     hold, values = np.exp(-dt / time), [std * rng.standard_normal()]
