@@ -384,7 +384,11 @@ def _fits(table: FloatArray, second: FloatArray) -> FloatArray:
 
 # Stamps against arrival ---------------------------------------------------------------------------
 
-CHECKED = ('joints', 'imu', 'sinkage', 'reference')
+CHECKED = {'joints': 'rate', 'imu': 'force', 'sinkage': 'sinkage', 'reference': 'velocity'}
+"""Channels and what they measure."""
+PERIODS = (2e-4, 20.0)  # between messages of wheel rates [s]
+USUAL_PERIODS = (2e-3, 2.0)  # the same in the right unit [s]
+TIME_UNITS = {'milliseconds': 1e-3, 'microseconds': 1e-6, 'nanoseconds': 1e-9}  # [s]
 LONGEST_SILENCE = 5.0  # of an input at an end of a recording in which others come [s]
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
@@ -411,6 +415,59 @@ MOST_LATE = 40.0  # beyond which a longer history is no remedy [s]
 QUARTERS, UNEVEN = 4, 0.5  # parts of a drive; unlike gains of a drift over their mean, at most [-]
 CLOCK_DIFFERENCE = 1.0  # of log time less stamp of two topics, at most [s]
 LONGEST_WAY = 10.0  # of a message into the log [s]
+
+
+def check_time_unit(recording: Recording) -> tuple[list[Outcome], Recording]:
+    """Return a log whose times were taken for another unit, and the recording with them right."""
+    joints = recording.joints
+    if joints is None or joints.stamp.size < SEVERAL:
+        return [], recording
+    # The mean as well: a buffer may be read in bursts, and a recorder may pause.
+    kinds = np.median, np.mean
+    periods = [
+        1e-9 * f(np.abs(np.diff(at))) for f in kinds for at in (joints.stamp, joints.log_time)
+    ]
+    if not (max(periods) < PERIODS[0] or min(periods) > PERIODS[1]):
+        return [], recording  # where one of both clocks is right it is the other's fault
+    stamped = joints.period
+    for unit, factor in TIME_UNITS.items():
+        for times, now, right in ((factor, 's', unit), (1.0 / factor, unit, 's')):
+            if USUAL_PERIODS[0] < stamped * times < USUAL_PERIODS[1]:
+                words: dict[str, Any] = {'period': stamped, 'now': now, 'right': right}
+                mended = {n: _paced(getattr(recording, n), joints.stamp[0], times) for n in CHECKED}
+                outcome = found('time_unit', joints.topic, 0.97, value=times, **words)
+                return [outcome], replace(recording, **mended, heard={})
+    return [], recording
+
+
+def check_publishers(recording: Recording) -> tuple[list[Outcome], Recording]:
+    """Return topics that a second publisher sends nothing but 0 on, and them without these.
+
+    Its messages have the stamps of others, which measured.
+    """
+    outcomes, mended = list[Outcome](), dict[str, Any]()
+    for name, field in CHECKED.items():
+        if (channel := getattr(recording, name)) is None:
+            continue
+        live = np.nan_to_num(getattr(channel, field)).any(axis=1)
+        twin = (np.diff(channel.stamp) == 0) & (channel.stamp[1:] > 0)
+        beside = np.append(False, twin & live[:-1]) | np.append(twin & live[1:], False)
+        blank = ~live & beside
+        if blank.any() and np.mean(blank) > BACKWARD_SHARE:
+            outcomes.append(found('two_publishers', channel.topic, 0.97, count=int(blank.sum())))
+            mended[name] = rows_of(channel, ~blank)
+    return outcomes, replace(recording, **mended)
+
+
+def _paced(channel: Any, origin: int, times: float) -> Any:
+    """Return a channel whose time runs so many times as fast from an origin [ns] on."""
+    if channel is None:
+        return None
+    stamp, log_time = (
+        origin + np.round((at - origin) * times).astype(np.int64)
+        for at in (channel.stamp, channel.log_time)
+    )
+    return replace(channel, stamp=stamp, log_time=log_time)
 
 
 def check_transport(

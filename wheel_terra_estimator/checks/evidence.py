@@ -17,6 +17,7 @@ from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
 from wheel_terra_estimator.checks.finding import FAULTS, Finding, found
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import (
+    LONGEST_HELD,
     Channel,
     JointSeries,
     Recording,
@@ -278,11 +279,20 @@ class Evidence:
     def rows(self, kept: Mask) -> Evidence:
         """Return the evidence with some messages of the wheel odometry."""
         recording = replace(self.recording, joints=rows_of(self.joints, kept))
-        force, gyro = (None if one is None else one[kept] for one in (self.force, self.gyro))
+        force, gyro = (self._between(one, kept) for one in (self.force, self.gyro))
         left = replace(self, recording=recording, time=self.time[kept], force=force, gyro=gyro)
         return replace(left, steering=self.steering[kept]).with_rate(
             self.rate[kept], self.torque[kept]
         )
+
+    def _between(self, values: FloatArray | None, kept: Mask) -> FloatArray | None:
+        """Return means of (k, 3) values over the time from one of some rows to the next."""
+        if values is None:
+            return None
+        spans = _since_the_row_before(self.time)
+        total = np.cumsum(np.column_stack([values, np.ones(spans.size)]) * spans[:, None], axis=0)
+        table = np.diff(total[kept], axis=0, prepend=0.0)
+        return table[:, :-1] / table[:, -1:]
 
     def with_channel(self, name: str, **values: Any) -> Evidence:
         """Return the evidence with other values in a channel of the recording."""
@@ -345,7 +355,7 @@ def gather(recording: Recording, facts: RoverFacts, figures: dict[str, Any]) -> 
     imu = recording.imu
     if imu is not None:
         at = (imu.stamp - rows.stamp[0]) * 1e-9
-        width = float(np.median(np.diff(time)))
+        width = _since_the_row_before(time)
         force, gyro = (
             averaged(at, np.nan_to_num(values) @ facts.mounting.T, time, width) - bias
             if np.isfinite(values).any()
@@ -358,6 +368,12 @@ def gather(recording: Recording, facts: RoverFacts, figures: dict[str, Any]) -> 
     return Evidence(
         recording, facts, time, rate, torque, force, gyro, facts.mounting, figures, steering
     )
+
+
+def _since_the_row_before(time: FloatArray) -> FloatArray:
+    """Return the time since the row before [s]; no more than a reading stands, usual at first."""
+    step = np.diff(time)
+    return np.minimum(np.append(np.median(step), step), LONGEST_HELD * 1e-9)
 
 
 def noise_of(values: FloatArray, bends: Mask | slice = slice(None)) -> float:
@@ -428,7 +444,7 @@ def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None
     width = max(round(0.4 / period), 1)
     speed = moving_mean(evidence.rim, width)
     curve = speed * moving_mean(evidence.gyro[:, 2], width)
-    motion = without_drift(np.gradient(speed, period) + 1j * curve, period, drift)
+    motion = without_drift(np.gradient(speed, evidence.time) + 1j * curve, period, drift)
     along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
     seen = without_drift(along + 1j * across, period, drift)
     return motion, seen
@@ -442,8 +458,16 @@ def acceleration_fits(evidence: Evidence) -> tuple[Estimate, Estimate] | None:
         return None
     motion, seen = both
     pairs = (motion.real, seen.real), (motion.imag, seen.imag)
-    along, across = (block_fit(wheels[:, None], measured)[0] for wheels, measured in pairs)
+    along, across = (_fit_beyond_chance(*pair) for pair in pairs)
     return along, across
+
+
+def _fit_beyond_chance(motion: FloatArray, seen: FloatArray) -> Estimate:
+    """Return a robust fit; few curves on a slope leave more open than their blocks differ."""
+    value, std = block_fit(motion[:, None], seen)[0]
+    energy = float(motion @ motion)
+    chance = math.sqrt(2.0) * _by_chance(motion, seen, value * energy) / max(energy, 1e-12)
+    return Estimate(value, max(std, chance))
 
 
 def accelerometer_signs(evidence: Evidence) -> list[int]:
@@ -479,7 +503,7 @@ def mounting_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
     return Estimate(float(np.angle(total)), std)
 
 
-def _by_chance(motion: Complex, seen: Complex, total: complex) -> float:
+def _by_chance(motion: Any, seen: Any, total: complex) -> float:
     """Return the chance correlation of a motion with the rest of the measured one at other lags."""
     left = seen - motion * total / np.vdot(motion, motion)
     at_lags = np.fft.ifft(np.fft.fft(left) * np.conj(np.fft.fft(motion)))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.checks.finding import Finding, Outcome, found, not_checked
-from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
+from wheel_terra_estimator.checks.rover_facts import RoverFacts, place, side_of, wheel_names
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 
 IMU = 'sensor_msgs/msg/Imu'
@@ -155,14 +155,15 @@ def _missing(topic: str, names: Sequence[str], how: str) -> Finding:
 
 def _pairs(absent: Sequence[str], spare: Sequence[str]) -> dict[str, str]:
     """Return {configured name: name in the recording} where they belong together."""
+    if len(absent) == len(spare):
+        pairs = dict(zip(sorted(absent, key=place), sorted(spare, key=place), strict=True))
+        if all(side_of(name) * side_of(other) >= 0 for name, other in pairs.items()):
+            return {name: pairs[name] for name in absent}
     left = list(spare)
     pairs = {}
     for name in absent:
         same_side = [other for other in left if side_of(other) in (0, side_of(name))]
-        close = difflib.get_close_matches(name, same_side, n=1, cutoff=0.5)
-        if not close and len(absent) == len(spare):
-            close = [left[0]]  # as many as are missing: in the usual order
-        if close:
-            pairs[name] = close[0]
-            left.remove(close[0])
+        for other in difflib.get_close_matches(name, same_side, n=1, cutoff=0.5):
+            pairs[name] = other
+            left.remove(other)
     return pairs

@@ -26,6 +26,7 @@ LEAST_MESSAGES = 10  # messages in which it stays, at least
 LEAST_NOISY = 4  # the same of a reading with noise
 LONGER = 10.0  # so many times longer than a reading usually stays [-]
 FINE = 50  # different readings of a sensor whose steps are not what makes it stay
+LIVELY = 2.0  # messages that one with fewer usually stays, at most, if its noise spans its steps
 LEAST_BESIDE = 30  # other readings from which a sensor is seen to have noise
 SELDOM = 0.1  # share of readings that repeat the one before of a sensor with noise [-]
 CALM = 0.02  # change of the rates over the working rate that steps of a reading may hide [-]
@@ -178,14 +179,15 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         steps = beside.size > LEAST_BESIDE and not noisy
         if steps and np.ptp(speed[first:last]) < CALM * evidence.working_rate:
             continue
-        changes = np.flatnonzero(~beside)
-        usual = np.quantile(np.diff(changes), 0.9) if changes.size > LEAST_MESSAGES else 1.0
         others = np.delete(readings, np.s_[first : last + 1], axis=0)
         coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
             FINE, len(others) // 2
         )
+        lengths = np.diff(np.flatnonzero(~beside))
+        usual = np.quantile(lengths, 0.9) if lengths.size >= LEAST_MESSAGES else 1.0
+        lively = lengths.size >= LEAST_MESSAGES and usual <= LIVELY
         needed = LEAST_NOISY if noisy else max(LEAST_MESSAGES, LONGER * usual)
-        if coarse or share * (last - first) < needed:
+        if (coarse and not lively) or share * (last - first) < needed:
             continue
         rows[np.flatnonzero(known)[first : last + 1]] = True
         if lasts > longest:

@@ -24,6 +24,7 @@ _RIGHT = re.compile(r'(^|[^a-z])(right|r|fr|mr|rr|rf|rm|br|rb)([^a-z]|$)')
 _FRONT = re.compile(r'front|(^|[^a-z])(f[lr]?|[lr]f)([^a-z]|$)')
 _MIDDLE = re.compile(r'mid|cent(re|er)|(^|[^a-z])(m[lr]?|[lr]m)([^a-z]|$)')
 _WHEEL = re.compile(r'wheel|drive|traction')
+_NUMBER = re.compile(r'\d{1,3}')
 _CAMEL = re.compile(r'(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])')
 
 
@@ -112,7 +113,7 @@ def wheel_names(joints: Sequence[str]) -> tuple[str, ...]:
     driven = [n for n in joints if 'steer' not in n.lower()]
     wheels = [n for n in driven if _WHEEL.search(n.lower())]
     wheels = wheels or [n for n in driven if side_of(n)] or list(joints)
-    return tuple(sorted(wheels, key=_place))
+    return tuple(sorted(wheels, key=place))
 
 
 def in_words(name: str) -> str:
@@ -127,7 +128,9 @@ def side_of(name: str) -> int:
     return int(left) - int(right)
 
 
-def _place(name: str) -> tuple[int, int]:
+def place(name: str) -> tuple[int, int, int]:
+    """Return what orders names front to rear, left before right: row, number, side."""
     low = in_words(name)
     row = 0 if _FRONT.search(low) else 1 if _MIDDLE.search(low) else 2
-    return row, -side_of(name)
+    number = _NUMBER.search(low)
+    return row, int(number.group()) if number else 0, -side_of(name)

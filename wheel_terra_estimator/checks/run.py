@@ -130,7 +130,9 @@ def _examined(
         report.not_checked += [not_checked('radius', 'odom'), not_checked('track', 'odom')]
     stated = facts
     facts = mended('missing_wheel', facts, lambda: names.check_wheel_names(recording, stated))
-    arrived = recording
+    read = recording
+    paced = mended('unit', read, lambda: clocks.check_time_unit(read))
+    arrived = mended('jumps', paced, lambda: clocks.check_publishers(paced))
     stamped = mended(
         'order', arrived, lambda: clocks.check_transport(arrived, stated, report.figures)
     )

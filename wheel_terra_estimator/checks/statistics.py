@@ -195,7 +195,9 @@ def probability(log_odds: float) -> float:
     return 1.0 / (1.0 + math.exp(-min(max(log_odds, -50.0), 50.0)))
 
 
-def averaged(time: FloatArray, values: FloatArray, at: FloatArray, width: float) -> FloatArray:
+def averaged(
+    time: FloatArray, values: FloatArray, at: FloatArray, width: float | FloatArray
+) -> FloatArray:
     """Return the means of (k, p) values over windows ``[at - width, at]`` [s].
 
     A window without a sample has the interpolated value at its middle.

@@ -106,20 +106,22 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [not_checked('sign', 'torque_no_change')], evidence
     changes = np.array([response.value for response, _ in by_wheel])
     usual = float(np.median(np.abs(changes)))
+    brakes = np.array([-level.value > SIGN_SIGMAS * level.std for _, level in by_wheel])
     agree = all(response.value * level.value > 0.0 for response, level in by_wheel)
     wrong, unsure = [], []
     for i, (response, level) in enumerate(by_wheel):
-        brakes = -level.value > SIGN_SIGMAS * level.std
         # In a turn one side pushes against the other, all its wheels alike.
         beside = np.delete(changes, i)[np.delete(facts.side, i) == facts.side[i]]
         odd = beside.size and response.value * np.median(beside) < 0.0
-        clear = response.sigmas_from(0.0) > SIGN_SIGMAS and (odd or brakes)
-        clear |= brakes and agree
+        clear = response.sigmas_from(0.0) > SIGN_SIGMAS and (odd or brakes[i])
+        clear |= brakes[i] and agree
         drives = level.value > SIGN_SIGMAS * level.std
         if response.value < -LEAST_RESPONSE * usual and clear and not drives:
             wrong.append(i)
-        elif brakes:
+        elif brakes[i]:
             unsure.append(facts.names[i])
+    if 2 * brakes.sum() >= brakes.size and all(level.value < 0.0 for _, level in by_wheel):
+        wrong, unsure = list(range(brakes.size)), []  # no rover goes on by brakes alone
     why = not_checked('sign', 'torque_unsure', wheels=', '.join(unsure))
     outcomes: list[Outcome] = [why] if unsure else []
     if not wrong:

@@ -67,6 +67,8 @@ MOST_WHEELS = 10  # wheels for which all combinations of signs are tried
 LEAST_TURNING_ROWS = 40  # rows with a turn by the gyro that the wheels must account for
 MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2  # residual of a cure; of steered wheels, at most [-]
 UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
+GOING = 0.4  # speed by the reference over its usual one from which a rover goes on [-]
+UNDRIVEN = 0.5  # the same of a way by the reference that goes with the wheels, or against them [-]
 CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
 SLIDE = ', or the rover slides back'
@@ -96,11 +98,12 @@ class Turning:
     lateral: FloatArray
     unbiased: bool  # else a constant yaw rate may be the gyro's
     along: FloatArray  # (k, m) cosine of the steering angles; 1 where not steered
+    ahead: FloatArray  # (k,) speed by the reference [m/s]; zeros without one
 
     def rows(self, part: slice | Mask) -> Turning:
         """Return a part of the stretch."""
-        speed, yaw, along = self.speed[part], self.yaw[part], self.along[part]
-        return replace(self, speed=speed, yaw=yaw, along=along)
+        names = 'speed', 'yaw', 'along', 'ahead'
+        return replace(self, **{name: getattr(self, name)[part] for name in names})
 
     @cached_property
     def turns(self) -> Mask:
@@ -168,6 +171,9 @@ def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
     spread = np.abs(rolling - median[:, :, None]).mean(axis=2)
     size = np.maximum(np.abs(speed).mean(axis=2), 1e-9)
     cost = cost + (spread / size).mean(axis=1)
+    way = np.abs(stretch.ahead)
+    with_rims = np.abs(np.sign(median) @ stretch.ahead) / max(float(way.sum()), 1e-12)
+    cost = cost + UNDRIVEN * (1.0 - with_rims) * way.any()
     return [Fit(*map(float, one)) for one in zip(cost, track, alike, strict=True)]
 
 
@@ -225,7 +231,12 @@ def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turni
         lateral = np.zeros(there.size)
     speed = (evidence.rate * evidence.radius)[keep][:, there]
     along = np.cos(np.nan_to_num(evidence.steering[keep][:, there]))
-    return Turning(speed, evidence.yaw[keep], lateral, evidence.rested, along)
+    reference, ahead = evidence.recording.reference, np.zeros(keep.size)
+    if reference is not None and not reference.points_aside:
+        forward = np.nan_to_num(reference.velocity[:, 0])
+        ahead = np.interp(evidence.time[keep], evidence.seconds(reference), forward)
+        ahead[np.abs(ahead) < GOING * np.quantile(np.abs(ahead), 0.9)] = 0.0  # noise at rest
+    return Turning(speed, evidence.yaw[keep], lateral, evidence.rested, along, ahead)
 
 
 def _known(evidence: Evidence) -> tuple[NDArray[np.intp], Mask]:
@@ -388,7 +399,8 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     signed = [Fix((1, *those)) for those in itertools.product((1, -1), repeat=count - 1)]
     best, fit, trial = compare(stretch, [*signed, *exchanges(stretch)[1:]])
     if not trial.falls and count > 2 and stretch.turns.sum() >= 2 * LEAST_TURNING_ROWS:
-        again = compare(stretch.rows(stretch.turns), exchanges(stretch))  # they show in turns alone
+        turns = replace(stretch, ahead=0.0 * stretch.ahead).rows(stretch.turns)
+        again = compare(turns, exchanges(stretch))  # they show in turns alone
         best, fit, trial = again if again[2].falls else (best, fit, trial)
     # Nothing is clearly better than what the rover file says, or good enough.
     steered = np.isfinite(evidence.steering).any()

@@ -179,6 +179,9 @@ def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     for column, drives, fine in zip(zero.T, fast.T, count, strict=True):
         short = _sudden(column, drives, evidence.time, SHORT_ZERO + evidence.period)
         column &= short & (len(runs(short)) >= MANY_ZEROS and fine)
+    together = zero.all(axis=1)
+    if (zero[~together].sum(axis=0) > together.sum()).sum() > 1:
+        zero[:] = False  # each at its own time: no count came between two readings
     reference = evidence.recording.reference
     if reference is not None:
         size, at = np.linalg.norm(reference.velocity, axis=1), evidence.seconds(reference)
@@ -222,7 +225,7 @@ def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         same = (alike > np.maximum(SAME_CHANGES * both.sum(axis=0), LEAST_CHANGES)).sum(axis=1)
         fine = [_measured(one[np.isfinite(one)]) for one in table[evidence.moving].T]
         copies, there = (same > 1) & fine, np.isfinite(table).any(axis=0)
-        alone = int((there & ~copies).sum())
+        alone = int((same == 1).sum())  # wheels that change as none other does
         every = copies.all() and (turns & evidence.moving).sum() > LEAST_CHANGES
         if copies.any() and (alone > (not there.all()) or (every and same.min() == same.size)):
             details = {'field': field, 'wheel': evidence.facts.named(copies)}
@@ -278,7 +281,7 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             details = {'value': factor, 'unit': unit, 'how': 'straight ahead, by the other wheels'}
             finding = evidence.found('rate_unit', 0.9, wheel=facts.named(wrong), **details)
             return [finding], evidence.with_rate(evidence.rate * np.where(wrong, factor, 1.0))
-    sense = np.sign(evidence.speed)
+    sense = np.where(speed > LIVELY * middle[:, None], np.sign(evidence.speed), 0.0)
     common, outcomes = np.sign(row_medians(sense)), list[Outcome]()
     ways = [rows & (common == way) for way in (1.0, -1.0)]
     unlike = [np.nanmean(sense[way], axis=0) for way in ways]
@@ -325,6 +328,7 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [not_checked('unit', 'no_radius')], evidence
     ratios, how = speed_ratios(evidence), 'speed of the reference'
     ratio = None if ratios is None else float(np.quantile(ratios, LEAST_SLIP))
+    how += f', or is that of a motor before a gear of {1.0 / ratio:.3g}' if ratio else ''
     track = turning.track_ratio(evidence)
     if ratio is None and track is None:
         return [not_checked('unit', 'no_speed')], evidence
