@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 from rolling_rover import checked, faults
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.checks.evidence import acceleration_fits, gather
 from wheel_terra_estimator.checks.names import check_wheel_names
@@ -214,3 +215,15 @@ def test_accelerations_of_few_slow_curves_are_known_no_better_than_they_are():
         _, across = acceleration_fits(gather(replace(whole, imu=imu), facts, {}))
         off.append(abs(across.value - 1.0) / across.std)
     assert np.mean(np.array(off) > 2.0) < 0.1, sorted(off)
+
+
+@pytest.mark.parametrize('sense', [1.0, -1.0])
+def test_an_orientation_that_leans_the_wrong_way_is_told_by_slopes(sense):
+    """Uphill the nose points up: about y by less than nothing (REP 103)."""
+    motion = rolling.ten_minute_drive()
+    angles = np.column_stack([np.cumsum(motion.yaw_rate) * 0.1, -sense * motion.slope])
+    at = np.column_stack([np.interp(WHOLE.imu.seconds, motion.time, one) for one in angles.T])
+    oriented = Rotation.from_euler('ZY', at).as_quat()
+    told = checked(imu={'orientation': oriented}).findings
+    assert [f.fault for f in told] == ([] if sense > 0.0 else ['orientation'])
+    assert all('leans' in f.words for f in told)

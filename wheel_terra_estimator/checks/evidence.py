@@ -458,16 +458,11 @@ def acceleration_fits(evidence: Evidence) -> tuple[Estimate, Estimate] | None:
         return None
     motion, seen = both
     pairs = (motion.real, seen.real), (motion.imag, seen.imag)
-    along, across = (_fit_beyond_chance(*pair) for pair in pairs)
-    return along, across
-
-
-def _fit_beyond_chance(motion: FloatArray, seen: FloatArray) -> Estimate:
-    """Return a robust fit; few curves on a slope leave more open than their blocks differ."""
-    value, std = block_fit(motion[:, None], seen)[0]
-    energy = float(motion @ motion)
-    chance = math.sqrt(2.0) * _by_chance(motion, seen, value * energy) / max(energy, 1e-12)
-    return Estimate(value, max(std, chance))
+    along, across = (block_fit(wheels[:, None], measured)[0] for wheels, measured in pairs)
+    # Few curves on a slope leave more open than their blocks differ.
+    energy = max(float(motion.imag @ motion.imag), 1e-12)
+    chance = math.sqrt(2.0) * _by_chance(motion.imag, seen.imag, across.value * energy) / energy
+    return along, Estimate(across.value, max(across.std, chance))
 
 
 def accelerometer_signs(evidence: Evidence) -> list[int]:

@@ -42,6 +42,7 @@ from wheel_terra_estimator.checks.statistics import (
     block_fit,
     block_fits,
     confidence,
+    correlation,
     moving_mean,
     probability,
     robust_std,
@@ -94,6 +95,9 @@ OUTLIER_SIGMAS = 10.0  # of the usual change of a reading, which another unit ma
 MOST_OUTLIERS = 0.2  # greatest share of samples that are single outliers [-]
 LEAST_MESSAGES = 20
 UNIT_TOLERANCE = 0.12  # share by which the mean specific force may lie off gravity in another unit
+AGAINST = -0.7  # correlation of two ups of which one leans the wrong way, at most [-]
+SLOPE_TIME = 3.0  # over which accelerations average out, and slopes do not [s]
+LEAST_LEAN = math.radians(1.0)  # deviation of slopes that tell it [rad]
 UP_DIFFERENCE = math.radians(25.0)  # that no acceleration makes [rad]
 MOST_COMPARED = 5000  # messages
 FROZEN_SHARE = 0.3  # share of messages that repeat the one before
@@ -142,15 +146,32 @@ def _up_by_orientation(imu: ImuSeries, facts: RoverFacts) -> Judged:
     if known.size < LEAST_MESSAGES:
         return [], imu
     some = known[:: max(known.size // MOST_COMPARED, 1)]
-    up = Rotation.from_quat(imu.orientation[some]).apply(imu.force[some])[:, 2]
-    size = np.linalg.norm(np.median(imu.force, axis=0))  # without noise and vibration
+    world, force = Rotation.from_quat(imu.orientation[some]), imu.force[some]
+    up = world.apply(force)[:, 2]
+    size = np.linalg.norm(np.median(force, axis=0))  # without noise and vibration
     difference = math.acos(float(np.clip(np.median(up) / size, -1.0, 1.0)))
     upright = float((facts.mounting @ np.median(imu.force, axis=0))[2]) > 0.0
     turned_round = difference > math.pi - UP_DIFFERENCE and not upright  # see `check_upside`
-    if not difference >= UP_DIFFERENCE or turned_round:
+    how = ''
+    if difference >= UP_DIFFERENCE and not turned_round:
+        how = f'its up and that of linear_acceleration lie {math.degrees(difference):.0f} degrees'
+        how += ' apart'
+    elif _against(size * world.inv().as_matrix()[:, :, 2], force, imu.seconds[some]) < AGAINST:
+        how = 'where its up leans one way, that of linear_acceleration leans the other'
+    if not how:
         return [], imu
-    how = f'its up and that of linear_acceleration lie {math.degrees(difference):.0f} degrees apart'
     return [found('orientation', imu.topic, 0.97, how=how)], _without(imu, 'orientation')
+
+
+def _against(up: FloatArray, force: FloatArray, time: FloatArray) -> float:
+    """Return the correlation of how two ups (k, 3) [m/s^2] lean over a drive; 0: hardly."""
+    width = round(SLOPE_TIME / max(float(np.median(np.diff(time))), 1e-3))
+    leans = [
+        np.concatenate([moving_mean(one - one.mean(), width) for one in values.T])
+        for values in (up, force)
+    ]
+    clear = np.std(leans[0]) > LEAST_LEAN * np.linalg.norm(up[0])
+    return correlation(*leans) if clear else 0.0
 
 
 def _placeholders(imu: ImuSeries) -> Judged:

@@ -38,11 +38,13 @@ from wheel_terra_estimator.checks.finding import (
     listed,
     not_checked,
 )
+from wheel_terra_estimator.checks.reference import CLEAR_SPEED
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
     LEAST_FALL,
     Trial,
+    bend_noise,
     block_fit,
     block_fits,
     confidence,
@@ -235,7 +237,8 @@ def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turni
     if reference is not None and not reference.points_aside:
         forward = np.nan_to_num(reference.velocity[:, 0])
         ahead = np.interp(evidence.time[keep], evidence.seconds(reference), forward)
-        ahead[np.abs(ahead) < GOING * np.quantile(np.abs(ahead), 0.9)] = 0.0  # noise at rest
+        least = max(GOING * np.quantile(np.abs(ahead), 0.9), CLEAR_SPEED * bend_noise(forward))
+        ahead[np.abs(ahead) < least] = 0.0
     return Turning(speed, evidence.yaw[keep], lateral, evidence.rested, along, ahead)
 
 
