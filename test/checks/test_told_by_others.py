@@ -227,3 +227,13 @@ def test_an_orientation_that_leans_the_wrong_way_is_told_by_slopes(sense):
     told = checked(imu={'orientation': oriented}).findings
     assert [f.fault for f in told] == ([] if sense > 0.0 else ['orientation'])
     assert all('leans' in f.words for f in told)
+
+
+@pytest.mark.parametrize('deep', [0.016, 0.009])
+def test_a_zero_of_one_wheel_is_not_that_of_the_one_beside_it(deep):
+    """A front axle that sinks a centimetre less than the rear one, of which the left reads more."""
+    sinkage = WHOLE.sinkage.sinkage - rolling.DEPTH + [deep, deep, deep + 0.012, deep + 0.012]
+    assert 'sinkage_zero' not in faults(checked(sinkage={'sinkage': sinkage}))
+    told = checked(sinkage={'sinkage': sinkage + [0.012, 0.0, 0.0, 0.0]}).findings
+    sure = [f.wheel for f in told if f.confidence > 0.5]
+    assert sure in ([], [NAMES[0]]) and all(NAMES[0] in f'{f.wheel} {f.words}' for f in told)

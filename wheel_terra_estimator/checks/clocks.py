@@ -386,7 +386,7 @@ def _fits(table: FloatArray, second: FloatArray) -> FloatArray:
 
 CHECKED = {'joints': 'rate', 'imu': 'force', 'sinkage': 'sinkage', 'reference': 'velocity'}
 """Channels and what they measure."""
-PERIODS = (2e-4, 20.0)  # between messages of wheel rates [s]
+PERIODS = (2e-4, 5.0)  # between messages of wheel rates [s]
 USUAL_PERIODS = (2e-3, 2.0)  # the same in the right unit [s]
 TIME_UNITS = {'milliseconds': 1e-3, 'microseconds': 1e-6, 'nanoseconds': 1e-9}  # [s]
 LONGEST_SILENCE = 5.0  # of an input at an end of a recording in which others come [s]

@@ -23,6 +23,7 @@ ANOTHER_UNIT = 30.0  # noise over the stated one from which it may be another un
 USUAL_RADIUS = 0.15  # wheels below this [m] have smaller limits, as their radii are
 DEEP_SPELL = 0.004  # highest readings [m] from which a reading below the ground is no sign error
 BELOW_ZERO = 0.006  # median above the ground that no sinkage has [m] (lugs carry less)
+UNLIKE_AXLES = 3.0  # sinkage of an axle over that of another one, at most [-]
 ALIKE_SHARE = 0.4  # change of an offset over a drive that is still a zero, as a share [-]
 DEEP_STD = 0.02  # deviation of a zero of all wheels: their true sinkage [m]
 ODD_ZERO = 0.01  # A wheel that reads this much less or more than every other of its side [m] is odd
@@ -131,7 +132,13 @@ def _sign_and_zero(
         least = max(ODD_ZERO * small, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
         # A reading far beyond that is no sinkage.
         if least < abs(far) < NO_DEPTH * _radius(evidence) and _lasting(table, index, far):
-            outcomes.append(_zero(evidence, [name], far, spread, how))
+            other = _beside(evidence.facts, name)
+            axles = own > 0.0 and max(own, typical) < UNLIKE_AXLES * min(own, typical)
+            if axles and other:  # of an axle that sinks so much deeper, or less deep
+                how += (
+                    f', or {other} {-1000 * far:+.0f} mm and their axle sinks otherwise: lift both'
+                )
+            outcomes.append(_zero(evidence, [name], far, spread, how, 0.5 if axles else 0.9))
     return outcomes
 
 
@@ -147,7 +154,18 @@ def _lasting(table: FloatArray, index: int, far: float) -> bool:
     return all(abs(one - far) < ALIKE_SHARE * abs(far) for one in differences)
 
 
-def _zero(evidence: Evidence, names: list[str], left: float, std: float, how: str) -> Finding:
+def _beside(facts: RoverFacts, name: str) -> str:
+    """Return the wheel on the other side of the same axle; '' for none."""
+    if name not in facts.names or not facts.known:
+        return ''
+    index, x = facts.names.index(name), facts.configuration.wheels.x
+    apart = np.where(facts.side == -facts.side[index], np.abs(x - x[index]), math.inf)
+    return facts.names[int(np.argmin(apart))] if apart.min() < math.inf else ''
+
+
+def _zero(
+    evidence: Evidence, names: list[str], left: float, std: float, how: str, sure: float = 0.8
+) -> Finding:
     """Return the finding of a zero [m] that is left in the readings of some wheels."""
     facts = evidence.facts
     zeros, gain = facts.errors.sinkage.zero.copy(), facts.errors.sinkage.gain
@@ -156,4 +174,4 @@ def _zero(evidence: Evidence, names: list[str], left: float, std: float, how: st
     value = round(float(np.mean(zeros[rows])), 4) if rows else round(left, 4)
     wheel = names[0] if len(names) == 1 else None
     details = {'wheel': wheel, 'value': value, 'std': round(std, 4), 'zeros': listed(zeros)}
-    return evidence.found('sinkage_zero', 0.9 if wheel else 0.8, how=how, **details)
+    return evidence.found('sinkage_zero', sure, how=how, **details)

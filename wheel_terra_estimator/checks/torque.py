@@ -115,8 +115,7 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         odd = beside.size and response.value * np.median(beside) < 0.0
         clear = response.sigmas_from(0.0) > SIGN_SIGMAS and (odd or brakes[i])
         clear |= brakes[i] and agree
-        drives = level.value > SIGN_SIGMAS * level.std
-        if response.value < -LEAST_RESPONSE * usual and clear and not drives:
+        if response.value < -LEAST_RESPONSE * usual and clear and level.value < 0.0:
             wrong.append(i)
         elif brakes[i]:
             unsure.append(facts.names[i])

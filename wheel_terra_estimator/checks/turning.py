@@ -69,6 +69,7 @@ MOST_WHEELS = 10  # wheels for which all combinations of signs are tried
 LEAST_TURNING_ROWS = 40  # rows with a turn by the gyro that the wheels must account for
 MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2  # residual of a cure; of steered wheels, at most [-]
 UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
+SLIP_APART = 0.1  # track over the stated one of wheels that drift apart, no gyro in degrees/s [-]
 GOING = 0.4  # speed by the reference over its usual one from which a rover goes on [-]
 UNDRIVEN = 0.5  # the same of a way by the reference that goes with the wheels, or against them [-]
 CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
@@ -378,7 +379,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if (signs < 0.0).any():
         finding, mended = _backwards(evidence, mended, signs, chosen)
         outcomes.append(finding)
-    if turn < 0.0:
+    if turn < 0.0 and not SKID_TRACKS[0] > -turn > SLIP_APART:
         swaps, mended = _swapped(mended, ALL_WHEELS if agreement == (None, None) else '')
         outcomes += swaps
     if blame == 'reference' and evidence.recording.reference is not None:
