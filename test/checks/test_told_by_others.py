@@ -234,6 +234,6 @@ def test_a_zero_of_one_wheel_is_not_that_of_the_one_beside_it(deep):
     """A front axle that sinks a centimetre less than the rear one, of which the left reads more."""
     sinkage = WHOLE.sinkage.sinkage - rolling.DEPTH + [deep, deep, deep + 0.012, deep + 0.012]
     assert 'sinkage_zero' not in faults(checked(sinkage={'sinkage': sinkage}))
-    told = checked(sinkage={'sinkage': sinkage + [0.012, 0.0, 0.0, 0.0]}).findings
+    told = checked(sinkage={'sinkage': sinkage + np.array([0.012, 0.0, 0.0, 0.0])}).findings
     sure = [f.wheel for f in told if f.confidence > 0.5]
     assert sure in ([], [NAMES[0]]) and all(NAMES[0] in f'{f.wheel} {f.words}' for f in told)
