@@ -388,7 +388,13 @@ CHECKED = {'joints': 'rate', 'imu': 'force', 'sinkage': 'sinkage', 'reference': 
 """Channels and what they measure."""
 PERIODS = (2e-4, 5.0)  # between messages of wheel rates [s]
 USUAL_PERIODS = (2e-3, 2.0)  # the same in the right unit [s]
-TIME_UNITS = {'milliseconds': 1e-3, 'microseconds': 1e-6, 'nanoseconds': 1e-9}  # [s]
+TIME_UNITS = (
+    ('milliseconds', 's', 1e-3),
+    ('s', 'milliseconds', 1e3),
+    ('microseconds', 's', 1e-6),
+    ('nanoseconds', 's', 1e-9),
+)
+"""Unit of times, the one that they were taken for, and the first over the second [-]."""
 LONGEST_SILENCE = 5.0  # of an input at an end of a recording in which others come [s]
 LONGEST_GAP = 0.5  # of wheel odometry or IMU that leaves the estimator no blind spot [s]
 GAP_PERIODS = 6.0  # A gap also has to be longer than so many periods
@@ -429,15 +435,22 @@ def check_time_unit(recording: Recording) -> tuple[list[Outcome], Recording]:
     ]
     if not (max(periods) < PERIODS[0] or min(periods) > PERIODS[1]):
         return [], recording  # where one of both clocks is right it is the other's fault
-    stamped = joints.period
-    for unit, factor in TIME_UNITS.items():
-        for times, now, right in ((factor, 's', unit), (1.0 / factor, unit, 's')):
-            if USUAL_PERIODS[0] < stamped * times < USUAL_PERIODS[1]:
-                words: dict[str, Any] = {'period': stamped, 'now': now, 'right': right}
-                mended = {n: _paced(getattr(recording, n), joints.stamp[0], times) for n in CHECKED}
-                outcome = found('time_unit', joints.topic, 0.97, value=times, **words)
-                return [outcome], replace(recording, **mended, heard={})
+    for unit, taken, times in TIME_UNITS:
+        if USUAL_PERIODS[0] < joints.period * times < USUAL_PERIODS[1]:
+            words: dict[str, Any] = {'period': joints.period, 'now': taken, 'right': unit}
+            mended = {n: _paced(getattr(recording, n), joints.stamp[0], times) for n in CHECKED}
+            outcome = found('time_unit', joints.topic, 0.97, value=times, **words)
+            return [outcome], replace(recording, **mended, heard={})
     return [], recording
+
+
+def _paced(channel: Any, origin: int, times: float) -> Any:
+    """Return a channel whose time runs so many times as fast from an origin [ns] on."""
+    if channel is None:
+        return None
+    both = {name: getattr(channel, name) - origin for name in ('stamp', 'log_time')}
+    paced = {k: origin + np.round(at * times).astype(np.int64) for k, at in both.items()}
+    return replace(channel, **paced)
 
 
 def check_publishers(recording: Recording) -> tuple[list[Outcome], Recording]:
@@ -457,17 +470,6 @@ def check_publishers(recording: Recording) -> tuple[list[Outcome], Recording]:
             outcomes.append(found('two_publishers', channel.topic, 0.97, count=int(blank.sum())))
             mended[name] = rows_of(channel, ~blank)
     return outcomes, replace(recording, **mended)
-
-
-def _paced(channel: Any, origin: int, times: float) -> Any:
-    """Return a channel whose time runs so many times as fast from an origin [ns] on."""
-    if channel is None:
-        return None
-    stamp, log_time = (
-        origin + np.round((at - origin) * times).astype(np.int64)
-        for at in (channel.stamp, channel.log_time)
-    )
-    return replace(channel, stamp=stamp, log_time=log_time)
 
 
 def check_transport(

@@ -14,6 +14,7 @@ from wheel_terra_estimator.checks.finding import Finding, Outcome, listed, not_c
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import SinkageSeries
 from wheel_terra_estimator.checks.statistics import bend_noise, halves
+from wheel_terra_estimator.checks.turning import sides_exchanged
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors
 
 DEEPEST = 1.2  # sinkage over radius that no wheel gets out of [-]
@@ -121,6 +122,8 @@ def _sign_and_zero(
     outcomes: list[Outcome] = []
     if np.nanmedian(np.abs(middle)) < limit:
         outcomes.append(not_checked('sign', 'sinkage_shallow'))
+    facts = evidence.facts
+    across = {a: facts.names[i] for a, i in zip(facts.names, sides_exchanged(facts), strict=True)}
     for index, name in enumerate(names):
         others, own = np.delete(middle, index), float(middle[index])
         if others.size < 2 or not np.isfinite(own):
@@ -132,12 +135,10 @@ def _sign_and_zero(
         least = max(ODD_ZERO * small, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
         # A reading far beyond that is no sinkage.
         if least < abs(far) < NO_DEPTH * _radius(evidence) and _lasting(table, index, far):
-            other = _beside(evidence.facts, name)
+            other = across.get(name, name)
             axles = own > 0.0 and max(own, typical) < UNLIKE_AXLES * min(own, typical)
-            if axles and other:  # of an axle that sinks so much deeper, or less deep
-                how += (
-                    f', or {other} {-1000 * far:+.0f} mm and their axle sinks otherwise: lift both'
-                )
+            if axles and other != name:  # of an axle that sinks so much deeper, or less deep
+                how += f', or {other} {-1000 * far:+.0f} mm and their axle sinks otherwise'
             outcomes.append(_zero(evidence, [name], far, spread, how, 0.5 if axles else 0.9))
     return outcomes
 
@@ -152,15 +153,6 @@ def _lasting(table: FloatArray, index: int, far: float) -> bool:
         low, high = np.nanquantile(table[part], [0.1, 0.9], axis=0)
         differences += [float(q[index] - np.nanmedian(np.delete(q, index))) for q in (low, high)]
     return all(abs(one - far) < ALIKE_SHARE * abs(far) for one in differences)
-
-
-def _beside(facts: RoverFacts, name: str) -> str:
-    """Return the wheel on the other side of the same axle; '' for none."""
-    if name not in facts.names or not facts.known:
-        return ''
-    index, x = facts.names.index(name), facts.configuration.wheels.x
-    apart = np.where(facts.side == -facts.side[index], np.abs(x - x[index]), math.inf)
-    return facts.names[int(np.argmin(apart))] if apart.min() < math.inf else ''
 
 
 def _zero(

@@ -274,7 +274,7 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not np.isfinite(evidence.steering).any():
         return [], evidence
     gain, zero = _steered_as_turned(evidence)
-    still, order = np.abs(gain) < STILL, _sides_exchanged(facts)
+    still, order = np.abs(gain) < STILL, sides_exchanged(facts)
     ahead = np.nan_to_num(evidence.steering[evidence.unturned])
     # One angle that is published for two wheels is off in turns alone.
     stays = (np.median(ahead, axis=0) if ahead.size else 0.0) * zero > 0.5 * zero**2
@@ -530,7 +530,7 @@ def _swapped(evidence: Evidence, others: str) -> tuple[list[Outcome], Evidence]:
         mended = replace(evidence, gyro=evidence.gyro * [1.0, 1.0, -1.0])
         return [evidence.found('gyro_reversed', 0.9, **details)], mended
     mended = replace(evidence, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
-    order = _sides_exchanged(facts)
+    order = sides_exchanged(facts)
     if np.isfinite(evidence.steering).any():  # steering joints are named as before, or with it
         both = mended, replace(mended, steering=mended.steering[:, order])
         mended = min(both, key=lambda one: (_steered_against(one), left_in_turns(one)))
@@ -657,7 +657,7 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [], evidence
 
 
-def _sides_exchanged(facts: RoverFacts) -> list[int]:
+def sides_exchanged(facts: RoverFacts) -> list[int]:
     """Return the wheels in order, each left one in the place of the right one beside it."""
     order, forward = list(range(len(facts.names))), facts.configuration.wheels.x
     left, right = (
