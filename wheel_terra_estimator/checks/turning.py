@@ -71,6 +71,7 @@ MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2  # residual of a cure; of steered wheels
 UNTURNED = 0.5  # weight of turns without an answer of the wheels [-]
 SLIP_APART = 0.1  # track over the stated one of wheels that drift apart, no gyro in degrees/s [-]
 GOING = 0.4  # speed by the reference over its usual one from which a rover goes on [-]
+GOES_ALONG = 0.8  # share of the way that goes with the wheels, less the rest, of right ones [-]
 UNDRIVEN = 0.5  # the same of a way by the reference that goes with the wheels, or against them [-]
 CLEAR_DIRECTION = 0.8  # cosine of a felt yaw that tells the sense [-]
 SAME_SENSE = 0.5  # share of the way by the reference with the wheels, less the rest [-]
@@ -176,7 +177,7 @@ def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
     cost = cost + (spread / size).mean(axis=1)
     way = np.abs(stretch.ahead)
     with_rims = np.abs(np.sign(median) @ stretch.ahead) / max(float(way.sum()), 1e-12)
-    cost = cost + UNDRIVEN * (1.0 - with_rims) * way.any()
+    cost = cost + UNDRIVEN * (1.0 - np.minimum(with_rims / GOES_ALONG, 1.0)) * way.any()
     return [Fit(*map(float, one)) for one in zip(cost, track, alike, strict=True)]
 
 
