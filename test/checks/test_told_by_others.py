@@ -10,10 +10,12 @@ import rolling_rover as rolling
 from rolling_rover import checked, faults
 from scipy.spatial.transform import Rotation
 
+from wheel_terra_estimator.checks.clocks import Lag
 from wheel_terra_estimator.checks.evidence import acceleration_fits, gather
 from wheel_terra_estimator.checks.names import check_wheel_names
 from wheel_terra_estimator.checks.rover_facts import from_configuration
 from wheel_terra_estimator.checks.series import rows_of
+from wheel_terra_estimator.checks.statistics import Trial
 from wheel_terra_estimator.checks.turning import Fix, Turning, fits_of
 
 WHOLE = rolling.recording()
@@ -237,3 +239,11 @@ def test_a_zero_of_one_wheel_is_not_that_of_the_one_beside_it(deep):
     told = checked(sinkage={'sinkage': sinkage + np.array([0.012, 0.0, 0.0, 0.0])}).findings
     sure = [f.wheel for f in told if f.confidence > 0.5]
     assert sure in ([], [NAMES[0]]) and all(NAMES[0] in f'{f.wheel} {f.words}' for f in told)
+
+
+@pytest.mark.parametrize(('left', 'counts'), [(0.47, False), (0.2, True)])
+def test_a_lag_that_both_halves_show_has_to_explain_something(left, counts):
+    """Two halves may agree by chance where turns of wheels and gyro are half unlike all along."""
+    evidence = gather(WHOLE, from_configuration(rolling.rover()), {})
+    lag = Lag(-0.48, 'turns', (-0.482, -0.478), Trial(0.476, left))
+    assert lag.counts(evidence, 'imu') == counts

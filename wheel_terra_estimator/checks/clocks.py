@@ -47,6 +47,7 @@ LEAST_STD = {'turns': 0.15, 'starts': 0.15, 'speeds': 0.1, BY_LOG: 0.5}
 CHASSIS_SIGMAS = 2.5  # of these, up to which a lag may be theirs (a Husky turns 0.28 s late)
 AGREEING_LAGS = 0.2  # lags of two halves or motions that differ by less agree [s]
 SIGMAS, SHARP_SIGMAS = 4.0, 10.0
+SHARP_FALLS = 0.9  # unlike part of a lag that both halves show alike, at most [-]
 BETWEEN = 0.25  # part of a period that a lag is not known to, one deviation [-]
 MANY = 60  # references from which it is averaged over starts and stops
 SLOWEST = 1.5  # period above which stamps are not checked [s]
@@ -80,7 +81,7 @@ class Lag(NamedTuple):
         between *= SIGMAS if reference is not None and reference.stamp.size < MANY else 2.0
         clear = max(LEAST_OFFSET, evidence.period, between, SIGMAS * self.std)
         sharp = abs(self.value) > SHARP_SIGMAS * self.std  # what else is unlike, no stamp mends
-        falls = self.trial.after < (1.0 if sharp else FALLS[self.by]) * self.trial.before
+        falls = self.trial.after < (SHARP_FALLS if sharp else FALLS[self.by]) * self.trial.before
         return abs(self.value) > clear and falls
 
     def of_the_first(self) -> Lag:
