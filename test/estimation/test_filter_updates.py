@@ -243,12 +243,15 @@ def test_a_rejected_reference_leaves_the_speed_in_doubt_until_the_next_one(parts
     update = reference_update(parts)
     ekf.set(SPEED, 0.045, 0.001**2)
     hear(parts, update, ekf, 0.0, 0.045)
-    assert update.doubt_variance == 0.0
     told = float(ekf.x[SPEED])
     hear(parts, update, ekf, 1.0, 0.02)
-    assert update.doubt_variance == pytest.approx(np.var([told, 0.02]))
-    hear(parts, update, ekf, 2.0, float(ekf.x[SPEED]))
-    assert update.doubt_variance == 0.0
+    assert update.doubt_variance(1.1) == pytest.approx(np.var([told, 0.02]))
+    assert update.doubt_variance(6.0) == 0.0  # the slip is forgotten
+    hear(parts, update, ekf, 2.0, 0.9)  # no wheel drives so fast
+    assert update.doubt_variance(2.1) == 0.0
+    hear(parts, update, ekf, 3.0, 0.02)
+    hear(parts, update, ekf, 4.0, float(ekf.x[SPEED]))
+    assert update.doubt_variance(4.1) == 0.0
 
 
 def wandering(rng, count, dt, std, time):

@@ -719,7 +719,7 @@ class WheelSoilEstimator:
         slip_known = self._reference.known(time)
         speed, variance = self._speed.present(self._ekf, time, rims, window, inflated=slip_known)
         variance *= excess(self._reference.state.nis)
-        return SpeedAndVariance(speed, variance + self._reference.doubt_variance)
+        return SpeedAndVariance(speed, variance + self._reference.doubt_variance(time))
 
     def _speed_by_torque(self, rims: RimSpeeds) -> Opinion | None:
         """Return speed [m/s] and variance by the typical slip at the measured torques.

@@ -63,6 +63,8 @@ class ReferenceState(NamedTuple):
     rejected: int = 0
     rejected_in_a_row: int = 0
     last_rejected: float = 0.0  # innovation of the last rejected one [m/s]
+    doubt: float = 0.0
+    """Deviation of the speed by the last one, if rejected: as likely wild as true [m/s]."""
     forward: float = math.nan  # the last one [m/s]
     jumped: bool = False  # whether the first rejected one in a row differs much from that before it
     nis: float | None = None  # running mean; None = no reading yet
@@ -123,11 +125,9 @@ class ReferenceUpdate(Component[ReferenceState]):
         """Return whether the last reference is younger than `_FRESH_TIME`."""
         return time - self.state.time < _FRESH_TIME
 
-    @property
-    def doubt_variance(self) -> float:
-        """Variance by a last reference that was rejected: as likely wild as true [(m/s)^2]."""
-        state = self.state
-        return (0.5 * state.last_rejected) ** 2 if state.rejected_in_a_row else 0.0
+    def doubt_variance(self, time: float) -> float:
+        """Return the variance by a rejected reference [(m/s)^2], while the slip is known."""
+        return self.state.doubt**2 if self.known(time) else 0.0
 
     @property
     def model_variance_factor(self) -> float:
@@ -210,9 +210,10 @@ class ReferenceUpdate(Component[ReferenceState]):
                 rejected=state.rejected + 1,
                 rejected_in_a_row=0 if inflated else state.rejected_in_a_row + 1,
                 last_rejected=residual,
+                doubt=0.5 * residual if possible and not inflated else 0.0,
             )
         else:
-            state = state._replace(rejected_in_a_row=0)
+            state = state._replace(rejected_in_a_row=0, doubt=0.0)
         ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
         rests = still and time >= state.sliding_until
         if not rests and not state.rejected_in_a_row:
