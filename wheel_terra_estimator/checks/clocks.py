@@ -20,7 +20,14 @@ from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome, found, not_checked, of_offset
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import Channel, Recording, of_one_wheel, rows_of, shifted
+from wheel_terra_estimator.checks.series import (
+    Channel,
+    Recording,
+    Series,
+    of_one_wheel,
+    rows_of,
+    shifted,
+)
 from wheel_terra_estimator.checks.statistics import (
     Trial,
     averaged,
@@ -439,16 +446,15 @@ def check_time_unit(recording: Recording) -> tuple[list[Outcome], Recording]:
     for unit, taken, times in TIME_UNITS:
         if USUAL_PERIODS[0] < joints.period * times < USUAL_PERIODS[1]:
             words: dict[str, Any] = {'period': joints.period, 'now': taken, 'right': unit}
-            mended = {n: _paced(getattr(recording, n), joints.stamp[0], times) for n in CHECKED}
+            heard = {n: one for n in CHECKED if (one := getattr(recording, n)) is not None}
+            mended = {n: _paced(one, joints.stamp[0], times) for n, one in heard.items()}
             outcome = found('time_unit', joints.topic, 0.97, value=times, **words)
             return [outcome], replace(recording, **mended, heard={})
     return [], recording
 
 
-def _paced(channel: Any, origin: int, times: float) -> Any:
+def _paced(channel: Series, origin: int, times: float) -> Series:
     """Return a channel whose time runs so many times as fast from an origin [ns] on."""
-    if channel is None:
-        return None
     both = {name: getattr(channel, name) - origin for name in ('stamp', 'log_time')}
     paced = {k: origin + np.round(at * times).astype(np.int64) for k, at in both.items()}
     return replace(channel, **paced)

@@ -498,7 +498,7 @@ def mounting_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
     return Estimate(float(np.angle(total)), std)
 
 
-def _by_chance(motion: Any, seen: Any, total: complex) -> float:
+def _by_chance(motion: Complex | FloatArray, seen: Complex | FloatArray, total: complex) -> float:
     """Return the chance correlation of a motion with the rest of the measured one at other lags."""
     left = seen - motion * total / np.vdot(motion, motion)
     at_lags = np.fft.ifft(np.fft.fft(left) * np.conj(np.fft.fft(motion)))

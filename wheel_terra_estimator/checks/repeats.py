@@ -26,7 +26,8 @@ LEAST_MESSAGES = 10  # messages in which it stays, at least
 LEAST_NOISY = 4  # the same of a reading with noise
 LONGER = 10.0  # so many times longer than a reading usually stays [-]
 FINE = 50  # different readings of a sensor whose steps are not what makes it stay
-LIVELY = 2.0  # messages that one with fewer usually stays, at most, if its noise spans its steps
+MOST_STAYED = 2.0
+"""Messages that a reading of few steps usually stays, at most, if its noise spans them."""
 LEAST_BESIDE = 30  # other readings from which a sensor is seen to have noise
 SELDOM = 0.1  # share of readings that repeat the one before of a sensor with noise [-]
 CALM = 0.02  # change of the rates over the working rate that steps of a reading may hide [-]
@@ -185,7 +186,7 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         )
         lengths = np.diff(np.flatnonzero(~beside))
         usual = np.quantile(lengths, 0.9) if lengths.size >= LEAST_MESSAGES else 1.0
-        lively = lengths.size >= LEAST_MESSAGES and usual <= LIVELY
+        lively = lengths.size >= LEAST_MESSAGES and usual <= MOST_STAYED
         needed = LEAST_NOISY if noisy else max(LEAST_MESSAGES, LONGER * usual)
         if (coarse and not lively) or share * (last - first) < needed:
             continue

@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray, Quantity
 from wheel_terra_estimator.estimation.judgement.entrapment import entrapments
 from wheel_terra_estimator.frames import Columns, to_frame
 
@@ -36,10 +36,10 @@ class Recorded:
     wheel_rate: FloatArray
     slip_angle: FloatArray  # [rad]
     lateral_force: FloatArray  # positive left [N]
-    forward_velocity: Any
-    lateral_velocity: Any
-    yaw_rate: Any
-    slope: Any  # of the ground in the direction of the heading, positive uphill
+    forward_velocity: Quantity
+    lateral_velocity: Quantity
+    yaw_rate: Quantity
+    slope: Quantity  # of the ground in the direction of the heading, positive uphill
     position: FloatArray  # x, y, heading
 
 
@@ -70,6 +70,10 @@ class TruthTable(Recorded):
     (x, y, heading). ``wheels``: names of the n wheels.
     """
 
+    forward_velocity: FloatArray
+    lateral_velocity: FloatArray
+    yaw_rate: FloatArray
+    slope: FloatArray
     stamp: IntArray
     slip_class: NDArray[np.uint8]
     stuck: BoolArray
