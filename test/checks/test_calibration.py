@@ -65,6 +65,16 @@ def test_a_reference_without_stated_variance_or_noise_keeps_a_deviation_that_is_
     assert told[4.0 * stated]['sensors.reference_std'] == pytest.approx(4.0 * stated, rel=0.3)
 
 
+def test_noise_that_may_be_motion_is_not_written():
+    """Twice the stated noise: the filter would follow the wheels less, in three drives of 19."""
+    stated = float(rolling.rover().sensors.wheel_rate_std)
+    joints, random = rolling.recording().joints, np.random.default_rng(2)
+    for times, written in ((2.0, False), (6.0, True)):
+        rate = joints.rate + times * stated * random.standard_normal(joints.rate.shape)
+        calibration, _ = calibrated(joints=replace(joints, rate=rate))
+        assert ('sensors.wheel_rate_std' in {c.key for c in calibration.changes}) == written
+
+
 def test_a_reversed_gyro_leaves_the_wheels_on_their_sides():
     """Swapped sides are its rival; without starts nothing tells which of both it is."""
     imu = rolling.recording().imu

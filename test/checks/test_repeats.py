@@ -23,7 +23,7 @@ def held(channel, field, since, until, column=...):
     return replace(channel, **{field: values})
 
 
-WHOLE = rolling.recording()
+WHOLE, NAMES = rolling.recording(), rolling.NAMES
 
 
 @pytest.mark.parametrize('dead', [None, 2])
@@ -62,6 +62,14 @@ def test_a_seldom_reference_that_stays_for_six_readings():
     reference = rows_of(WHOLE.reference, np.arange(WHOLE.reference.stamp.size) % 2 == 0)
     (finding,) = found(reference=held(reference, 'velocity', 120.0, 127.5))
     assert finding.fault == 'reference_frozen'
+
+
+def test_a_torque_that_is_never_read_is_no_scale_of_all():
+    """A quarter of the torque is missing on slopes: no mass and no gain follow from that."""
+    torque = WHOLE.joints.torque * [1.0, 1.0, 0.0, 1.0]
+    (finding,) = found(joints={'torque': torque})
+    assert (finding.fault, finding.wheel, finding.confidence) == ('torque_frozen', NAMES[2], 0.5)
+    assert 'or it is not driven' in finding.words
 
 
 @pytest.mark.parametrize('ratio', [0.4, 0.2])

@@ -21,7 +21,8 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.ros_yaml import Value, as_text, format_value
 from wheel_terra_estimator.errors import UserError
 
-WORTH_CHANGING = 0.2  # relative change of a noise or rate that is written, at least [-]
+WORTH_CHANGING = 0.2  # relative change of a rate that is written, at least [-]
+NOISIER = 3.0  # noise over the one stated that is written, at least [-]: less may be motion
 NOISE_STD = 0.1  # relative deviation of a noise that a drive tells [-]
 LEAST_SURE = 0.8  # confidence from which a cure is written [-]
 CLEAR = 2.0  # deviations by which a number is off, from which another is written [-]
@@ -158,14 +159,12 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
         seen, stated = report.figures.get(figure), changes.before[key]
         if not seen or not math.isfinite(seen):
             continue
-        if stated and abs(math.log(seen / stated)) < WORTH_CHANGING:
-            continue
         if key.endswith('_std'):
-            if seen < stated:  # biases and vibration do not jump from message to message
+            if seen < NOISIER * stated:  # biases and vibration do not jump from message to message
                 continue
             source = 'changes from message to message on the move'
             changes.add(key, float(f'{seen:.3g}'), NOISE_STD * seen, source)
-        else:
+        elif abs(math.log(seen / stated)) > WORTH_CHANGING:
             changes.add(key, round(seen, 2), None, 'median period of the stamps')
 
 

@@ -9,6 +9,7 @@ far longer than the sensor itself ever does.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.series import rows_of
-from wheel_terra_estimator.checks.statistics import runs
+from wheel_terra_estimator.checks.statistics import integrated, runs
 
 LEAST_TIME = 5.0  # time of driving in which a reading that stays is frozen [s]
 ZERO_TIME = 20.0  # the same of a vector of zeros [s]
@@ -33,6 +34,7 @@ SELDOM = 0.1  # share of readings that repeat the one before of a sensor with no
 CALM = 0.02  # change of the rates over the working rate that steps of a reading may hide [-]
 AT_ONCE = 0.9  # share of a stretch in which no rate without noise changes, at least [-]
 LEAST_CHANGES = 30  # changes of rates from which their rhythm is found
+TURNED = 0.5  # turn by the gyro in which an orientation does not stay [rad]
 CLEAR_SINKAGE = 0.005  # of the other wheels, beside which none reads 0 all the time [m]
 
 
@@ -92,46 +94,71 @@ def _reference(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 
 def _imu(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    outcomes, imu = list[Outcome](), evidence.recording.imu
-    for name, field in (('force', 'linear_acceleration'), ('gyro', 'angular_velocity')):
-        if imu is not None and getattr(evidence, name) is not None:
-            readings = imu.force if name == 'force' else imu.rate
-            if dead := stays(evidence, evidence.seconds(imu), readings):
-                outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
-                evidence = replace(evidence, **{name: None})  # type: ignore[arg-type]
-    return outcomes, evidence
+    """Return what of an IMU stays the same, and the evidence without it.
+
+    On an even straight an orientation without noise may stay, in a turn it does not.
+    """
+    outcomes, imu, left = list[Outcome](), evidence.recording.imu, dict[str, None]()
+    if imu is None:
+        return [], evidence
+    at, heading = evidence.seconds(imu), integrated(evidence.time, evidence.yaw)
+    for name, field, readings in (
+        ('force', 'linear_acceleration', imu.force),
+        ('gyro', 'angular_velocity', imu.rate),
+    ):
+        if getattr(evidence, name) is not None and (dead := stays(evidence, at, readings)):
+            outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
+            left[name] = None
+    dead = stays(evidence, at, imu.orientation)
+    if dead and np.ptp(np.interp(at[dead.rows], evidence.time, heading)) > TURNED:
+        outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'orientation {dead.how}'))
+        evidence = evidence.with_channel('imu', orientation=math.nan * imu.orientation)
+    return outcomes, replace(evidence, **left)  # type: ignore[arg-type]
 
 
 def _joints(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels whose rate or torque stays the same, and the evidence without these."""
-    outcomes, left = list[Outcome](), [evidence.rate.copy(), evidence.torque.copy()]
-    for table, fault in zip(left, ('rate_frozen', 'torque_frozen'), strict=True):
-        greatest, dead = float(np.nanmax(np.abs(table), initial=0.0)), dict[str, str]()
-        for i, name in enumerate(evidence.facts.names):
-            still = stays(evidence, evidence.time, table[:, i : i + 1])
-            # Else a wheel that stands, or a drive at its limit.
-            if still is not None and still.value and abs(still.value) < greatest:
-                dead[name], table[:, i] = still.how, np.nan
-        if dead:
-            how = next(iter(dead.values()))
-            outcomes.append(evidence.found(fault, 0.97, wheel=', '.join(dead), how=how))
-    return outcomes, evidence.with_rate(*left)
+    names = evidence.facts.names
+    rates, rate = _by_wheel(evidence, 'rate_frozen', names, evidence.time, evidence.rate)
+    torques, torque = _by_wheel(evidence, 'torque_frozen', names, evidence.time, evidence.torque)
+    return rates + torques, evidence.with_rate(rate, torque)
 
 
 def _sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return wheels whose sinkage stays the same; 0 is right on firm ground."""
-    outcomes, sinkage = list[Outcome](), evidence.recording.sinkage
+    """Return wheels whose sinkage stays the same, and the evidence without that."""
+    sinkage = evidence.recording.sinkage
     if sinkage is None:
         return [], evidence
-    known = sinkage.sinkage.copy()
-    middle = np.nan_to_num(np.nanmedian(np.abs(sinkage.sinkage), axis=0))
-    for i, name in enumerate(sinkage.names):
-        others = float(np.median(np.delete(middle, i))) if middle.size > 1 else 0.0
-        dead = stays(evidence, evidence.seconds(sinkage), sinkage.sinkage[:, i : i + 1])
-        if dead is not None and (dead.value != 0.0 or others > CLEAR_SINKAGE):
-            outcomes.append(evidence.found('sinkage_frozen', 0.97, wheel=name, how=dead.how))
-            known[dead.rows, i] = np.nan
-    return outcomes, evidence.with_channel('sinkage', sinkage=known) if outcomes else evidence
+    at = evidence.seconds(sinkage)
+    outcomes, left = _by_wheel(evidence, 'sinkage_frozen', sinkage.names, at, sinkage.sinkage)
+    return outcomes, evidence.with_channel('sinkage', sinkage=left) if outcomes else evidence
+
+
+def _by_wheel(
+    evidence: Evidence, fault: str, names: Sequence[str], time: FloatArray, table: FloatArray
+) -> tuple[list[Outcome], FloatArray]:
+    """Return wheels whose readings (k, n) stay the same, and the readings without these."""
+    size, left, dead = np.abs(table), table.copy(), dict[str, Stays]()
+    greatest = float(np.nanmax(size, initial=0.0))
+    for i, name in enumerate(names):
+        still = stays(evidence, time, table[:, i : i + 1])
+        if still is None:
+            continue
+        if fault == 'sinkage_frozen':  # 0 is right on firm ground
+            others = np.nan_to_num(np.nanmedian(np.delete(size, i, axis=1), axis=0))
+            counts = still.value != 0.0 or float(np.median(others)) > CLEAR_SINKAGE
+        else:  # else a wheel that stands, or a drive at its limit
+            alive = still.value == 0.0 and fault == 'rate_frozen'
+            counts = abs(still.value) < greatest and not alive
+        if counts:
+            dead[name], left[still.rows, i] = still, np.nan
+    if not dead:
+        return [], left
+    how, idle = next(iter(dead.values())).how, fault == 'torque_frozen'
+    idle = idle and not any(still.value for still in dead.values())
+    how += ', or it is not driven' * idle
+    sure = 0.5 if idle else 0.97
+    return [evidence.found(fault, sure, wheel=', '.join(dead), how=how)], left
 
 
 class Stays(NamedTuple):

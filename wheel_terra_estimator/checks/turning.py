@@ -636,7 +636,9 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if other is None:
             continue
         seen = _turns(evidence, other)
-        if _most(seen) < LEAST_TURNED or correlation(gyro, seen) < SAME_TURNS:
+        # A turn that stays the same shows no scale: it may as well be a bias.
+        alike = correlation(gyro - gyro.mean(), seen - seen.mean()) if seen.size else 0.0
+        if _most(seen) < LEAST_TURNED or alike < SAME_TURNS:
             continue
         # Noise of either flattens the fit to it; a tilted one has a part of the turns on x and y.
         one = np.ones(seen.size)
