@@ -65,14 +65,22 @@ def test_a_reference_without_stated_variance_or_noise_keeps_a_deviation_that_is_
     assert told[4.0 * stated]['sensors.reference_std'] == pytest.approx(4.0 * stated, rel=0.3)
 
 
-def test_noise_that_may_be_motion_is_not_written():
-    """Twice the stated noise: the filter would follow the wheels less, in three drives of 19."""
-    stated = float(rolling.rover().sensors.wheel_rate_std)
-    joints, random = rolling.recording().joints, np.random.default_rng(2)
-    for times, written in ((2.0, False), (6.0, True)):
-        rate = joints.rate + times * stated * random.standard_normal(joints.rate.shape)
-        calibration, _ = calibrated(joints=replace(joints, rate=rate))
-        assert ('sensors.wheel_rate_std' in {c.key for c in calibration.changes}) == written
+@pytest.mark.parametrize(
+    ('times', 'reversed_reference', 'written'), [(2.0, 1, False), (6.0, 1, True), (6.0, -1, False)]
+)
+def test_noise_that_may_be_motion_or_hides_what_is_wrong_is_not_written(
+    times, reversed_reference, written
+):
+    """The filter would follow the wheels less, and what is wrong more."""
+    joints, reference = rolling.recording().joints, rolling.recording().reference
+    noise = float(rolling.rover().sensors.wheel_rate_std) * times
+    rate = joints.rate + noise * np.random.default_rng(2).standard_normal(joints.rate.shape)
+    reference = replace(reference, velocity=reversed_reference * reference.velocity)
+    noisy = replace(joints, rate=rate)
+    given = replace(rolling.recording(), joints=noisy, reference=reference)
+    calibration = calibrate(given, rolling.rover())
+    assert ('sensors.wheel_rate_std' in {c.key for c in calibration.changes}) == written
+    assert ('noise' in {entry.kind for entry in calibration.not_seen}) == (reversed_reference < 0)
 
 
 def test_a_reversed_gyro_leaves_the_wheels_on_their_sides():

@@ -23,6 +23,7 @@ from wheel_terra_estimator.errors import UserError
 
 WORTH_CHANGING = 0.2  # relative change of a rate that is written, at least [-]
 NOISIER = 3.0  # noise over the one stated that is written, at least [-]: less may be motion
+LIVED_WITH = ('noise', 'covariance', 'jumps', 'drop_outs')  # kinds beside which noise is written
 NOISE_STD = 0.1  # relative deviation of a noise that a drive tells [-]
 LEAST_SURE = 0.8  # confidence from which a cure is written [-]
 CLEAR = 2.0  # deviations by which a number is off, from which another is written [-]
@@ -63,11 +64,11 @@ def calibrate(
         if read_off and finding.parameter and finding.value is not None:
             changes.add(finding.parameter, finding.value, finding.std, finding.words)
     _biases(changes, _mounting(changes, evidence, report), report)
-    _noises_and_rates(changes, report)
     _radius(changes, evidence, report)
     if np.isfinite(evidence.torque).any(axis=0).all():
         _torques(changes, evidence)
     _track(changes, evidence)
+    _noises_and_rates(changes, report)
     report.not_checked.append(not_checked('mass', 'centre'))
     left = (f for f in report.findings if f.parameter not in changes and f.fault != 'mass')
     return Calibration(tuple(changes.values()), tuple(report.not_checked), tuple(left))
@@ -149,10 +150,14 @@ SEEN = {
 
 
 def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
+    """Note rates, and noises unless something else stays wrong, which they would weigh more."""
     figures = dict(SEEN)
     if report.figures.get('reference.stated_std_m_s') == 0.0:  # the messages state none
         figures['sensors.reference_std'] = 'reference.noise_m_s'
     doubtful = {f.parameter for f in report.findings if f.confidence <= LEAST_SURE}
+    wrong = any(f.parameter not in changes and f.kind not in LIVED_WITH for f in report.findings)
+    if wrong:
+        report.not_checked.append(not_checked('noise', 'others'))
     for key, figure in figures.items():
         if key in doubtful:
             continue
@@ -160,7 +165,7 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
         if not seen or not math.isfinite(seen):
             continue
         if key.endswith('_std'):
-            if seen < NOISIER * stated:  # biases and vibration do not jump from message to message
+            if wrong or seen < NOISIER * stated:  # biases do not jump from message to message
                 continue
             source = 'changes from message to message on the move'
             changes.add(key, float(f'{seen:.3g}'), NOISE_STD * seen, source)
