@@ -930,3 +930,26 @@ def test_a_gyro_that_turns_sixty_times_as_its_orientation_is_in_degrees():
     imu = {'rate': np.degrees(whole.imu.rate), 'orientation': shown}
     told = checked(whole=whole, joints=straight, imu=imu).findings
     assert {f.fault for f in told if f.kind in ('unit', 'gain')} == {'gyro_degrees'}
+
+
+def test_a_side_that_reads_negative_without_an_imu_is_told_by_the_reference():
+    """Sides that go apart are a turn on the spot only while the rover stays where it is."""
+    rate = WHOLE.joints.rate * [1.0, -1.0, 1.0, -1.0]
+    report = checked(imu=None, joints={'rate': rate, 'torque': math.nan * rate})
+    told = [f for f in report.findings if f.kind == 'sign']
+    assert [(f.fault, f.wheel) for f in told] == [('backwards', 'front_right, rear_right')]
+
+
+def test_a_wheel_that_was_read_in_one_turn_alone_has_no_other_radius():
+    """On the inner side, without an IMU: what it was like on the other half is not known."""
+    seconds = WHOLE.joints.seconds
+    rate = WHOLE.joints.rate.copy()
+    rate[(seconds < 130.0) | (seconds > 165.0), 0] = math.nan
+    assert 'radius' not in {f.kind for f in checked(imu=None, joints={'rate': rate}).findings}
+
+
+def test_the_height_of_the_hubs_is_no_depth():
+    """It falls where the wheels sink in, from nearly the radius."""
+    height = rolling.RADIUS - WHOLE.sinkage.sinkage
+    (told,) = checked(sinkage={'sinkage': height}).findings
+    assert told.fault == 'sinkage_sign' and 'positive upwards, or a zero error' in told.words

@@ -18,6 +18,7 @@ from wheel_terra_estimator.checks.turning import sides_exchanged
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors
 
 DEEPEST = 1.2  # sinkage over radius that no wheel gets out of [-]
+DEEPEST_USUAL = 0.75  # the same that no rover drives with most of the time [-]
 NO_DEPTH = 3.0  # the same over the other wheels, either way, that is no zero of a sensor [-]
 LEAST_READINGS = 50
 ANOTHER_UNIT = 30.0  # noise over the stated one from which it may be another unit [-]
@@ -113,9 +114,10 @@ def _sign_and_zero(
     lugs = float(np.max(evidence.facts.configuration.wheels.lug_height))
     small = min(_radius(evidence) / USUAL_RADIUS, 1.0)
     limit, usual = BELOW_ZERO * small + lugs, float(np.nanquantile(middle, 0.5, method='higher'))
-    if usual < -limit:  # most wheels
+    deep = usual > DEEPEST_USUAL * _radius(evidence)  # perhaps the height of the hub
+    if usual < -limit or deep:  # most wheels
         top = float(np.nanmedian(np.nanquantile(table, 0.98, axis=0)))
-        if top > DEEP_SPELL * small:
+        if top > DEEP_SPELL * small and not deep:
             how = f'median sinkage {1000 * usual:.0f} mm: the wheels would float'
             return [_zero(evidence, names, usual, DEEP_STD * small, how)]
         return [evidence.found('sinkage_sign', 0.5, value=-1.0, reading=1000 * usual)]

@@ -418,7 +418,8 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     turn = fit.clear_track
     signs[there] = best.signs
     facts = evidence.facts
-    if evidence.gyro is None and facts.has_sides() and not np.ptp(signs * facts.side):
+    apart = facts.has_sides() and not np.ptp(signs * facts.side)
+    if evidence.gyro is None and apart and not stretch.ahead.any():
         return _Chosen(np.ones(signs.size))  # it may be a turn on the spot
     doubled = 2 * int(np.sum(signs < 0.0))
     if doubled > count or (doubled == count and turn < 0.0):

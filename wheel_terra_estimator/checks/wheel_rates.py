@@ -298,8 +298,10 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     whole, first, second = (np.log(np.maximum(part, 1e-3)) for part in ratios)
     rate, rolling = evidence.rate.copy(), facts.radius.copy()
     for i, name in enumerate(facts.names):
-        beside = max(float(np.nanmax(np.abs(np.delete(whole, i)))), abs(first[i] - second[i]))
-        if not abs(whole[i]) > max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LEAST_COUNTS):
+        apart = abs(first[i] - second[i])  # nan: it was not there in both halves
+        beside = max(float(np.nanmax(np.abs(np.delete(whole, i)))), apart)
+        small = abs(whole[i]) <= max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LEAST_COUNTS)
+        if small or not math.isfinite(apart):
             continue
         times = math.exp(whole[i])
         details = {'times': times, 'by': 1.0 / times}
