@@ -65,6 +65,12 @@ def test_a_reference_without_stated_variance_or_noise_keeps_a_deviation_that_is_
     assert told[4.0 * stated]['sensors.reference_std'] == pytest.approx(4.0 * stated, rel=0.3)
 
 
+def test_a_noise_that_is_stated_as_larger_than_the_rates_is_mended():
+    calibration = calibrate(rolling.recording(), rolling.rover(**{'sensors.wheel_rate_std': 4.0}))
+    told = {change.key: change.after for change in calibration.changes}
+    assert told['sensors.wheel_rate_std'] == pytest.approx(0.004, rel=0.1)
+
+
 @pytest.mark.parametrize(
     ('times', 'reversed_reference', 'written'), [(2.0, 1, False), (6.0, 1, True), (6.0, -1, False)]
 )

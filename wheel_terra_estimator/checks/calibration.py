@@ -154,7 +154,8 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
     figures = dict(SEEN)
     if report.figures.get('reference.stated_std_m_s') == 0.0:  # the messages state none
         figures['sensors.reference_std'] = 'reference.noise_m_s'
-    doubtful = {f.parameter for f in report.findings if f.confidence <= LEAST_SURE}
+    told = {f.parameter for f in report.findings}
+    doubtful = told - {f.parameter for f in _sure(report)}
     wrong = any(f.parameter not in changes and f.kind not in LIVED_WITH for f in report.findings)
     if wrong:
         report.not_checked.append(not_checked('noise', 'others'))
@@ -165,7 +166,8 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
         if not seen or not math.isfinite(seen):
             continue
         if key.endswith('_std'):
-            if wrong or seen < NOISIER * stated:  # biases do not jump from message to message
+            clear = seen > NOISIER * stated or key in told
+            if wrong or not clear:  # biases do not jump from message to message
                 continue
             source = 'changes from message to message on the move'
             changes.add(key, float(f'{seen:.3g}'), NOISE_STD * seen, source)

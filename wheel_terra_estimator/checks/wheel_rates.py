@@ -420,6 +420,8 @@ def check_noise(evidence: Evidence) -> list[Outcome]:
         figures['wheels.rate_step_rad_s'] = float(f'{np.median(by_steps) / COUNTING_STD:.3g}')
     coarse = np.array(by_steps) > max(STEP_FACTOR * stated, LEAST_STEP_SHARE * working)
     noisy = np.array(noise) > max(NOISE_FACTOR * stated, LEAST_NOISE_SHARE * working)
+    # Nor does any rate count beside a noise that is stated as larger than the rates themselves.
+    noisy |= min(noise) > 0.0 and stated > max(working, NOISE_FACTOR * max(noise))
     if not (coarse | noisy).any():
         return []
     key, wrong = ('rate_steps', coarse) if coarse.any() else ('rate_noise', noisy)
