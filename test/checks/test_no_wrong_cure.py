@@ -953,3 +953,15 @@ def test_the_height_of_the_hubs_is_no_depth():
     height = rolling.RADIUS - WHOLE.sinkage.sinkage
     (told,) = checked(sinkage={'sinkage': height}).findings
     assert told.fault == 'sinkage_sign' and 'positive upwards, or a zero error' in told.words
+
+
+@pytest.mark.parametrize('late', [0.4, 0.5, 0.8])
+def test_stamps_that_are_late_by_half_a_swing_reverse_nothing(late):
+    """To and fro: with no lag the gyro goes against the wheels, half a swing later with them."""
+    sway = lambda time: 0.08 * np.sin(4.5 * time + np.sin(0.9 * time))  # noqa: E731
+    whole = rolling.driven(60.0, 0.3, yaw=sway)
+    stamp = whole.imu.stamp + round(1e9 * late)
+    (told,) = checked(
+        whole=whole, imu={'stamp': stamp, 'log_time': stamp + 2_000_000}, sinkage=None
+    ).findings
+    assert told.fault == 'imu_offset' and told.value == pytest.approx(late, abs=0.1)

@@ -18,7 +18,14 @@ import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray, IntArray
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.finding import NotChecked, Outcome, found, not_checked, of_offset
+from wheel_terra_estimator.checks.finding import (
+    LEAST_TURN_RATE,
+    NotChecked,
+    Outcome,
+    found,
+    not_checked,
+    of_offset,
+)
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import (
     Channel,
@@ -263,8 +270,11 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
     if np.isfinite(difference).any():
         yaw = averaged(at, (imu.rate @ evidence.rotation.T)[:, 2:3], time, 2 * STEP)[:, 0]
         wheels = _even(evidence, difference, time)
-        wheels = wheels * np.sign(correlation(wheels, yaw) or 1.0)
-        turned = after(wheels, yaw, 'turns')
+        # As the gyro was mended; at no lag the motion may well look reversed.
+        yaw = yaw * np.sign(correlation(_even(evidence, evidence.gyro[:, 2], time), yaw) or 1.0)
+        turns = np.abs(moving_mean(yaw - np.median(yaw), round(SMOOTHED / STEP)))
+        if np.quantile(turns, 0.98) > LEAST_TURN_RATE:  # else a body rocks, or a driver corrects
+            turned = after(wheels, yaw, 'turns')
     if evidence.force is not None and time.size > 2:
         width = round(SMOOTHING / STEP)
         speed = moving_mean(_even(evidence, evidence.rim, time), width)
