@@ -240,6 +240,18 @@ def test_signals_end_it_while_it_starts_also_twice(start_interpreter, parameters
         assert status == 0 and 'Traceback' not in words, words
 
 
+def test_signals_until_the_very_end_leave_its_status(start_interpreter, listener):
+    """Ctrl-C of `ros2 launch` comes twice, the second one while the interpreter ends."""
+    node, until = listener
+    process = start_interpreter('traction_limiter_node')
+    until(lambda: node.count_publishers('cmd_vel_out'))
+    while process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.002)
+    status, words = process.stop()
+    assert status == 0 and 'Traceback' not in words, words
+
+
 def test_a_closing_that_hangs_is_cut_short(monkeypatch):
     from wheel_terra_estimator.ros import process
 

@@ -37,17 +37,19 @@ class _Signals:
     def __init__(self) -> None:
         self.stopped = False
         self.serving = False
-        for number in (signal.SIGINT, *terminations()):
+        self._numbers = signal.SIGINT, *terminations()
+        for number in self._numbers:
             signal.signal(number, self._on_signal)
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         if not self.serving:
             os._exit(0)  # nothing has been opened yet
-        if not self.stopped:
-            self.stopped = True
-            end = threading.Timer(LONGEST_END, os._exit, (0,))
-            end.daemon = True
-            end.start()
+        for each in self._numbers:  # the end of the interpreter restores handlers, this it leaves
+            signal.signal(each, signal.SIG_IGN)
+        self.stopped = True
+        end = threading.Timer(LONGEST_END, os._exit, (0,))
+        end.daemon = True
+        end.start()
 
 
 def run_node(module: str, name: str, args: list[str] | None) -> int:
