@@ -374,6 +374,16 @@ def test_a_rover_that_stands_by_a_reference_confirms_the_warning(speed, confirme
     assert not any(a.confirmed for a in blind)
 
 
+def test_a_start_or_a_stop_does_not_confirm_it():
+    """There a reference is at rest for up to 0.9 s while the wheels, in a wrong unit, turn fast."""
+    monitor = StuckMonitor(SETTINGS)
+    spinning = [wheel(0.98, rim=2.5)._replace(slip_std=0.003 / 2.5)] * 6
+    found = held(monitor, spinning, 3.0, speed=0.05, speed_known=True)
+    found += held(monitor, spinning, 0.9, start=3.0, speed=0.0, speed_known=True)
+    found += held(monitor, spinning, 3.0, start=3.9, speed=0.05, speed_known=True)
+    assert found[-1].stuck and not any(a.confirmed for a in found)
+
+
 @pytest.mark.parametrize(('torque', 'confirmed'), [(0.95, True), (950.0, False)])
 def test_wheels_at_their_torque_limit_confirm_it_and_torques_far_beyond_do_not(torque, confirmed):
     """Torques in a wrong unit are a thousand times too great."""

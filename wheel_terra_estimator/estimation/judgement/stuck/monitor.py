@@ -55,7 +55,10 @@ class StuckAssessment(NamedTuple):
     digging: float = 0.0
     """Sinkage gained over rim travel by more than half of the wheels [m/m]."""
     confirmed: bool = False
-    """Whether there is evidence that no wrong sign or unit of the wheels' readings can produce."""
+    """Whether there is evidence that no wrong sign or unit of the wheels' readings can produce.
+
+    These make the slip of a moving rover near 1, but its speed zero only while it stops or starts.
+    """
     holds: bool = False
     """Whether the ground still holds the rover: same direction, no smaller demand."""
     buried: bool = False
@@ -72,6 +75,7 @@ class StuckState(NamedTuple):
     direction: int = 0
     demand: float = NAN  # when the warning was raised [-]
     clear_since: float = NAN  # [s]
+    stands_since: float = NAN  # by a reference, while wheels turn [s]
 
 
 class StuckMonitor(Component[StuckState]):
@@ -100,7 +104,11 @@ class StuckMonitor(Component[StuckState]):
         times = zip(since, (slip_hold, STANDING_HOLD, max(HOLD, border)), strict=True)
         held = [time - begun > hold for begun, hold in times]
         stays = any(criteria) or situation.sunk
-        state = old._replace(memory=situation.memory, since=since, clear_since=NAN)
+        stands = time if isnan(old.stands_since) else old.stands_since
+        stands = stands if _stands(situation) else NAN
+        state = old._replace(
+            memory=situation.memory, since=since, clear_since=NAN, stands_since=stands
+        )
         if any(held) and not old.stuck:
             memory = situation.memory
             direction = memory.direction if time - memory.direction_since > SINKING_HOLD else 0
@@ -122,19 +130,15 @@ class StuckMonitor(Component[StuckState]):
             situation.stalled,
             state.direction,
             situation.digging,
-            state.stuck and _confirmed(situation),
+            state.stuck and (time - stands > HOLD or _at_limit(situation)),
             holds,
             holds and situation.sunk,
         )
 
 
-def _confirmed(s: Situation) -> bool:
-    """Return whether the rover stands by a reference, or two wheels are at their torque limit.
-
-    Rim speeds in a wrong unit make the slip of a moving rover near 1, but not its speed zero;
-    torques in a wrong unit are far beyond their limit.
-    """
-    return _stands(s) or NEAR_LIMIT < s.torque_share < 1.0 / NEAR_LIMIT
+def _at_limit(s: Situation) -> bool:
+    """Return whether two wheels are at their torque limit; torques in a wrong unit are beyond."""
+    return NEAR_LIMIT < s.torque_share < 1.0 / NEAR_LIMIT
 
 
 def _stands(s: Situation) -> bool:
