@@ -380,7 +380,9 @@ def test_a_start_or_a_stop_does_not_confirm_it():
     spinning = [wheel(0.98, rim=2.5)._replace(slip_std=0.003 / 2.5)] * 6
     found = held(monitor, spinning, 3.0, speed=0.05, speed_known=True)
     found += held(monitor, spinning, 0.9, start=3.0, speed=0.0, speed_known=True)
-    found += held(monitor, spinning, 3.0, start=3.9, speed=0.05, speed_known=True)
+    noise = [w._replace(rim_speed=0.007) for w in spinning]  # of rates at rest, in that unit
+    found += held(monitor, noise, 3.0, start=3.9, speed=0.0, speed_known=True)
+    found += held(monitor, spinning, 3.0, start=6.9, speed=0.05, speed_known=True)
     assert found[-1].stuck and not any(a.confirmed for a in found)
 
 

@@ -75,7 +75,7 @@ class StuckState(NamedTuple):
     direction: int = 0
     demand: float = NAN  # when the warning was raised [-]
     clear_since: float = NAN  # [s]
-    stands_since: float = NAN  # by a reference, while wheels turn [s]
+    stands_since: float = NAN  # by a reference, while wheels turn on [s]
 
 
 class StuckMonitor(Component[StuckState]):
@@ -105,7 +105,7 @@ class StuckMonitor(Component[StuckState]):
         held = [time - begun > hold for begun, hold in times]
         stays = any(criteria) or situation.sunk
         stands = time if isnan(old.stands_since) else old.stands_since
-        stands = stands if _stands(situation) else NAN
+        stands = stands if _stands(situation) and not situation.slowed else NAN
         state = old._replace(
             memory=situation.memory, since=since, clear_since=NAN, stands_since=stands
         )
