@@ -25,6 +25,7 @@ from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal import (
     Gap,
     Rival,
+    like,
     propose,
     rivals,
 )
@@ -187,6 +188,8 @@ class Decider:
         if beyond_doubt:
             return names, True
         law = self._law(decision)
+        if law and law.fit and {*map(like, law.fit.names)} <= {n.name for n in names}:
+            law = None  # it says the same in other words
         ahead = gap.closed(unseen) - (law.closed if law else 0.0)
         if law is not None and ahead < -_CLEARLY:
             return names, False
@@ -272,13 +275,13 @@ def _names(
     total, own = selection.totals[decision.verdict.index], set(map(effect_of, fitted.names))
     nameless = {r.words: r.odds(total) for r in beside if r.like not in own}
     for place, key in enumerate(fitted.names):
-        values = features(selection, decision.verdict, place) | shown
+        name, values = effect_of(key), features(selection, decision.verdict, place) | shown
         values['strength'] = _strength(fitted, key)
         competitors = decision.verdict.ambiguity_groups[place]
         alike = _known_alike(key, decision, known, table.units)
         values['alike'] = float(len(alike))
-        # Slips of a drive are our own.
-        if 'wheel_radius_bias' in (key, *competitors) and not table.true_rows.any():
+        bias = 'wheel_radius_bias'  # slips of a drive are our own
+        if (name == bias or bias in competitors) and not table.true_rows.any():
             alike = (_SAME_ERROR, *alike)
             values['alike'] += _SAME_ERROR_ODDS
         values['nameless'] = sum(nameless.values())
@@ -286,7 +289,6 @@ def _names(
         alike = (*alike, *(words for words, odds in nameless.items() if odds > _NOTABLE))
         alone = float(selection.totals[selection.index((key,))])
         sure = confidence(values, values['alike'])
-        name = effect_of(key)
         effect = NamedEffect(
             name,
             {

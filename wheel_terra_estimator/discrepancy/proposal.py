@@ -86,12 +86,12 @@ _LIKE = {
     'shear_modulus_by_load': 'shear_deformation',
     'shear_modulus_by_slip': 'shear_deformation',
     'shear_modulus_by_slip_squared': 'shear_deformation',
-    'bearing_pressure_by_pass': 'multipass',
-    'bearing_pressure_by_rim_speed': 'rate_dependence',
     'exponent_by_load': 'slip_sinkage_exponent',
     'drawbar_pull_by_load': 'pull_zero',
     'torque_by_torque_squared': 'torque_gain',
 }
+# Inputs of which any influence on the soil has one name.
+_LIKE_ON_SOIL = {'pass': 'multipass', 'rim_speed': 'rate_dependence'}
 _LEVEL_INPUTS = (
     'normal_load',
     'lug_height',
@@ -234,11 +234,15 @@ def rivals(table: SteadyTable, findings: Findings) -> tuple[Rival, ...]:
     nearest = sorted(starts, key=lambda s: -s[0])[:_TRIED]
     prior = math.log(_PRIOR_OF_LAW / max(len(terms), 1))
     return tuple(
-        Rival(
-            law.log_evidence + prior, f'a law ({plain(law.names[0])})', _LIKE.get(law.names[0], '')
-        )
+        Rival(law.log_evidence + prior, f'a law ({plain(law.names[0])})', like(law.names[0]))
         for law in explained(setting, [start for _, start in nearest])
     )
+
+
+def like(term: str) -> str:
+    """Return the effect that a term of a law comes near, or is; empty if there is none."""
+    target, feature = pair_of(term)
+    return (_LIKE_ON_SOIL if target not in QUANTITIES else {}).get(feature, _LIKE.get(term, ''))
 
 
 def _can_be_believed(fitted: Fit) -> bool:
@@ -342,7 +346,7 @@ def _resembling(findings: Findings, refit: Fit, law: Fit) -> tuple[str, ...]:
         cosine = float(signature.change @ weighted) / far if far > 0.0 else 0.0
         alike[effect_of(key)] = max(abs(cosine), alike.get(effect_of(key), 0.0))
     order = sorted(alike, key=lambda name: -alike[name])
-    same = [_LIKE[c.name] for c in law.coordinates if c.name in _LIKE]
+    same = [like(c.name) for c in law.coordinates if c.owner == NAME and like(c.name)]
     found = [*same, *(name for name in order if alike[name] > _ALIKE)]
     return tuple(dict.fromkeys(found))[:_RESEMBLING]
 
