@@ -24,15 +24,20 @@ _KEPT = 3
 _WORTH = 2.0  # d' that a measurement must promise, and ...
 _MORE = 1.5  # ... least gain over the present distance of a proposed measurement
 _DEEPEST = 0.6  # of the radius: blocks in which a competitor sinks deeper are not proposed
+# A proportional loss vanishes at zero torque; lifting and lowering differ by friction alone.
+_KNOWN_TORQUE = (
+    'read the torque while the wheel lifts, then lowers, a known weight on a cord round it'
+)
 # A zero check costs minutes and settles an instrument's error for good.
 ZERO_CHECKS = {
     'sinkage_offset': 'read the sinkage sensor with the wheel on a hard, level floor (should be 0)',
     'drivetrain_friction': 'read the torque with the wheel turning in the air',
-    'drivetrain_friction:viscous': 'read the torque with the wheel turning in the air',
-    # A proportional loss vanishes at zero torque; lifting and lowering differ by friction alone.
-    'drivetrain_friction:proportional': 'read the torque while the wheel lifts, then lowers, '
-    'a known weight on a cord round it',
+    'drivetrain_friction:proportional': _KNOWN_TORQUE,
     'wheel_radius_bias': 'roll the wheel out on a hard floor: distance over 10 turns',
+    'pull_zero': 'read the pull with the wheel lifted off the soil (should be 0)',
+    'pull_gain': 'load the pull sensor with a known weight on a cord',
+    'torque_gain': _KNOWN_TORQUE,
+    'sinkage_gain': 'lift the sinkage sensor by a step of known height',
     'pitch_bias': 'read attitude and pull with the rig at rest, then turned by 180 degrees',
 }
 
@@ -56,9 +61,14 @@ def propose(
             names = (' + '.join(chosen.names), ' + '.join(competitor.names))
         now = _distance(setting, chosen, competitor)
         ours, theirs = ({effect_of(key) for key in f.names} for f in (chosen, competitor))
-        for key in dict.fromkeys((*chosen.names, *competitor.names)):
-            if key in ZERO_CHECKS and effect_of(key) in ours ^ theirs:
-                found.append(NextMeasurement(ZERO_CHECKS[key], names, now, np.inf))
+        checks = (
+            ZERO_CHECKS.get(key, ZERO_CHECKS.get(effect_of(key)))
+            for key in (*chosen.names, *competitor.names)
+            if effect_of(key) in ours ^ theirs
+        )
+        found += [
+            NextMeasurement(check, names, now, np.inf) for check in dict.fromkeys(checks) if check
+        ]
         blocks = []
         for (what, rows), (values, sensitivity) in zip(menu, predicted, strict=True):
             outputs = values[[0, place]]

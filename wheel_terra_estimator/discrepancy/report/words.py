@@ -390,8 +390,12 @@ def _agreement(decision: Decision, gap_p_value: float) -> str:
     within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'
     if not floor:
         within = ' (model-error floor needed: none)'
-    beds = f' and the bed of each {decision.ground} may be another' if decision.ground else ''
-    return f'Model and measurement agree once the soil is refitted{beds}{within}.'
+    if decision.ground:
+        return (
+            f'Model and measurement agree only if each {decision.ground} had a bed of its own, '
+            f'once the soil is refitted{within}; else something is missing.'
+        )
+    return f'Model and measurement agree once the soil is refitted{within}.'
 
 
 def sentence(
@@ -422,7 +426,8 @@ def sentence(
             f'like them{f" ({near})" if near else ""}.'
         )
     if verdict.status == 'unexplained':
-        size = f'a misfit of about {100 * left.amplitude:.0f} % of the range is left'
+        share = f'{100 * left.amplitude:.0f} %'
+        size = f'a plausible soil leaves a misfit of about {share} of the range'
         if left.amplitude < 0.005:  # with a reference what is shared is not in it
             scatter = 'nothing smooth, but more scatter than the noise allows, is left'
             size = '' if left.shared else scatter
