@@ -41,11 +41,21 @@ def test_a_reading_that_drifts_is_found_and_says_along_what():
     assert (change.column, change.quantity) == ('row_order', 'drawbar_pull')
     assert change.p_value < 0.01
     assert 'drawbar pull change along row order' in change.text
-    # Two quantities along two columns are four chances to be wrong.
+    # Two quantities, each tried twice along an order and once between groups: six chances.
     rng, _ = columns(40, 7)
     more = {'torque': rng.normal(20.0, 1.0, 40), 'trial': rng.permutation(np.arange(40.0) % 4)}
     (same,) = changes(values | more)
-    assert same.p_value == pytest.approx(4.0 * change.p_value)
+    assert same.p_value == pytest.approx(3.0 * change.p_value)
+
+
+def test_a_drift_over_few_rows_is_found_where_its_neighbours_scatter():
+    _, values = columns(18, 5)
+    drift = np.linspace(-2.0, 2.0, 18)
+    values['drawbar_pull'] = values['drawbar_pull'] - drift
+    (change,) = changes(values)
+    truth = np.corrcoef(values['drawbar_pull'], np.arange(18))[0, 1]
+    assert change.drift and change.strength == pytest.approx(truth, abs=0.02)
+    assert 'a drift' in change.text
 
 
 def test_the_share_between_groups_is_that_of_an_analysis_of_variance():

@@ -96,7 +96,7 @@ def changed_stretch(
     return Stretch(text, float(times[first]), float(times[last]), stiffness, best)
 
 
-_DRAWS = 2000
+_DRAWS = 5000
 _SEED = 11
 _CHANCE = 0.01  # chance, the number of tests paid for, below which a change is one
 _FEWEST_ROWS = 8
@@ -112,6 +112,7 @@ class Change:
     quantity: str
     p_value: float
     strength: float
+    drift: bool = False  # ``strength`` is the correlation with the order, else that of neighbours
 
     @property
     def text(self) -> str:
@@ -120,7 +121,9 @@ class Change:
             f'chance {number(self.p_value, 1)}' if self.p_value >= 1e-3 else 'chance below 0.001'
         )
         name, column = plain(self.quantity), plain(self.column)
-        if self.column in _SEQUENCES:
+        if self.drift:
+            how = f'a drift: their correlation with it is {number(self.strength, 2)}'
+        elif self.column in _SEQUENCES:
             how = f'neighbours correlate with {number(self.strength, 2)}'
         else:
             how = f'its values account for {number(100.0 * self.strength, 2)} % of their squares'
@@ -135,9 +138,10 @@ def changes_along_rows(table: SteadyTable, predicted: FloatArray, band: FloatArr
     columns = [name for name in ORDER_COLUMNS if name in table.columns]
     columns = [name for name in columns if _apart_from_inputs(table, name)]
     rng = np.random.default_rng(_SEED)
-    tests = max(len(columns) * len(table.quantities), 1)
+    tried = {name: (_lag_one, _drift) if name in _SEQUENCES else (_between,) for name in columns}
+    tests = max(sum(map(len, tried.values())) * len(table.quantities), 1)
     found = []
-    for column in columns:
+    for column, statistics in tried.items():
         key = table.columns[column]
         for q, quantity in enumerate(QUANTITIES):
             mine = np.isfinite(table.measured[:, q]) & np.isfinite(key)
@@ -147,11 +151,16 @@ def changes_along_rows(table: SteadyTable, predicted: FloatArray, band: FloatArr
             residual = np.clip(residual - np.median(residual), -4.0, 4.0)  # no outlier decides
             shuffled = rng.permuted(np.tile(residual, (_DRAWS, 1)), axis=1)
             every = np.vstack([residual, shuffled])
-            in_sequence = column in _SEQUENCES
-            values = _lag_one(every, key[mine]) if in_sequence else _between(every, key[mine])
-            chance = (1.0 + float((values[1:] >= values[0]).sum())) / (1.0 + _DRAWS)
-            if chance * tests < _CHANCE:
-                found.append(Change(column, quantity, min(chance * tests, 1.0), float(values[0])))
+            changes = list[Change]()
+            for statistic in statistics:
+                values = statistic(every, key[mine])
+                size = np.abs(values) if statistic is _drift else values
+                chance = tests * (1.0 + float((size[1:] >= size[0]).sum())) / (1.0 + _DRAWS)
+                drift, strength = statistic is _drift, float(values[0])
+                changes.append(Change(column, quantity, min(chance, 1.0), strength, drift))
+            likeliest = min(changes, key=lambda change: change.p_value)
+            if likeliest.p_value < _CHANCE:
+                found.append(likeliest)
     return found
 
 
@@ -173,6 +182,14 @@ def _lag_one(residuals: FloatArray, key: FloatArray) -> FloatArray:
     """(D,) correlation of neighbours along the key."""
     along = residuals[:, np.argsort(key, kind='stable')]
     return (along[:, 1:] * along[:, :-1]).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)
+
+
+def _drift(residuals: FloatArray, key: FloatArray) -> FloatArray:
+    """(D,) correlation with the rank of the key."""
+    rank, centred = _ranks(key), residuals - residuals.mean(axis=1, keepdims=True)
+    rank = rank - rank.mean()
+    size = np.sqrt((centred**2).sum(axis=1) * (rank**2).sum())
+    return centred @ rank / np.maximum(size, 1e-12)
 
 
 def _between(residuals: FloatArray, key: FloatArray) -> FloatArray:
