@@ -86,12 +86,11 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         '',
         '<!-- Written by `python tools/document_effects.py`; do not edit. -->',
         '',
-        'Every physical or instrument effect that the models know. Each is off unless a file has '
-        '`effects.<name>.enabled: true`; `effects.<name>.form` chooses one of its forms. What a '
-        'further form shares with the first is not repeated. Numbers of a parameter: default '
-        '(range), prior: mean ± deviation of a normal one, or scale of a half-normal one. '
-        '*Needs*: columns that must vary in a table. *Confounded with*: in brackets what tells '
-        'the two apart. Figures: first parameter, wheel of 157 mm radius with 10 mm lugs, 80 N, '
+        'Each is off unless a file has `effects.<name>.enabled: true`; `effects.<name>.form` '
+        'chooses a form; what it shares with the first is not repeated. Numbers of a parameter: '
+        'default (range), prior: mean ± deviation, or scale of a half-normal one (†: grows with W, '
+        'of a torque with W r). *Needs*: columns that must vary. *Confounded with*: in brackets '
+        'what tells the two apart. Figures, and †: wheel of 157 mm radius with 10 mm lugs, 80 N, '
         'HIT-LSS1 sand.',
         '',
         'By the outputs that they change:',
@@ -180,9 +179,8 @@ def _parameter(p: EffectParameter) -> str:
 
 
 def _prior(p: EffectParameter) -> str:
-    if p.prior == 'half_normal':
-        return f'half-normal {p.prior_scale:g}'
-    return f'{p.prior_mean:g} ± {p.prior_scale:g}'
+    centre = 'half-normal ' if p.prior == 'half_normal' else f'{p.prior_mean:g} ± '
+    return f'{centre}{p.prior_scale:g}{"†" if p.by_load else ""}'
 
 
 def main() -> None:

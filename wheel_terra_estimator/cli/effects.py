@@ -21,7 +21,7 @@ from wheel_terra_estimator.terramechanics.effects import (
     load_file,
 )
 from wheel_terra_estimator.terramechanics.effects import learned_closure as law
-from wheel_terra_estimator.terramechanics.effects.base import TOUCHABLE
+from wheel_terra_estimator.terramechanics.effects.base import REFERENCE_LOAD, TOUCHABLE
 
 EXAMPLES = ('wheel-terra effects', 'wheel-terra effects lug_digging multipass')
 
@@ -97,19 +97,20 @@ def left_aside(effect: Effect) -> list[str]:
         if not form.candidate and not form.sparse:
             of = f'the form {form.form} is ' if len(effect.forms) > 1 else ''
             why = f': {form.why_aside}' if form.why_aside else ''
-            found.append(f'{of}tried by the discrepancy workflow only when asked for by name{why}')
+            found.append(f'{of}tried by diagnose only when asked for by name{why}')
     return found
 
 
 def _parameter_text(p: EffectParameter) -> list[str]:
     """Return range and prior of a parameter, in words."""
     note = '' if p.free else '; not fitted'
+    by_load = f' at {REFERENCE_LOAD:g} N, more with the load' if p.by_load else ''
     half = p.prior == 'half_normal'
     prior = 'half-normal, scale ' if half else f'normal, {p.prior_mean:g} ± '
     return _wrapped(
         f'{p.name} [{p.unit}]: ',
         f'{p.meaning}; default {p.default:g}, range {p.lower:g} to {p.upper:g}, '
-        f'prior {prior}{p.prior_scale:g}{note}',
+        f'prior {prior}{p.prior_scale:g}{by_load}{note}',
     )
 
 

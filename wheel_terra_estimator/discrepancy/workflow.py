@@ -40,7 +40,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     operating_points,
 )
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects import Catalogue, catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 _UNLIKELY = 0.05  # odds of different beds below which they are not reported
@@ -83,7 +83,8 @@ def diagnose(
     points = operating_points(both.columns, configuration, both.name)
     check_wheel_of_model(both, configuration)
     check_against_wheel(both, np.broadcast_to(points.wheel.radius, (len(both),)))
-    known = catalogue()
+    load, radius = (float(np.median(v)) for v in (points.normal_load, points.wheel.radius))
+    known = Catalogue({key: e.sized(load, radius) for key, e in catalogue().items()})
     effects, not_tried = _effects_to_try(configuration, chosen, known)
     readings = Readings.of(configuration).true_on(both.true_rows)
     forward = Forward(

@@ -21,7 +21,8 @@ STAGES = ('on_inputs', 'on_contact', 'on_normal_stress', 'on_outputs')
 # A term changes the contact in place; `parameters.kd` is the value of the parameter ``kd``;
 # its quantities are numbers or arrays.
 Term: TypeAlias = Callable[[Contact, SimpleNamespace], None]
-REFERENCE_PRESSURE = 3000.0  # [Pa]; 80 N on 165 mm x 157 mm, the wheel of Ding et al. 2010
+# Of the wheel of Ding et al. 2010, 165 mm wide: load [N], rim radius [m], pressure [Pa].
+REFERENCE_LOAD, REFERENCE_RADIUS, REFERENCE_PRESSURE = 80.0, 0.157, 3000.0
 # Effect name -> parameter -> value; ``form`` names the form where it is not the first one.
 EffectSettings: TypeAlias = Mapping[str, Mapping[str, Any]]
 FORM_MARK = ':'  # between the name of an effect and that of its form in the key of a variant
@@ -50,6 +51,9 @@ class EffectParameter:
     prior_mean: float = 0.0
     neutral: float = 0.0  # value at which the term vanishes
     free: bool = True  # False: kept at its value by the discrepancy workflow
+    # True: `prior_scale` is that of the reference wheel, and grows with the load, a torque's with
+    # load times radius
+    by_load: bool = False
 
     def __post_init__(self) -> None:
         if self.prior not in PRIORS:
@@ -72,11 +76,12 @@ def _of_prior(
     meaning: str,
     *,
     free: bool = True,
+    by_load: bool = False,
 ) -> EffectParameter:
     """Return a parameter whose prior has its centre at the default, or at 0."""
     centre = default if about_default else 0.0
     limits = default, lower, upper, scale
-    return EffectParameter(name, unit, *limits, prior, meaning, centre, free=free)
+    return EffectParameter(name, unit, *limits, prior, meaning, centre, free=free, by_load=by_load)
 
 
 magnitude = partial(_of_prior, 'half_normal', False)
@@ -188,6 +193,22 @@ class Effect(Form):
         if form not in forms:
             raise ValueError(f'effect {self.name} has no form {form!r}; it has {", ".join(forms)}')
         return forms[form]
+
+    def sized(self, load: float, radius: float) -> Effect:
+        """Return the effect with the priors of forces and torques for such a wheel [N], [m]."""
+
+        def of_wheel(parameters: tuple[EffectParameter, ...]) -> tuple[EffectParameter, ...]:
+            force = load / REFERENCE_LOAD
+            torque = force * radius / REFERENCE_RADIUS
+            return tuple(
+                replace(p, prior_scale=p.prior_scale * (force if p.unit == 'N' else torque))
+                if p.by_load
+                else p
+                for p in parameters
+            )
+
+        others = (replace(f, parameters=of_wheel(f.parameters)) for f in self.other_forms)
+        return replace(self, parameters=of_wheel(self.parameters), other_forms=tuple(others))
 
     def parameter(self, name: str) -> EffectParameter:
         """Return the parameter of that name; ``KeyError`` if there is none."""

@@ -43,7 +43,7 @@ def _gain_of(
         touches=frozenset({quantity}),
         instrument=True,
         confounded_with=confounded_with,
-        validity=f'constant over the table; {validity}',
+        validity=validity,
         source='instrument model',
         on_outputs=partial(_gain, quantity),
     )
@@ -84,14 +84,14 @@ EFFECTS = (
         name='pull_zero',
         claim='zero error of the pull reading; positive: it reads too much',
         symbol='F += offset',
-        parameters=(signed('offset', 'N', 2.0, -1e4, 1e4, 3.0, 'zero error'),),
+        parameters=(signed('offset', 'N', 2.0, -1e4, 1e4, 3.0, 'zero error', by_load=True),),
         touches=frozenset({'drawbar_pull'}),
         instrument=True,
         confounded_with={
             'pitch_bias': 'a load series: an attitude error grows with the load',
             'bulldozing': 'a load series; the reading of the unloaded cell',
         },
-        validity='constant over the table; does not change sign in reverse',
+        validity='does not change sign in reverse',
         source='instrument model',
         on_outputs=partial(_offset, 'drawbar_pull'),
     ),
@@ -121,7 +121,7 @@ EFFECTS = (
             'slope_gravity': 'level rows, or the same slope driven both ways',
             'bulldozing': 'three times the load or another wheel; a level check',
         },
-        validity='constant over the table; does not change sign in reverse',
+        validity='does not change sign in reverse',
         source='statics',
         on_outputs=_tilt,
     ),
@@ -148,7 +148,11 @@ DRIVETRAIN_FRICTION = Effect(
     claim='torque is lost before the wheel: the reading is higher by a constant',
     form='constant',
     symbol='T += torque sgn(w)',
-    parameters=(magnitude('torque', 'N m', 0.3, 0.0, 20.0, 0.5, 'friction torque of the drive'),),
+    parameters=(
+        magnitude(
+            'torque', 'N m', 0.3, 0.0, 1e4, 0.5, 'friction torque of the drive', by_load=True
+        ),
+    ),
     touches=frozenset({'torque'}),
     instrument=True,
     confounded_with={'lug_shear_radius': 'torque of the wheel in the air; pull'},
@@ -164,7 +168,7 @@ DRIVETRAIN_FRICTION = Effect(
                 magnitude('share', '-', 0.1, 0.0, 2.0, 0.15, 'torque lost over torque used'),
             ),
             validity='a turning wheel; one gear stage loses a few per cent, a worm drive half',
-            source='efficiency of a gear, 1/(1 + share) while the motor drives',
+            source='efficiency of a gear, 1/(1 + share)',
             on_outputs=_in_proportion,
         ),
         Form(
@@ -172,15 +176,29 @@ DRIVETRAIN_FRICTION = Effect(
             claim='torque is lost before the wheel in proportion to its rate',
             symbol='T += damping w',
             parameters=(
-                magnitude('damping', 'N m s/rad', 0.5, 0.0, 100.0, 0.5, 'viscous friction'),
+                magnitude(
+                    'damping', 'N m s/rad', 0.5, 0.0, 1e4, 0.5, 'viscous friction', by_load=True
+                ),
             ),
             needs=('angular_velocity',),
-            validity='a turning wheel; nothing where the rate is not recorded',
-            source='viscous friction of bearings and grease',
+            validity='a turning wheel',
+            source='bearings and grease',
             on_outputs=_viscous,
+        ),
+        Form(
+            name='zero',
+            claim='zero error of the torque reading; positive: it reads too much',
+            symbol='T += offset',
+            parameters=(signed('offset', 'N m', 0.3, -1e4, 1e4, 0.5, 'zero error', by_load=True),),
+            validity='does not change sign in reverse',
+            source='instrument model',
+            on_outputs=partial(_offset, 'torque'),
         ),
     ),
 )
+
+
+_BIAS = signed('bias', '-', 0.03, -0.3, 0.3, 0.04, 'effective over configured radius, minus one')
 
 
 def _bias(contact: Contact, p: SimpleNamespace) -> None:
@@ -190,19 +208,36 @@ def _bias(contact: Contact, p: SimpleNamespace) -> None:
     contact.slip = slip_of_speed_ratio(ratio)
 
 
+def _other_rim(contact: Contact, p: SimpleNamespace) -> None:
+    # The slip was reckoned with the configured radius, so that v/w is as measured.
+    contact.shear_radius = contact.shear_radius + p.bias * contact.radius
+    contact.radius = contact.radius * (1.0 + p.bias)
+    contact.slip = slip_of_speed_ratio(speed_ratio(contact.slip) / (1.0 + p.bias))
+
+
 WHEEL_RADIUS_BIAS = Effect(
     name='wheel_radius_bias',
+    form='slip',
     claim='the effective rolling radius differs from the configured one, so slip is misread',
     symbol='1 - s_true = (1 - s_recorded)/(1 + bias)',
-    parameters=(
-        signed('bias', '-', 0.03, -0.3, 0.3, 0.04, 'effective over configured radius, minus one'),
-    ),
+    parameters=(_BIAS,),
     instrument=True,
     needs=('slip',),
     confounded_with={'lug_shear_radius': 'rows with other lugs or none; roll-out on a hard floor'},
     validity='biases of up to some 10 %; the contact geometry keeps the configured radius',
-    source='definition of the slip ratio; Ding et al. 2010 eq. 1 leaves the radius open',
+    source='Ding et al. 2010 eq. 1 leaves the radius open',
     on_inputs=_bias,
+    other_forms=(
+        Form(
+            name='rim',
+            claim='the rim has another radius than configured',
+            symbol='r, R += bias r; v/w as recorded',
+            parameters=(_BIAS,),
+            validity='biases of up to some 10 %',
+            source='geometry of the wheel',
+            on_inputs=_other_rim,
+        ),
+    ),
 )
 
 

@@ -96,8 +96,7 @@ RIM_FRICTION = Effect(
     ),
     needs=('lug_height',),
     confounded_with={'cohesion': 'a load series; a lugged wheel'},
-    validity='metal rims in dry sand, with the friction of soil on soil as '
-    'soil.friction_angle_deg; the transition between smooth and lugged is assumed',
+    validity='metal rims in dry sand, with the friction of soil on soil as soil.friction_angle_deg',
     source='Ding et al. 2010 section 2.4 in words (doi 10.1007/s11771-010-0021-7; metal-soil '
     'friction is below soil friction); '
     'formula reconstructed',
@@ -129,7 +128,7 @@ SHEAR_DEFORMATION = Effect(
         'wheel_radius_bias': 'sinkage; visual odometry on hard ground',
         'cohesion': 'slip below 0.2, where K shows most',
     },
-    validity='the same as a fitted soil.shear_modulus, hence not tried beside one',
+    validity='the same as another soil.shear_modulus',
     source='Janosi and Hanamoto 1961 (proceedings, no DOI)',
     candidate=False,
     why_aside='the refitted soil.shear_modulus stands for it',
