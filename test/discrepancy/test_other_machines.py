@@ -11,6 +11,7 @@ import pytest
 from test_workflow import noisy, run, settings
 
 from wheel_terra_estimator.discrepancy.assessment.next_measurement import ZERO_CHECKS
+from wheel_terra_estimator.discrepancy.proposal import like
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_lab.trials.designs import random_rows, random_soil
@@ -63,6 +64,14 @@ def test_a_law_that_says_the_same_in_other_words_does_not_take_the_name_away(
     """Whichever closure changes with speed or pass."""
     found = run(*table_of(Change('strength', change), 'basic16', seed=seed, **{column: levels}))
     assert [effect.name for effect in found.effects] == [name]
+
+
+def test_soil_that_changes_with_speed_or_pass_is_like_one_effect_and_a_reading_is_not():
+    assert like('friction_by_rim_speed') == like('exponent_by_slip_times_rim_speed')
+    assert like('exponent_by_slip_times_rim_speed') == 'rate_dependence'
+    assert like('bearing_pressure_by_load_times_pass') == like('cohesion_by_pass') == 'multipass'
+    assert like('torque_by_rim_speed') == like('friction_by_load') == ''
+    assert like('torque_by_one') == 'drivetrain_friction'
 
 
 @pytest.mark.parametrize('times', [0.4, 1.0, 5.0])

@@ -242,7 +242,9 @@ def rivals(table: SteadyTable, findings: Findings) -> tuple[Rival, ...]:
 def like(term: str) -> str:
     """Return the effect that a term of a law comes near, or is; empty if there is none."""
     target, feature = pair_of(term)
-    return (_LIKE_ON_SOIL if target not in QUANTITIES else {}).get(feature, _LIKE.get(term, ''))
+    inputs = FEATURES[feature].factors or (feature,)
+    whole = [_LIKE_ON_SOIL[name] for name in inputs if name in _LIKE_ON_SOIL]
+    return whole[0] if whole and target not in QUANTITIES else _LIKE.get(term, '')
 
 
 def _can_be_believed(fitted: Fit) -> bool:
