@@ -16,6 +16,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration, Rea
 from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     BED,
+    Coordinate,
     base_coordinates,
     bed_coordinates,
     soil_coordinates,
@@ -102,31 +103,14 @@ def diagnose(
     floors = default_floors() if reference is None else shared_floors()
 
     findings = search(both, forward, nuisance, effects, floors)
-    misread_in, tens_alone = '', chosen.effects is not None
-    columns = Columns(both, forward, nuisance, effects, findings, configured)
-    misread = columns.asked(tens_alone) if reference is None else {}
-    asked: dict[str, Mapping[str, float | str]] = {}
-    for part in (reference, table) if reference is not None else ():
-        # Each by itself: floors that both share take any reading.
-        points = operating_points(part.columns, configuration, part.name)
-        readings = Readings.of(configuration).true_on(part.true_rows)
-        rows = replace(forward, points=points, active=None, readings=readings)
-        size = _check_soil_carries(part, rows)
-        believed = tuple(c for c in nuisance if c.owner != BED)
-        for tried in ({}, effects):  # most are done with before any effect
-            own = search(part, rows, believed, tried, default_floors())
-            columns = Columns(part, rows, believed, tried, own, size, strictly=True)
-            asked[part.name] = columns.asked(tens_alone)
-            if not asked[part.name]:
-                break
-    found = next(((f'{name}: ', said) for name, said in asked.items() if said), None)
-    if found and len(set(map(str, asked.values()))) > 1:
-        misread_in, misread = found
-    elif found and any(
-        quantity in QUANTITIES and not math.log10(float(times)).is_integer()
-        for quantity, times in found[1].items()
-    ):  # a load, slip or mere size may be an error that both share
-        misread_in, misread = f'{" and ".join(asked)}: ', found[1]
+    tens_alone = chosen.effects is not None
+    if reference is None:
+        columns = Columns(both, forward, nuisance, effects, findings, configured)
+        misread_in, misread = '', columns.asked(tens_alone)
+    else:
+        misread_in, misread = _misread_in_either(
+            (reference, table), configuration, forward, nuisance, effects, tens_alone
+        )
     decider = Decider(table, findings, chosen.allowed_error, misread)
     decision = decider.decision()
     notes: tuple[str, ...] = ()
@@ -145,6 +129,42 @@ def diagnose(
     seconds = time.perf_counter() - started
     notes, said = (*notes, *diagnosis.notes), f'{misread_in}{diagnosis.sentence}'
     return replace(diagnosis, sentence=said, not_tried=not_tried, notes=notes, seconds=seconds)
+
+
+def _misread_in_either(
+    parts: Sequence[SteadyTable],  # reference and table
+    configuration: Configuration,
+    forward: Forward,  # of both
+    nuisance: tuple[Coordinate, ...],
+    effects: Mapping[str, Effect],
+    tens_alone: bool,
+) -> tuple[str, Mapping[str, float | str]]:
+    """Return which of two tables has columns that look misread, in words, and these columns.
+
+    Each is asked by itself: floors that both share take any reading.
+    """
+    asked: dict[str, Mapping[str, float | str]] = {}
+    believed = tuple(c for c in nuisance if c.owner != BED)
+    for part in parts:
+        points = operating_points(part.columns, configuration, part.name)
+        readings = Readings.of(configuration).true_on(part.true_rows)
+        rows = replace(forward, points=points, active=None, readings=readings)
+        size = _check_soil_carries(part, rows)
+        for tried in ({}, effects):  # most are done with before any effect
+            own = search(part, rows, believed, tried, default_floors())
+            columns = Columns(part, rows, believed, tried, own, size, strictly=True)
+            asked[part.name] = columns.asked(tens_alone)
+            if not asked[part.name]:
+                break
+    found = next(((f'{name}: ', said) for name, said in asked.items() if said), None)
+    if found and len(set(map(str, asked.values()))) > 1:
+        return found
+    if found and any(
+        quantity in QUANTITIES and not math.log10(float(times)).is_integer()
+        for quantity, times in found[1].items()
+    ):  # a load, slip or mere size may be an error that both share
+        return f'{" and ".join(asked)}: ', found[1]
+    return '', {}
 
 
 def _effects_to_try(
