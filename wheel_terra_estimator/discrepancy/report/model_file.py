@@ -106,11 +106,12 @@ def _sensor_keys(
             moved.append(name)
         owner = _SINKAGE_ZERO if quantity == 'sinkage' else _TORQUE_ZERO
         found = effects.get(owner)
-        if found is None or not ('offset' in found or (turning and 'torque' in found)):
+        if found is None or (owner == _TORQUE_ZERO and (not turning or 'torque' not in found)):
             continue
-        parameter, scale = ('offset', 1.0) if 'offset' in found else ('torque', turning)
-        if owner == _TORQUE_ZERO:  # the gain acts on it as well: the reading is the motor's torque
-            scale *= factor
+        # The gain acts on the friction as well: the reading is the motor's torque.
+        parameter, scale = ('offset', 1.0)
+        if owner == _TORQUE_ZERO:
+            parameter, scale = 'torque', turning * factor
         size = scale * found[parameter]
         keys[f'sensors.{quantity}_zero'] = [
             float(zero + gain * size) for zero, gain in zip(zeros, gains, strict=True)

@@ -149,8 +149,15 @@ DRIVETRAIN_FRICTION = Effect(
     form='constant',
     symbol='T += torque sgn(w)',
     parameters=(
-        magnitude(
-            'torque', 'N m', 0.3, 0.0, 1e4, 0.5, 'friction torque of the drive', by_load=True
+        signed(
+            'torque',
+            'N m',
+            0.3,
+            -1e4,
+            1e4,
+            0.5,
+            'friction torque of the drive; below 0: a zero error of the reading',
+            by_load=True,
         ),
     ),
     touches=frozenset({'torque'}),
@@ -184,15 +191,6 @@ DRIVETRAIN_FRICTION = Effect(
             validity='a turning wheel',
             source='bearings and grease',
             on_outputs=_viscous,
-        ),
-        Form(
-            name='zero',
-            claim='zero error of the torque reading; positive: it reads too much',
-            symbol='T += offset',
-            parameters=(signed('offset', 'N m', 0.3, -1e4, 1e4, 0.5, 'zero error', by_load=True),),
-            validity='does not change sign in reverse',
-            source='instrument model',
-            on_outputs=partial(_offset, 'torque'),
         ),
     ),
 )
