@@ -43,6 +43,7 @@ INPUT_TYPES = {
 _FASTEST = 30.0  # lateral speed that no rover has [m/s]
 DAMAGED = 'damaged message'  # why bytes are refused that are no message of their type
 _NO_WHEEL = 'contains none of the configured wheels'
+_NO_RATES = 'velocity is empty -> publish the wheel rates there, or set wheel_odometry: odom'
 _GONE = 1_000_000_000  # other joints alone for so long [ns] are reported
 _MOST_LETTERS = 300  # of the names of joints in one line of words
 
@@ -230,7 +231,8 @@ class InputConverter:
             del self.rejected[topic, _NO_WHEEL]
         self._with_wheels[topic] = message.stamp
         if len(values) != len(names):
-            self.rejected[topic, f'{label} and name differ in length'] += 1
+            empty = label == 'velocity' and not len(values)
+            self.rejected[topic, _NO_RATES if empty else f'{label} and name differ in length'] += 1
             return None
         given = np.array(values, dtype=np.float64)
         if target == self._all and len(given) == len(target):
