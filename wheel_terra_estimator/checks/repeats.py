@@ -154,9 +154,8 @@ def _by_wheel(
             dead[name], left[still.rows, i] = still, np.nan
     if not dead:
         return [], left
-    how, idle = next(iter(dead.values())).how, fault == 'torque_frozen'
-    idle = idle and not any(still.value for still in dead.values())
-    how += ', or it is not driven' * idle
+    idle = fault == 'torque_frozen' and not any(still.value for still in dead.values())
+    how = next(iter(dead.values())).how + (', or it is not driven' if idle else '')
     sure = 0.5 if idle else 0.97
     return [evidence.found(fault, sure, wheel=', '.join(dead), how=how)], left
 

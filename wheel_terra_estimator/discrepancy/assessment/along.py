@@ -154,10 +154,10 @@ def changes_along_rows(table: SteadyTable, predicted: FloatArray, band: FloatArr
             changes = list[Change]()
             for statistic in statistics:
                 values = statistic(every, key[mine])
-                size = np.abs(values) if statistic is _drift else values
+                drift = statistic is _drift  # of either sign
+                size = np.abs(values) if drift else values
                 chance = tests * (1.0 + float((size[1:] >= size[0]).sum())) / (1.0 + _DRAWS)
-                drift, strength = statistic is _drift, float(values[0])
-                changes.append(Change(column, quantity, min(chance, 1.0), strength, drift))
+                changes.append(Change(column, quantity, min(chance, 1.0), float(values[0]), drift))
             likeliest = min(changes, key=lambda change: change.p_value)
             if likeliest.p_value < _CHANCE:
                 found.append(likeliest)

@@ -145,7 +145,7 @@ def _viscous(contact: Contact, p: SimpleNamespace) -> None:
 
 DRIVETRAIN_FRICTION = Effect(
     name='drivetrain_friction',
-    claim='torque is lost before the wheel: the reading is higher by a constant',
+    claim='the torque reading is off by a constant: friction before the wheel, or its zero',
     form='constant',
     symbol='T += torque sgn(w)',
     parameters=(
