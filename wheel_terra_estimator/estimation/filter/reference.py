@@ -72,6 +72,27 @@ class ReferenceState(NamedTuple):
     """Running mean of the innovations, each over its deviation."""
 
 
+class _Reading(NamedTuple):
+    """A reference velocity beside the speed of the filter."""
+
+    time: float  # [s]
+    forward: float  # [m/s]
+    variance: float  # [(m/s)^2]
+    innovation: float  # [m/s]
+    total: float  # variance of the innovation [(m/s)^2]
+
+    @property
+    def nis(self) -> float:
+        """Normalised innovation squared [-]."""
+        return self.innovation * self.innovation / self.total
+
+    @property
+    def score(self) -> float:
+        """Innovation over its deviation, within limits [-]."""
+        most = _MOST_DEVIATIONS
+        return clipped(self.innovation / math.sqrt(self.total), -most, most)
+
+
 class ReferenceUpdate(Component[ReferenceState]):
     """Fuses reference velocities."""
 
@@ -84,8 +105,8 @@ class ReferenceUpdate(Component[ReferenceState]):
     ) -> None:
         super().__init__(ReferenceState())
         self._error = layout.reference_error
-        self._reading = np.zeros(layout.size)  # row h: speed plus lasting (correlated) error
-        self._reading[SPEED if self._error is None else [SPEED, self._error]] = 1.0
+        self._row = np.zeros(layout.size)  # row h: speed plus lasting (correlated) error
+        self._row[SPEED if self._error is None else [SPEED, self._error]] = 1.0
         self._gate = float(configuration.filter.gate)
         self._rover, self._sensors = rover, sensors
 
@@ -105,8 +126,8 @@ class ReferenceUpdate(Component[ReferenceState]):
         if self._error is None:
             state, variance = float(ekf.x[SPEED]), float(ekf.P[SPEED, SPEED])
         else:
-            state = float(self._reading @ ekf.x)
-            variance = float(self._reading @ ekf.P @ self._reading)
+            state = float(self._row @ ekf.x)
+            variance = float(self._row @ ekf.P @ self._row)
         return reference.forward - state, variance
 
     def known(self, time: float) -> bool:
@@ -159,7 +180,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         opposed: bool,
         variance: float,
     ) -> bool:
-        """Fuse a reference velocity at a time [s]; return whether its variance was inflated.
+        """Fuse a reference velocity at a time [s]; return whether an outlier is believed.
 
         `still`: no wheel turns; `opposed`: all wheels turn against the reading; `fastest_rim` is
         the greatest rim speed [m/s], `variance` that of the reading, as stated or, if greater, as
@@ -167,59 +188,73 @@ class ReferenceUpdate(Component[ReferenceState]):
         """
         if still:
             self._note_slide(ekf, time, reference.forward, variance)
-        gap, step = time - self.state.time, abs(reference.forward - self.state.forward)
-        gap_before = self.state.gap
-        self.state = self.state._replace(time=time, gap=gap, forward=reference.forward)
-        residual, prior = self.innovation(ekf, reference)
-        total = prior + variance
-        nis = residual * residual / total
-        most = _MOST_DEVIATIONS
-        score = clipped(residual / math.sqrt(total), -most, most)
-        state = self.state
-        state = state._replace(nis=smoothed_nis(state.nis, min(nis, self._gate)))
-        if nis <= self._gate or state.rejected_in_a_row:  # a single outlier is no bias
-            mean = state.mean_innovation
-            state = state._replace(mean_innovation=mean + (score - mean) / _MEAN_COUNT)
-        inflated = False
-        if nis > self._gate:
-            beyond = abs(reference.forward) > (
-                _BEYOND_RIM * fastest_rim + _BEYOND_STD * math.sqrt(total)
+        innovation, prior = self.innovation(ekf, reference)
+        reading = _Reading(time, reference.forward, variance, innovation, prior + variance)
+        state = self._followed(reading)
+        outlying = reading.nis > self._gate
+        if outlying:
+            rim = 0.0 if opposed else fastest_rim
+            possible = abs(reading.forward) < rim + _MOVING_STD * math.sqrt(variance)
+            beyond = abs(reading.forward) > (
+                _BEYOND_RIM * fastest_rim + _BEYOND_STD * math.sqrt(reading.total)
             )
-            change = abs(residual - state.last_rejected)
-            same = change < _SAME_STD * math.sqrt(2.0 * variance + total)
-            lasts = time - state.slip_time > (_LASTING_BEYOND if beyond else _LASTING)
-            if not state.rejected_in_a_row:
-                unseen = _JUMP_STD * math.sqrt(2.0 * variance) + _UNSEEN_ACCELERATION * gap
-                state = state._replace(jumped=step > unseen)
-            believed = lasts or not (beyond or state.jumped)
-            fastest = 0.0 if opposed else fastest_rim
-            possible = abs(reference.forward) < fastest + _MOVING_STD * math.sqrt(variance)
-            # Where readings are seldom, the slip has more often changed than one is wild: it is
-            # believed at once, unless the rover would be faster than its wheels or against them.
-            alone = _LASTING < min(gap, gap_before) < math.inf and possible and not still
-            inflated = alone or (same and believed and state.rejected_in_a_row > 0)
-            if alone:
-                # The models did not foresee it, and would draw the speed back until the next one.
-                state = state._replace(mean_innovation=score)
-            if inflated:
-                ekf.inflate(SPEED, residual * residual)
-            else:
+            state = self._with_outlier(state, reading, beyond, possible=possible, still=still)
+            if state.rejected_in_a_row:
                 gate = _GATE_BEYOND if beyond else _GATE
-                variance += chi_square_gate(residual, total, gate)
-            state = state._replace(
-                rejected=state.rejected + 1,
-                rejected_in_a_row=0 if inflated else state.rejected_in_a_row + 1,
-                last_rejected=residual,
-                doubt=0.5 * residual if possible and not inflated else 0.0,
-            )
+                variance += chi_square_gate(innovation, reading.total, gate)
+            else:
+                ekf.inflate(SPEED, innovation * innovation)
         else:
             state = state._replace(rejected_in_a_row=0, doubt=0.0)
-        ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
+        ekf.fuse([Row(self.innovation(ekf, reference)[0], self._row, variance)])
         rests = still and time >= state.sliding_until
         if not rests and not state.rejected_in_a_row:
             state = state._replace(slip_time=time, slip_time_before=state.slip_time)
         self.state = state
-        return inflated
+        return outlying and not state.rejected_in_a_row
+
+    def _followed(self, reading: _Reading) -> ReferenceState:
+        """Return the memory with time, reading and running means of one reference more."""
+        state, nis = self.state, reading.nis
+        mean = state.mean_innovation
+        if nis <= self._gate or state.rejected_in_a_row:  # a single outlier is no bias
+            mean += (reading.score - mean) / _MEAN_COUNT
+        return state._replace(
+            time=reading.time,
+            gap=reading.time - state.time,
+            forward=reading.forward,
+            nis=smoothed_nis(state.nis, min(nis, self._gate)),
+            mean_innovation=mean,
+        )
+
+    def _with_outlier(
+        self, state: ReferenceState, reading: _Reading, beyond: bool, *, possible: bool, still: bool
+    ) -> ReferenceState:
+        """Return the memory with an outlier; `rejected_in_a_row` is 0 where it is believed.
+
+        `beyond`: it is faster than the wheels by far; not `possible`: at all, or against them.
+        """
+        before, (time, forward, variance, innovation, total) = self.state, reading
+        if not state.rejected_in_a_row:
+            unseen = _JUMP_STD * math.sqrt(2.0 * variance) + _UNSEEN_ACCELERATION * state.gap
+            state = state._replace(jumped=abs(forward - before.forward) > unseen)
+        agrees = state.rejected_in_a_row > 0 and abs(
+            innovation - state.last_rejected
+        ) < _SAME_STD * math.sqrt(2.0 * variance + total)
+        lasts = time - state.slip_time > (_LASTING_BEYOND if beyond else _LASTING)
+        believed = agrees and (lasts or not (beyond or state.jumped))
+        # Where readings are seldom, the slip has more often changed than one is wild: it is
+        # believed at once, unless the rover would be faster than its wheels or against them.
+        if _LASTING < min(state.gap, before.gap) < math.inf and possible and not still:
+            believed = True
+            # The models did not foresee it, and would draw the speed back until the next one.
+            state = state._replace(mean_innovation=reading.score)
+        return state._replace(
+            rejected=state.rejected + 1,
+            rejected_in_a_row=0 if believed else state.rejected_in_a_row + 1,
+            last_rejected=innovation,
+            doubt=0.5 * innovation if possible and not believed else 0.0,
+        )
 
     def variance(self, reference: ReferenceVelocity, noise: ObservedNoise) -> float:
         """Return the variance of a reading [(m/s)^2]: as it states, else as of its sensor."""
