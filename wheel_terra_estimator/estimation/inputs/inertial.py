@@ -48,6 +48,9 @@ class InertialWindow(NamedTuple):
     [(m/s^2)^2 s]."""
     stated: StatedNoise = NOTHING_STATED
     """Noise that the messages state, where no file does."""
+    gravity: tuple[float, float, float] | None = None
+    """Specific force at rest by the reported orientation [m/s^2]; None unless there is an
+    orientation and no accelerometer."""
 
     def mean_force(self) -> tuple[float, float, float]:
         """Return the mean specific force [m/s^2]; only where `has_force` holds."""
@@ -55,10 +58,6 @@ class InertialWindow(NamedTuple):
         if not n and self.gravity is not None:
             return self.gravity
         return self.force_x / n, self.force_y / n, self.force_z / n
-
-    gravity: tuple[float, float, float] | None = None
-    """Specific force at rest by the reported orientation [m/s^2]; None unless there is an
-    orientation and no accelerometer."""
 
     @property
     def has_force(self) -> bool:
