@@ -272,18 +272,12 @@ class Evidence:
             last > first, (total[last] - total[first]) / np.maximum(last - first, 1), np.nan
         )
 
-    def with_rate(self, rate: FloatArray, torque: FloatArray | None = None) -> Evidence:
-        """Return the evidence with other wheel rates (after something was mended)."""
-        return replace(self, rate=rate, torque=self.torque if torque is None else torque)
-
     def rows(self, kept: Mask) -> Evidence:
         """Return the evidence with some messages of the wheel odometry."""
         recording = replace(self.recording, joints=rows_of(self.joints, kept))
-        force, gyro = (self._between(one, kept) for one in (self.force, self.gyro))
-        left = replace(self, recording=recording, time=self.time[kept], force=force, gyro=gyro)
-        return replace(left, steering=self.steering[kept]).with_rate(
-            self.rate[kept], self.torque[kept]
-        )
+        rows = {name: getattr(self, name)[kept] for name in ('time', 'rate', 'torque', 'steering')}
+        means = {name: self._between(getattr(self, name), kept) for name in ('force', 'gyro')}
+        return replace(self, recording=recording, **rows, **means)
 
     def _between(self, values: FloatArray | None, kept: Mask) -> FloatArray | None:
         """Return means of (k, 3) values over the time from one of some rows to the next."""
@@ -405,16 +399,11 @@ def _shared(values: NDArray[Any]) -> NDArray[Any]:
 
 def row_medians(values: FloatArray) -> FloatArray:
     """Return the median of each row of (k, n) without nan, 0 where all are nan."""
-    known = np.isfinite(values)
-    whole, some = known.all(axis=1), known.any(axis=1)
-    some &= ~whole
-    result = np.zeros(values.shape[0])
-    if whole.any():
-        ordered, n = np.sort(values[whole], axis=1), values.shape[1]  # as median, twice as fast
-        result[whole] = 0.5 * (ordered[:, (n - 1) // 2] + ordered[:, n // 2])
-    if some.any():
-        result[some] = np.nanmedian(values[some], axis=1)
-    return result
+    count = np.isfinite(values).sum(axis=1, keepdims=True)
+    ordered = np.sort(values, axis=1)  # nan behind all others
+    low, high = np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[1] - 1)
+    both = [np.take_along_axis(ordered, middle, axis=1) for middle in (low, high)]
+    return np.where(count > 0, 0.5 * (both[0] + both[1]), 0.0)[:, 0]
 
 
 def _row_means(values: FloatArray) -> FloatArray:

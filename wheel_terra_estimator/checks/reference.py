@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -100,7 +101,7 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         unknown = unknown | (evidence.rate == 0.0) & goes_back[:, None]
     rate = np.where(unknown, np.nan, evidence.rate * np.sign(speed)[:, None])
     finding = evidence.found('rates_unsigned', 0.95, other='reference goes')
-    return [finding], evidence.with_rate(rate)
+    return [finding], replace(evidence, rate=rate)
 
 
 def _slides(evidence: Evidence, back: Mask, share: FloatArray) -> bool:

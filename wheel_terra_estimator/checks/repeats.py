@@ -121,7 +121,7 @@ def _joints(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     names = evidence.facts.names
     rates, rate = _by_wheel(evidence, 'rate_frozen', names, evidence.time, evidence.rate)
     torques, torque = _by_wheel(evidence, 'torque_frozen', names, evidence.time, evidence.torque)
-    return rates + torques, evidence.with_rate(rate, torque)
+    return rates + torques, replace(evidence, rate=rate, torque=torque)
 
 
 def _sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -121,22 +121,21 @@ def _examined(
     topic = recording.joints.topic if recording.joints is not None else ''
     if recording.lost > LEAST_LOST:
         report.take([found('damaged', topic, 0.99, share=100.0 * recording.lost)])
-    mended('drop_outs', None, lambda: names.check_required(recording, facts))
-    mended('unknown_name', None, lambda: names.check_topics(recording, remapped, own))
+    mended('drop_outs', recording, lambda given: names.check_required(given, facts))
+    mended('unknown_name', recording, lambda given: names.check_topics(given, remapped, own))
     checks = AGAINST_EACH_OTHER
     if own == 'odom':  # in which radius and track are its publisher's
         recording = names.of_rims(recording, facts)
         checks = tuple(check for check in checks if check[1] is not geometry)
         report.not_checked += [not_checked('radius', 'odom'), not_checked('track', 'odom')]
-    stated = facts
-    facts = mended('missing_wheel', facts, lambda: names.check_wheel_names(recording, stated))
-    read = recording
-    paced = mended('unit', read, lambda: clocks.check_time_unit(read))
-    arrived = mended('jumps', paced, lambda: clocks.check_publishers(paced))
-    stamped = mended(
-        'order', arrived, lambda: clocks.check_transport(arrived, stated, report.figures)
+    stated, read = facts, recording
+    facts = mended('missing_wheel', stated, lambda given: names.check_wheel_names(read, given))
+    recording = mended('unit', recording, clocks.check_time_unit)
+    recording = mended('jumps', recording, clocks.check_publishers)
+    recording = mended(
+        'order', recording, lambda given: clocks.check_transport(given, stated, report.figures)
     )
-    recording = mended('placeholder', stamped, lambda: _whole_rows(stamped))
+    recording = mended('placeholder', recording, _whole_rows)
     evidence = against_each_other(recording, facts, checks, mended)
     if evidence is None:
         report.not_checked.append(not_checked('sign', 'no_rates'))
@@ -175,12 +174,12 @@ class Mended:
         self,
         kind: str,
         given: Given,
-        check: Callable[[], list[Outcome] | tuple[list[Outcome], Given]],
+        check: Callable[[Given], list[Outcome] | tuple[list[Outcome], Given]],
         name: str = '',
     ) -> Given:
         """Run a check of a kind of fault on what is given, and note what it said by its name."""
         nothing: list[Outcome] | tuple[list[Outcome], Given] = []
-        result = run_apart(self.report, kind, nothing, check)
+        result = run_apart(self.report, kind, nothing, lambda: check(given))
         outcomes, given = result if isinstance(result, tuple) else (result, given)
         self.report.take(outcomes)
         self.by_check[name] = outcomes
@@ -191,15 +190,14 @@ def against_each_other(
     recording: Recording, facts: RoverFacts, checks: Sequence[Check], mended: Mended
 ) -> Evidence | None:
     """Hold one channel against another; None where hardly any wheel rates are."""
-    sensed = mended('gravity', recording, lambda: imu.check_imu(recording, facts), 'check_imu')
+    recording = mended('gravity', recording, lambda given: imu.check_imu(given, facts), 'check_imu')
     planet = next((f.value for f in mended.report.findings if f.fault == 'planet'), None)
     facts = replace(facts, gravity=planet or facts.gravity)
-    evidence = gather(sensed, facts, mended.report.figures)
+    evidence = gather(recording, facts, mended.report.figures)
     if evidence is None or np.isfinite(evidence.rate).any(axis=1).sum() < LEAST_MOVING_ROWS:
         return None
     for kind, module, check, *_ in checks:
-        given = evidence
-        evidence = mended(kind, given, lambda: getattr(module, check)(given), check)  # noqa: B023
+        evidence = mended(kind, evidence, getattr(module, check), check)
     return evidence
 
 

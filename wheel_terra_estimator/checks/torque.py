@@ -65,12 +65,11 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     known = np.isfinite(evidence.torque).any(axis=0)
     if not known.any():
         return _not_checked('no_torque'), evidence
+    blank = replace(evidence, torque=np.full_like(evidence.torque, np.nan))
     if not np.nan_to_num(evidence.torque).any():
-        blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
         return [evidence.found('torque_placeholder', 0.99)], blank
     unsigned = [] if evidence.force is None else _unsigned(evidence)
     if unsigned:
-        blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
         return [*unsigned, *_not_checked('no_sign')], blank
     outcomes, evidence = _signs(evidence)
     if not evidence.facts.known or evidence.force is None:
@@ -80,8 +79,8 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     zeros = torque_zeros(evidence)
     without = evidence
     if zeros is not None:  # a zero looks like a resistance that no soil has, not the other way
-        table = evidence.torque - np.array([zero.value for zero in zeros])
-        without = evidence.with_rate(evidence.rate, table)
+        offsets = np.array([zero.value for zero in zeros])
+        without = replace(evidence, torque=evidence.torque - offsets)
     scale, without = _scale(without)
     outcomes += scale
     if any(isinstance(o, Finding) for o in scale):
@@ -130,7 +129,7 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     sure = confidence(min(max(one.sigmas_from(0.0) for one in by_wheel[i]) for i in wrong))
     names = ', '.join(facts.names[i] for i in wrong)
     outcomes.append(evidence.found('torque_sign', sure, wheel=names, value=-1.0))
-    return outcomes, evidence.with_rate(evidence.rate, torque)
+    return outcomes, replace(evidence, torque=torque)
 
 
 def _fight(evidence: Evidence, measured: list[tuple[Estimate, Estimate]]) -> bool:
@@ -220,7 +219,7 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     evidence.figures['torque.level_traction'] = round(traction, 4)
     if traction > UNIT_TRACTION:
         finding = evidence.found('torque_unit', 0.97, value=1e-3, traction=traction)
-        return [finding], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
+        return [finding], replace(evidence, torque=evidence.torque * 1e-3)
     if not evidence.enough(rows):
         return [not_checked('gain', 'no_straight')], evidence
     size = _middle_mean(np.abs(thrust(evidence)[rows])) / (facts.mass * facts.gravity)

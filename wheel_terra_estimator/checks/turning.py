@@ -356,7 +356,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         kinds = ('sign', 'swapped_sides', 'exchanged_wheels')
         return [not_checked(kind, 'hardly_moves') for kind in kinds], evidence
     outcomes: list[Outcome] = []
-    chosen = _chosen(evidence, there, rows)
+    chosen = _chosen(evidence)
     signs, turn, mended = chosen.signs, chosen.track, evidence
     if chosen.exchanged:
         finding, mended = _exchanged(evidence, chosen)
@@ -395,10 +395,11 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return outcomes, mended
 
 
-def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
+def _chosen(evidence: Evidence) -> _Chosen:
     """Return the hypothesis that stood its trial, or that nothing is wrong."""
+    there, rows = _known(evidence)
     signs, count = np.ones(len(evidence.facts.names)), there.size
-    if not 2 <= count <= MOST_WHEELS:
+    if not 2 <= count <= MOST_WHEELS or rows.sum() < LEAST_MOVING_ROWS:
         return _Chosen(signs)
     stretch = stretch_of(evidence, there, rows)
     signed = [Fix((1, *those)) for those in itertools.product((1, -1), repeat=count - 1)]
@@ -435,15 +436,14 @@ def turns_upright(evidence: Evidence) -> float:
 
     Whatever wheels are exchanged or count backwards: where half do, the reference tells which.
     """
-    there, rows = _known(evidence)
-    if evidence.gyro is None or rows.sum() < LEAST_MOVING_ROWS:
+    if evidence.gyro is None:
         return 0.0
-    chosen = _chosen(evidence, there, rows)
+    chosen = _chosen(evidence)
     signs = chosen.signs
     if not signs.sum():
         signs = signs * np.sign(_direction(evidence, signs)[0] or 0.0)
     order = Fix((), chosen.exchanged).order(signs.size)
-    difference = evidence.with_rate(evidence.rate[:, order] * signs).side_difference
+    difference = replace(evidence, rate=evidence.rate[:, order] * signs).side_difference
     rows = evidence.turning & np.isfinite(difference)
     if rows.sum() * evidence.period < LEAST_TURNING:
         return 0.0
@@ -452,10 +452,7 @@ def turns_upright(evidence: Evidence) -> float:
 
 def against_reference(evidence: Evidence) -> bool:
     """Return whether the wheels, beside those that alone count backwards, run against it."""
-    there, rows = _known(evidence)
-    if rows.sum() < LEAST_MOVING_ROWS:
-        return False
-    signs = _chosen(evidence, there, rows).signs
+    signs = _chosen(evidence).signs
     return bool(signs.sum()) and (_direction(evidence, signs)[0] or 0.0) < 0.0
 
 
@@ -490,7 +487,7 @@ def _direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
         forward = np.clip(forward, -most, most)  # but for jumps
         fit = float(sense @ forward) / max(float(np.abs(forward).sum()), 1e-12)
         by_reference = fit if abs(fit) > SAME_SENSE else None
-    signed = evidence.with_rate(evidence.rate * signs, evidence.torque * signs)
+    signed = replace(evidence, rate=evidence.rate * signs, torque=evidence.torque * signs)
     yaw = mounting_yaw(signed)
     if yaw is not None and abs(math.cos(yaw.value)) > CLEAR_DIRECTION:
         by_force = math.cos(yaw.value)
@@ -517,7 +514,7 @@ def _backwards(
     details['directions'] = listed(facts.direction * signs, '.0f')
     value = float(-facts.direction[signs < 0.0][0])
     finding = evidence.found('backwards', chosen.sure, value=value, **details)
-    return finding, mended.with_rate(mended.rate * signs, mended.torque * signs)
+    return finding, replace(mended, rate=mended.rate * signs, torque=mended.torque * signs)
 
 
 def _swapped(evidence: Evidence, others: str) -> tuple[list[Outcome], Evidence]:
@@ -680,7 +677,8 @@ def _exchanged(evidence: Evidence, chosen: _Chosen) -> tuple[Finding, Evidence]:
     details = {'wheel': wheels, 'trial': chosen.trial}
     details['names'] = ', '.join(names[i] for i in order)
     finding = evidence.found('exchanged', min(chosen.sure, 0.95), **details)
-    return finding, evidence.with_rate(evidence.rate[:, order], evidence.torque[:, order])
+    rate, torque = evidence.rate[:, order], evidence.torque[:, order]
+    return finding, replace(evidence, rate=rate, torque=torque)
 
 
 def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -74,7 +74,7 @@ COUNTING_BEND = math.sqrt(0.6 * math.pi / 2.0)
 STEP_FACTOR = 1.5  # noise by the steps over the one stated, above which it matters [-]
 KEPT = 0.9  # share of repeated rates from which they are rounded, not counted [-]
 LEAST_STEP_SHARE = 0.02  # noise by steps that matters, over the working rate [-]
-
+FIELDS = {'rate': 'velocity', 'torque': 'effort'}  # of joint states
 
 # Dead channels -----------------------------------------------------------------------------------
 
@@ -115,7 +115,7 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     told = bool(np.isfinite(evidence.torque).any())  # else it may as well stand
     how += '' if told else ', or it stands: no torque tells'
     finding = evidence.found('rate_frozen', 0.97 if told else 0.5, wheel=', '.join(dead), how=how)
-    return [finding], evidence.with_rate(rate)
+    return [finding], replace(evidence, rate=rate)
 
 
 def _stands(evidence: Evidence, index: int) -> float:
@@ -197,7 +197,7 @@ def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes.append(evidence.found('rate_zeros', 0.95, **details))
     if wheels.all():
         return outcomes, evidence.rows(~zero.all(axis=1))
-    return outcomes, evidence.with_rate(np.where(zero, np.nan, evidence.rate))
+    return outcomes, replace(evidence, rate=np.where(zero, np.nan, evidence.rate))
 
 
 def _sudden(zero: Mask, fast: Mask, time: FloatArray, longest: float = math.inf) -> Mask:
@@ -214,9 +214,10 @@ def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
     All wheels of a side may hang on one encoder, if those of the other side do.
     """
-    outcomes, mended, rim = list[Outcome](), [], np.abs(evidence.rim)
+    outcomes, mended, rim = list[Outcome](), dict[str, Any](), np.abs(evidence.rim)
     turns = np.abs(evidence.yaw) * np.ptp(evidence.facts.lateral) > GOES_ON * rim
-    for field, table in (('velocity', evidence.rate), ('effort', evidence.torque)):
+    for name, field in FIELDS.items():
+        table = getattr(evidence, name)
         change = np.abs(np.diff(table[evidence.moving], axis=0))  # whatever their signs
         moves = np.nan_to_num(change) != 0.0
         both = moves[:, :, None] | moves[:, None, :]
@@ -230,9 +231,8 @@ def check_copies(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if copies.any() and (alone > (not there.all()) or (every and same.min() == same.size)):
             details = {'field': field, 'wheel': evidence.facts.named(copies)}
             outcomes.append(evidence.found('copied', 0.95, **details))
-            table = np.where(copies, np.nan, table)
-        mended.append(table)
-    return outcomes, evidence.with_rate(*mended) if outcomes else evidence
+            mended[name] = np.where(copies, np.nan, table)
+    return outcomes, replace(evidence, **mended) if mended else evidence
 
 
 def _measured(values: FloatArray) -> bool:
@@ -244,21 +244,21 @@ def _measured(values: FloatArray) -> bool:
 
 def check_wild(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return single rates and torques that leave the ones before and after; left out from here."""
-    outcomes, mended = list[Outcome](), []
-    for name, table in (('velocity', evidence.rate), ('effort', evidence.torque)):
+    outcomes, mended = list[Outcome](), dict[str, Any]()
+    for name, field in FIELDS.items():
+        table = getattr(evidence, name)
         size, off = np.abs(table[evidence.moving]), spike_height(table)
         usual = np.nanquantile(size, 1.0 - MOST_WILD, axis=0)
         noise = np.array([robust_std(column) for column in np.diff(table, axis=0).T])
         wild = off > np.fmax(WILD_FACTOR * usual, WILD_SIGMAS * noise)
         # To break away or turn back takes a large torque for an instant.
-        counted = wild if name == 'velocity' else wild & evidence.steady[:, None]
+        counted = wild if name == 'rate' else wild & evidence.steady[:, None]
         if counted.any(axis=1).sum() >= LEAST_WILD and wild.sum() < MOST_WILD * wild.size:
             wheels = evidence.facts.named(wild.any(axis=0))
-            details = {'field': name, 'count': int(wild.sum()), 'most': float(off[wild].max())}
+            details = {'field': field, 'count': int(wild.sum()), 'most': float(off[wild].max())}
             outcomes.append(evidence.found('wild', 0.97, wheel=wheels, **details))
-            table = np.where(wild, np.nan, table)
-        mended.append(table)
-    return outcomes, evidence.with_rate(*mended) if outcomes else evidence
+            mended[name] = np.where(wild, np.nan, table)
+    return outcomes, replace(evidence, **mended) if mended else evidence
 
 
 def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -280,7 +280,7 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             wrong = fast if factor < 1.0 else slow
             details = {'value': factor, 'unit': unit, 'how': 'straight ahead, by the other wheels'}
             finding = evidence.found('rate_unit', 0.9, wheel=facts.named(wrong), **details)
-            return [finding], evidence.with_rate(evidence.rate * np.where(wrong, factor, 1.0))
+            return [finding], replace(evidence, rate=evidence.rate * np.where(wrong, factor, 1.0))
     sense = np.where(speed > LIVELY * middle[:, None], np.sign(evidence.speed), 0.0)
     common, outcomes = np.sign(row_medians(sense)), list[Outcome]()
     ways = [rows & (common == way) for way in (1.0, -1.0)]
@@ -292,7 +292,7 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             evidence.found('rates_unsigned', 0.95, wheel=wheels, other='other wheels go')
         )
         signed = np.abs(evidence.rate) * common[:, None]
-        evidence = evidence.with_rate(np.where(unsigned, signed, evidence.rate))
+        evidence = replace(evidence, rate=np.where(unsigned, signed, evidence.rate))
     ratio = speed[rows] / middle[rows, None]
     ratios = [np.nanmedian(part, axis=0) for part in (ratio, *np.array_split(ratio, 2))]
     whole, first, second = (np.log(np.maximum(part, 1e-3)) for part in ratios)
@@ -317,7 +317,7 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         outcomes.append(finding)
     if not outcomes:
         return [], evidence
-    return outcomes, replace(evidence.with_rate(rate), facts=replace(facts, radius=rolling))
+    return outcomes, replace(evidence, rate=rate, facts=replace(facts, radius=rolling))
 
 
 # Units -------------------------------------------------------------------------------------------
@@ -344,7 +344,7 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         sure = 0.97 / (len(units) + len(of_reference))
         findings, evidence = _unit_findings(evidence, units, how, sure * len(units))
         findings += [evidence.found('reference_unit', sure, **one) for one in of_reference.values()]
-        return findings, evidence.with_rate(evidence.rate * math.nan)
+        return findings, replace(evidence, rate=evidence.rate * math.nan)
     scaled = ratio is not None and ratio > MOST_COUNT and not OF_RADII[0] < ratio < OF_RADII[1]
     if ratio and track and scaled and not units and abs(ratio * track - 1.0) < SAME_SCALE:
         units, how = {f'rad/s before a gear of {track:.3g}': 1.0 / track}, 'speeds and turns'
@@ -359,7 +359,7 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     details = {'times': 1.0 / ratio, 'counts': 2.0 * math.pi / ratio, 'how': how}
     finding = evidence.found('rate_counts', 0.45 if units else 0.9, value=value, **details)
     perhaps, _ = _unit_findings(evidence, units, how, 0.45)
-    return [*perhaps, finding], evidence.with_rate(evidence.rate * ratio)
+    return [*perhaps, finding], replace(evidence, rate=evidence.rate * ratio)
 
 
 def _fitting_units(
@@ -393,7 +393,7 @@ def _unit_findings(
         for unit, factor in units.items()
     ]
     factor = math.nan if len(units) != 1 else next(iter(units.values()))
-    return findings, evidence.with_rate(evidence.rate * factor)
+    return findings, replace(evidence, rate=evidence.rate * factor)
 
 
 # Noise -------------------------------------------------------------------------------------------
