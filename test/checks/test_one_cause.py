@@ -154,6 +154,17 @@ def test_joints_that_do_not_steer_as_the_rover_turns(change, wheel, said):
     assert {f.kind for f in report.findings} <= {'sign', 'radius', 'track'}
 
 
+@pytest.mark.parametrize('change', [lambda angle: -angle, lambda angle: angle[:, [2, 3, 0, 1]]])
+def test_half_a_radian_of_turning_shows_angles_reversed_or_of_the_other_axle(change):
+    """Too little to tell a zero from a slide down a cross slope."""
+    yaw = [10.0, 11.0, 20.0, 21.0, 30.0, 31.0, 40.0, 41.0], [0, 0.05, 0.05, 0, 0, -0.05, -0.05, 0]
+    curves = rolling.motion(60.0, ([3.0, 4.0], [0.0, 0.3]), yaw=yaw)
+    off = np.array([0.14, 0.0, 0.0, 0.0])
+    assert not steered(lambda angle: angle + off, motion=curves).findings
+    (finding,) = steered(change, motion=curves).findings
+    assert (finding.fault, finding.wheel) == ('steering_angle', ALL)
+
+
 def test_the_noise_of_a_gyro_makes_no_joint_steer_less():
     """As large as the turns: a fit to it has wheels half as much steered."""
     rate = WHOLE.imu.rate + np.random.default_rng(3).normal(0.0, 0.15, WHOLE.imu.rate.shape)

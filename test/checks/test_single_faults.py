@@ -44,6 +44,11 @@ def stays(channel, field, column=..., since=120.0, until=160.0):
     return channel, {field: change}
 
 
+def since(time):
+    """Rows of the wheels from a time [s] on."""
+    return (WHOLE.joints.seconds > time)[:, None]
+
+
 def in_steps(values):
     step = 0.25 * np.nanmax(np.abs(values))
     return step * np.round(values / step)
@@ -144,6 +149,8 @@ FAULTS = [  # channel, what its fields become, the only fault, its wheel, its tr
     (JOINTS, {'rate': by([1, 1, math.nan, 1])}, 'missing_wheel', RL, None, 'velocity is empty'),
     (JOINTS, {'rate': by([1, 1, math.nan, 1]), 'position': lambda _: 0.0 * WHOLE.joints.rate},
      'missing_wheel', RL, None, 'change of its position'),
+    (JOINTS, both(lambda v: np.where(since(80.0) & [[0, 0, 1, 0]], math.nan, v)), 'missing_wheel',
+     RL, None, 'in 63 % of the seconds'),
     (IMU, {'rate': plus(0.0, 0.0, 0.03)}, 'gyro_bias', None, approx(0.03, abs=1e-3), ''),
     (IMU, {'rate': by(1.15)}, 'gyro_scale', None, approx(1.0 / 1.15, rel=0.01), ''),
     (IMU, {'force': one_number(2.6, 2.0, 2.4), 'rate': one_number(0.01, 0.01, 0.01)},
@@ -247,6 +254,7 @@ ALIKE = [  # channel, what its fields become, the only faults that may be told, 
     (JOINTS, {'rate': rounded(0.02)}, set(), ''),
     (JOINTS, {'rate': counted}, {'rate_steps'}, ''),
     (JOINTS, {'rate': one_dead_among_coarse}, {'rate_frozen', 'rate_steps'}, ''),
+    (JOINTS, both(lambda v: np.where(since(120.0) & [[0, 0, 1, 0]], math.nan, v)), set(), ''),
     (JOINTS, {'rate': damaged}, set(), ''),
     (JOINTS, {'rate': lambda v: v[:, [0, 1, 0, 1]]}, set(), ''),  # an encoder for each side
     (JOINTS, {'torque': jerks}, set(), ''),

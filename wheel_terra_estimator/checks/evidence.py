@@ -275,9 +275,10 @@ class Evidence:
     def rows(self, kept: Mask) -> Evidence:
         """Return the evidence with some messages of the wheel odometry."""
         recording = replace(self.recording, joints=rows_of(self.joints, kept))
-        rows = {name: getattr(self, name)[kept] for name in ('time', 'rate', 'torque', 'steering')}
-        means = {name: self._between(getattr(self, name), kept) for name in ('force', 'gyro')}
-        return replace(self, recording=recording, **rows, **means)
+        of_rows = 'time', 'rate', 'torque', 'steering'
+        left: dict[str, Any] = {name: getattr(self, name)[kept] for name in of_rows}
+        left |= {name: self._between(getattr(self, name), kept) for name in ('force', 'gyro')}
+        return replace(self, recording=recording, **left)
 
     def _between(self, values: FloatArray | None, kept: Mask) -> FloatArray | None:
         """Return means of (k, 3) values over the time from one of some rows to the next."""

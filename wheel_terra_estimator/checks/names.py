@@ -17,6 +17,7 @@ from wheel_terra_estimator.checks.rover_facts import RoverFacts, place, side_of,
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 
 IMU = 'sensor_msgs/msg/Imu'
+MOST_SILENT = 0.5  # seconds with a rate, over those of the wheel with most, of one that is told [-]
 LONGEST_SILENCE = 2.0  # of all wheels at the end, while other joints are reported [s]
 
 DEFAULT_TOPICS = {
@@ -96,11 +97,12 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         return [not_checked('missing_wheel', 'no_joints')], facts
     if not facts.known:
         return [], facts
-    silent = {
-        name
-        for name, column in zip(joints.names, joints.rate.T, strict=True)
-        if not np.isfinite(column).any()
-    }
+    second, columns = (
+        joints.log_time // 1_000_000_000,
+        zip(joints.names, joints.rate.T, strict=True),
+    )
+    heard = {name: np.unique(second[np.isfinite(rate)]).size for name, rate in columns}
+    most = max((heard[name] for name in facts.names if name in heard), default=0)
     absent = [name for name in facts.names if name not in joints.names]
     known = {*facts.names, *facts.configuration.wheels.steering_joints}
     spare = [name for name in wheel_names(joints.names) if name not in known]
@@ -114,23 +116,25 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
     gone = [name for name in absent if name not in renamed]
     if gone:
         outcomes.append(_missing(joints.topic, gone, 'in no message'))
-    heard = np.isfinite(joints.rate[:, [name in names for name in joints.names]]).any(axis=1)
-    last = int(np.flatnonzero(heard)[-1]) if heard.any() else -1
+    told = np.isfinite(joints.rate[:, [name in names for name in joints.names]]).any(axis=1)
+    last = int(np.flatnonzero(told)[-1]) if told.any() else -1
     silence = (joints.log_time[-1] - joints.log_time[last]) * 1e-9
     if silence > LONGEST_SILENCE:
         others: Any = np.isfinite(joints.rate[last + 1 :]).any(axis=0)
         later = itertools.compress(joints.names, others)
         how = f'in no message of the last {silence:.0f} s, only {", ".join(later)}'
         outcomes.append(_missing(joints.topic, facts.names, how))
-    mute = [name for name in facts.names if name in silent]
+    mute = [name for name in facts.names if heard.get(name, most) <= MOST_SILENT * most]
     if mute:
         at = joints.position
         angles = at is not None and np.isfinite(at[:, joints.names.index(mute[0])]).any()
-        how = 'without a rate: velocity is empty, NaN, infinite or of another length'
+        share = 1.0 - max(heard[name] for name in mute) / max(most, 1)
+        how = 'without a rate' + f' in {100 * share:.0f} % of the seconds' * (share < 1.0)
+        how += ': velocity is empty, NaN, infinite or of another length'
         how += '; take the change of its position' if angles else ''
         outcomes.append(_missing(joints.topic, mute, how))
     for name in spare:
-        if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
+        if name not in renamed.values() and 'wheel' in name.lower() and heard[name]:
             outcomes.append(found('spare_joint', joints.topic, 0.7, wheel=name))
     steering = [name for name in joints.names if 'steer' in name.lower()]
     if steering and not any(facts.configuration.wheels.steering_joints):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.arrays import FloatArray
-from wheel_terra_estimator.checks.evidence import Evidence, Mask
+from wheel_terra_estimator.checks.evidence import Evidence, Mask, noise_of
 from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.series import rows_of
 from wheel_terra_estimator.checks.statistics import integrated, runs
@@ -34,6 +34,7 @@ SELDOM = 0.1  # share of readings that repeat the one before of a sensor with no
 CALM = 0.02  # change of the rates over the working rate that steps of a reading may hide [-]
 AT_ONCE = 0.9  # share of a stretch in which no rate without noise changes, at least [-]
 LEAST_CHANGES = 30  # changes of rates from which their rhythm is found
+LEAST_NOISE = 1e-6  # of the numbers of an orientation that has any [-]
 TURNED = 0.5  # turn by the gyro in which an orientation does not stay [rad]
 CLEAR_SINKAGE = 0.005  # of the other wheels, beside which none reads 0 all the time [m]
 
@@ -110,7 +111,8 @@ def _imu(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
             left[name] = None
     dead = stays(evidence, at, imu.orientation)
-    if dead and np.ptp(np.interp(at[dead.rows], evidence.time, heading)) > TURNED:
+    noisy = dead and max(map(noise_of, imu.orientation[~dead.rows].T)) > LEAST_NOISE
+    if dead and (noisy or np.ptp(np.interp(at[dead.rows], evidence.time, heading)) > TURNED):
         outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'orientation {dead.how}'))
         evidence = evidence.with_channel('imu', orientation=math.nan * imu.orientation)
     return outcomes, replace(evidence, **left)  # type: ignore[arg-type]

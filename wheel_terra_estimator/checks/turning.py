@@ -306,8 +306,9 @@ def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     steered = np.isfinite(steering).any(axis=0)
     gain, zero = np.full((2, x.size), np.nan)
     rows, heading = evidence.moving, integrated(evidence.time, evidence.yaw)
-    if evidence.turning.sum() < LEAST_TURNING_ROWS or np.ptp(heading) < LEAST_HEADINGS:
+    if evidence.turning.sum() < LEAST_TURNING_ROWS:
         return gain, zero
+    slides = np.ptp(heading) < LEAST_HEADINGS  # or may do so all along: that looks like zeros
     speed = np.nan_to_num(evidence.speed[rows])
     by_angle = speed * np.tan(np.nan_to_num(evidence.steering[rows]))
     others = ~steered if not steered.all() else steered
@@ -322,7 +323,7 @@ def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
         share, off = block_fit(design, seen, other)
         asked = np.quantile(np.abs(aside[:, i]), 0.9) > LEAST_ASKED * np.abs(speed[:, i]).mean()
         if asked and share.std < 0.5 * STILL:
-            gain[i], zero[i] = share.value, math.atan(off.value)
+            gain[i], zero[i] = share.value, 0.0 if slides else math.atan(off.value)
     return gain, zero
 
 
