@@ -17,6 +17,7 @@ from wheel_terra_estimator.checks.rover_facts import RoverFacts, place, side_of,
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 
 IMU = 'sensor_msgs/msg/Imu'
+SECOND = 1_000_000_000  # [ns]
 MOST_SILENT = 0.5  # seconds with a rate, over those of the wheel with most, of one that is told [-]
 LONGEST_SILENCE = 2.0  # of all wheels at the end, while other joints are reported [s]
 
@@ -97,12 +98,8 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         return [not_checked('missing_wheel', 'no_joints')], facts
     if not facts.known:
         return [], facts
-    second, columns = (
-        joints.log_time // 1_000_000_000,
-        zip(joints.names, joints.rate.T, strict=True),
-    )
+    second, columns = joints.log_time // SECOND, zip(joints.names, joints.rate.T, strict=True)
     heard = {name: np.unique(second[np.isfinite(rate)]).size for name, rate in columns}
-    most = max((heard[name] for name in facts.names if name in heard), default=0)
     absent = [name for name in facts.names if name not in joints.names]
     known = {*facts.names, *facts.configuration.wheels.steering_joints}
     spare = [name for name in wheel_names(joints.names) if name not in known]
@@ -124,11 +121,13 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         later = itertools.compress(joints.names, others)
         how = f'in no message of the last {silence:.0f} s, only {", ".join(later)}'
         outcomes.append(_missing(joints.topic, facts.names, how))
-    mute = [name for name in facts.names if heard.get(name, most) <= MOST_SILENT * most]
+    there = {name: heard[name] for name in names if name in heard}
+    most = max(there.values(), default=0)
+    mute = [name for name, seconds in there.items() if seconds <= MOST_SILENT * most]
     if mute:
         at = joints.position
         angles = at is not None and np.isfinite(at[:, joints.names.index(mute[0])]).any()
-        share = 1.0 - max(heard[name] for name in mute) / max(most, 1)
+        share = 1.0 - max(there[name] for name in mute) / max(most, 1)
         how = 'without a rate' + f' in {100 * share:.0f} % of the seconds' * (share < 1.0)
         how += ': velocity is empty, NaN, infinite or of another length'
         how += '; take the change of its position' if angles else ''
