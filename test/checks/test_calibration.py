@@ -71,6 +71,15 @@ def test_a_noise_that_is_stated_as_larger_than_the_rates_is_mended():
     assert told['sensors.wheel_rate_std'] == pytest.approx(0.004, rel=0.1)
 
 
+@pytest.mark.parametrize('stated', ['specific_force_std', 'angular_rate_std', ''])
+def test_a_rate_of_the_imu_is_written_where_it_is_no_density_of_a_default_noise(stated):
+    """25 Hz where the default is 50 Hz: a default noise per message would become larger."""
+    rover = rolling.rover(**({f'sensors.{stated}': 0.01} if stated else {}))
+    told = {change.key: change for change in calibrate(rolling.recording(), rover).changes}
+    assert bool(stated) == ('sensors.imu_rate' in told)
+    assert told['sensors.reference_rate'].after == 2.0
+
+
 @pytest.mark.parametrize(
     ('times', 'reversed_reference', 'written'), [(2.0, 1, False), (6.0, 1, True), (6.0, -1, False)]
 )

@@ -68,7 +68,7 @@ def calibrate(
     if np.isfinite(evidence.torque).any(axis=0).all():
         _torques(changes, evidence)
     _track(changes, evidence)
-    _noises_and_rates(changes, report)
+    _noises_and_rates(changes, report, configuration)
     report.not_checked.append(not_checked('mass', 'centre'))
     left = (f for f in report.findings if f.parameter not in changes and f.fault != 'mass')
     return Calibration(tuple(changes.values()), tuple(report.not_checked), tuple(left))
@@ -147,10 +147,14 @@ SEEN = {
     'sensors.reference_rate': 'reference.rate_hz',
 }
 """Noises and rates of the sensors -> the figure that a recording has of them."""
+NOISES_OF_IMU = {'sensors.specific_force_std', 'sensors.angular_rate_std'}
 
 
-def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
-    """Note rates, and noises unless something else stays wrong, which they would weigh more."""
+def _noises_and_rates(changes: _Changes, report: CheckReport, configuration: Configuration) -> None:
+    """Note rates, and noises unless something else stays wrong, which they would weigh more.
+
+    The rate of the IMU makes a density of its noise: a default of both stays as it is.
+    """
     figures = dict(SEEN)
     if report.figures.get('reference.stated_std_m_s') == 0.0:  # the messages state none
         figures['sensors.reference_std'] = 'reference.noise_m_s'
@@ -171,6 +175,8 @@ def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
                 continue
             source = 'changes from message to message on the move'
             changes.add(key, float(f'{seen:.3g}'), NOISE_STD * seen, source)
+        elif key == 'sensors.imu_rate' and not NOISES_OF_IMU & {*configuration.stated, *changes}:
+            continue
         elif abs(math.log(seen / stated)) > WORTH_CHANGING:
             changes.add(key, round(seen, 2), None, 'median period of the stamps')
 
