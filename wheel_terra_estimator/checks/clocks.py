@@ -687,14 +687,14 @@ def _in_order(channel: Channel) -> Channel:
 
 def _silent(recording: Recording) -> list[Outcome]:
     """Return inputs that end before others do, and wheel rates or an IMU that begin after them."""
-    heard, way = dict[str, tuple[float, float]](), dict[str, float]()
+    heard, sent = dict[str, tuple[float, float]](), dict[str, tuple[float, float]]()
     for name in CHECKED:
         if (channel := getattr(recording, name)) is not None:
             end = recording.heard.get(channel.topic, int(channel.log_time.max()))
-            heard[name] = int(channel.log_time.min()) * 1e-9, end * 1e-9
+            first, last = int(channel.log_time.min()) * 1e-9, end * 1e-9
             late = float(np.median(channel.late)) if channel.late.size else 0.0
-            way[name] = late if 0.0 < late < LONGEST_WAY else 0.0
-    sent = {name: (first - way[name], last - way[name]) for name, (first, last) in heard.items()}
+            way = late if 0.0 < late < LONGEST_WAY else 0.0
+            heard[name], sent[name] = (first, last), (first - way, last - way)
     # By log time and by stamp: a message may come late, or its stamp be off.
     spans = [
         (one, min(first for first, _ in one.values()), max(last for _, last in one.values()))

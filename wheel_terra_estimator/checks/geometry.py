@@ -428,17 +428,12 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     if ratio.sigmas_from(1.0) < 4.0 or abs(ratio.value - 1.0) < LEAST_TRACK_ERROR:
         return []
     sure = confidence(ratio.sigmas_from(1.0))
-    words: dict[str, Any] = {'stated': stated, 'trial': trial.words('error', 'of the track')}
     alternative, separate = ', or the gyro has a scale error', '; measure it with a tape'
     if not alone:
         alternative = ', or the radius is wrong, or the wheels slip'
         separate += ', or drive straight with a reference'
-    words |= {
-        'alternative': alternative,
-        'separate': separate,
-        'ratio': ratio.value,
-        'off': ratio.std,
-    }
+    words: dict[str, Any] = {'alternative': alternative, 'separate': separate, 'stated': stated}
+    words |= {'ratio': ratio.value, 'off': ratio.std, 'trial': trial.words('error', 'of the track')}
     value, std = round(stated * ratio.value, 4), round(stated * ratio.std, 4)
     lateral = listed(evidence.facts.configuration.wheels.y * ratio.value, '.3f')
     sure = 0.9 * sure if alone else 0.5

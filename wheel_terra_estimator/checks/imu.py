@@ -89,6 +89,7 @@ BIAS_SIGMAS = 5.0
 TILT_IS_MOUNTING = 0.7  # probability that a tilt in circles is the mounting, not a zero [-]
 CROSS_AXIS = 0.01  # gyro against accelerometer in one housing [rad]; data sheets of MEMS
 UNTURNED = 0.85  # probability that it is upside down, not its accelerometer reversed [-]
+OR_REVERSED = ', or linear_acceleration has the wrong sign'
 CLEAR_AGREEMENT = 0.8  # correlation of gyro and wheels in turns that are the same way round [-]
 LEAST_OUTLIERS = 3
 OUTLIER_SIGMAS = 10.0  # of the usual change of a reading, which another unit makes large
@@ -440,13 +441,11 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     mended, up = evidence.turned(fix @ evidence.rotation), np.median(evidence.force, axis=0)
     force = f'mean specific force ({up[0]:.2f}, {up[1]:.2f}, {up[2]:.2f}) m/s^2'
-    words: dict[str, Any] = {'force': force}
-    sure = 0.999
-    starts = mounting_yaw(mended)
+    sure, alternative, starts = 0.999, '', mounting_yaw(mended)
     std = math.degrees(STEEPEST_MEAN) / 3.0
     if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]):
         if against_reference(evidence):  # of either pair of faults both have the other's turns
-            words['alternative'] = ', or linear_acceleration has the wrong sign: look at the IMU'
+            words = {'force': force, 'alternative': f'{OR_REVERSED}: look at the IMU'}
             told = mounting_finding('imu_upside', evidence, mended, std, 0.5, **words)
             return [told], replace(evidence, force=None, gyro=None)
         upright = turns_upright(evidence)
@@ -455,18 +454,16 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             forward = mounting_yaw(reversed_force)
             # Measured backward then it lies on its back, and the sides are swapped.
             if forward is None or abs(forward.value) <= 0.5 * math.pi:
-                return [evidence.found('force_reversed', 0.97, **words)], reversed_force
+                return [evidence.found('force_reversed', 0.97, force=force)], reversed_force
         if upright > -CLEAR_AGREEMENT:
-            sure = UNTURNED
-            words['alternative'] = ', or linear_acceleration has the wrong sign: drive circles'
+            sure, alternative = UNTURNED, f'{OR_REVERSED}: drive circles'
         elif starts is not None and abs(starts.value) > 0.5 * math.pi:  # all as in a mirror
-            sure = UNTURNED
-            words['alternative'] = ', or linear_acceleration has the wrong sign, and left and right'
-            words['alternative'] += ' wheels are swapped: look at the IMU'
+            sides = ', and left and right wheels are swapped: look at the IMU'
+            sure, alternative = UNTURNED, f'{OR_REVERSED}{sides}'
     if starts is None:  # about another axis it would be upright as well
         sure = 0.5
-        words.setdefault('alternative', '')
-        words['alternative'] += '; which way its x axis points is open: drive brisk starts'
+        alternative += '; which way its x axis points is open: drive brisk starts'
+    words = {'force': force, 'alternative': alternative}
     return [mounting_finding('imu_upside', evidence, mended, std, sure, **words)], mended
 
 

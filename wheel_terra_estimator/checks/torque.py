@@ -57,6 +57,7 @@ ZERO_FACTOR = 6.0
 ZERO_SIGMAS = 5.0
 SIGN_ROUNDS = 4  # fits of torques without a sign, each with the signs by the one before
 LEVEL_SHARE = 1.0 / 3.0  # of the driving, with the least slopes, that shows the resistance [-]
+PITCHED = ', or the IMU is pitched: drive a level circle'
 ALIKE_ZEROS = 0.6  # scatter of zeros over their mean within which they are one [-]
 
 
@@ -440,9 +441,7 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     whole = whole_zeros(evidence, zeros)
     pitch = like_a_pitch(evidence, zeros)  # a slope that is none is in all of them
     sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong)) * (0.5 if pitch else 1.0)
-    details: dict[str, Any] = {
-        'alternative': ', or the IMU is pitched: drive a level circle' * pitch
-    }
+    details: dict[str, Any] = {'alternative': PITCHED * pitch}
     details['left'] = listed((zeros[i].value for i in wrong), '.2f')
     details['zeros'] = listed((zero.value for zero in whole), '.2f')
     details['wheel'] = ', '.join(facts.names[i] for i in wrong)
