@@ -256,6 +256,17 @@ def test_without_torque_and_sinkage_there_is_still_pull():
     assert np.isfinite(rows.columns['drawbar_pull']).all()
 
 
+def test_a_level_drive_hardly_pulls_and_is_a_table_all_the_same():
+    level = [{'slip': 0.1, 'slope': 0.0, 'rate': rate} for rate in (0.4, 0.5, 0.6)]
+    rows = rows_from_measurements(Drive(level).measurements, settings(), 'level')
+    pulls, load = rows.columns['drawbar_pull'], rows.columns['normal_load']
+    # Pulls that a measured table would be refused for: as if in kN, and far below their deviation.
+    for share in (1e-3, 1e-6):
+        small = share * np.nanmean(load) * pulls / np.nanmax(np.abs(pulls))
+        table = replace(rows, columns={**rows.columns, 'drawbar_pull': small}).table()
+        assert np.isfinite(table.measured[:, 1]).sum() == np.isfinite(pulls).sum()
+
+
 def test_many_windows_are_merged_and_know_more():
     rows = rows_from_measurements(
         Drive([{**section, 'duration': 180.0} for section in STAIRS]).measurements, settings()

@@ -104,7 +104,9 @@ class DriveRows:
 
     def table(self) -> SteadyTable:
         """Return the rows as a checked table: the stated errors of the sensors are off already."""
-        table = check_table(self.name, self.columns, notes=self.notes, most=MOST_ROWS)
+        table = check_table(
+            self.name, self.columns, notes=self.notes, most=MOST_ROWS, computed=('drawbar_pull',)
+        )
         return replace(table, true_rows=np.ones(len(table), dtype=bool))
 
 

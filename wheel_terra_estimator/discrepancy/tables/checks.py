@@ -41,8 +41,12 @@ def check_table(
     lines: Sequence[int] | IndexArray | None = None,
     notes: Sequence[str] = (),
     most: int = MOST_ROWS,
+    computed: Sequence[str] = (),
 ) -> SteadyTable:
     """Check columns of numbers (SI, nan = not measured) and return them as a table.
+
+    The columns in ``computed`` come from this program: their unit is known, so that small values
+    are no sign of another one.
 
     Raises UserError as `read_table` does.
     """
@@ -57,7 +61,7 @@ def check_table(
     count = len(arrays['slip'])
     where = np.arange(2, count + 2) if lines is None else np.asarray(lines, dtype=np.intp)
     remarks = list(notes)
-    _check_ranges(name, arrays, where)
+    _check_ranges(name, arrays, where, computed)
     _check_signs(name, arrays, where)
     measured = _columns(arrays, QUANTITIES, count)
     empty = ~np.isfinite(measured[:, : len(ONE_OF)]).any(axis=1)
@@ -156,7 +160,9 @@ def _refuse(
         raise UserError(f'{name}, line {lines[row]}, column {column}: {shown} {said}')
 
 
-def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray) -> None:
+def _check_ranges(
+    name: str, arrays: Mapping[str, FloatArray], lines: IndexArray, computed: Sequence[str]
+) -> None:
     """Raise where a value is impossible, with the unit that it looks like."""
 
     def refuse(bad: BoolArray, column: str, why: str) -> None:
@@ -180,11 +186,11 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: IndexArray
         if column in arrays:
             force, far = arrays[column], f'is over {most} times the normal load; check both units'
             refuse(abs(force) > _TIMES_LOAD[most] * load, column, f'{far} (N, not kg or kN)')
-            measured = np.isfinite(force)
+            measured = np.isfinite(force) & (column not in computed)
             if measured.sum() > 2 and 0.0 < abs(force[measured]).max() < _NO_FORCE * load.max():
                 refuse(measured, column, _KILONEWTON)
     for quantity in QUANTITIES:
-        if quantity in arrays and f'{quantity}_std' in arrays:
+        if quantity in arrays and f'{quantity}_std' in arrays and quantity not in computed:
             std, values = arrays[f'{quantity}_std'], np.abs(arrays[quantity])
             greatest = values[np.isfinite(values)].max(initial=0.0)
             # A deviation far above its whole column has another unit.
