@@ -172,6 +172,18 @@ def with_errors(table, factors, zeros):
     return {**table, **read}
 
 
+def test_stated_errors_are_those_at_the_slips_that_were_read(tmp_path):
+    """Where slips are uncertain the fit moves along curves that a tangent does not follow."""
+    table, values, _, _ = make('sweep40', ('slip_sinkage_exponent',), 1.5)
+    count = len(table['slip'])
+    wrong = 0.015 * np.random.default_rng(5).standard_normal(count)
+    table |= {'slip': np.clip(table['slip'] + wrong, 0.0, 0.9), 'slip_std': np.full(count, 0.015)}
+    few = Options(effects=('slip_sinkage_exponent', 'lug_digging'))
+    found = written(table, values, tmp_path, options=few)
+    assert found.outliers == ()
+    assert_errors(predicted(table, found.configuration, tmp_path), table, found.gap, 'before')
+
+
 @pytest.mark.parametrize(
     ('factors', 'zeros', 'keys'),
     [

@@ -383,12 +383,15 @@ def _curves(
 ) -> Curves:
     setting = findings.setting
     nuisance, problem = setting.nuisance, setting.problem
-    configured = setting.forward.solve([nuisance], [np.zeros(len(nuisance))], jacobian=False)
+    read = findings.table.columns['slip']
+    configured = setting.at(read, nuisance, np.zeros(len(nuisance)))
+    moved = bool(np.any(problem.moved))
+    alone = setting.at(read, after.coordinates, after.u) if moved else after.outputs
     fits = [findings.nothing.outputs, after.outputs]
     refit, fitted = setting.predicted(fits, problem.variance(floor))
     left = floor if setting.forward.active is None else 0.0  # what a reference shows is in them
     band = np.sqrt(findings.noise.std**2 + (left * problem.scale) ** 2)
     # Where slips are latent the model stands at the most probable slip; a curve is compared with
     # what was read, so that it goes back along the tangent (cells that were not measured stay).
-    curves = (configured.outputs[0], refit, fitted, held_out[0], held_out[-1], after.outputs)
-    return Curves(*[(values - problem.moved)[:rows] for values in curves] + [band[:rows]])
+    curves = [values - problem.moved for values in (refit, fitted, held_out[0], held_out[-1])]
+    return Curves(*[values[:rows] for values in (configured, *curves, alone, band)])

@@ -312,12 +312,14 @@ def _proposal(
     by_slip = gap.left_out(setting, [refit, law], slip_groups(gap.table))
     terms = [number for number in law.numbers() if number.coordinate.owner == NAME]
     names, values = [t.coordinate.name for t in terms], tuple(t.value for t in terms)
+    alone = setting.at(gap.findings.table.columns['slip'], law.coordinates, law.u)
+    measured = kept_cells(gap.table, gap.findings)
     gaps = {
         quantity: replace(
             gap.reported[quantity],
             refit=by_slip[quantity].refit,
             after=by_slip[quantity].law,
-            fitted=error(law.outputs, gap.measured, q),
+            fitted=error(alone, measured, q),
         )
         for q, quantity in enumerate(QUANTITIES)
         if quantity in by_slip

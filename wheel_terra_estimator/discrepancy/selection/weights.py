@@ -12,7 +12,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -74,6 +74,15 @@ class Setting:
         """Return nuisance coordinates followed by those of the effects."""
         own = [c for name in names for c in effect_coordinates(self.effects[name])]
         return (*self.nuisance, *own)
+
+    def at(self, slip: FloatArray, coordinates: Sequence[Coordinate], u: FloatArray) -> FloatArray:
+        """Return the model's outputs (N, 4) at other slips than those of the fits.
+
+        Where slips are uncertain these are the most probable ones, not those that were read.
+        """
+        points = replace(self.forward.points, slip=slip)
+        forward = replace(self.forward, points=points)
+        return forward.solve([coordinates], [u], jacobian=False).outputs[0]
 
     def fit(
         self,
