@@ -29,6 +29,7 @@ _FIELDS = ('stiffness', 'tan_friction')
 _WIDTH = 3.0
 _LEAST_ROWS = 4  # in a stretch and outside it
 _SURE = 5.0  # nats, the choice of the stretch paid for
+_TOLD = 0.05  # relative change: a smaller one is not told
 
 
 class Stretch(NamedTuple):
@@ -87,10 +88,15 @@ def changed_stretch(
         float(np.exp(fitted.coordinates[place[name]].scale * x))
         for name, x in zip(_FIELDS, change, strict=True)
     )
-    grip = f' and has {number(friction, 2)} times the friction coefficient'
+    changes = (
+        (stiffness, f'is about {number(stiffness, 2)} times as stiff'),
+        (friction, f'has {number(friction, 2)} times the friction coefficient'),
+    )
+    said = ' and '.join(words for factor, words in changes if abs(factor - 1.0) > _TOLD)
+    if not said:
+        return None  # sure, and of no weight
     text = (
-        f'the soil changes along the way: from {times[first]:.0f} to {times[last]:.0f} s it is '
-        f'about {number(stiffness, 2)} times as stiff{grip if abs(friction - 1.0) > 0.05 else ""} '
+        f'the soil changes along the way: from {times[first]:.0f} to {times[last]:.0f} s it {said} '
         'as on the rest of the drive'
     )
     return Stretch(text, float(times[first]), float(times[last]), stiffness, best)

@@ -110,7 +110,7 @@ def _menu(setting: Setting) -> list[tuple[str, dict[str, FloatArray]]]:
         ('a wheel of 0.6 times the radius', {'wheel_radius': 0.6 * radius}),
         ('a wheel of twice the width', {'wheel_width': 2.0 * width}),
         ('a slope of 12 degrees', {'slope': np.radians(12.0)}),
-        ('the same rows again', {}),
+        ('one more sweep at the usual load, slip 0.05 to 0.8', {}),
     ]
     if lugs > 0.0:
         changes.append(('the wheel without lugs', {'lug_height': 0.0}))
