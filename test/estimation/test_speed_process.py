@@ -369,10 +369,10 @@ def test_a_jolt_is_felt_at_once_and_an_accelerometer_that_jolts_for_long_is_doub
         wheels = made.by_wheels(dt, cycle.yaw_compensated, 0.0)
         lacking = made.learn_bias(ekf, cycle, wheels, wheels)
         wheels = wheels._replace(variance=wheels.variance + lacking)
-        return made.combined(wheels, dt, window).wheel_weight
+        return made.combined(wheels, dt, window, lacking).wheel_weight
 
     assert weight_of_wheels(0.0) > 0.9
-    assert weight_of_wheels(0.05) < 0.1
+    assert weight_of_wheels(0.05) == pytest.approx(0.5, abs=0.02)  # soil or stone: either's fault
     weights = [weight_of_wheels(0.05 * (-1) ** i) for i in range(40)]
     assert min(weights[-10:]) > 0.5
 

@@ -461,7 +461,8 @@ class WheelSoilEstimator:
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
         x = self._ekf.x
         prediction = Prediction.unchanged(x)
-        step = speed.combined(by_wheels, cycle.dt, self._trusted(cycle.window, cycle.time))
+        window = self._trusted(cycle.window, cycle.time)
+        step = speed.combined(by_wheels, cycle.dt, window, lacking)
         if unseen:
             step = speed.towards_equilibrium_slip(step, cycle, direction, length, buried=buried)
         speed.predict(prediction, step, cycle)

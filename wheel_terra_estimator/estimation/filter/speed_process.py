@@ -331,10 +331,10 @@ class SpeedProcess(Component[SpeedState]):
         Their difference shows the bias, best at rest, where the wheels are exact. `step` is the
         prediction without accelerometer. Changes of the wheel rates within their noise would look
         like wheels that the rover does not follow: of the speed only what sets `step` apart from
-        `by_wheels` is then seen. Return the variance [(m/s)^2] to be added to it where the
-        difference exceeds the gate: soil that fails suddenly is no random walk, and wheel rates do
-        not show it. If the difference lasts, the accelerometer noise grows with the running NIS:
-        the attitude is probably wrong.
+        `by_wheels` is then seen. Return the variance [(m/s)^2] to be added to either where the
+        difference exceeds the gate: soil may fail suddenly, which is no random walk and which wheel
+        rates do not show, or a stone shake the IMU. If the difference lasts, the accelerometer
+        noise grows with the running NIS: the attitude is probably wrong.
         """
         increment = self.velocity_increment(cycle.dt, cycle.window)
         if (
@@ -357,12 +357,17 @@ class SpeedProcess(Component[SpeedState]):
         ekf.fuse([Row(residual, row, variance + lacking)])
         return lacking
 
-    def combined(self, step: SpeedStep, dt: float, window: InertialWindow) -> SpeedStep:
-        """Return the prediction with the wheels combined with the accelerometer's over `dt` [s]."""
+    def combined(
+        self, step: SpeedStep, dt: float, window: InertialWindow, lacking: float = 0.0
+    ) -> SpeedStep:
+        """Return the prediction with the wheels combined with the accelerometer's over `dt` [s].
+
+        `lacking` is variance of the accelerometer's beyond its noise [(m/s)^2].
+        """
         increment = self.velocity_increment(dt, window)
         if increment is None:
             return step
-        accelerated, noise = increment
+        accelerated, noise = increment[0], increment[1] + lacking
         weight = noise / (noise + step.variance)  # of the wheels
         return SpeedStep(
             weight * step.speed_gain + (1.0 - weight),

@@ -19,6 +19,11 @@ _LONGEST_GAP = 0.25
 """Longest time between two readings that is integrated over [s]."""
 _NOISE_TIME = 2.0
 """Time constant of the observed noise of the accelerometer [s]."""
+_MOST_CHANGE = 4.0
+"""Deviations of the observed noise by which a component of the specific force may change from one
+reading to the next [-]: a stone shakes the IMU, but hardly changes the speed of the rover."""
+_LEAST_JERK = 8.0
+"""Rate of change that it follows without noise [m/s^3]: starts and stops."""
 _LEVELLING_TIME = 5.0
 """Time constant with which an attitude without orientation follows the specific force [s]: over
 longer than a start or a stop the mean acceleration of a rover vanishes."""
@@ -82,6 +87,7 @@ class InertialState(NamedTuple):
     window: InertialWindow = InertialWindow()
     attitude: Attitude = Attitude()
     acceleration: float = NAN  # f_x - g_x of the last reading [m/s^2]
+    force: tuple[float, ...] = (NAN,) * 3  # the last specific force, as it counts [m/s^2]
 
 
 class InertialInput(Component[InertialState]):
@@ -106,14 +112,16 @@ class InertialInput(Component[InertialState]):
 
     def update(self, time: float, reading: InertialReading, zero: GyroZero) -> None:
         """Take a reading at a time [s]."""
-        before, force_time, rate_time, window, attitude, last = self.state
+        before, force_time, rate_time, window, attitude, last, force = self.state
         dt = time - before if before > -math.inf else 0.0
         if any(reading.variance) and not all(window.stated):
             stated = window.stated.completed(reading.variance, self._given)
             if stated != window.stated:
                 window = window._replace(stated=stated)
-        attitude = self.attitude_after(attitude, reading, dt, zero.pitch)
-        force_x, force_y, force_z = reading.specific_force.tolist()
+        since = time - force_time if force_time > -math.inf else 0.0
+        force = _followed(force, reading.specific_force.tolist(), since, window.noise_density)
+        force_x, force_y, force_z = force
+        attitude = self.attitude_after(attitude, reading, force_x, dt, zero.pitch)
         _, pitch_rate, yaw_rate = reading.angular_rate.tolist()
         if not isnan(yaw_rate):
             rate_time = time
@@ -123,7 +131,6 @@ class InertialInput(Component[InertialState]):
                 rate_readings=window.rate_readings + 1,
             )
         if not isnan(force_x):
-            since = time - force_time if force_time > -math.inf else 0.0
             force_time = time
             acceleration = force_x - self._gravity * attitude.sine_up
             change, last = acceleration - last, acceleration
@@ -147,7 +154,7 @@ class InertialInput(Component[InertialState]):
             )
         elif reading.orientation is not None:
             window = window._replace(gravity=self._gravity_in_body(reading.orientation))
-        self.state = InertialState(time, force_time, rate_time, window, attitude, last)
+        self.state = InertialState(time, force_time, rate_time, window, attitude, last, force)
 
     def _gravity_in_body(self, orientation: FloatArray) -> tuple[float, float, float]:
         """Return the specific force of a rover at rest with this orientation [m/s^2]."""
@@ -163,7 +170,7 @@ class InertialInput(Component[InertialState]):
         return window
 
     def attitude_after(
-        self, attitude: Attitude, reading: InertialReading, dt: float, zero: float
+        self, attitude: Attitude, reading: InertialReading, force_x: float, dt: float, zero: float
     ) -> Attitude:
         """Return the attitude after a reading that came `dt` [s] after the last one.
 
@@ -174,7 +181,7 @@ class InertialInput(Component[InertialState]):
             x, y, z, w = reading.orientation.tolist()
             # The third row of the rotation matrix is the vertical in the body.
             return Attitude(2.0 * (x * z - w * y), known=True, reported=True)
-        force = float(reading.specific_force[0]) / self._gravity
+        force = force_x / self._gravity
         if not attitude.known:
             return attitude if isnan(force) else Attitude(clipped(force, -1.0, 1.0), known=True)
         # Nose up is a negative rotation about y.
@@ -184,3 +191,19 @@ class InertialInput(Component[InertialState]):
             return Attitude(clipped(turned, -1.0, 1.0), known=True)
         share = dt / (_LEVELLING_TIME + dt)
         return Attitude(clipped(turned + share * (force - turned), -1.0, 1.0), known=True)
+
+
+def _followed(
+    before: tuple[float, ...], reading: list[float], since: float, noise_density: float
+) -> tuple[float, ...]:
+    """Return a specific force [m/s^2] that follows a reading `since` [s] after the one before it.
+
+    Each component changes by no more than a rover and the observed noise make it.
+    """
+    if not 0.0 < since <= _LONGEST_GAP:
+        return tuple(reading)
+    most = max(_LEAST_JERK * since, _MOST_CHANGE * math.sqrt(2.0 * noise_density / since))
+    return tuple(
+        now if isnan(old + now) else clipped(now, old - most, old + most)
+        for old, now in zip(before, reading, strict=True)
+    )

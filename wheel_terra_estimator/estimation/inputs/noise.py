@@ -77,8 +77,8 @@ _OUTLIER_DEVIATIONS = 10.0
 _LONGEST_GAP = 0.5  # between readings that are compared [s]
 _LEAST_SHARE = 0.01  # bounds of the observed deviation, over the stated one
 _MOST_SHARE = 100.0
-_REPORTED_AFTER = 100  # readings before it is reported
-_REPORTED_AFTER_REFERENCES = 10
+_REPORTED_AFTER = 100  # readings before it is used and reported
+_SOONER = {'wheel_rate': 25, 'reference': 10}  # the same of sensors that count in motion only
 _FAULT_FACTOR = 5.0  # observed over stated deviation that is reported as a fault
 _MOST_FACTOR = 1000.0  # the same above which no figure is given
 _REPLACING_FACTOR = 2.0
@@ -226,7 +226,7 @@ class ObservedNoise(Component[ObservedNoiseState]):
     def observed(self, sensor: str) -> float | None:
         """Return the observed deviation of one message; None after too few readings."""
         state = self.state.channels[sensor]
-        least = _REPORTED_AFTER_REFERENCES if sensor == 'reference' else _REPORTED_AFTER
+        least = _SOONER.get(sensor, _REPORTED_AFTER)
         return math.sqrt(state.variance) if state.readings >= least else None
 
     def variance(self, sensor: str, stated: float | None = None) -> float:
