@@ -217,6 +217,16 @@ def test_smoothing_does_not_put_a_ramp_behind(wheels):
     assert wheels.rim_speeds(1.0)[0] == pytest.approx(RADIUS, rel=0.002)
 
 
+@pytest.mark.parametrize('rate', [10, 20, 50, 100])
+def test_a_wheel_that_stops_at_once_does_not_turn_back(wheels, rate):
+    speeds = []
+    for i in range(2 * rate):
+        wheels.update(i / rate, odometry([1.0 if i < rate else 0.0] * 6, [NAN] * 6), NOISE)
+        speeds += [wheels.rim_speeds((i + part) / rate)[0] for part in (0.0, 0.5)]
+    assert min(speeds) >= 0.0
+    assert speeds[-1] == pytest.approx(0.0, abs=1e-6)
+
+
 def test_a_wheel_in_messages_of_its_own_is_smoothed_by_its_own_rate(wheels):
     """Six wheels at 20 Hz in turns, on a ramp that ends at 1 s."""
     for i in range(126):

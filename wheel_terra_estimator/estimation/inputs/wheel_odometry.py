@@ -36,6 +36,7 @@ class Rim(NamedTuple):
 
     speed: float = NAN  # smoothed [m/s], nan = never known
     time: float = -math.inf  # of the last reading [s]
+    reading: float = NAN  # the last one [m/s]
     slope: float = 0.0  # rate of change of the speed, smoothed [m/s^2]
     lag: float = 0.0  # of the smoothed speed behind the readings [s]
     readings: float = 0.0  # in the mean of a noisy one
@@ -52,7 +53,7 @@ class Rim(NamedTuple):
         slope = 0.0
         if 0.0 < gap < _LONGEST_GAP:
             slope = self.slope + _SLOPE_GAIN * ((speed - self.speed) / gap - self.slope)
-        return Rim(speed, time, slope, lag, readings, noise / math.sqrt(readings))
+        return Rim(speed, time, reading, slope, lag, readings, noise / math.sqrt(readings))
 
     def _readings(self, gap: float, reading: float, noise: float) -> float:
         """Return the readings in the mean, `gap` after the last one [s]: until the noise is small.
@@ -130,13 +131,16 @@ class WheelOdometryInput(Component[WheelOdometryState]):
     def rim_speeds(self, time: float) -> Floats:
         """Return the rim speeds [m/s], nan where the rate is unknown or too old.
 
-        A change is extrapolated over the age and the lag of smoothing.
+        A change is extrapolated over the age and the lag of smoothing, but not to a reversal that
+        the last reading does not show: a wheel that stops at once does not turn back.
         """
         rims = []
         for rim in self.state.rims:
             age = time - rim.time
             lasts = abs(rim.slope) > self._least_slope and age + rim.lag <= _LONGEST_EXTRAPOLATED
             now = rim.speed + rim.slope * (age + rim.lag) if lasts else rim.speed
+            if now * rim.speed <= 0.0 and now * rim.reading <= 0.0:
+                now = 0.0
             rims.append(now if age <= self._silence else NAN)
         return tuple(rims)
 
