@@ -128,8 +128,8 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> tuple[list[Out
         at = joints.position
         angles = at is not None and np.isfinite(at[:, joints.names.index(mute[0])]).any()
         share = 1.0 - max(there[name] for name in mute) / max(most, 1)
-        how = 'without a rate' + f' in {100 * share:.0f} % of the seconds' * (share < 1.0)
-        how += ': velocity is empty, NaN, infinite or of another length'
+        seldom = f' in {100 * share:.0f} % of the seconds' if share < 1.0 else ''
+        how = f'without a rate{seldom}: velocity is empty, NaN, infinite or of another length'
         how += '; take the change of its position' if angles else ''
         outcomes.append(_missing(joints.topic, mute, how))
     for name in spare:
