@@ -503,7 +503,7 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
 
     half = order < len(truth) // 2
 
-    def told(stiffness, rows=half):
+    def told(stiffness, rows=half, std=std):
         measured = truth + std * rng.standard_normal(truth.shape)
         other = WheelSoilModel(replace(SOIL, frictional_modulus=2.4e6 * stiffness), {})
         measured[rows, :3] += (other.steady_state(forward.points).outputs() - truth[:, :3])[rows]
@@ -532,6 +532,8 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
         return float(after - before)
 
     assert 0.3 < told(0.5).stiffness < 0.8
+    assert told(0.98, std=0.05 * std) is None  # sure, but too little to tell
+    assert '0.9 times as stiff as on' in told(0.9, std=0.05 * std).text
     patch = told(0.4, (order >= 5) & (order <= 7))  # three rows: too few for a soil of their own
     assert patch.end - patch.start + 1.0 == 4.0
     found = [told(stiffness) for stiffness in np.linspace(0.6, 1.0, 30)]

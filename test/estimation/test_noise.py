@@ -105,6 +105,15 @@ def test_what_nobody_stated_is_known_after_the_first_seconds():
     assert silent.observed('torque') == pytest.approx(0.02, rel=0.1)
 
 
+def test_coarse_wheel_rates_are_known_by_the_first_readings_of_a_drive():
+    rng, seen = np.random.default_rng(11), ObservedNoise(sensors(), given=())
+    for i in range(30):
+        odometry = WheelOdometry(0, rng.normal(0.5, 0.08, 6), np.full(6, 2.0))
+        seen.update(0.1 * i, StepInputs(wheel_odometry=odometry))
+    assert seen.variance('wheel_rate') == pytest.approx(0.08**2, rel=0.4)
+    assert seen.observed('torque') is None  # constant at rest: too soon
+
+
 def test_wheels_that_stand_tell_nothing_of_the_noise_of_their_rates():
     rng, seen = np.random.default_rng(9), ObservedNoise(sensors(), given=())
     for i in range(400):

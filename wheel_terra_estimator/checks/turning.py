@@ -308,7 +308,8 @@ def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     rows, heading = evidence.moving, integrated(evidence.time, evidence.yaw)
     if evidence.turning.sum() < LEAST_TURNING_ROWS:
         return gain, zero
-    slides = np.ptp(heading) < LEAST_HEADINGS  # or may do so all along: that looks like zeros
+    # On one heading a slide down a cross slope looks like zeros of the angles.
+    one_way = np.ptp(heading) < LEAST_HEADINGS
     speed = np.nan_to_num(evidence.speed[rows])
     by_angle = speed * np.tan(np.nan_to_num(evidence.steering[rows]))
     others = ~steered if not steered.all() else steered
@@ -323,7 +324,7 @@ def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
         share, off = block_fit(design, seen, other)
         asked = np.quantile(np.abs(aside[:, i]), 0.9) > LEAST_ASKED * np.abs(speed[:, i]).mean()
         if asked and share.std < 0.5 * STILL:
-            gain[i], zero[i] = share.value, 0.0 if slides else math.atan(off.value)
+            gain[i], zero[i] = share.value, 0.0 if one_way else math.atan(off.value)
     return gain, zero
 
 

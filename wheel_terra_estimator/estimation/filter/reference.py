@@ -232,7 +232,7 @@ class ReferenceUpdate(Component[ReferenceState]):
     ) -> ReferenceState:
         """Return the memory with an outlier; `rejected_in_a_row` is 0 where it is believed.
 
-        `beyond`: it is faster than the wheels by far; not `possible`: at all, or against them.
+        `beyond`: much faster than the wheels; `possible`: no faster than they, nor against them.
         """
         before, (time, forward, variance, innovation, total) = self.state, reading
         if not state.rejected_in_a_row:

@@ -23,7 +23,7 @@ _MOST_CHANGE = 4.0
 """Deviations of the observed noise by which a component of the specific force may change from one
 reading to the next [-]: a stone shakes the IMU, but hardly changes the speed of the rover."""
 _LEAST_JERK = 8.0
-"""Rate of change that it follows without noise [m/s^3]: starts and stops."""
+"""Rate of change of the specific force that counts without noise [m/s^3]: starts and stops."""
 _LEVELLING_TIME = 5.0
 """Time constant with which an attitude without orientation follows the specific force [s]: over
 longer than a start or a stop the mean acceleration of a rover vanishes."""
