@@ -143,42 +143,45 @@ def estimate_noise(
         for q in unknown:
             guess[:, q] = usual[q] * shape
         problem = build(guess)
-        here = fitted.within(problem)
-        target = here.residual + here.jacobian @ here.u
+        unrotate = np.linalg.inv(problem.rotation)
+        smooth = (unrotate * problem.roughness) @ unrotate.T
+        # Soil and errors of inputs, which are no noise of a reading, however large they are.
+        known = unrotate @ unrotate.T - np.diag(problem.std**2)
+        known += fitted.sensitivity @ fitted.sensitivity.T
+        target = problem.wanted - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
         for q in (*unknown, *stated):
             cells = problem.quantity == q
-            # Where slip errors mix the axes, those at the places of the cells stand for them.
-            part = target[cells], here.jacobian[cells], problem.roughness[cells]
+            own, square = problem.std[cells], np.ix_(cells, cells)
+            sizes = np.outer(own, own)
+            part = target[cells] / own, known[square] / sizes, smooth[square] / sizes
             if q in stated:  # whose own shape stays
                 std[:, q] = noise.std[:, q] * _white_part(*part, _STATED, 1.0, _TRUST)[0]
                 continue
             value, count, score = _white_part(*part, _FACTORS, _USUAL, _SPREAD)
-            score -= float(np.log(problem.std[cells]).sum())
+            score -= float(np.log(own).sum())
             if score < best[q] + _CLEARLY:
                 continue
             best[q] = score
             square = (value * usual[q]) ** 2
             unseen = _UNSEEN * (_UNSEEN_NOISE * problem.scale[q]) ** 2
             weighed = (count * square + unseen) / (count + _UNSEEN)
-            known = np.isfinite(noise.std[:, q])
-            std[known, q] = math.sqrt(max(square, weighed)) * shape[known]
+            there = np.isfinite(noise.std[:, q])
+            std[there, q] = math.sqrt(max(square, weighed)) * shape[there]
     return replace(noise, std=std)
 
 
 def _white_part(
-    target: FloatArray,
-    jacobian: FloatArray,
-    roughness: FloatArray,
+    target: FloatArray,  # (k,) cells of a quantity, as the covariances over their deviations
+    known: FloatArray,  # (k, k) covariance of what is no noise
+    smooth: FloatArray,  # (k, k) covariance of the smooth misfit of amplitude 1
     factors: FloatArray,
     usual: float,  # centre of the prior; ``spread``: deviation of the logarithm
     spread: float,
 ) -> tuple[float, float, float]:
     """Return the most probable noise factor, its degrees of freedom and its log likelihood."""
     found = []
-    outer = jacobian @ jacobian.T
     for amplitude in _SMOOTH:
-        smooth = outer + np.diag(amplitude**2 * roughness)
-        values, vectors = np.linalg.eigh(smooth)
+        values, vectors = np.linalg.eigh(known + amplitude**2 * smooth)
         power = (vectors.T @ target) ** 2
         variance = np.maximum(values, 0.0)[None] + factors[:, None] ** 2
         score = -0.5 * (np.log(variance) + power / variance).sum(axis=1)
