@@ -218,9 +218,11 @@ class Forward:
     def by_input(
         self, name: str, hypothesis: Sequence[Coordinate], u: FloatArray, angle: FloatArray
     ) -> FloatArray:
-        """Return (N, 4) derivative of the outputs by slip or leaving angle; 0 where it is nan."""
+        """Return (N, 4) derivative of the outputs by slip, load or leaving angle; 0 where nan."""
         given = np.asarray(getattr(self.points, name), dtype=float)
         step = np.where((given > 0.99) | (name == 'leaving_angle'), -1e-4, 1e-4)
+        if name == 'normal_load':
+            step = 1e-4 * given
         moved: dict[str, Any] = {name: given + step}
         beside = replace(self, points=replace(self.points, **moved))
         base, other = (

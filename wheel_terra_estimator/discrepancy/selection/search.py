@@ -61,6 +61,10 @@ _KEPT = 30  # best sets that are weighed again, where beds differ
 _ROUNDS = 2  # of adding and swapping
 _NEAR = 2.0  # nats behind the best one, up to which that is done
 _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
+_LOAD = (
+    0.01  # deviation of a wheel's load in a drive: of simulated ones (docs/discrepancy/drives.md)
+)
+_WHEEL_SLIP = 0.005  # deviation of each wheel's own slip in a drive: radii alike to that; assumed
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,9 @@ def search(
     if (table.slip_std > 0.0).any():
         builder.linearise(nothing, stated.std)
         problem, nothing = builder.fit_nothing(stated.std, (), nothing)
+    if table.true_rows.any():  # a drive's
+        load = np.where(table.true_rows, _LOAD * table.columns['normal_load'], 0.0)
+        builder.let_err('normal_load', load, np.arange(len(table)), nothing)
     if table.leaving_angle_std.any():
         builder.let_err('leaving_angle', table.leaving_angle_std, np.arange(len(table)), nothing)
     noise = builder.estimate(stated, nothing, ())
@@ -254,12 +261,20 @@ def _joined_by(setting: Setting, selection: Selection, more: list[Explanation]) 
     return weigh(tuple(known.values()), setting.floors, setting.effects)
 
 
-def _shared_readings(slip: FloatArray) -> IndexArray:
-    """Return (N,) reading of each row: those that are equal to the last digit, but no set value."""
+def _slip_errors(table: SteadyTable) -> list[tuple[FloatArray, IndexArray]]:
+    """Return the parts (N,) of the deviation of the slip, and the rows (N,) that share each.
+
+    All wheels of a moment of a drive share the error of its speed. In a table those share one that
+    are equal to the last digit, but no set value.
+    """
+    slip, std, own = table.columns['slip'], table.slip_std, np.arange(len(table))
+    if table.true_rows.all() and 'time' in table.columns:
+        moment = np.ravel(np.unique(table.columns['time'], return_inverse=True)[1])
+        apart = np.minimum(std, _WHEEL_SLIP)
+        return [(np.sqrt(std**2 - apart**2), moment.astype(np.intp)), (apart, own)]
     group = np.ravel(np.unique(slip, return_inverse=True)[1])
     nominal = np.abs(slip - np.round(slip, 2)) < 1e-9
-    own = group.max() + 1 + np.arange(len(slip))
-    return np.where(nominal, own, group).astype(np.intp)
+    return [(std, np.where(nominal, group.max() + 1 + own, group).astype(np.intp))]
 
 
 class _Builder:
@@ -293,25 +308,27 @@ class _Builder:
 
         Where the curves bend within an error of the slip, a tangent at the reading is not enough.
         """
-        slip, std = self.table.columns['slip'], self.table.slip_std
-        group = _shared_readings(slip)
-        self.let_err('slip', std, group, nothing)
+        slip, errors = self.table.columns['slip'], _slip_errors(self.table)
+        for std, group in errors:
+            self.let_err('slip', std, group, nothing)
         problem = self.build(noise_std, ())
         here = nothing.within(problem)
         target = here.residual + here.jacobian @ here.u
         variance = problem.variance(_LATENT_FLOOR)
         cells = problem.rotation.T @ over_covariance(target, variance, here.jacobian)
         by_slip = problem.flat(self.by_input[0].slope)
-        pull = np.bincount(
-            group[problem.row], by_slip * std[problem.row] * cells, minlength=group.max() + 1
-        )
-        moved = np.clip(pull[group], -_FARTHEST, _FARTHEST) * std
+        moved = np.zeros(len(slip))
+        for std, group in errors:
+            pull = np.bincount(
+                group[problem.row], by_slip * std[problem.row] * cells, minlength=group.max() + 1
+            )
+            moved += np.clip(pull[group], -_FARTHEST, _FARTHEST) * std
         moved = np.clip(slip + moved, -0.97, 0.97) - slip
         points = replace(self.forward.points, slip=slip + moved)
         self.forward = replace(self.forward, points=points)
         angle = self.forward.solve([nothing.coordinates], [nothing.u], jacobian=False).angle[0]
         slope = self.forward.by_input('slip', nothing.coordinates, nothing.u, angle)
-        self.by_input = [CommonError(slope, std, group)]
+        self.by_input = [CommonError(slope, std, group) for std, group in errors]
         # The reading lies off the point of linearisation: the tangent takes the cells along.
         self._moved = slope * moved[:, None]
 
