@@ -62,7 +62,7 @@ _SAME_ERROR = 'the same error of all slips (reference speed, or readings that la
 _SAME_ERROR_ODDS = 0.5  # how frequent it is assumed to be beside a wrong radius [-]
 _NOTABLE = 0.2  # odds beside a name from which something without one is told
 _SURE = 2.0  # deviations within which a bias of the radius is the height of the lugs
-_RARE = 3.0  # deviations of its prior, beyond which a gain may as well be something else
+_RARE = 3.0  # deviations of its prior, beyond which a gain or bias may as well be something else
 _MOST_TRIED = 3  # doubtful names, after which none is given
 _LONG = 40  # iterations of a fit that may have to go far
 # A name is given where it, or one of those that the rows cannot tell from it, is more likely right
@@ -330,6 +330,8 @@ def _known_alike(
                 found.append(f'another unit of the column ({text})')
             elif abs(u) > _RARE:
                 found.append('something else in that column (so large a gain is rare)')
+        elif effect_of(c.owner) == effect_of(name) == 'wheel_radius_bias' and abs(u) > _RARE:
+            found.append('something else (so wrong a radius is rare)')
     on = set(findings.setting.forward.base_effects)
     own = known[effect_of(name)].confounded_with
     others = (o.base_name for o in known.values() if effect_of(name) in o.confounded_with)

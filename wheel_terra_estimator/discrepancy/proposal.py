@@ -77,19 +77,19 @@ _RESEMBLING = 3
 # Terms that are near a named effect, or equivalent to it in one of its forms.
 _LIKE = {
     'exponent_by_slip': 'slip_sinkage_exponent',
-    'exponent_by_slip_squared': 'slip_sinkage_exponent',
     'peak_angle_by_slip': 'stress_peak_shift',
-    'peak_angle_by_slip_squared': 'stress_peak_shift',
+    'sinkage_by_slip': 'lug_digging',
     'torque_by_one': 'drivetrain_friction',
     'drawbar_pull_by_one': 'pull_zero',
     'sinkage_by_one': 'sinkage_offset',
     'shear_modulus_by_load': 'shear_deformation',
     'shear_modulus_by_slip': 'shear_deformation',
-    'shear_modulus_by_slip_squared': 'shear_deformation',
     'exponent_by_load': 'slip_sinkage_exponent',
     'drawbar_pull_by_load': 'pull_zero',
     'torque_by_torque_squared': 'torque_gain',
 }
+# Features that grow with slip: whichever, the term is the same in other words.
+_GROWING = ('slip', 'slip_squared', 'slip_over_02', 'slip_over_04', 'slip_over_06')
 # Inputs of which any influence on the soil has one name.
 _LIKE_ON_SOIL = {'pass': 'multipass', 'rim_speed': 'rate_dependence'}
 _LEVEL_INPUTS = (
@@ -244,7 +244,9 @@ def like(term: str) -> str:
     target, feature = pair_of(term)
     inputs = FEATURES[feature].factors or (feature,)
     whole = [_LIKE_ON_SOIL[name] for name in inputs if name in _LIKE_ON_SOIL]
-    return whole[0] if whole and target not in QUANTITIES else _LIKE.get(term, '')
+    if whole and target not in QUANTITIES:
+        return whole[0]
+    return _LIKE.get(f'{target}_by_slip' if feature in _GROWING else term, '')
 
 
 def _can_be_believed(fitted: Fit) -> bool:

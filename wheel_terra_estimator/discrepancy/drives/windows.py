@@ -58,6 +58,7 @@ LEAST_SEGMENTS = 8  # into which a window is cut to judge drift and scatter
 MOST_ROWS = 120  # more are averaged over windows of like slip, slope and rate
 TURNING = 0.03  # mean yaw rate [rad/s] beyond which a window counts as a turn
 SLIP_SPREAD = 0.15  # between wheels, beyond which there is no mean wheel
+MOST_SLIP = 0.97  # of a wheel: beyond it no state is steady
 SETTLING_TRAVEL = 0.5  # rim travel after standing, in wheel radii, that is not used
 
 # Greatest drift over a window: share of the mean, and an absolute amount that is always allowed.
@@ -241,6 +242,8 @@ class _WindowFinder:
         slip = self._slip(start, end, count, rate)
         if np.isnan(rate).any() or np.isnan(slip).any():
             return 'no data', None
+        if slip.mean(0).max() > MOST_SLIP:
+            return 'no way made', None
         direction = np.sign(np.mean(rate))
         tilt = np.nan_to_num(sinkage) @ np.asarray(self.settings.rut_tilt)
         pitch = np.arctan2(force[:, 0], force[:, 2])

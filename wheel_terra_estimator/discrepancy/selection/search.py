@@ -64,7 +64,7 @@ _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 _LOAD = (
     0.01  # deviation of a wheel's load in a drive: of simulated ones (docs/discrepancy/drives.md)
 )
-_WHEEL_SLIP = 0.005  # deviation of each wheel's own slip in a drive: radii alike to that; assumed
+_WHEEL_SLIP = 0.005  # deviation of each wheel's own slip in a drive (radii differ); assumed
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,11 @@ _HARMLESS_UNITS = frozenset({'s', 'ms', 'min', 'h', 'k', '\u00b0c', 'degc', 'cel
 _BRACKETS = re.compile(r'(.*?)\s*[\[(]([^\])]*)[\])]')
 _BETWEEN = re.compile(r'\s+in\s+|\s*[/,]\s*|[_\s]+')  # a name and its unit without brackets
 _MEASURED = re.compile(r'^(meas|measured|mean|avg|average)[_\s]+', re.IGNORECASE)
+_COEFFICIENT = re.compile(r'coeff|/\s*\(?\s*(w|fz|load)\b', re.IGNORECASE)  # DP/W, T/(W r)
+_TIMES_LOAD = (
+    'a share of the load? write times normal_load, drawbar_pull [N], a torque times the radius, '
+    'torque [N m]'
+)
 ALL = 'all'
 
 
@@ -224,7 +229,8 @@ class Header:
             times = 1.0
         if times is None:
             known = ', '.join(UNITS[unit_of(name)])
-            self._faults.append(f'the unit of {title!r} is not known; give one of {known}')
+            share = f' ({_TIMES_LOAD})' if unit == '-' else ''
+            self._faults.append(f'the unit of {title!r} is not known; give one of {known}{share}')
         elif name in self.names:
             other = next(self.titles[c.place] for c in self.columns if c.name == name)
             twice = f'column {title!r} stands there twice; delete one'
@@ -307,7 +313,7 @@ def _hint(title: str, free: Sequence[str]) -> tuple[str, str]:
         close = difflib.get_close_matches(_key(base), keys, n=1, cutoff=0.86)
         if close:
             return keys[close[0]], f'{keys[close[0]]}?'
-    return '', ''
+    return '', _TIMES_LOAD if _COEFFICIENT.search(title) else ''
 
 
 def _find(titles: Sequence[str], entry: Entry) -> tuple[int, str, int] | None:
