@@ -18,11 +18,18 @@ from wheel_terra_estimator.discrepancy.drives.series import Channel, SpeedSmooth
 from wheel_terra_estimator.discrepancy.drives.windows import (
     GOOD,
     SMOOTHED,
+    DriveRows,
     block_moments,
     pooled_correlation,
     rows_from_bag,
     rows_from_measurements,
 )
+from wheel_terra_estimator.discrepancy.fitting.coordinates import soil_coordinates
+from wheel_terra_estimator.discrepancy.fitting.forward import Forward
+from wheel_terra_estimator.discrepancy.selection.search import search
+from wheel_terra_estimator.discrepancy.selection.verdict import choose
+from wheel_terra_estimator.discrepancy.selection.weights import default_floors
+from wheel_terra_estimator.discrepancy.tables.steady_table import operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -31,6 +38,8 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.simulation import drive, scenario
+from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 
 GRAVITY = 9.80665
 RADIUS, LUG = 0.12, 0.01
@@ -449,3 +458,44 @@ def test_a_drift_is_a_mean_that_changes(step, at, told):
     values = 0.3 + 0.01 * np.random.default_rng(5).standard_normal(80)
     values[at:] += step
     assert windows._drifts(values, 0.03) == told
+
+
+def test_wheels_that_spin_on_the_spot_make_no_window():
+    """Their slip is 1, or by the noise of the reference beyond: no row of a table."""
+    spins = {'slip': 1.0, 'slope': 0.14}
+    rows = rows_from_measurements(Drive([*STAIRS, spins]).measurements, settings())
+    assert rows.seconds['no way made'] > 30.0
+    assert rows.table().columns['slip'].max() < 0.5
+
+
+def test_wheels_of_a_moment_share_the_error_of_the_speed():
+    """All wheels of a window tell its speed together, beside loads that err."""
+    configuration = settings(**{'soil.source': ''})
+    rng = np.random.default_rng(4)
+    count = 12
+    moment = np.repeat(np.arange(count), 4)
+    slip = np.linspace(0.05, 0.6, count)[moment] + 0.01 * rng.standard_normal(4 * count)
+    columns = {
+        'time': 10.0 * moment,
+        'slip': slip,
+        'normal_load': np.tile([85.0, 95.0, 100.0, 110.0], count),
+    }
+    points = operating_points(columns, configuration, 'drive')
+    state = WheelSoilModel(configuration.soil, {}).steady_state(points)
+    columns['normal_load'] = columns['normal_load'] * (1.0 + 0.01 * rng.standard_normal(slip.size))
+    columns['slip'] = slip + (0.04 * rng.standard_normal(count))[moment]
+    columns['slip_std'] = np.full(slip.size, 0.04)
+    for name, values, noise in (('sinkage', state.sinkage, 1e-3), ('torque', state.torque, 0.2)):
+        columns[name] = values + noise * rng.standard_normal(slip.size)
+        columns[f'{name}_std'] = np.full(slip.size, noise)
+    table = DriveRows('drive', columns, (), {}, ()).table()
+    soil = soil_coordinates(configuration.soil, {})
+    forward = Forward(
+        operating_points(table.columns, configuration, 'drive'), configuration.soil, {}, catalogue()
+    )
+    findings = search(table, forward, soil, {}, default_floors())
+    told = findings.setting.forward.points.slip
+    off = (told - table.columns['slip']).reshape(count, 4)
+    assert np.ptp(off, axis=1).max() < 0.02
+    assert np.std(told - slip) < 0.8 * np.std(table.columns['slip'] - slip)
+    assert choose(findings.selection, findings.setting.problem).status == 'agrees'

@@ -72,6 +72,9 @@ def test_soil_that_changes_with_speed_or_pass_is_like_one_effect_and_a_reading_i
     assert like('bearing_pressure_by_load_times_pass') == like('cohesion_by_pass') == 'multipass'
     assert like('torque_by_rim_speed') == like('friction_by_load') == ''
     assert like('torque_by_one') == 'drivetrain_friction'
+    assert like('exponent_by_slip_over_02') == like('exponent_by_slip') == 'slip_sinkage_exponent'
+    assert like('sinkage_by_slip_squared') == 'lug_digging'
+    assert like('friction_by_slip') == like('sinkage_by_slip_near_02') == ''
 
 
 @pytest.mark.parametrize('times', [0.4, 1.0, 5.0])

@@ -325,16 +325,16 @@ def test_outliers_are_found_and_a_hump_is_none(forward, setting):
 def test_noise_is_estimated_beside_an_effect_and_never_none(forward, setting):
     soil, truth, std, inputs, scale = setting
 
-    def estimated(measured, row=0):
+    def estimated(measured, row=0, common=()):
         guess = np.broadcast_to(0.01 * scale, truth.shape)
-        problem = build_problem(measured, guess, inputs, scale)
+        problem = build_problem(measured, guess, inputs, scale, common=common)
         nothing = of_soil(forward, problem, soil, problem.variance(0.1))
         origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
         after = noise.estimate_noise(
             Noise(guess, origin),
             nothing,
             [np.ones(len(truth)), shape],
-            lambda std: build_problem(measured, std, inputs, scale),
+            lambda std: build_problem(measured, std, inputs, scale, common=common),
         )
         return after.std[row, :3]
 
@@ -346,6 +346,21 @@ def test_noise_is_estimated_beside_an_effect_and_never_none(forward, setting):
         estimated(bent + std * rng.standard_normal(truth.shape)) / std[0, :3] for _ in range(6)
     ]
     assert np.all(np.exp(np.mean(np.log(ratios), axis=0)) == pytest.approx(1.0, rel=0.3))
+    # Errors of the slip, which pull and torque feel far beyond their noise, are no noise of theirs.
+    slope = forward.by_input(
+        'slip',
+        soil,
+        np.zeros(len(soil)),
+        forward.solve([soil], [np.zeros(len(soil))], jacobian=False).angle[0],
+    )
+    misread = CommonError(slope, np.full(len(truth), 0.02), np.arange(len(truth)))
+    ratios = []
+    for _ in range(12):
+        off = slope * (0.02 * rng.standard_normal(len(truth)))[:, None]
+        drawn = truth + off + std * rng.standard_normal(truth.shape)
+        ratios.append(estimated(drawn, common=[misread]) / std[0, :3])
+    usual = np.exp(np.mean(np.log(ratios), axis=0))  # of few rows seldom less than 2 % of the range
+    assert np.all((usual > 0.7) & (usual < 1.7))
     # Rows without scatter, read off a curve: half a per cent of the range at least.
     assert (estimated(truth) > 0.005 * scale[:3]).all()
     loud = truth + std * shape[:, None] * rng.standard_normal(truth.shape)
