@@ -111,6 +111,13 @@ def test_asked(title):
     assert table.measured[:, 2] == pytest.approx(numbers)
 
 
+@pytest.mark.parametrize('title', ['DP/W [-]', 'pull coefficient', 'T/(W r)', 'drawbar_pull [-]'])
+def test_a_share_of_the_load_is_to_be_written_as_a_force(title):
+    data = BASE | {'sinkage': rows()['sinkage'], title: rows()['slip']}
+    with pytest.raises(UserError, match='times normal_load'):
+        table_of(data, 'data')
+
+
 @pytest.mark.parametrize('title', HARMLESS)
 def test_when_and_which_is_no_measurement(title):
     table = table_of(BASE | {'torque': rows()['torque'], title: np.arange(8.0)}, 'data')

@@ -301,6 +301,8 @@ def _harmless(title: str) -> bool:
 
 def _hint(title: str, free: Sequence[str]) -> tuple[str, str]:
     """Return which of the free columns a title may be, and the same with what it has to hold."""
+    if _COEFFICIENT.search(title):
+        return '', _TIMES_LOAD
     meaning = meaning_of(title)
     if meaning is not None:
         name = meaning.name
@@ -313,7 +315,7 @@ def _hint(title: str, free: Sequence[str]) -> tuple[str, str]:
         close = difflib.get_close_matches(_key(base), keys, n=1, cutoff=0.86)
         if close:
             return keys[close[0]], f'{keys[close[0]]}?'
-    return '', _TIMES_LOAD if _COEFFICIENT.search(title) else ''
+    return '', ''
 
 
 def _find(titles: Sequence[str], entry: Entry) -> tuple[int, str, int] | None:
