@@ -151,9 +151,9 @@ def estimate_noise(
         target = problem.wanted - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
         for q in (*unknown, *stated):
             cells = problem.quantity == q
-            own, square = problem.std[cells], np.ix_(cells, cells)
+            own, block = problem.std[cells], np.ix_(cells, cells)
             sizes = np.outer(own, own)
-            part = target[cells] / own, known[square] / sizes, smooth[square] / sizes
+            part = target[cells] / own, known[block] / sizes, smooth[block] / sizes
             if q in stated:  # whose own shape stays
                 std[:, q] = noise.std[:, q] * _white_part(*part, _STATED, 1.0, _TRUST)[0]
                 continue
