@@ -254,6 +254,8 @@ def slowing(speed, deceleration, start):
         (slowing(0.7, 1.2, 9.3), slowing(0.7, 0.9, 8.0), True, 0.1, 0.01),
         # Wheels that are stopped hold the slope: their torque is what it was, half of the limit.
         (slowing(0.05, 0.02, 8.0), slowing(0.04, 0.016, 8.0), False, 0.5, 0.002),
+        # The same on a slope that takes three quarters of it.
+        (slowing(0.05, 0.02, 8.0), slowing(0.04, 0.016, 8.0), True, 0.78, 0.002),
     ],
 )
 def test_wheels_that_are_being_stopped_raise_nothing(rims, speeds, known, torque, least):
@@ -279,11 +281,36 @@ def test_drives_that_give_way_near_their_limit_raise_it_without_any_speed():
     assert 'torque limit' in found[-1].reason
 
 
-@pytest.mark.parametrize(('torque', 'stuck'), [(0.95, True), (0.4, False)])
-def test_wheels_that_slow_evenly_are_held_if_they_are_near_their_limit(torque, stuck):
-    rows = [[wheel(0.2, rim=1.8, torque=0.4)] * 4] * 50 + [[wheel(0.2, torque=torque)] * 4] * 10
+@pytest.mark.parametrize(
+    ('before', 'torque', 'stuck'),
+    [
+        (0.4, 0.95, True),
+        (0.4, 0.75, True),
+        (0.4, 0.4, False),
+        (0.72, 0.77, False),  # stopped on a climb that takes nearly as much
+        (0.88, 0.92, True),  # more than 0.9 is the limit
+    ],
+)
+def test_wheels_that_slow_evenly_are_held_if_their_torque_rose_near_its_limit(
+    before, torque, stuck
+):
+    rows = [[wheel(0.2, rim=1.8, torque=before)] * 4] * 50 + [[wheel(0.2, torque=torque)] * 4] * 10
     found = course(rows)
     assert not found[50].stuck and found[-1].stuck is stuck
+
+
+def test_wheels_that_lag_behind_the_others_stay_held_however_long_they_do():
+    monitor = StuckMonitor(SETTINGS)
+    held(monitor, [wheel(0.2, rim=1.8, torque=0.4)] * 4, 5.0)
+    lag = [wheel(0.2, rim=1.3, torque=0.75)] * 3 + [wheel(0.2, rim=1.75, torque=0.4)]
+    assert held(monitor, lag, 30.0, start=5.0)[-1].stuck
+
+
+def test_a_short_drive_between_two_stops_on_a_steep_climb_raises_nothing():
+    monitor = StuckMonitor(SETTINGS)
+    held(monitor, [wheel(0.0, rim=0.0, known=False, torque=0.5)] * 4, 5.0)
+    held(monitor, [wheel(0.2, rim=0.1, torque=0.78)] * 4, 4.0, start=5.0)
+    assert first(held(monitor, [wheel(0.2, rim=0.05, torque=0.78)] * 4, 2.0, start=9.0)) is None
 
 
 @pytest.mark.parametrize('silent', [0, 3])

@@ -32,6 +32,9 @@ _DIRECTION_SHARE = 0.1
 """Rim speed over the recent one below which the direction is kept [-]: wheels rock as they stop."""
 NEAR_LIMIT = 0.7
 """Torque over its limit [-]: below it wheels are not held, above it they are not being stopped."""
+_RISE = 0.1
+"""Growth of that share above its recent mean by which wheels lack power [-]: a climb may need as
+much all the time, until the rover is stopped. In snow it grew by 0.17 to 0.67."""
 _STALL_SHARE_AT_REST = 0.9  # the same at rest [-]; below it a rover may be parked on a slope
 _BEYOND_SLOPE = 0.15  # mean of that share beyond what holds the rover on its slope [-]
 _STALL_TIME_AT_REST = 1.0  # for which a wheel may pull near its limit before it turns [s]
@@ -86,6 +89,7 @@ class Memory(NamedTuple):
     depth: float = NAN  # running mean of the typical sinkage over the radius [-]
     direction: int = 0  # of the rims: 1 forward, -1 backward, 0 both
     direction_since: float = NAN  # [s]
+    torque_share: float = NAN  # running mean while wheels turn and are not slowed [-]
     pulls_since: float = NAN
     """Since when all wheels stand and one pulls near its limit [s]; nan = this is not the case."""
 
@@ -118,6 +122,9 @@ class Situation:
         pulls = pulls and sum(shares) / len(shares) - self.motion.holding_share > _BEYOND_SLOPE
         since = self.time if isnan(before.pulls_since) else before.pulls_since
         cruise = max(before.cruise * math.exp(-dt / _CRUISE_TIME), self.rim)
+        share = self.torque_share if isnan(before.torque_share) else before.torque_share
+        if not self.slow_against(cruise):
+            share += gain_of(dt, _CRUISE_TIME) * (self.torque_share - share)
         return Memory(
             time=self.time,
             rolled=rolled,
@@ -136,6 +143,7 @@ class Situation:
             + gain_of(self.rim * dt, _DEEPENING_RADII * self.radius) * (self.depth - usual),
             direction=direction,
             direction_since=before.direction_since if direction == before.direction else self.time,
+            torque_share=share if moves else NAN,
             pulls_since=since if pulls else NAN,
         )
 
@@ -236,6 +244,10 @@ class Situation:
         """Whether the wheels are slower than in the last seconds."""
         return self.rim < (1.0 - _SLOWING) * self.memory.cruise
 
+    def slow_against(self, cruise: float) -> bool:
+        """Return whether wheels are slower than `cruise` [m/s], or than the fastest wheel."""
+        return self.rim < (1.0 - _SLOWING) * max(cruise, self.fastest)
+
     @property
     def braked(self) -> bool:
         """Whether the wheels are being stopped, at low torque."""
@@ -246,8 +258,9 @@ class Situation:
         """Whether the wheels stall at their torque limit, or are about to."""
         if self.pulls_at_rest:
             return self.torque_share > _STALL_SHARE_AT_REST
-        slow = self.slowed or self.rim < (1.0 - _SLOWING) * self.fastest
-        return self.settled and self.torque_share > NEAR_LIMIT and slow
+        risen = min(self.memory.torque_share + _RISE, _STALL_SHARE_AT_REST)
+        slow = self.slow_against(self.memory.cruise)
+        return self.settled and self.torque_share > max(NEAR_LIMIT, risen) and slow
 
     @cached_property
     def pulls_at_rest(self) -> bool:
