@@ -61,10 +61,10 @@ _KEPT = 30  # best sets that are weighed again, where beds differ
 _ROUNDS = 2  # of adding and swapping
 _NEAR = 2.0  # nats behind the best one, up to which that is done
 _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
-_LOAD = (
-    0.01  # deviation of a wheel's load in a drive: of simulated ones (docs/discrepancy/drives.md)
-)
-_WHEEL_SLIP = 0.005  # deviation of each wheel's own slip in a drive (radii differ); assumed
+# In a drive: deviation of a wheel's load, as simulated (docs/discrepancy/drives.md) [-], and of
+# each wheel's own slip, since radii differ [-]; the latter is assumed.
+_LOAD = 0.01
+_WHEEL_SLIP = 0.005
 
 
 @dataclass(frozen=True)
