@@ -220,6 +220,24 @@ def test_a_warning_that_was_confirmed_once_stays_and_wrong_torques_confirm_none(
     assert out('rate_unit', [False, True, False]) == [False, True, True]
 
 
+@pytest.mark.parametrize(
+    ('clears', 'given'),
+    [
+        (99.0, [4.0, 10.0]),
+        (3.0, []),  # a spin at the start is over
+        (6.0, [4.0, 10.0]),  # what has been given stays until it has cleared
+    ],
+)
+def test_a_warning_whose_signs_pass_while_it_is_checked_is_not_given(monkeypatch, clears, given):
+    monkeypatch.setattr(InputJudge, 'undecided', 'the first seconds of motion')
+    judge, out = InputJudge(Wheels().configuration), []
+    for time in np.arange(0.0, 10.5, 0.5):
+        waits = some_estimates(6, stuck=True, stuck_clears=bool(time >= clears))
+        if judge.judged(replace(waits, stamp=waits.stamp + round(1e9 * time)), {}).stuck:
+            out.append(time)
+    assert [out[0], out[-1]] == given if given else not out
+
+
 @pytest.mark.parametrize('rover', [SIX, pytest.param(FOUR, marks=pytest.mark.slow)])
 def test_a_drive_without_fault_is_silent(rover):
     sets = sets_of(drive_of(rover), lambda m: m)

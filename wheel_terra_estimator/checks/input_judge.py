@@ -91,15 +91,17 @@ class InputJudge(OnlineChecks):
             return
         rises = self._stuck_since is None
         begun = estimates.stamp if self._stuck_since is None else self._stuck_since
-        held_up = (rises or bool(self._waits_for)) and estimates.stamp - begun < LONGEST_WAIT
+        waits = rises or bool(self._waits_for)
+        doubts = self.undecided if estimates.stamp - begun < LONGEST_WAIT else ''
         self._stuck_since, self._waits_for = begun, ''
         self._confirmed |= estimates.stuck_confirmed and not doubted
         if self._confirmed:
             return
         if silenced:
             self._waits_for = silenced
-        elif held_up and not self._failed and self.undecided:
-            self._waits_for = f'stuck warning waits: {self.undecided}'
+        elif waits and not self._failed and (doubts or estimates.stuck_clears):
+            # What has passed while it was checked is no warning any more.
+            self._waits_for = f'stuck warning waits: {doubts or "no sign of it is left"}'
 
 
 def _misfits(health: Mapping[str, Any], *, dug_in: bool) -> dict[str, str]:

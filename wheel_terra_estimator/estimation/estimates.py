@@ -80,6 +80,7 @@ class EstimateSet:
     faults: dict[str, str] = field(default_factory=dict)  # input or state -> words, for diagnostics
     stuck_direction: int = 0  # of the rims that led to `stuck`: 1, -1; 0 none, both or unknown
     stuck_confirmed: bool = False  # by evidence that no wrong sign or unit can produce
+    stuck_clears: bool = False  # no sign of an entrapment is left
     slip_on_slope: SlipOnSlope | None = None  # once a second; None = not in this set
     sideways: Sideways | None = None  # slip angles, lateral force and speed; None = unknown
 

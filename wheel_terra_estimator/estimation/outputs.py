@@ -132,6 +132,7 @@ class Outputs:
             stuck=given.assessment.stuck,
             stuck_direction=given.assessment.direction,
             stuck_confirmed=given.assessment.confirmed,
+            stuck_clears=given.assessment.clears,
             reasons=reasons_in_words(given.rims, given.slips, given.assessment),
             faults=faults,
             slip_on_slope=given.slip_on_slope,

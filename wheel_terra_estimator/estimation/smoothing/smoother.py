@@ -53,6 +53,7 @@ _FILTERED_FIELDS = (
     'stuck',
     'stuck_direction',
     'stuck_confirmed',
+    'stuck_clears',
     'slip_on_slope',
     'stuck_probability',
     'time_to_stuck',

@@ -63,6 +63,8 @@ class StuckAssessment(NamedTuple):
     """Whether the ground still holds the rover: same direction, no smaller demand."""
     buried: bool = False
     """Whether it does, and most wheels are measured too deep to climb out."""
+    clears: bool = False
+    """Whether no sign of an entrapment is left; the warning ends if that lasts."""
 
 
 class StuckState(NamedTuple):
@@ -133,6 +135,7 @@ class StuckMonitor(Component[StuckState]):
             state.stuck and (time - stands > HOLD or _at_limit(situation)),
             holds,
             holds and situation.sunk,
+            not isnan(state.clear_since),
         )
 
 
