@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rover file that states little: the prior spans soils, torques scale, hard ground is no trap."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from parts import step_inputs
@@ -158,6 +160,23 @@ def test_sinkage_readings_below_their_zero_stop_no_rover_on_hard_ground(seed):
     assert not any(s.stuck for s in sets)
     slip = np.array([s.slip for s in sets if s.stamp > 8e9])
     assert np.sqrt(np.mean((slip - SLIP) ** 2)) < 0.06
+
+
+@pytest.mark.parametrize(
+    ('stated', 'torque', 'known'),
+    [({}, False, False), ({}, True, True), ({'soil.shear_modulus': 0.01}, False, True)],
+)
+def test_wheel_rates_and_imu_give_no_slip_on_a_soil_that_nobody_states(stated, torque, known):
+    """The pull of level ground is 0 at a slip of 0 in dense sand, of 0.5 in loose snow."""
+    configuration = reader.from_parameters({**TEN_LINES, **stated})
+    seen = []
+    for reading in rolling(np.random.default_rng(3), 20.0):
+        if isinstance(reading, WheelOdometry) and not torque:
+            reading = replace(reading, torque=np.full(6, np.nan))
+        if not isinstance(reading, ReferenceVelocity):
+            seen.append(reading)
+    sets, _ = run_estimator(configuration, seen)
+    assert (sets[-1].slip_std.max() < configuration.filter.class_std) == known
 
 
 def test_the_loads_of_a_suspension_that_nobody_states_are_open():

@@ -10,6 +10,7 @@ extrapolated, so that wheel odometry at 100 Hz costs little more than at 10 Hz. 
 from __future__ import annotations
 
 import math
+from functools import partial
 from math import isnan
 from typing import Any, NamedTuple
 
@@ -315,8 +316,12 @@ class WheelSoilEstimator:
             if self._contact_age.settled or cycle.reference_known:
                 rows += force_rows
         unread = self._sinkage.unread(time)
+        # The pull of a soil that nobody states gives no slip.
+        shown = cycle.reference_known or self._curve_known(time)
         considered = layout.considered(
-            settled=self._contact_age.settled and self._reference.contradiction(time) <= 1.0,
+            settled=shown
+            and self._contact_age.settled
+            and self._reference.contradiction(time) <= 1.0,
             opposes_rims=cycle.yaw_compensated.oppose(float(ekf.x[SPEED])),
             unread=unread,
             blurred=forces is not None and forces.blurred,
@@ -453,10 +458,16 @@ class WheelSoilEstimator:
         # There is no equilibrium slip where the ground holds the rover.
         held, buried = self._clock.assessment.holds, self._clock.assessment.buried
         length = HELD_LENGTH if held and not buried else EQUILIBRIUM_LENGTH
+        usual = partial(
+            speed.towards_equilibrium_slip,
+            cycle=cycle,
+            direction=direction,
+            length=length,
+            buried=buried,
+            curve_known=self._curve_known(cycle.time),
+        )
         if unseen:
-            expected = speed.towards_equilibrium_slip(
-                by_wheels, cycle, direction, length, buried=buried
-            )
+            expected = usual(by_wheels)
         lacking = speed.learn_bias(self._ekf, cycle, expected, by_wheels)
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
         x = self._ekf.x
@@ -464,7 +475,7 @@ class WheelSoilEstimator:
         window = self._trusted(cycle.window, cycle.time)
         step = speed.combined(by_wheels, cycle.dt, window, lacking)
         if unseen:
-            step = speed.towards_equilibrium_slip(step, cycle, direction, length, buried=buried)
+            step = usual(step)
         speed.predict(prediction, step, cycle)
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:
@@ -548,6 +559,10 @@ class WheelSoilEstimator:
             ekf, forces, total, cycle, stationary=stationary, model_variance=start, repeats=repeats
         )
         return forces, total, stationary, [*rows, balance]
+
+    def _curve_known(self, time: float) -> bool:
+        """Return whether a stated soil or torques tell slip from pull."""
+        return self._configuration.soil_stated or self._wheels.torque_known(time)
 
     def _depth_read(self, time: float) -> bool:
         """Return whether the sinkage of most wheels is measured."""

@@ -387,7 +387,14 @@ class SpeedProcess(Component[SpeedState]):
         return max(spread(changes) - self._rim_noise, 0.0)
 
     def towards_equilibrium_slip(
-        self, step: SpeedStep, cycle: Cycle, direction: float, length: float, *, buried: bool
+        self,
+        step: SpeedStep,
+        cycle: Cycle,
+        direction: float,
+        length: float,
+        *,
+        buried: bool,
+        curve_known: bool = True,
     ) -> SpeedStep:
         """Without a reference velocity, revert v / rim speed to the equilibrium slip of the slope.
 
@@ -402,8 +409,9 @@ class SpeedProcess(Component[SpeedState]):
         slip = most if buried else self._equilibrium_slip.at(demand, beyond=most)
         ratio = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
         keep = math.exp(-abs(rim) * cycle.dt / length)
-        # On an unknown slope no more is known than before the drive.
-        std = _EQUILIBRIUM_SLIP_STD if cycle.loads.force_known else _FIRST_RATIO_STD
+        # On an unknown slope or traction curve no more is known than before the drive.
+        known_slip = curve_known and cycle.loads.force_known
+        std = _EQUILIBRIUM_SLIP_STD if known_slip else _FIRST_RATIO_STD
         return SpeedStep(
             keep * step.speed_gain,
             keep * step.bias_gain,
