@@ -735,6 +735,26 @@ def test_rates_without_a_sign_reverse_no_wheels_of_a_rover_that_turns_backwards_
     assert told == ['rates_unsigned']
 
 
+def test_standstills_hide_no_rates_without_a_sign():
+    """It goes back for 14 % of the way and for 8 % of the time."""
+    knots = [0, 80, 81, 141, 142, 150, 151, 161, 162, 170]
+    speed = knots, [0, 0, 0.3, 0.3, 0, 0, -0.3, -0.3, 0, 0]
+    whole = rolling.recording(rolling.motion(170.0, speed))
+    assert faults(checked(whole=whole)) == []
+    told = faults(checked(whole=whole, joints={'rate': np.abs(whole.joints.rate)}))
+    assert told == ['rates_unsigned']
+
+
+@pytest.mark.parametrize('alike', [True, False])
+def test_wheels_that_turn_otherwise_than_the_rover_tell_no_unit(alike):
+    """A body that slides and turns on wheels that hardly do; in another unit they turn alike."""
+    whole = rolling.recording()
+    apart = 0.0 if alike else np.sin(whole.joints.seconds)[:, None] * [1.0, 1.0, -1.0, -1.0]
+    rate = whole.joints.rate / (2.0 * math.pi) + apart
+    report = checked(whole=whole, joints={'rate': rate}, reference=None)
+    assert ('rate_unit' in faults(report)) == alike
+
+
 def oriented(whole, motion, noise=1e-4):
     """The attitude on level ground."""
     psi = np.interp(whole.imu.seconds, motion.time, np.cumsum(motion.yaw_rate) / rolling.RATE)

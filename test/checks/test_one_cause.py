@@ -130,6 +130,7 @@ def one_for_both(angle):
 
 
 ALL = ', '.join(rolling.NAMES)
+RL_ALONE = np.array(rolling.NAMES) == 'rear_left'
 
 
 @pytest.mark.parametrize(
@@ -142,6 +143,8 @@ ALL = ', '.join(rolling.NAMES)
         (lambda angle: 0.0 * angle, None, ''),
         (lambda angle: angle + np.array([0.0, 0.14, 0, 0]), 'front_right', '8 degrees'),
         (lambda angle: angle[:, [2, 1, 0, 3]], 'front_left, rear_left', 'by -'),
+        (lambda angle: angle[:, [1, 0, 3, 2]], ALL, '?'),  # so far off that a share is unclear
+        (lambda angle: angle[:, [1, 0, 2, 3]], 'front_left, front_right', '?'),
         (one_for_both, None, ''),
     ],
 )
@@ -152,6 +155,15 @@ def test_joints_that_do_not_steer_as_the_rover_turns(change, wheel, said):
     assert [f.wheel for f in told] == [wheel] * (wheel is not None)
     assert all(said in f.words and 'by hand' in f.cure for f in told)
     assert {f.kind for f in report.findings} <= {'sign', 'radius', 'track'}
+
+
+def test_a_wheel_whose_rate_is_frozen_is_not_said_to_be_steered_wrongly():
+    def frozen(rate):
+        since = len(rate) // 3
+        return np.where((np.arange(len(rate)) > since)[:, None] & RL_ALONE, rate[since], rate)
+
+    report = steered(lambda angle: angle, sent=frozen)
+    assert [(f.fault, f.wheel) for f in report.findings] == [('rate_frozen', 'rear_left')]
 
 
 @pytest.mark.parametrize('change', [lambda angle: -angle, lambda angle: angle[:, [2, 3, 0, 1]]])
@@ -165,11 +177,18 @@ def test_half_a_radian_of_turning_shows_angles_reversed_or_of_the_other_axle(cha
     assert (finding.fault, finding.wheel) == ('steering_angle', ALL)
 
 
+def test_the_noise_of_a_gyro_makes_no_track_narrower():
+    """A fit to it alone has 0.938 of the track."""
+    rate = WHOLE.imu.rate + np.random.default_rng(3).normal(0.0, 0.06, WHOLE.imu.rate.shape)
+    figures = rolling.checked(imu=replace(WHOLE.imu, rate=rate)).figures
+    assert figures['rover.effective_over_stated_track'] == pytest.approx(1.0, abs=0.03)
+
+
 def test_the_noise_of_a_gyro_makes_no_joint_steer_less():
     """As large as the turns: a fit to it has wheels half as much steered."""
     rate = WHOLE.imu.rate + np.random.default_rng(3).normal(0.0, 0.15, WHOLE.imu.rate.shape)
     drive, rover = circles(lambda angle: angle, imu=replace(WHOLE.imu, rate=rate))
-    gain, _ = turning._steered_as_turned(gather(drive, from_configuration(rover), {}))
+    gain = turning._steered_as_turned(gather(drive, from_configuration(rover), {}))[0]
     assert gain == pytest.approx(np.ones(4), abs=0.1)
 
 

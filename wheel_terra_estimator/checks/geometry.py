@@ -368,10 +368,12 @@ def measured_track(evidence: Evidence) -> TriedRatio | NotChecked:
         return not_checked('track', 'no_turn')
     track = stated_track(evidence)
 
-    turns = np.column_stack([yaw, np.ones(yaw.size)])[:, : 1 if evidence.rested else 2]
+    bias = [np.ones(yaw.size)] * (not evidence.rested)
+    yaws = (np.roll(evidence.yaw, by)[rows] for by in (0, 1))  # of another noise
+    turns, others = (np.column_stack([one, *bias]) for one in yaws)
 
     def fitted(part: slice) -> Estimate:
-        slope = block_fit(turns[part], difference[part])[0]
+        slope = block_fit(turns[part], difference[part], others[part])[0]
         return Estimate(slope.value / track, slope.std / abs(track))
 
     ratio = fitted(slice(None))

@@ -62,7 +62,8 @@ TRIAL_ROWS = 1000  # rows, spread over the drive, that hypotheses are compared o
 MOST_STEERING = 3.3  # steering angle that no wheel has [rad]
 AS_TURNED, STILL = 0.5, 0.3  # share of the turn that a wheel is steered by, or not [-]
 LEAST_STEERING_ZERO = math.radians(5.0)  # beyond what wheels slip aside [rad]
-LEAST_ACROSS = math.radians(1.5)  # the same of two of an axle that are off to both sides
+LEAST_ACROSS = math.radians(1.0)  # error in turns of two joints that are exchanged [rad]
+LEFT_CROSSED = 0.25  # the same with them exchanged back, over that without, at most [-]
 LEAST_ASKED = 0.1  # speed aside in turns over that ahead, of a wheel that has to steer [-]
 LEAST_HEADINGS = 1.0  # turn in a drive that is not all on one cross slope [rad]
 MOST_WHEELS = 10  # wheels for which all combinations of signs are tried
@@ -144,7 +145,8 @@ class Fit(NamedTuple):
     @property
     def clear_track(self) -> float:
         """The track where gyro and wheels see the same turns, else 0."""
-        return self.track if abs(self.correlation) > LEAST_CORRELATION else 0.0
+        clear = abs(self.correlation) > LEAST_CORRELATION and self.cost < MOST_LEFT
+        return self.track if clear else 0.0
 
 
 def fits_of(fixes: Sequence[Fix], stretch: Turning) -> list[Fit]:
@@ -274,7 +276,7 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts, track = evidence.facts, track_ratio(evidence)
     if not np.isfinite(evidence.steering).any():
         return [], evidence
-    gain, zero = _steered_as_turned(evidence)
+    gain, zero, left = _steered_as_turned(evidence)
     still, order = np.abs(gain) < STILL, sides_exchanged(facts)
     ahead = np.nan_to_num(evidence.steering[evidence.unturned])
     # One angle that is published for two wheels is off in turns alone.
@@ -283,49 +285,53 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     wrong = stays & (np.abs(zero) > LEAST_STEERING_ZERO) & turned
     wrong |= still & ~still[order] & turned  # both of an axle may be held straight
     # Of joints that are exchanged the inner one turns too little, to either side.
-    crossed = _steered_as_turned(replace(evidence, steering=evidence.steering[:, order]))[1]
-    across = (zero * zero[order] < 0.0) & (np.abs(crossed) < LEAST_FALL * np.abs(zero))
-    wrong |= across & (np.abs(zero) > LEAST_ACROSS)
+    crossed = _steered_as_turned(replace(evidence, steering=evidence.steering[:, order]))[2]
+    by_axle, exchanged = (one + one[order] for one in (left, crossed))
+    wrong |= (by_axle > 2.0 * LEAST_ACROSS) & (exchanged < LEFT_CROSSED * by_axle)
     if track is not None and track > 0.0:
         wrong |= gain < -AS_TURNED
     if not wrong.any():
         return [not_checked('frozen', 'steering')] * bool(still.any() and not turned), evidence
     details = {'wheel': facts.named(wrong), 'share': listed(100.0 * gain[wrong], '.0f')}
     details['degrees'] = listed(np.degrees(zero[wrong]), '.0f')
+    details = {key: text.replace('nan', '?') for key, text in details.items()}
     left = replace(evidence, steering=np.where(wrong, np.nan, evidence.steering))
     return [evidence.found('steering_angle', 0.9, **details)], left
 
 
-def _steered_as_turned(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-    """Return the share of its turn by the gyro that each wheel is steered by, and its zero [rad].
+def _steered_as_turned(evidence: Evidence) -> FloatArray:
+    """Return share of its turn by the gyro that each wheel is steered by, zero and error [rad].
 
     Without slip a wheel moves aside with ``v_y + w_z x``, where a wheel that does not steer does
     not. Not a number where the angles or the drive tell none.
     """
     x, steering = evidence.facts.configuration.wheels.x, evidence.steering
     steered = np.isfinite(steering).any(axis=0)
-    gain, zero = np.full((2, x.size), np.nan)
+    told = np.full((3, x.size), np.nan)
     rows, heading = evidence.moving, integrated(evidence.time, evidence.yaw)
     if evidence.turning.sum() < LEAST_TURNING_ROWS:
-        return gain, zero
+        return told
     # On one heading a slide down a cross slope looks like zeros of the angles.
     one_way = np.ptp(heading) < LEAST_HEADINGS
-    speed = np.nan_to_num(evidence.speed[rows])
+    speed = evidence.speed[rows]
     by_angle = speed * np.tan(np.nan_to_num(evidence.steering[rows]))
     others = ~steered if not steered.all() else steered
     yaws = (np.roll(evidence.yaw, by)[rows, None] for by in (0, 1))  # of another noise
     aside, beside = (
-        np.median((by_angle * steered - yaw * x)[:, others], axis=1, keepdims=True) + yaw * x
+        np.nanmedian((by_angle * steered - yaw * x)[:, others], axis=1, keepdims=True) + yaw * x
         for yaw in yaws
     )
     for i in np.flatnonzero(steered & np.isfinite(evidence.rate).any(axis=0)):
-        seen = speed[:, i] * np.tan(np.nan_to_num(steering[rows, i]))
-        design, other = (np.column_stack([one[:, i], speed[:, i]]) for one in (aside, beside))
+        known = np.isfinite(aside[:, i]) & np.isfinite(beside[:, i]) & np.isfinite(speed[:, i])
+        seen, ahead = by_angle[known, i], speed[known, i]
+        design, other = (np.column_stack([one[known, i], ahead]) for one in (aside, beside))
         share, off = block_fit(design, seen, other)
-        asked = np.quantile(np.abs(aside[:, i]), 0.9) > LEAST_ASKED * np.abs(speed[:, i]).mean()
+        asked = np.quantile(np.abs(design[:, 0]), 0.9) > LEAST_ASKED * np.abs(ahead).mean()
+        turns = evidence.turning[rows][known]
+        told[2, i] = np.median(np.abs(seen - design[:, 0])[turns]) / np.median(np.abs(ahead)[turns])
         if asked and share.std < 0.5 * STILL:
-            gain[i], zero[i] = share.value, 0.0 if one_way else math.atan(off.value)
-    return gain, zero
+            told[:2, i] = share.value, 0.0 if one_way else math.atan(off.value)
+    return told
 
 
 def _steered_against(evidence: Evidence) -> bool:
@@ -559,7 +565,7 @@ def _sense_of_gyro(evidence: Evidence) -> tuple[str, int]:
     if oriented := _turns_as_oriented(evidence, imu):
         return 'orientation', oriented
     # The yaw rate of a reference may be made of the wheels or of the gyro: it tells neither.
-    gain, _ = _steered_as_turned(evidence)
+    gain = _steered_as_turned(evidence)[0]
     senses = set(np.sign(gain[np.abs(gain) > AS_TURNED]).astype(int).tolist())
     return ('steering', senses.pop()) if len(senses) == 1 else ('', 0)
 
