@@ -119,8 +119,8 @@ class InertialInput(Component[InertialState]):
             if stated != window.stated:
                 window = window._replace(stated=stated)
         since = time - force_time if force_time > -math.inf else 0.0
-        force = _followed(force, reading.specific_force.tolist(), since, window.noise_density)
-        force_x, force_y, force_z = force
+        followed = _followed(force, reading.specific_force.tolist(), since, window.noise_density)
+        force_x, force_y, force_z = followed
         attitude = self.attitude_after(attitude, reading, force_x, dt, zero.pitch)
         _, pitch_rate, yaw_rate = reading.angular_rate.tolist()
         if not isnan(yaw_rate):
@@ -131,7 +131,7 @@ class InertialInput(Component[InertialState]):
                 rate_readings=window.rate_readings + 1,
             )
         if not isnan(force_x):
-            force_time = time
+            force_time, force = time, followed
             acceleration = force_x - self._gravity * attitude.sine_up
             change, last = acceleration - last, acceleration
             speed_change, duration = window.speed_change, window.duration
