@@ -176,6 +176,19 @@ def test_a_late_input_does_not_take_a_published_warning_back():
     assert at(6.0, True).stuck and not at(6.1, False).stuck, 'else the estimator clears'
 
 
+@pytest.mark.parametrize(('clears', 'held'), [(29, False), (5, True)])
+def test_a_late_input_does_not_prolong_a_warning_that_clears(clears, held):
+    """Ten sets a second, each after a late input; no sign is left in the last of them."""
+    config = configuration()
+    memory = StuckMemory(config)
+    blank = EstimatorCore(config, Digging(config, 'raise')).add(odometry(0.0))[0]
+    free = replace(blank, slip_class=np.zeros_like(blank.slip_class))
+    for i in range(40):
+        now = replace(free, stamp=stamp_at(0.1 * i), stuck=True, stuck_clears=i >= 40 - clears)
+        assert memory.follow(now, run_again=True).stuck
+    assert memory.follow(replace(free, stamp=stamp_at(4.0)), run_again=True).stuck is held
+
+
 @pytest.mark.filter_fails
 def test_a_step_that_fails_before_its_set_is_told_with_the_set():
     told = []

@@ -31,6 +31,7 @@ class StuckMemory:
         self._restored = False
         self._before = 'a restart'
         self._free: tuple[int, int] | None = None  # stamps: since when, last seen
+        self._clears_since: int | None = None  # stamp since which no sign of it is left
         self.retune(configuration)
 
     def retune(self, configuration: Configuration) -> None:
@@ -60,7 +61,16 @@ class StuckMemory:
 
         `run_again`: a late input was fused at its own stamp since the set before.
         """
-        if run_again and self.state.stuck and not estimates.stuck and not self._restored:
+        since = self._clears_since
+        cleared = since is not None and (
+            (estimates.stamp - since) * NANOSECOND > self._clear_time - self._longest_gap
+        )
+        if estimates.stuck_clears:
+            self._clears_since = estimates.stamp if since is None else since
+        else:
+            self._clears_since = None
+        lost = self.state.stuck and not (estimates.stuck or self._restored or cleared)
+        if run_again and lost:
             self.begin_anew()
             self._before = 'a late input'
         if self._restored and self._is_clear(estimates):
