@@ -188,7 +188,7 @@ def test_the_noise_of_a_gyro_makes_no_joint_steer_less():
     """As large as the turns: a fit to it has wheels half as much steered."""
     rate = WHOLE.imu.rate + np.random.default_rng(3).normal(0.0, 0.15, WHOLE.imu.rate.shape)
     drive, rover = circles(lambda angle: angle, imu=replace(WHOLE.imu, rate=rate))
-    gain = turning._steered_as_turned(gather(drive, from_configuration(rover), {}))[0]
+    gain = turning._steered_as_turned(gather(drive, from_configuration(rover), {})).gain
     assert gain == pytest.approx(np.ones(4), abs=0.1)
 
 

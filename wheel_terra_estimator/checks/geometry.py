@@ -369,8 +369,8 @@ def measured_track(evidence: Evidence) -> TriedRatio | NotChecked:
     track = stated_track(evidence)
 
     bias = [np.ones(yaw.size)] * (not evidence.rested)
-    yaws = (np.roll(evidence.yaw, by)[rows] for by in (0, 1))  # of another noise
-    turns, others = (np.column_stack([one, *bias]) for one in yaws)
+    before = np.roll(evidence.yaw, 1)[rows]  # the same turns, of another noise
+    turns, others = (np.column_stack([one, *bias]) for one in (yaw, before))
 
     def fitted(part: slice) -> Estimate:
         slope = block_fit(turns[part], difference[part], others[part])[0]

@@ -85,8 +85,8 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if hardly_moves(forward, np.abs(rim) >= 0.4 * np.quantile(np.abs(rim), 0.9)):
         return [], evidence  # wheels that spin on the spot
     least = 0.4 * float(np.quantile(np.abs(forward), 0.9))
-    ways = np.sign(forward[np.abs(forward) > least])  # while it goes
-    both = min(np.mean(ways > 0.0), np.mean(ways < 0.0)) > SELDOM_NEGATIVE
+    ahead, back = (forward > least).sum(), (forward < -least).sum()
+    both = min(ahead, back) > SELDOM_NEGATIVE * (ahead + back)
     speed = np.interp(evidence.time, evidence.seconds(reference), moving_mean(forward, LEAST_ROWS))
     cut = _cut_off(evidence, speed > least, speed < -least)
     share = -forward[forward < -least] / np.maximum(rim[forward < -least], 1e-9)

@@ -276,7 +276,7 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts, track = evidence.facts, track_ratio(evidence)
     if not np.isfinite(evidence.steering).any():
         return [], evidence
-    gain, zero, left = _steered_as_turned(evidence)
+    gain, zero, error = _steered_as_turned(evidence)
     still, order = np.abs(gain) < STILL, sides_exchanged(facts)
     ahead = np.nan_to_num(evidence.steering[evidence.unturned])
     # One angle that is published for two wheels is off in turns alone.
@@ -285,8 +285,8 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     wrong = stays & (np.abs(zero) > LEAST_STEERING_ZERO) & turned
     wrong |= still & ~still[order] & turned  # both of an axle may be held straight
     # Of joints that are exchanged the inner one turns too little, to either side.
-    crossed = _steered_as_turned(replace(evidence, steering=evidence.steering[:, order]))[2]
-    by_axle, exchanged = (one + one[order] for one in (left, crossed))
+    crossed = _steered_as_turned(replace(evidence, steering=evidence.steering[:, order])).error
+    by_axle, exchanged = (one + one[order] for one in (error, crossed))
     wrong |= (by_axle > 2.0 * LEAST_ACROSS) & (exchanged < LEFT_CROSSED * by_axle)
     if track is not None and track > 0.0:
         wrong |= gain < -AS_TURNED
@@ -299,15 +299,23 @@ def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [evidence.found('steering_angle', 0.9, **details)], left
 
 
-def _steered_as_turned(evidence: Evidence) -> FloatArray:
-    """Return share of its turn by the gyro that each wheel is steered by, zero and error [rad].
+class _Steered(NamedTuple):
+    """Steering of each wheel beside the turns; nan where the angles or the drive tell none."""
+
+    gain: FloatArray  # share of its turn by the gyro that it is steered by [-]
+    zero: FloatArray  # [rad]
+    error: FloatArray  # typical one in turns [rad]
+
+
+def _steered_as_turned(evidence: Evidence) -> _Steered:
+    """Compare the steering of each wheel with the turn by the gyro.
 
     Without slip a wheel moves aside with ``v_y + w_z x``, where a wheel that does not steer does
-    not. Not a number where the angles or the drive tell none.
+    not.
     """
     x, steering = evidence.facts.configuration.wheels.x, evidence.steering
     steered = np.isfinite(steering).any(axis=0)
-    told = np.full((3, x.size), np.nan)
+    told = _Steered(*np.full((3, x.size), np.nan))
     rows, heading = evidence.moving, integrated(evidence.time, evidence.yaw)
     if evidence.turning.sum() < LEAST_TURNING_ROWS:
         return told
@@ -328,9 +336,10 @@ def _steered_as_turned(evidence: Evidence) -> FloatArray:
         share, off = block_fit(design, seen, other)
         asked = np.quantile(np.abs(design[:, 0]), 0.9) > LEAST_ASKED * np.abs(ahead).mean()
         turns = evidence.turning[rows][known]
-        told[2, i] = np.median(np.abs(seen - design[:, 0])[turns]) / np.median(np.abs(ahead)[turns])
+        off_aside = np.median(np.abs(seen - design[:, 0])[turns])
+        told.error[i] = off_aside / np.median(np.abs(ahead)[turns])
         if asked and share.std < 0.5 * STILL:
-            told[:2, i] = share.value, 0.0 if one_way else math.atan(off.value)
+            told.gain[i], told.zero[i] = share.value, 0.0 if one_way else math.atan(off.value)
     return told
 
 
@@ -565,7 +574,7 @@ def _sense_of_gyro(evidence: Evidence) -> tuple[str, int]:
     if oriented := _turns_as_oriented(evidence, imu):
         return 'orientation', oriented
     # The yaw rate of a reference may be made of the wheels or of the gyro: it tells neither.
-    gain = _steered_as_turned(evidence)[0]
+    gain = _steered_as_turned(evidence).gain
     senses = set(np.sign(gain[np.abs(gain) > AS_TURNED]).astype(int).tolist())
     return ('steering', senses.pop()) if len(senses) == 1 else ('', 0)
 
