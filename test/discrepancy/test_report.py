@@ -299,7 +299,7 @@ def test_noise_of_a_cell_is_its_own_part_of_the_covariance():
     problem = SimpleNamespace(
         std=np.ones(3),
         block=np.array([-1, -1, -1]),
-        rotation=np.linalg.inv(np.linalg.cholesky(covariance)),
+        unrotation=np.linalg.cholesky(covariance),
         row=np.zeros(3, dtype=int),
         quantity=np.arange(3),
     )

@@ -124,8 +124,7 @@ def _cell_noise(findings: Findings) -> FloatArray:
     """(N, 4) noise of the cells, with what uncertain slips and leaving angles add."""
     problem = findings.setting.problem
     std = findings.noise.std.copy()
-    square = np.linalg.inv(problem.rotation) ** 2
-    std[problem.row, problem.quantity] = np.sqrt(square.sum(axis=1))
+    std[problem.row, problem.quantity] = np.sqrt((problem.unrotation**2).sum(axis=1))
     return std
 
 

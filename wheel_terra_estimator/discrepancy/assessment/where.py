@@ -133,7 +133,7 @@ def _simulated(problem: Problem, nothing: Fit, variance: FloatArray | None) -> F
         error = np.sqrt(variance - problem.variance(0.0))[:, None] * rng.standard_normal(
             noise.shape
         )
-        noise += np.linalg.inv(problem.rotation) @ error / problem.std[:, None]
+        noise += problem.unrotation @ error / problem.std[:, None]
     precision = jacobian.T @ jacobian + np.diag(nothing.prior)
     left = noise - jacobian @ np.linalg.solve(precision, jacobian.T @ noise)
     return np.asarray(left * problem.std[:, None])

@@ -143,10 +143,9 @@ def estimate_noise(
         for q in unknown:
             guess[:, q] = usual[q] * shape
         problem = build(guess)
-        unrotate = np.linalg.inv(problem.rotation)
-        smooth = (unrotate * problem.roughness) @ unrotate.T
+        smooth = problem.covariance(problem.roughness)
         # Soil and errors of inputs, which are no noise of a reading, however large they are.
-        known = unrotate @ unrotate.T - np.diag(problem.std**2)
+        known = problem.covariance(1.0) - np.diag(problem.std**2)
         known += fitted.sensitivity @ fitted.sensitivity.T
         target = problem.wanted - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
         for q in (*unknown, *stated):

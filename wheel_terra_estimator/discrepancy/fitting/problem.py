@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,6 +53,15 @@ class Problem:
         """Number of cells."""
         return len(self.observed)
 
+    @cached_property
+    def unrotation(self) -> FloatArray:
+        """(m, m) back from the rotated axes to the cells."""
+        return np.asarray(np.linalg.inv(self.rotation), dtype=float)
+
+    def covariance(self, variance: FloatArray | float) -> FloatArray:
+        """Return the (m, m) covariance of the cells by variances (m,) of the rotated axes."""
+        return np.asarray((self.unrotation * variance) @ self.unrotation.T)
+
     def flat(self, values: FloatArray) -> FloatArray:
         """Take the measured cells of an (N, 4, ...) array: (m, ...)."""
         return values[self.row, self.quantity]
@@ -79,9 +89,8 @@ class Problem:
         if ours is None:
             return error
         here = ours[self.row]
-        unrotate = np.linalg.inv(self.rotation)
-        smooth = (unrotate * (variance - self.variance(0.0))) @ unrotate.T
-        total = (unrotate * variance) @ unrotate.T
+        smooth = self.covariance(variance - self.variance(0.0))
+        total = self.covariance(variance)
         weights = np.linalg.solve(total[np.ix_(~here, ~here)], residual[~here])
         error[here] = smooth[np.ix_(here, ~here)] @ weights
         return error
