@@ -288,7 +288,7 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
 
     def after(travel, buried=False):
         cycle = on_sand().cycle([rim] * 6, dt=travel / rim)
-        return made.towards_equilibrium_slip(free, cycle, 1.0, length, buried=buried)
+        return made.reversion(cycle, 1.0, length, buried=buried, curve_known=True).of(free)
 
     assert after(length).speed_gain == pytest.approx(np.exp(-1.0))
     usual = after(1e3 * length).constant
@@ -306,9 +306,10 @@ def test_wheel_rates_without_any_slope_leave_the_slip_class_unknown():
     cycle = Parts(configuration).cycle([rim] * 6, dt=1e4)
     for slope_known in (True, False):
         seen = cycle._replace(loads=cycle.loads._replace(force_known=slope_known))
-        step = process([rim] * 6).towards_equilibrium_slip(
-            SpeedStep(1.0, 0.0, 0.0, 0.0), seen, 1.0, EQUILIBRIUM_LENGTH, buried=False
+        reversion = process([rim] * 6).reversion(
+            seen, 1.0, EQUILIBRIUM_LENGTH, buried=False, curve_known=True
         )
+        step = reversion.of(SpeedStep(1.0, 0.0, 0.0, 0.0))
         slip_std = np.sqrt(step.variance) / rim
         assert (slip_std < configuration.filter.class_std) == slope_known
 

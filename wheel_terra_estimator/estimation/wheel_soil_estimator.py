@@ -10,7 +10,6 @@ extrapolated, so that wheel odometry at 100 Hz costs little more than at 10 Hz. 
 from __future__ import annotations
 
 import math
-from functools import partial
 from math import isnan
 from typing import Any, NamedTuple
 
@@ -62,6 +61,7 @@ from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import (
     EQUILIBRIUM_LENGTH,
     HELD_LENGTH,
+    Reversion,
     SpeedProcess,
 )
 from wheel_terra_estimator.estimation.filter.state import (
@@ -458,16 +458,13 @@ class WheelSoilEstimator:
         # There is no equilibrium slip where the ground holds the rover.
         held, buried = self._clock.assessment.holds, self._clock.assessment.buried
         length = HELD_LENGTH if held and not buried else EQUILIBRIUM_LENGTH
-        usual = partial(
-            speed.towards_equilibrium_slip,
-            cycle=cycle,
-            direction=direction,
-            length=length,
-            buried=buried,
-            curve_known=self._curve_known(cycle.time),
-        )
+        reversion = Reversion()
         if unseen:
-            expected = usual(by_wheels)
+            curve_known = self._curve_known(cycle.time)
+            reversion = speed.reversion(
+                cycle, direction, length, buried=buried, curve_known=curve_known
+            )
+            expected = reversion.of(by_wheels)
         lacking = speed.learn_bias(self._ekf, cycle, expected, by_wheels)
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
         x = self._ekf.x
@@ -475,7 +472,7 @@ class WheelSoilEstimator:
         window = self._trusted(cycle.window, cycle.time)
         step = speed.combined(by_wheels, cycle.dt, window, lacking)
         if unseen:
-            step = usual(step)
+            step = reversion.of(step)
         speed.predict(prediction, step, cycle)
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:

@@ -117,6 +117,23 @@ class SpeedStep(NamedTuple):
     wheel_weight: float = 1.0  # of the prediction with the wheels in it [-]
 
 
+class Reversion(NamedTuple):
+    """Mean reversion of the speed over a step: v' = keep v + constant, and variance of its own."""
+
+    keep: float = 1.0
+    constant: float = 0.0  # [m/s]
+    variance: float = 0.0  # [(m/s)^2]
+
+    def of(self, step: SpeedStep) -> SpeedStep:
+        """Return a prediction with it."""
+        return step._replace(
+            speed_gain=self.keep * step.speed_gain,
+            bias_gain=self.keep * step.bias_gain,
+            constant=self.keep * step.constant + self.constant,
+            variance=self.keep * self.keep * step.variance + self.variance,
+        )
+
+
 class PastDrive(NamedTuple):
     """Last drive in a direction."""
 
@@ -386,25 +403,19 @@ class SpeedProcess(Component[SpeedState]):
         changes = [now - old for now, old in zip(rims.each, self.state.rims.each, strict=True)]
         return max(spread(changes) - self._rim_noise, 0.0)
 
-    def towards_equilibrium_slip(
-        self,
-        step: SpeedStep,
-        cycle: Cycle,
-        direction: float,
-        length: float,
-        *,
-        buried: bool,
-        curve_known: bool = True,
-    ) -> SpeedStep:
+    def reversion(
+        self, cycle: Cycle, direction: float, length: float, *, buried: bool, curve_known: bool
+    ) -> Reversion:
         """Without a reference velocity, revert v / rim speed to the equilibrium slip of the slope.
 
         On deep or saturated contacts torque and pull hardly change with slip. There slip
         is unobservable and a random walk diverges; mean reversion (Ornstein-Uhlenbeck) bounds it.
-        `length` is its length in rim travel [m]; `buried` wheels revert to the greatest slip.
+        `length` is its length in rim travel [m]; `buried` wheels revert to the greatest slip;
+        `curve_known`: a stated soil or torques give the slip of a pull.
         """
         rim, demand = cycle.yaw_compensated.typical, direction * cycle.loads.slope_share
         if not abs(rim) >= self._rover.low_rim:
-            return step
+            return Reversion()
         most = _MOST_EQUILIBRIUM_SLIP
         slip = most if buried else self._equilibrium_slip.at(demand, beyond=most)
         ratio = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
@@ -412,12 +423,7 @@ class SpeedProcess(Component[SpeedState]):
         # On an unknown slope or traction curve no more is known than before the drive.
         known_slip = curve_known and cycle.loads.force_known
         std = _EQUILIBRIUM_SLIP_STD if known_slip else _FIRST_RATIO_STD
-        return SpeedStep(
-            keep * step.speed_gain,
-            keep * step.bias_gain,
-            keep * step.constant + (1.0 - keep) * ratio * rim,
-            keep * keep * step.variance + (1.0 - keep * keep) * (std * rim) ** 2,
-        )
+        return Reversion(keep, (1.0 - keep) * ratio * rim, (1.0 - keep * keep) * (std * rim) ** 2)
 
     def present(
         self,

@@ -31,7 +31,7 @@ from wheel_terra_estimator.estimation.scalars import SECOND
 GREATEST_SPEED = 50.0  # rim or body [m/s]; far above any rover
 GREATEST_STEERING = math.pi  # [rad]
 GREATEST_TORQUE = 1.0e5  # [N m]
-GREATEST_FORCE = 100.0  # specific force [m/s^2], 10 g
+GREATEST_FORCE = 100.0  # specific force [m/s^2], 10 g; a drive has less, stones apart
 GREATEST_RATE = 50.0  # angular rate [rad/s]
 OUTLIER_FORCE = 30.0  # change of the specific force from one message to the next [m/s^2], 3 g
 OUTLIER_RATE = 5.0  # change of the angular rate from one message to the next [rad/s]
