@@ -177,6 +177,15 @@ def test_half_a_radian_of_turning_shows_angles_reversed_or_of_the_other_axle(cha
     assert (finding.fault, finding.wheel) == ('steering_angle', ALL)
 
 
+@pytest.mark.parametrize(('rate', 'found'), [(0.1, True), (0.02, False)])
+def test_joints_of_an_axle_that_are_exchanged_show_by_two_degrees(rate, found):
+    """In circles of 3 and 15 m the wheels of an axle differ by 2.2 and 0.1 degrees."""
+    yaw = [10.0, 11.0, 30.0, 31.0, 40.0, 41.0, 60.0, 61.0], [0, rate, rate, 0, 0, -rate, -rate, 0]
+    curves = rolling.motion(80.0, ([3.0, 4.0], [0.0, 0.3]), yaw=yaw)
+    report = steered(lambda angle: angle[:, [1, 0, 3, 2]], motion=curves)
+    assert [f.fault for f in report.findings] == ['steering_angle'] * found
+
+
 def test_the_noise_of_a_gyro_makes_no_track_narrower():
     """A fit to it alone has 0.938 of the track."""
     rate = WHOLE.imu.rate + np.random.default_rng(3).normal(0.0, 0.06, WHOLE.imu.rate.shape)

@@ -499,3 +499,14 @@ def test_wheels_of_a_moment_share_the_error_of_the_speed():
     assert np.ptp(off, axis=1).max() < 0.02
     assert np.std(told - slip) < 0.8 * np.std(table.columns['slip'] - slip)
     assert choose(findings.selection, findings.setting.problem).status == 'agrees'
+    # Torques of the first and the last wheel of a moment differ by noise, own slip and 1 % of load.
+    heavier = replace(points, normal_load=1.01 * points.normal_load)
+    by_load = WheelSoilModel(configuration.soil, {}).steady_state(heavier).torque - state.torque
+    pair = [np.flatnonzero(moment == count // 2)[k] for k in (0, -1)]
+    problem = findings.setting.problem
+    a, b = (np.flatnonzero((problem.row == k) & (problem.quantity == 2))[0] for k in pair)
+    known = problem.covariance(1.0)
+    apart = (
+        known[a, a] + known[b, b] - 2.0 * known[a, b] - problem.std[a] ** 2 - problem.std[b] ** 2
+    )
+    assert apart > 0.8 * (by_load[pair] ** 2).sum()
