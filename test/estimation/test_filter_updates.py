@@ -700,11 +700,11 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
     layout = parts.layout
 
     def entries(**changes):
-        given = {'settled': True, 'opposes_rims': False, 'unread': [], 'blurred': False}
+        given = {'forces_show_speed': True, 'unread': [], 'blurred': False}
         return set(layout.considered(**(given | changes)))
 
     assert entries() == set()
-    assert entries(settled=False) == entries(opposes_rims=True) == {SPEED}
+    assert entries(forces_show_speed=False) == {SPEED}
     one = entries(unread=[2])
     assert one == {layout.sinkage.start + 2, layout.stiffness.start + 2}
     assert SLIP_SINKAGE in entries(unread=list(range(6)))

@@ -316,13 +316,13 @@ class WheelSoilEstimator:
             if self._contact_age.settled or cycle.reference_known:
                 rows += force_rows
         unread = self._sinkage.unread(time)
-        # The pull of a soil that nobody states gives no slip.
-        shown = cycle.reference_known or self._curve_known(time)
+        # The pull of a soil that nobody states gives no slip; against the wheels it is the same at
+        # any speed.
+        known = cycle.reference_known or self._curve_known(time)
+        believed = self._reference.contradiction(time) <= 1.0
+        opposed = cycle.yaw_compensated.oppose(float(ekf.x[SPEED]))
         considered = layout.considered(
-            settled=shown
-            and self._contact_age.settled
-            and self._reference.contradiction(time) <= 1.0,
-            opposes_rims=cycle.yaw_compensated.oppose(float(ekf.x[SPEED])),
+            forces_show_speed=known and believed and self._contact_age.settled and not opposed,
             unread=unread,
             blurred=forces is not None and forces.blurred,
         )

@@ -89,20 +89,17 @@ class StateLayout:
         object.__setattr__(self, 'reference_error', each if self.reference_wanders else None)
 
     def considered(
-        self, *, settled: bool, opposes_rims: bool, unread: Sequence[int], blurred: bool
+        self, *, forces_show_speed: bool, unread: Sequence[int], blurred: bool
     ) -> list[int]:
         """Return the considered entries (Schmidt 1966), which measurements must not change.
 
         Their uncertainty counts, but they keep mean and variance; else model errors would be taken
-        for them. On contacts that are not `settled` (at a start, after a turn on the spot) forces
-        do not show the speed. Where the rover moves against its wheels (`opposes_rims`), their
-        forces are the same at any such speed. Of wheels without a sinkage reading (`unread`),
-        sinkage and errors of the shear model are not separable. Where the noise of the wheel rates
-        hides how torques depend on soil (`blurred`), the soil is not learned from them.
+        for them. The speed is one of them unless `forces_show_speed`. Of wheels without a sinkage
+        reading (`unread`), sinkage and errors of the shear model are not separable. Where the noise
+        of the wheel rates hides how torques depend on soil (`blurred`), the soil is not learned
+        from them.
         """
-        entries = []
-        if not settled or opposes_rims:
-            entries.append(SPEED)
+        entries = [] if forces_show_speed else [SPEED]
         for part in (self.sinkage, self.stiffness):
             entries += [part.start + i for i in unread]
         if len(unread) == self.wheel_count:
